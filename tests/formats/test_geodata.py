@@ -10,9 +10,9 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from structures import drawn
 
 import blockvis
-from blockvis.layout.layout import Layout
 
 SQUARES = [[[x, y], [x + 0.4, y], [x + 0.4, y + 0.2], [x, y + 0.2], [x, y]] for y in (0, 0.2) for x in (0, 0.4)]
 UTM = 'PROJCS["WGS 84 / UTM 32N",GEOGCS["WGS 84",UNIT["degree",0.01745]],UNIT["{}",{}],AUTHORITY["EPSG","32632"]]'
@@ -87,7 +87,8 @@ def test_a_layout_comes_back_from_geojson(tmp_path_factory, n, shift, scale):
     path = tmp_path_factory.mktemp("wall") / "wall.geojson"
     rings = tuple(np.array(SQUARES[0][:-1]) * scale + shift + [0.4 * k * scale, 0] for k in range(n))
     names = tuple(f"stone ä{k}" for k in range(n))
-    layout = Layout(blocks=rings, names=names, roles=("fixed",) * n, groups=("lowest",) * n)
+    drawing = drawn(path.with_name("wall.json"), rings, names, role=("fixed",) * n, group=("lowest",) * n)
+    layout = blockvis.read_layout(drawing)
     blockvis.write_layout(layout, path)
     back = blockvis.read_layout(path)
     assert (back.names, back.roles, back.groups) == (names, layout.roles, layout.groups)

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from structures import suffixes_known
 
 import solver
-from blockvis import read, read_layout, save_layout
-from blockvis.formats import FORMATS
+from blockvis import generators, read, read_layout, save_layout
 
 #: All but single precision, which test_space_round_trips looks at.
-WRITTEN = sorted(suffix for suffix, known in FORMATS.items() if known.writes and suffix != ".glb")
+WRITTEN = [suffix for suffix in suffixes_known(save_layout, generators.arch()) if suffix != ".glb"]
 #: What a file cannot say of a block.
 SILENT = {".stl": ("roles", "materials", "density")}
 

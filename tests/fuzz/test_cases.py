@@ -6,10 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from structures import run_command
-
-from blockvis.case_files.read import parse_case
-from blockvis.cases.build import case_assembly, case_interfaces, case_loads
+from structures import assembly_of, case_from, run_command
 
 ROOT = Path(__file__).parents[2]
 
@@ -77,10 +74,7 @@ def _read(text: str) -> None:
     """Reads a case as far as a run does before it solves anything; bad input is a ValueError with a text."""
     said = "read without complaint"
     try:
-        case = parse_case(text, Path("case.toml"))
-        assembly = case_assembly(case)
-        case_interfaces(case)
-        case_loads(case, assembly)
+        assembly_of(case_from(text))
     except ValueError as error:
         said = str(error)
     assert 10 < len(said) < 2000

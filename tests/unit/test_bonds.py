@@ -8,14 +8,13 @@ import ezdxf
 import numpy as np
 import pytest
 import shapely
+import structures
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.case_files.read import parse_case
-from blockvis.cases.build import case_assembly
 from blockvis.cli import main
 from solver import mechanics
 
@@ -250,7 +249,7 @@ joint = 0.01
 def assembly_of(text, drawing):
     text = text.replace("{file}", drawing.name)
     with pytest.warns(UserWarning, match="was filled with"):
-        return case_assembly(parse_case(text, drawing.with_name("case.toml")))
+        return structures.assembly_of(structures.case_from(text, drawing.parent))
 
 
 def test_a_case_fills_the_wall_and_closes_its_joints(facade):
@@ -341,4 +340,4 @@ def test_new_writes_the_bond_into_the_case(tmp_path):
 
 def test_a_layout_by_name_has_no_outlines_to_fill(tmp_path):
     with pytest.raises(ValueError, match=r"\[bond\] walls are outlines of a drawing"):
-        parse_case('[geometry]\nlayout = "arch"\n[[bond]]\nwalls = "*"', tmp_path / "case.toml")
+        structures.case_from('[geometry]\nlayout = "arch"\n[[bond]]\nwalls = "*"', tmp_path)

@@ -9,10 +9,8 @@ from structures import assembly_of, box, case_from, drawn, layout_of, run_comman
 import blockvis
 import solver
 from blockvis import generators, read, save_layout, write_layout
-from blockvis.cases.build import case_assembly, case_controls
 from blockvis.cli import main
 from solver import mechanics
-from solver.assembly import check_blocks
 
 DOME = '[geometry]\nlayout = "dome"\nparameters = {lunes = 4, courses = 1}\n'
 ARCH = '[geometry]\nlayout = "arch"\nparameters = {voussoirs = 5}\n'
@@ -126,12 +124,12 @@ def test_a_small_overlap_that_facing_leaves_is_a_contact_with_a_note(tmp_path):
     text = '[geometry]\nfile = "a.json"\ndimension = 3\n[roles]\nlow = "moving"\n'
     found = case(text + DOWN, tmp_path)
     with pytest.warns(UserWarning, match=r"1 pairs of blocks overlap by up to 0.0049\d* m .* are taken as in contact"):
-        assembly = case_assembly(found)
+        assembly = assembly_of(found)
+    down = solver.Settlement(direction=(0, 0, -1), increment=0.01, limit=0.01)
     with pytest.raises(ValueError, match="overlaps block"):
-        check_blocks(assembly)
-    check_blocks(assembly, case_controls(found, assembly).overlap_tolerance)
+        solver.settle(assembly, down, friction_coefficient=0.6)
     with pytest.raises(ValueError, match=r"raise overlap_tolerance \(0.001 m\)"):
-        case_assembly(case(text.replace("[roles]", "overlap_tolerance = 0.001\n[roles]") + DOWN, tmp_path))
+        assembly_of(case(text.replace("[roles]", "overlap_tolerance = 0.001\n[roles]") + DOWN, tmp_path))
 
 
 def test_new_writes_a_case_in_space(tmp_path, capsys):

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_convex_parts import out_of_faces, prism
+from structures import box, prism, turn_by
+from test_convex_parts import out_of_faces
 
 import solver
-from blockvis.layout.solids import box
-from solver.kinematics import rotation_matrices
 
 #: Lengths of arms, legs and notches.
 length = st.floats(0.2, 3.0)
@@ -55,7 +54,7 @@ def parts_of(corners, faces):
 
 def check(corners, faces, rotation, scale, most):
     """Cut a body, turned, moved and scaled."""
-    corners = scale * (corners @ rotation_matrices(np.array([rotation]))[0].T) + [3.0, -7.0, 2.0]
+    corners = scale * (corners @ turn_by(rotation).T) + [3.0, -7.0, 2.0]
     shapes, parts = parts_of(corners, faces)
     assert 1 < len(parts.block_of_part) <= most
     assert parts.solids.volumes.sum() == pytest.approx(shapes.volumes[0], rel=1e-9)

@@ -9,12 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
-from structures import run_command
+from structures import layout_of, run_command
 
-from blockvis import generators
+from blockvis import generators, write_layout
 from blockvis.cli import main
-from blockvis.formats.read import write_layout
-from blockvis.layout.layout import layout_of
 
 WIDTH, HEIGHT, STONES = 0.5, 0.3, 4
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import solver
 from blockvis import inspect, save_layout
-from blockvis.pictures import palette
-from blockvis.pictures.inspection import draw_inspection
+from blockvis.cli import main
 
 FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "facade.dxf"
 
@@ -44,12 +44,12 @@ def test_numbers(layout):
 
 
 def test_picture(layout, tmp_path):
-    path = draw_inspection(inspect(layout), tmp_path / "found.png")
-    from PIL import Image
+    path = tmp_path / "found.png"
+    assert main(["info", str(layout), "--picture", str(path)]) == 0
 
     colours = {colour for _, colour in Image.open(path).convert("RGB").getcolors(1 << 24)}
     # A support, the duplicate and the overlap are there in their colours.
-    assert {palette.SUPPORT, palette.TWICE, palette.REFUSED} <= colours
+    assert {(206, 209, 213), (91, 143, 214), (214, 96, 91)} <= colours
 
 
 @pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")

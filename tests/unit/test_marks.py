@@ -1,16 +1,42 @@
-"""Joints, cracks, hinges, resultants and the parts of a mechanism."""
+"""Joints, cracks, hinges, resultants and the parts of a mechanism: what is marked, and how it is counted."""
+
+import base64
+import csv
+import json
+import re
+import zlib
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 import shapely
+import structures
 from hypothesis import given
 from hypothesis import strategies as st
-from structures import BENT, arch_response, dropped_brick, parted, stacked, wall
+from structures import (
+    BENT,
+    arch_response,
+    dropped_brick,
+    parted,
+    portal_response,
+    report_of,
+    stacked,
+    vault_response,
+    wall,
+)
 
+import blockvis
 import solver
+from blockvis import generators
+from blockvis.cli import _in_words
 from blockvis.pictures import marks
 from blockvis.pictures.hatching import hatch_lines
+from blockvis.pictures.swing import swing_of
+from blockvis.report.page import summary_rows
+from blockvis.results.cracks import crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
+from blockvis.results.swinging import corner_speeds, swing_factors, swung_increment
 from blockvis.text import rounded_length
 from solver import mechanics
 
@@ -203,3 +229,277 @@ def test_carried_there_and_back(turn, x, y):
     point = np.array([[0.7, -0.4]])
     there = mechanics.carried(point, np.array([0]), before, after)
     np.testing.assert_allclose(mechanics.carried(there, np.array([0]), after, before), point, atol=1e-9)
+
+
+@pytest.mark.parametrize("response_of", [arch_response, vault_response], ids=["plane", "space"])
+def test_a_mechanism_that_rises_swings_as_far_as_it_is_to(response_of):
+    response = response_of()
+    assembly, last = response.assembly, response.path[-1]
+    up = np.zeros_like(last.velocity)
+    up[assembly.free, assembly.dimension - 1] = 3.0
+    state = mechanics.with_motion(last, up)
+    np.testing.assert_allclose(corner_speeds(assembly, last.pose, up), np.where(assembly.free, 3.0, 0.0))
+    free = assembly.free[assembly.block_of_vertex]
+    extent = np.ptp(mechanics.moved_vertices(assembly, last.pose)[free], axis=0).max()
+    for share, factor in zip((0.5, 1.0), swing_factors(assembly, state, 0.1, np.array([0.5, 1.0])), strict=True):
+        frame = swung_increment(state, factor * state.velocity)
+        rise = (frame.pose.positions - last.pose.positions)[assembly.free]
+        np.testing.assert_allclose(rise[:, -1], 0.1 * share * extent)
+        np.testing.assert_allclose(rise[:, :-1], 0.0, atol=1e-12)
+        assert frame.status == solver.Status.FALLING
+    at_rest = mechanics.with_motion(last, np.zeros_like(up))
+    assert swing_factors(assembly, at_rest, 0.1, np.ones(1)).tolist() == [0.0]
+
+
+def moved(assembly, **motions):
+    """The pose in which blocks, by their names with _ for a space, have moved and turned."""
+    pose = solver.Pose.initial(assembly)
+    for name, (dx, dy, turn) in motions.items():
+        block = assembly.index(name.replace("_", " ").replace("N", "-"))
+        pose.positions[block] += dx, dy
+        pose.rotations[block] += turn
+    return pose
+
+
+def squares(*corners, size=1.0):
+    outlines = [[[x, y], [x + size, y], [x + size, y + size], [x, y + size]] for x, y in corners]
+    return solver.Assembly.from_outlines(outlines)
+
+
+def test_nothing_that_has_not_moved_is_cracked():
+    wall = structures.wall(4, 3)
+    assert cracks_of(wall, solver.Pose.initial(wall)) == []
+
+
+def test_a_block_that_is_lifted_leaves_a_level_crack():
+    assembly = squares((0, 0), (0, 1), (1, 0))
+    (crack,) = cracks_of(assembly, moved(assembly, block_1=(0.0, 0.01, 0.0)))
+    assert crack.width == pytest.approx(0.01)
+    assert set(crack.widest.split(" | ")) == {"block 0", "block 1"}
+    assert crack.inclination == pytest.approx(0.0)
+    np.testing.assert_allclose(crack.ends, [[0, 1], [1, 1]], atol=1e-12)
+    assert crack.size == pytest.approx(1.0)
+
+
+def test_a_stepped_crack_is_one_line_through_joints_that_only_slide():
+    """Two courses in running bond; their right ends go: two head joints open, the bed joint between them slides."""
+    outlines = [
+        [[0, 0], [2, 0], [2, 1], [0, 1]],
+        [[2, 0], [4, 0], [4, 1], [2, 1]],
+        [[0, 1], [3, 1], [3, 2], [0, 2]],
+        [[3, 1], [4, 1], [4, 2], [3, 2]],
+    ]
+    assembly = solver.Assembly.from_outlines(outlines)
+    (crack,) = cracks_of(assembly, moved(assembly, block_1=(0.02, 0.0, 0.0), block_3=(0.02, 0.0, 0.0)))
+    assert crack.width == pytest.approx(0.02)
+    np.testing.assert_allclose(crack.ends, [[2, 0], [3, 2]], atol=1e-12)
+    assert crack.inclination == pytest.approx(np.degrees(np.arctan2(2, 1)))
+    assert len(crack.joints) == 3
+
+
+def test_cracks_apart_are_lines_of_their_own_the_widest_first():
+    assembly = squares((0, 0), (0, 1), (5, 0), (5, 1))
+    cracks = cracks_of(assembly, moved(assembly, block_1=(0, 0.01, 0), block_3=(0, 0.03, 0)))
+    assert [round(crack.width, 6) for crack in cracks] == [0.03, 0.01]
+    words = crack_rows(cracks, 1)
+    assert words[0][1].startswith("30 mm at block")
+    assert words[1] == ("and", "1 narrower ones")
+
+
+def test_the_cracks_of_an_arch_are_its_hinges(tmp_path):
+    arch = structures.arch_response()
+    cracks = cracks_of(arch.assembly, arch.path[-1].pose)
+    assert len(cracks) >= 3
+    assert all(crack.size == pytest.approx(0.15, rel=0.01) for crack in cracks)
+    blockvis.write(arch, tmp_path / "out")
+    stored = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["cracks"]
+    assert [c["width_mm"] for c in stored] == pytest.approx([1e3 * c.width for c in cracks], abs=1e-3)
+    assert stored[0]["widest_joint"] == cracks[0].widest
+    # Places are numbers that can be read: 0, not 5.66e-17.
+    assert not re.search(r"\de-\d", " ".join(words for _, words in crack_rows(cracks, len(cracks))))
+    page = report_of(arch)
+    assert f"{1e3 * cracks[0].width:.3g} mm at {cracks[0].widest}" in page
+
+
+def test_every_key_of_a_crack_is_named_in_the_manual():
+    assembly = squares((0, 0), (0, 1))
+    (crack,) = cracks_of(assembly, moved(assembly, block_1=(0, 0.01, 0)))
+    manual = (structures.Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    assert [key for key in crack.values() if f"`{key}`" not in manual] == []
+
+
+def in_space(flat, depth):
+    """The same blocks in space, upright, as deep everywhere."""
+    rings = np.split(flat.vertices, flat.offsets[1:-1])
+    return solver.Assembly.from_solids([structures.upright(ring, 0.0, depth) for ring in rings])
+
+
+def test_a_stepped_crack_in_space_is_that_of_the_plane():
+    outlines = [
+        [[0, 0], [2, 0], [2, 1], [0, 1]],
+        [[2, 0], [4, 0], [4, 1], [2, 1]],
+        [[0, 1], [3, 1], [3, 2], [0, 2]],
+        [[3, 1], [4, 1], [4, 2], [3, 2]],
+    ]
+    flat = solver.Assembly.from_outlines(outlines)
+    solid = in_space(flat, 0.5)
+    (crack,) = cracks_of(solid, moved_in_space(solid, {1: (0.02, 0.0, 0.0), 3: (0.02, 0.0, 0.0)}))
+    assert crack.width == pytest.approx(0.02)
+    assert len(crack.joints) == 3
+    assert crack.size == pytest.approx(3 * 0.5)
+    values = crack.values()
+    assert values["area"] == pytest.approx(1.5)
+    assert (values["from"][0], values["from"][2], values["to"][0], values["to"][2]) == (2.0, 0.0, 3.0, 2.0)
+    assert crack.inclination == pytest.approx(np.degrees(np.arctan2(2.0, np.hypot(1.0, 0.5))))
+    assert "1.5 m², 61°, from (2, " in crack_rows([crack], 1)[0][1]
+
+
+def test_joints_that_part_otherwise_are_cracks_of_their_own():
+    """A block that stays, one that goes up from it and one that goes aside: their joints meet at an edge."""
+    flat = squares((0, 0), (0, 1), (1, 0))
+    solid = in_space(flat, 1.0)
+    cracks = cracks_of(solid, moved_in_space(solid, {1: (0.0, 0.0, 0.01), 2: (0.02, 0.0, 0.0)}))
+    assert [round(crack.width, 9) for crack in cracks] == [0.02, 0.01]
+    assert cracks_of(solid, solver.Pose.initial(solid)) == []
+
+
+def moved_in_space(assembly, motions):
+    """The pose in which blocks, by their numbers, have moved."""
+    pose = solver.Pose.initial(assembly)
+    for block, by in motions.items():
+        pose.positions[block] += by
+    return pose
+
+
+SINKS = (0.0, -1.0)
+
+
+@cache
+def facade():
+    bricks = {"bricks": 14, "courses": 24, "storeys": 1, "windows": 1, "window_bricks": 3, "voussoirs": 3}
+    sinks = solver.Settlement(direction=SINKS, increment=0.01, limit=0.04)
+    return solver.settle(generators.build("facade", bricks), sinks, friction_coefficient=0.6)
+
+
+RESPONSES = {"portal frame": portal_response, "semicircular arch": arch_response, "small façade": facade}
+
+#: The façade takes as long as all others together.
+MARKS = {"portal frame": pytest.mark.thorough, "small façade": pytest.mark.slow}
+EACH = pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in RESPONSES])
+
+
+def counted(response, increment):
+    mechanism = mechanics.mechanism_of(response.assembly, increment)
+    return len(mechanism.hinges), len(mechanism.sliding)
+
+
+def in_words(text):
+    """Hinges and sliding joints of a sentence: "hinges at a | b, c | d and 3 more; sliding at e | f"."""
+    counts = []
+    for what in ("hinges?", "sliding"):
+        found = re.search(rf"(?:^|; ){what} at (.*?)(?: and (\d+) more)?(?=;|$)", text)
+        counts.append(0 if found is None else found[1].count(" | ") + int(found[2] or 0))
+    return tuple(counts)
+
+
+def unpacked(table):
+    planes = np.frombuffer(zlib.decompress(base64.b64decode(table["data"])), dtype=np.uint8)
+    steps = planes.reshape(4, -1).T.copy().view("<i4").reshape(table["rows"], table["columns"])
+    return np.cumsum(steps, axis=0)
+
+
+@EACH
+def test_every_increment_has_one_count(name, tmp_path):
+    response = RESPONSES[name]()
+    expected = [counted(response, increment) for increment in response.increments]
+    assert max(hinges for hinges, _ in expected) > 0
+    joints = initial_joints(response.assembly)
+    for increment, (hinges, sliding) in zip(response.increments, expected, strict=True):
+        words = str(mechanics.mechanism_of(response.assembly, increment))
+        assert in_words(words) == (hinges, sliding)
+        marked = marks.marks_of(response.assembly, joints, increment, increment.pose)
+        assert (len(marked.hinges), len(marked.sliding)) == (hinges, sliding)
+
+    path = expected[: len(response.path)]
+    with (blockvis.write(response, tmp_path / "out") / "response.csv").open(encoding="utf-8") as file:
+        rows = [(int(row["hinges"]), int(row["sliding_joints"])) for row in csv.DictReader(file)]
+    assert rows == path
+
+    page = report_of(response)
+    model = json.loads(re.search(r'<script id="model" type="application/json">(.*?)</script>', page, re.S)[1])
+    packed = model["packed"]
+    ends, kinds = unpacked(packed["mark_first"]).ravel(), unpacked(packed["mark_kind"]).ravel()
+    frames = np.split(kinds, ends[1:-1])
+    # The last equilibrium shows the mechanism that follows it, as the picture of it and the film do.
+    shown = [*path, *expected[len(path) :]]
+    shown[len(path) - 1] = counted(response, swing_of(response).increment)
+    assert [((k == 1).sum(), (k == 2).sum()) for k in frames] == shown
+
+
+@pytest.mark.parametrize("name", [pytest.param("portal frame", marks=pytest.mark.thorough), "semicircular arch"])
+def test_collapse_has_one_count(name, tmp_path):
+    """Of the fall, of the last equilibrium in the motion of the fall, which the picture shows, and in the summary."""
+    response = RESPONSES[name]()
+    falling = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
+    expected = counted(response, falling)
+    assert in_words(response.collapse.words) == expected
+    assert counted(response, response.increments[len(response.path)]) == expected
+    summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
+    assert (summary["hinges"], summary["sliding_joints"]) == expected
+    parts = len(mechanics.mechanism_of(response.assembly, falling).motions)
+    counts = dict(summary_rows(response))["mechanism"]
+    assert summary["mechanism"].startswith(f"{parts} macro-blocks; ")
+    assert counts.startswith(f"{parts} moving parts, {expected[0]} hinges")
+
+
+@pytest.mark.thorough
+def test_console_and_summary_count_what_the_picture_shows(tmp_path):
+    """Not the first frame of the fall, whose contact points and forces are others."""
+    response = portal_response()
+    shown = swing_of(response).increment
+    collapse = replace(response.collapse, words="9 macro-blocks; hinge at a | b")
+    response = replace(response, collapse=collapse)
+    said = next(line for line in _in_words(response, tmp_path).splitlines() if line.startswith("mechanism: "))
+    assert said == f"mechanism: {mechanics.mechanism_of(response.assembly, shown)}"
+    summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
+    assert f"mechanism: {summary['mechanism']}" == said
+
+
+def test_creeping_counts_for_nothing():
+    """A joint that slides at a five hundredth of the speed of the fastest block does not slide."""
+    response = arch_response()
+    last = response.path[-1]
+    fastest = np.abs(last.velocity[:, :2]).max()
+    for part, slides in ((0.002, False), (0.5, True)):
+        motion = np.zeros_like(last.velocity)
+        motion[response.assembly.free] = [0.0, fastest, 0.0]
+        along = np.tile([0.0, part * fastest], (len(last.contacts), 1))
+        creeping = last.with_arrays(velocity=motion, displacements=along)
+        assert bool(counted(response, creeping)[1]) is slides
+
+
+def test_cracks_that_fork_and_turn_are_told_one_by_one():
+    """A wall of squares whose upper right goes up and right: a level crack that turns upwards, and a branch."""
+    wall = squares(*((x, y) for y in range(6) for x in range(6)))
+    lifted = {f"block_{6 * y + x}": (0.02 if x >= 3 else 0.0, 0.03, 0.0) for y in range(3, 6) for x in range(6)}
+    cracks = cracks_of(wall, moved(wall, **lifted))
+    level = [crack for crack in cracks if crack.inclination < 1.0]
+    upright = [crack for crack in cracks if abs(crack.inclination - 90.0) < 1.0]
+    assert len(cracks) == len(level) + len(upright)
+    assert len(upright) == 1
+    assert upright[0].size == pytest.approx(3.0)
+    assert upright[0].width == pytest.approx(0.02)
+    assert upright[0].places[1] == "the top"
+    # The branch of the larger area goes on where they meet.
+    assert sum(crack.size for crack in level) == pytest.approx(6.0)
+    assert {place for crack in level for place in crack.places} >= {"the left edge", "the right edge"}
+    assert sum(len(crack.joints) for crack in cracks) == 9
+
+
+def test_places_are_told_by_openings():
+    """A ring of squares around a window whose right column goes."""
+    wall = squares(*((x, y) for y in range(3) for x in range(3) if (x, y) != (1, 1)))
+    column = {f"block_{number}": (0.02, 0.0, 0.0) for number in (2, 4, 7)}
+    above, below = sorted(cracks_of(wall, moved(wall, **column)), key=lambda crack: -crack.at[1])
+    assert above.places == ("the upper right corner of the opening", "the top")
+    assert below.places[1] == "the lower right corner of the opening"

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from structures import drawn
 
 import solver
-from blockvis import generators, save_layout, write_layout
+from blockvis import generators, save_layout
 from blockvis.explanation.observations import read_observations
-from blockvis.layout.layout import layout_of
+from solver import mechanics
 
 ARCH = generators.arch(voussoirs=6)
 CROWN = "voussoir 3 | voussoir 4"
@@ -129,10 +130,8 @@ def lifted():
 def test_a_drawing_of_the_damaged_state_gives_widths_and_displacements(tmp_path, renamed):
     path = tmp_path / "damaged.json"
     if renamed:
-        moved = layout_of(ARCH, pose=lifted())
-        order = list(range(moved.n_blocks))[::-1]
-        drawn = moved.chosen(order)
-        write_layout(type(drawn)(drawn.outlines, tuple(f"stone {k}" for k in order)), path)
+        corners = np.split(mechanics.moved_vertices(ARCH, lifted()), ARCH.offsets[1:-1])
+        drawn(path, corners[::-1], [f"stone {k}" for k in range(len(corners))[::-1]])
     else:
         save_layout(ARCH, path, pose=lifted())
     found = read_observations(path, ARCH)

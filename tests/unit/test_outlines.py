@@ -1,12 +1,15 @@
-"""Cells to outlines: what the rings are, and what is refused."""
+"""Cells to outlines, outlines to triangles: what the rings are, and what is refused."""
 
 import math
 import time
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from blockvis.layout.outlines import arc_points, flattened, outlines_of_cells, ring_area, without_collinear
+from blockvis.layout.triangulation import cells_of_ring, triangles_of_ring
 
 SQUARES = np.array([[x, y] for y in range(4) for x in range(4)], dtype=float)
 
@@ -79,3 +82,21 @@ def test_an_upright_drawing_is_read_as_seen_from_the_front():
     assert "(x, z)" in note
     with pytest.raises(ValueError, match="'wall' is not flat"):
         flattened(np.eye(3), "'wall'")
+
+
+@given(st.integers(3, 40), st.integers(0, 1000))
+@settings(max_examples=60, deadline=None)
+def test_triangles_fill_a_star_and_turn_as_it_does(n, seed):
+    generator = np.random.default_rng(seed)
+    angle = 2 * np.pi * np.arange(n) / n
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * generator.uniform(0.2, 1.0, (n, 1))
+    for sense in (ring, ring[::-1]):
+        areas = [ring_area(sense[list(cell)]) for cell in triangles_of_ring(sense)]
+        assert len(areas) == n - 2
+        assert sum(areas) == pytest.approx(ring_area(sense), rel=1e-9)
+        assert (np.sign(areas) == np.sign(ring_area(sense))).all()
+
+
+def test_convex_quadrangles_stay_whole():
+    assert cells_of_ring(np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])) == [(0, 1, 2, 3)]
+    assert len(cells_of_ring(np.array([[0, 0], [2, 0], [0.5, 0.5], [0, 2.0]]))) == 2

@@ -12,7 +12,6 @@ from structures import equal_certificates, rectangle
 import solver
 from blockvis import generators
 from solver import mechanics
-from solver.programs.highs import run_highs
 
 pytestmark = pytest.mark.path
 
@@ -450,25 +449,6 @@ def test_increments_are_yielded_as_they_are_found():
     told = []
     response = solver.settle(two_bricks(), DOWN, controls=NO_FALL, on_increment=told.append)
     assert tuple(told) == response.increments
-
-
-def test_solver_failure_is_not_collapse(monkeypatch):
-    """HiGHS that gives nothing from some program on is told as such, with what was found before."""
-    from solver.programs import solve
-
-    run, calls = run_highs, []
-
-    def breaks(program, route):
-        calls.append(route)
-        return run(program, route) if len(calls) <= 8 else (None, "kSolveError")
-
-    monkeypatch.setattr(solve, "run_highs", breaks)
-    spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
-    response = solver.settle(generators.arch(), spread, friction_coefficient=2.0)
-    assert response.stop is solver.Status.SOLVER_FAILED
-    assert "kSolveError" in response.message
-    assert response.collapse is None
-    assert len(response.path) > 0
 
 
 @pytest.mark.thorough

@@ -12,7 +12,6 @@ from oracle import GRAVITY, Touching, judged, moved_on, support_velocities, touc
 from rubble import Trial, trial
 
 import solver
-from blockvis.runs.first_equilibrium import AS_DRAWN
 from solver import mechanics
 
 #: Distance at which corners touch, in block sizes: above what the solver leaves open, below every real gap.
@@ -134,7 +133,7 @@ def _judge(given: Trial, response: solver.Response, finding: Finding) -> None:
         if loose.falls > FALLS:
             finding.counted("no equilibrium at the start")
             came_to_rest = response.path and np.abs(response.path[0].pose.displacements(assembly)[:, :2]).max()
-            if not nothing and came_to_rest > AS_DRAWN * assembly.block_size:
+            if not nothing and came_to_rest > 0.002 * assembly.block_size:
                 # The blocks found an equilibrium a little further, and blockvis run says so.
                 finding.counted("fell to an equilibrium less than half a block away")
             elif not nothing:

@@ -1,17 +1,23 @@
-"""The study file: what it makes of a case, and what it refuses before anything starts."""
+"""Studies: what their file may hold, and the numbers that sum up their runs."""
 
 import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+import scipy.stats as st
 
 from blockvis.case_files.read import case_of
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.cli import main
 from blockvis.studies import campaign
+from blockvis.studies.fragility import fragility, fragility_of, wilson
+from blockvis.studies.pictures import counted
 from blockvis.studies.sampling import METHODS, designed
+from blockvis.studies.sensitivity import IMPERFECTIONS, first_order, swings
 from blockvis.studies.study_file import read_study
+from blockvis.studies.summary import in_words, summary_of
 
 CASE = """
 [geometry]
@@ -232,3 +238,190 @@ def test_an_unreachable_scheduler_is_one_message_and_nothing_started(study_file,
 def test_shipped_studies_are_studies(name, runs):
     study = read_study(Path(__file__).parents[2] / "examples" / "studies" / f"{name}.toml")
     assert study.n_runs == runs
+
+
+ARCH = {"geometry": {"layout": "arch"}, "settlement": {"direction": [1, 0]}}
+
+
+def _study(method="latin hypercube", runs=256, scattered=False, parameters=None):
+    given = {
+        "study": {"case": ARCH, "method": method, "seed": 2} | ({} if method == "grid" else {"runs": runs}),
+        "parameters": parameters
+        or {
+            "material.friction_coefficient": {"name": "a", "distribution": "uniform", "lower": 0.0, "upper": 1.0},
+            "material.density": {"name": "b", "distribution": "uniform", "lower": 1000.0, "upper": 2000.0},
+        },
+    }
+    if scattered:
+        given["imperfections"] = [{"kind": "density", "distribution": "lognormal", "deviation": 0.1}]
+    return read_study(given)
+
+
+def _table(study, outcome, status=None):
+    """The table that a study would have if this were the collapse displacement of every run."""
+    points = [study.point(run) for run in range(study.n_runs)]
+    n = study.n_runs
+    return pd.DataFrame(
+        {
+            "run": range(n),
+            "status": status or ["collapsed"] * n,
+            **{name: [p[name] for p in points] for name in points[0]},
+            "collapse_displacement": outcome,
+            "last_settlement": np.nan_to_num(outcome),
+            "unit": "m",
+            "mechanism_class": "1 part",
+            "falling_share": 1.0,
+            "message": "",
+            "seconds": 0.1,
+        }
+    )
+
+
+# Remission of leukaemia under 6-mercaptopurine [weeks]: Freireich et al., Blood 21 (1963) 699-716; the estimates and
+# Greenwood's standard errors are in textbooks of survival analysis.
+WEEKS = [6, 6, 6, 6, 7, 9, 10, 10, 11, 13, 16, 17, 19, 20, 22, 23, 25, 32, 32, 34, 35]
+RELAPSE = [1, 1, 1, 0, 1, 0, 1, 0, 0, 1, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0]
+STANDING = {6: 0.857, 7: 0.807, 10: 0.753, 13: 0.690, 16: 0.627, 22: 0.538, 23: 0.448}
+
+
+def test_kaplan_meier_of_published_data():
+    curve = fragility(WEEKS, RELAPSE)
+    assert curve.settlement.tolist() == list(STANDING)
+    np.testing.assert_allclose(1.0 - curve.probability, list(STANDING.values()), atol=5e-4)
+    assert (curve.n_runs, curve.n_collapsed, curve.n_stood, curve.furthest) == (21, 9, 12, 35.0)
+    reference = st.ecdf(st.CensoredData.right_censored(WEEKS, np.logical_not(RELAPSE))).sf
+    np.testing.assert_allclose(1.0 - curve.probability, reference.evaluate(curve.settlement), rtol=1e-12)
+    assert curve.quantile(0.5) == 23
+    assert curve.quantile(0.9) is None
+
+
+def test_band_is_wilsons_with_the_effective_number():
+    curve = fragility(WEEKS, RELAPSE)
+    # By hand at 10 weeks: S = 0.75294, Greenwood's error 0.0963, so that the effective number is S (1 - S) / error².
+    s, error = 0.752941, 0.096350
+    low, high = wilson(1.0 - s, s * (1.0 - s) / error**2)
+    k = curve.settlement.tolist().index(10)
+    assert (curve.lower[k], curve.upper[k]) == (
+        pytest.approx(float(low), abs=1e-4),
+        pytest.approx(float(high), abs=1e-4),
+    )
+
+
+def test_without_runs_that_stood_it_is_the_binomial_at_each_displacement():
+    displacement = np.array([0.3, 0.1, 0.2, 0.2, 0.5])
+    curve = fragility(displacement, np.ones(5, dtype=bool))
+    np.testing.assert_allclose(curve.probability, [0.2, 0.6, 0.8, 1.0])
+    for share, low, high in zip([1, 3, 4, 5], curve.lower, curve.upper, strict=True):
+        exact = st.binomtest(share, 5).proportion_ci(method="wilson")
+        assert (low, high) == (pytest.approx(exact.low), pytest.approx(exact.high))
+
+
+def test_runs_that_all_stood_make_no_step_and_the_largest_one_counts():
+    curve = fragility([0.1, 0.2], [False, False])
+    assert len(curve.settlement) == 0
+    assert curve.furthest == 0.2
+    # One that stood up to the very settlement of a collapse was at risk there.
+    assert fragility([0.1, 0.1], [True, False]).probability.tolist() == [0.5]
+
+
+def test_band_covers_the_truth_as_often_as_it_says():
+    random, inside, all_ = np.random.default_rng(3), 0, 0
+    for _ in range(400):
+        collapse, followed = random.exponential(1.0, 60), random.uniform(0.5, 3.0, 60)
+        curve = fragility(np.minimum(collapse, followed), collapse <= followed)
+        k = np.searchsorted(curve.settlement, 0.7) - 1
+        truth = 1.0 - np.exp(-0.7)
+        inside += curve.lower[k] <= truth <= curve.upper[k]
+        all_ += 1
+    assert 0.92 < inside / all_ < 0.98
+
+
+def test_runs_without_result_are_counted_and_left_out():
+    study = _study(runs=8)
+    y = np.arange(1.0, 9.0)
+    y[[2, 5]] = np.nan
+    status = ["collapsed"] * 8
+    status[2], status[5] = "failed", "limit reached"
+    table = _table(study, y, status)
+    table.loc[5, "last_settlement"] = 4.5
+    table.loc[2, "message"] = "out of memory"
+    curve = fragility_of(table)
+    assert (curve.n_runs, curve.n_collapsed, curve.n_stood) == (7, 6, 1)
+    summary = summary_of(study, table)
+    assert summary["n_without_result"] == 1
+    assert "1 failed" in in_words(summary)
+    assert "without result, 1 time: out of memory" in in_words(summary)
+
+
+def test_reasons_that_differ_in_numbers_only_are_counted_together():
+    study = _study(runs=8)
+    table = _table(study, np.full(8, np.nan), ["failed"] * 8)
+    table["message"] = [f"off by {k}.5e-0{k} m" for k in range(1, 8)] + ["out of memory"]
+    assert summary_of(study, table)["reasons"] == {"off by 1.5e-01 m": 7, "out of memory": 1}
+
+
+def test_title_and_words_count_what_collapsed_and_what_never_stood_apart():
+    study = _study(runs=8)
+    status = ["collapsed"] * 4 + ["no initial equilibrium"] * 2 + ["limit reached", "solver failed"]
+    table = _table(study, [0.1, 0.2, 0.3, 0.4, 0.0, 0.0, np.nan, np.nan], status)
+    table.loc[1, "falling_share"] = 0.02
+    summary = summary_of(study, table)
+    assert (summary["n_collapsed"], summary["n_never_stood"], summary["n_local"]) == (4, 2, 1)
+    assert "4 collapsed, 2 no initial equilibrium" in in_words(summary)
+    assert "1 of the collapses is a local loss: a few blocks fall, the structure stands" in in_words(summary)
+    title = counted(fragility_of(table), table, 1e3, "mm")
+    assert title.startswith("7 runs, 4 collapsed (1 of a few blocks only), 2 never stood, 1 stood")
+
+
+def test_first_order_indices_of_a_linear_function():
+    study = _study()
+    table = _table(study, np.zeros(study.n_runs))
+    table["collapse_displacement"] = 2.0 * table["a"] + table["b"] / 1000.0
+    found = first_order(study, table)
+    # Var(2 a) : Var(b) = 4 : 1.
+    assert found["a"][0] == pytest.approx(0.8, abs=0.03)
+    assert found["b"][0] == pytest.approx(0.2, abs=0.08)
+
+
+def test_first_order_indices_by_exchange_with_imperfections():
+    study = _study("saltelli", 256, scattered=True)
+    assert study.n_runs == 256 * 5
+    noise = np.array([np.random.default_rng(s).uniform() for s in study.design.seeds.tolist()])
+    table = _table(study, np.zeros(study.n_runs))
+    table["collapse_displacement"] = 2.0 * table["a"] + table["b"] / 1000.0 + noise
+    table.loc[7, ["status", "collapse_displacement"]] = ["failed", np.nan]
+    found = first_order(study, table)
+    for name, exact in (("a", 4 / 6), ("b", 1 / 6), (IMPERFECTIONS, 1 / 6)):
+        assert found[name][0] == pytest.approx(exact, abs=0.08), name
+        assert abs(found[name][0] - exact) < 2.0 * found[name][1]
+
+
+def test_first_order_indices_of_a_grid_are_exact():
+    study = _study(
+        "grid", parameters={"material.friction_coefficient": [0.0, 1.0, 2.0], "material.density": [1.0, 2.0]}
+    )
+    table = _table(study, np.zeros(6))
+    x, y = table["material.friction_coefficient"], table["material.density"]
+    table["collapse_displacement"] = x * y
+    # Means over y: 0, 1.5, 3; over x: 1, 2.
+    total = np.var([0, 0, 1, 2, 2, 4])
+    assert first_order(study, table)["material.friction_coefficient"][0] == pytest.approx(np.var([0, 1.5, 3]) / total)
+    assert first_order(study, table)["material.density"][0] == pytest.approx(np.var([1, 2]) / total)
+
+
+def test_an_outcome_that_never_changes_has_no_indices():
+    study = _study()
+    assert first_order(study, _table(study, np.full(study.n_runs, 0.25))) == {}
+
+
+def test_swings_compare_the_lowest_and_the_highest_fifth():
+    study = _study()
+    table = _table(study, np.zeros(study.n_runs))
+    table["collapse_displacement"] = 2.0 * table["a"] + table["b"] / 1000.0
+    first, second = swings(study, table)
+    assert (first.name, second.name) == ("a", "b")
+    # Of a uniform variable on 0 to 1 the fifths have the means 0.1 and 0.9.
+    assert first.low_value == pytest.approx(0.1, abs=0.01)
+    # What the other parameter adds scatters: three times its deviation over the root of 51 runs on either side.
+    assert first.high - first.low == pytest.approx(1.6, abs=3 * np.sqrt(2 / 12 / 51))
+    assert second.high - second.low == pytest.approx(0.8, abs=3 * np.sqrt(2 * 4 / 12 / 51))
