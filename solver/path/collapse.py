@@ -12,7 +12,7 @@ from solver.kinematics import motion_size
 from solver.results.increment import Increment, Status
 from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse
-from solver.tolerances import COMPUTED_GAP, FARTHEST_FALL
+from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, FARTHEST_FALL
 
 from .controls import Ending
 from .equilibrium_check import EquilibriumChecks
@@ -99,13 +99,15 @@ class Fall:
 
     def relax(self, place: Place, farthest: float = FARTHEST_FALL) -> tuple[Place, bool]:
         """Where blocks move with the supports fixed, and whether they come to rest in equilibrium there."""
-        end = place
+        end, at_rest = place, False
         for end, _, acceleration, speed in self.time_steps(place):
             if self.movements(place, end).max() > farthest:
                 return end, False
-            if acceleration < SLOW and speed < SLOW and self.checks.in_equilibrium(end, COMPUTED_GAP):
+            at_rest = acceleration < SLOW and speed < SLOW
+            if at_rest and self.checks.in_equilibrium(end, COMPUTED_GAP):
                 return end, True
-        return end, False
+        # A corner that comes to rest on the end of an edge is within rounding of contact points there.
+        return end, at_rest and self.checks.in_equilibrium(end, CLOSING_GAP)
 
     def movements(self, one: Place, other: Place) -> np.ndarray:
         """(n_blocks,) array: largest component of the movement of free blocks from place to place, in block sizes."""
@@ -165,12 +167,8 @@ class Fall:
         if self.model.live is None:
             return self
         stepper = Stepper(replace(self.model, live=None), self.driver)
-        return Fall(
-            stepper,
-            EquilibriumChecks(stepper),
-            Reports(stepper, self.reports.number, self.reports.fell_at),
-            self.n_frames,
-        )
+        reports = Reports(stepper, self.reports.number, self.reports.fell_at)
+        return Fall(stepper, EquilibriumChecks(stepper), reports, self.n_frames)
 
     def _fall(self, place: Place) -> Iterator[Increment]:
         """Frames of the fall, each a movement of the same size, until the blocks are at rest."""

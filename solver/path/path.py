@@ -353,6 +353,11 @@ class Path:
         places = [oldest, *(place for place in (*later, state.place) if oldest.s < place.s < bound)]
         gap = self._closed_gap(False)
         while len(places) > 1 and not self.checks.in_equilibrium(places[-1], gap):
+            # The path may have come here because blocks that the viscosity retards come to rest nearby.
+            resting = self.fall.relaxed(places[-1], JUMP)
+            if resting is not None:
+                places[-1] = replace(resting, works=places[-1].works)
+                break
             bound = min(bound, places.pop().s)
         place = places[-1]
         step = (bound - place.s) / 4.0

@@ -24,14 +24,7 @@ from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.program.model import Model
-from solver.tolerances import (
-    COMPLIANCE,
-    FRICTION_MEMORY,
-    IMPERFECTION,
-    SHEAR_COMPLIANCE,
-    VELOCITY_MEMORY,
-    VISCOSITY,
-)
+from solver.tolerances import COMPLIANCE, FRICTION_MEMORY, IMPERFECTION, SHEAR_COMPLIANCE, VELOCITY_MEMORY, VISCOSITY
 
 from .drivers import Driver
 from .state import Place
@@ -71,7 +64,7 @@ class StepError:
     Attributes
     ----------
     lag : float
-        Change of the friction bounds of sliding points, in weights of the structure.
+        Change of the friction bounds of joints at their sliding points, in weights of the structure.
     turn : float
         Change of the movement against that of the steps before, in block sizes.
     moved : float
@@ -234,8 +227,7 @@ class Stepper:
         scales, n_dof = model.lengths, len(model.lengths)
         # A step in time is solved to a small part of such a movement.
         s, size = (place.s, 1e-3) if in_time else (place.s + length, length / self.unit)
-        supports = driver.supports(s)
-        start = self.contacts(place.pose) if candidates is None else candidates
+        supports, start = driver.supports(s), self.contacts(place.pose) if candidates is None else candidates
         forces, trial, followed, is_new = self.transferred(place, start)
         friction, compliance = self.friction(start), self.compliance(start, model.compliance)
         bound = friction * followed
@@ -292,24 +284,16 @@ class Stepper:
             raise NotSolved("the movement is not finite")
         movement_size = float(np.abs(motion_so_far).max(initial=0.0))
         if movement_size > LARGEST_PENETRATION:
-            missed_contacts = self._missed_contacts(start, place.pose, pose, movement_size)
-            if len(missed_contacts):
-                candidates = joined_contacts([start, missed_contacts])
-                return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=candidates)
+            missed = self._missed_contacts(start, place.pose, pose, movement_size)
+            if len(missed):
+                start = joined_contacts([start, missed])
+                return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=start)
         # A larger share alternates where the normal force falls as the bound grows.
         share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
-        lag, followed = self._updated_bounds(forces, np.maximum(gap, 0.0), friction, bound, followed, is_new, share)
+        lag, followed = self._updated_bounds(contacts, forces, friction, bound, followed, is_new, share)
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
-        new = Place(
-            s,
-            pose,
-            contacts,
-            forces,
-            trial,
-            followed,
-            multiplier / (live_size or 1.0),
-            motion / length if in_time else self._velocity(place, motion, length),
-        )
+        velocity = motion / length if in_time else self._velocity(place, motion, length)
+        new = Place(s, pose, contacts, forces, trial, followed, multiplier / (live_size or 1.0), velocity)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
         return new, motion / scales, StepError(lag, turn, movement_size, float(-gap[carries].min(initial=0.0)))
@@ -328,22 +312,25 @@ class Stepper:
 
     def _updated_bounds(
         self,
+        contacts: Contacts,
         forces: np.ndarray,
-        gap: np.ndarray,
         friction: np.ndarray,
         bound: np.ndarray,
         followed: np.ndarray,
         is_new: np.ndarray,
         share: float | np.ndarray,
     ) -> tuple[float, np.ndarray]:
-        """Change of the friction bounds of sliding points, in weights of the structure, and followed normal forces."""
+        """Change of the friction bounds of sliding joints, in weights of the structure, and followed normal forces."""
         shear_force, normal = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
         sliding = ((shear_force >= SLIDES * bound) | (shear_force > friction * normal)) & ~is_new
         # In a joint that opens friction vanishes sooner.
-        share = np.maximum(share, gap / (gap + OPEN))
+        gap = np.maximum(contacts.gaps, 0.0)
+        share = np.maximum(share, gap / (gap + OPEN * self.model.length))
         # New contact points have the friction of their normal force at once.
         after = np.where(is_new, normal, followed + share * (normal - followed))
-        return float((friction * np.abs(after - followed))[sliding].sum()) / self.weight, after
+        # What the points of one joint hand to each other does not change its friction.
+        change = np.bincount(contacts.joints()[1], np.where(sliding, friction * (after - followed), 0.0))
+        return float(np.abs(change).sum()) / self.weight, after
 
     def _velocity(self, place: Place, motion: np.ndarray, length: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity after a step, averaged with those before."""
@@ -353,10 +340,7 @@ class Stepper:
     def _missed_contacts(self, stepped: Contacts, before: Pose, pose: Pose, movement_size: float) -> Contacts:
         """Contact points that a step has missed, where they were before it: at its end a corner is in a block.
 
-        Raises
-        ------
-        Unseen
-            Where that corner was behind the edge already, or the step had its contact point.
+        Raises ``Penetration`` where that corner was behind the edge already, or the step had its contact point.
         """
         end = self.contacts(pose)
         earlier, is_stepped = np.zeros(len(end)), np.zeros(len(end), dtype=bool)

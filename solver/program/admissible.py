@@ -66,19 +66,7 @@ def in_equilibrium(
     ------
     SolveError
     """
-    program = _StaticProgram(model, pose, contacts, friction, None, gap)
-    try:
-        solution = program.bound(0.0)
-    except SolveError as error:
-        best = error.best
-        if best is None or best.violation > ACCEPTED_VIOLATION:
-            raise
-        # The dual objective bounds the forces out of balance from below, at whatever accuracy.
-        falls, balanced = best.dual_objective > 2.0 * best.gap, program.unbalanced(best) <= ACCEPTED_VIOLATION
-        if falls == balanced:
-            raise
-        return balanced
-    return solution is not None and program.unbalanced(solution) <= FALLING_FRACTION
+    return _StaticProgram(model, pose, contacts, friction, None, gap).most_balanced()[1] <= FALLING_FRACTION
 
 
 def admissible(
@@ -128,12 +116,12 @@ def admissible(
                 raise
             unknown.add(sign)
             solutions[sign] = None
-    arbitrary = None
+    arbitrary, unbalanced = None, np.inf
     if solutions[forces_sign] is None and (forces_sign in unknown or solutions[-forces_sign] is None):
         # Where blocks are wedged neither bound is finite, and others may fall.
-        arbitrary = program.bound(0.0)
-    imbalance = {k: program.unbalanced(s) for k, s in {**solutions, 0.0: arbitrary}.items() if s is not None}
-    unbalanced = min(imbalance.values())
+        arbitrary, unbalanced = program.most_balanced()
+    imbalance = {sign: program.unbalanced(solution) for sign, solution in solutions.items() if solution is not None}
+    unbalanced = min([unbalanced, *imbalance.values()])
     values, gaps = [], [0.0]
     forces_of: dict[float, np.ndarray] = {}
     for sign, solution in solutions.items():
@@ -163,13 +151,7 @@ class _StaticProgram:
     """The program over all contact forces at a pose; parameters as in :func:`admissible`."""
 
     def __init__(
-        self,
-        model: Model,
-        pose: Pose,
-        contacts: Contacts,
-        friction: np.ndarray,
-        rate: np.ndarray | None,
-        gap: float,
+        self, model: Model, pose: Pose, contacts: Contacts, friction: np.ndarray, rate: np.ndarray | None, gap: float
     ) -> None:
         d, blocks = model.dimension, model.assembly.free
         free = np.repeat(blocks, model.n_dof)
@@ -218,6 +200,27 @@ class _StaticProgram:
             return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, places=self.places))
         except Unbounded:
             return None
+
+    def most_balanced(self) -> tuple[Solution | None, float]:
+        """Find forces of least imbalance, and their unbalanced forces over the total load, 0 where that is rounding.
+
+        Raises
+        ------
+        SolveError
+        """
+        try:
+            solution = self.bound(0.0)
+        except SolveError as error:
+            best = error.best
+            if best is None or best.violation > ACCEPTED_VIOLATION:
+                raise
+            if self.unbalanced(best) <= ACCEPTED_VIOLATION:
+                return best, 0.0
+            # The dual objective bounds the forces out of balance from below, at whatever accuracy.
+            if best.dual_objective <= 2.0 * best.gap:
+                raise
+            return best, self.unbalanced(best)
+        return solution, np.inf if solution is None else self.unbalanced(solution)
 
     @property
     def _slack(self) -> slice:

@@ -80,7 +80,8 @@ def _first_accepted(runs: Mapping[str, Callable[[], tuple[Solution | None, str]]
         if solution is not None and solution.accepted:
             return solution
         if solution is not None:
-            best, status = solution, f"{status}, violation {solution.violation:.1e}, gap {solution.gap:.1e}"
+            best = solution if best is None or solution.violation < best.violation else best
+            status = f"{status}, violation {solution.violation:.1e}, gap {solution.gap:.1e}"
         outcomes.append(f"{route}: {status}")
     raise SolveError(f"no solution of the {what} passed its check ({'; '.join(outcomes)})", best)
 
