@@ -43,7 +43,6 @@ WHITE_BOX = {
     "unit/test_extras.py": 4,
     "unit/test_fall.py": 6,
     "unit/test_fall_in_space.py": 3,
-    "unit/test_files.py": 10,
     "unit/test_import_graph.py": 1,
     "unit/test_kinds.py": 7,
     "unit/test_labels.py": 13,
@@ -57,6 +56,7 @@ WHITE_BOX = {
     "unit/test_studies.py": 16,
     "unit/test_tolerances.py": 1,
     "unit/test_video.py": 3,
+    "unit/test_written_files.py": 10,
     "validation/test_space_static.py": 3,
 }
 
