@@ -30,6 +30,9 @@ TURN = 1.5
 #: Most crack lines that a summary lists, the widest first.
 MOST_LISTED = 100
 
+#: Most main cracks, and the least part of the largest area of opening that one of them has.
+MOST_MAIN, LEAST_MAIN = 6, 0.05
+
 #: Joints in space belong to one crack where their blocks part by the same, up to this part of it.
 ALIKE = 0.5
 
@@ -137,6 +140,13 @@ def cracks_of(
         places = Places(assembly) if open_ones else None
         found = [_crack(assembly, joints, moved, course, places) for course in open_ones]
     return sorted((crack for crack in found if crack.width > least), key=lambda crack: -crack.width)
+
+
+def main_cracks(cracks: Sequence[Crack]) -> list[Crack]:
+    """Choose the cracks that pictures tell apart, those with the largest areas of opening, in the given order."""
+    areas = np.array([crack.mean_width * crack.size for crack in cracks])
+    largest = np.sort(np.argsort(-areas, kind="stable")[:MOST_MAIN])
+    return [cracks[k] for k in largest.tolist() if areas[k] >= LEAST_MAIN * areas.max()]
 
 
 def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
