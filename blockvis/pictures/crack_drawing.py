@@ -94,11 +94,12 @@ def draw_cracks(
     keys = [Key("line", f"crack {number_of[id(c)]}", palette.SURVEYED[k]) for k, c in enumerate(main)]
     if others:
         keys.append(Key("line", f"{len(others)} smaller", palette.FAINT))
+    none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
     said = f"{len(cracks)} crack{'s' if len(cracks) != 1 else ''}   ·   lines as thick as they are open, the thickest "
     page = sheet.composed(
         picture,
         title=f"Cracks   ·   {state_text(increment, response)}",
-        detail=f"{said}{width_text(widest)}   ·   drawn on the layout" if cracks else "no joint is open",
+        detail=f"{said}{width_text(widest)}   ·   drawn on the layout" if cracks else none,
         keys=keys,
         pixel=scene.pixel,
     )

@@ -440,7 +440,7 @@ class Drawer:
     def _keys_of_joints(self) -> list[Key]:
         seen, keys = self._seen, []
         if seen.cracks:
-            kind, widest = ("area", "") if self._flat else ("line", f", up to {_opening_text(seen.widest)}")
+            kind, widest = ("area", "") if self._flat else ("line", f", up to {width_text(seen.widest)}")
             keys.append(Key(kind, f"open joint{widest}", palette.OPEN, layers=("crack", "crack edge")))
         marked = [
             *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),
@@ -469,10 +469,11 @@ class Drawer:
     def _keys_drawn(self, increment: solver.Increment) -> list[Key]:
         """Return the legend of the picture that the scene holds; what was left out is told where statics has it."""
         falling = increment.status == solver.Status.FALLING
+        untinted = [] if self._acts(increment) else self._keys_of_tints()
         return [
             key
             for key in self.keys()
-            if (self.scene.holds(*key.layers) if key.layers else bool(key.kind) or not falling)
+            if key not in untinted and (self.scene.holds(*key.layers) if key.layers else bool(key.kind) or not falling)
         ]
 
     def _keys_of_tints(self) -> list[Key]:
@@ -631,10 +632,6 @@ def largest_displacement(assembly: solver.Assembly, increment: solver.Increment)
     """Largest displacement [m] of a corner of a free block since the layout."""
     moved = mechanics.moved_vertices(assembly, increment.pose) - assembly.vertices
     return float(np.linalg.norm(moved, axis=1)[assembly.free[assembly.block_of_vertex]].max(initial=0.0))
-
-
-def _opening_text(length: float) -> str:
-    return f"{1e3 * length:.2g} mm" if length < 0.0995 else f"{length:.2g} m"
 
 
 def size_of(box: tuple[int, int, int, int]) -> tuple[int, int]:

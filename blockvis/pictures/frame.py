@@ -309,7 +309,9 @@ def write_labels(
             written.append(min(free, key=lambda one: one[:2])[2])
     for one in written:
         if np.hypot(*np.subtract(one.nearest, one.place)) > text:
-            draw.line((*one.place, *one.nearest), fill=one.colour, width=max(1, text // 12))
+            # Grey and with a dot at its end: a coloured one would look like a crack.
+            draw.line((*one.place, *one.nearest), fill=palette.FAINT, width=max(1, text // 16))
+            draw.circle(one.place, text / 8.0, fill=palette.FAINT)
     for one in written:
         left, top, wide, high = one.box
         box = (left, top, left + wide, top + high)
@@ -328,7 +330,7 @@ class Label:
         Left, top, width and height.
     words : str
     colour : (int, int, int)
-        Of its rim and its leader.
+        Of its rim.
     """
 
     place: tuple[float, float]
