@@ -20,8 +20,9 @@ from .flat_scene import FlatScene
 from .frame import Key, Sheet, framed, write_labels
 from .render import STILL_SIZE
 
-#: Thickness of a crack that only slides and of the widest one, in heights of the picture.
-THIN, THICK = 1.0 / 540.0, 1.0 / 60.0
+#: Thickness of a crack that only slides and of the widest one, in heights of the picture; the latter in block sizes at
+#: most, or the steps of a fine bond would run into each other.
+THIN, THICK, OF_BLOCK = 1.0 / 540.0, 1.0 / 60.0, 0.35
 
 #: Of the colour of the blocks so much is left.
 PALE = 0.3
@@ -76,9 +77,11 @@ def draw_cracks(
     scene = FlatScene(assembly, frame, sheet.inside_size, fill, outline=palette.PALE_OUTLINE)
     others = [crack for crack in cracks if id(crack) not in {id(one) for one in main}]
     layers = [*zip(main, palette.SURVEYED, strict=False), *((crack, palette.FAINT) for crack in others)]
+    height = float(scene.frame.size[1])
+    thin, thick = THIN * height, max(min(THICK * height, OF_BLOCK * assembly.block_size), 2.0 * THIN * height)
     # The main ones are drawn last, on top.
     for k, (crack, colour) in list(enumerate(layers))[::-1]:
-        half = scene.size[1] * scene.pixel / 2.0 * (THIN + (THICK - THIN) * openings[crack.joints] / widest)
+        half = (thin + (thick - thin) * openings[crack.joints] / widest) / 2.0
         scene.polygons(f"crack edge/{k}", _bars(joints.ends[crack.joints], half), colour)
     picture = scene.image()
     if main:

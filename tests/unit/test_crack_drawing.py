@@ -1,10 +1,13 @@
 """The drawing of the cracks: each main crack in its colour, as thick as it is open, with its width."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PIL import Image
 from structures import arch_response
 
+from blockvis import generators
 from blockvis.pictures import crack_drawing, palette
 from blockvis.pictures.crack_drawing import draw_cracks
 from blockvis.pictures.drawer import Drawer, Look
@@ -44,6 +47,8 @@ def test_any_increment_is_drawn_on_demand(tmp_path):
     assert not any(covered(at_rest, colour) for colour in palette.SURVEYED)
     last = draw_cracks(response, len(response.path) - 1, tmp_path / "last.png", size=SIZE)
     assert last.read_bytes() == draw_cracks(response, -1, tmp_path / "same.png", size=SIZE).read_bytes()
+    with pytest.raises(ValueError, match="these lie in space"):
+        draw_cracks(replace(response, assembly=generators.dome()), 0, tmp_path / "none.png")
     with pytest.raises(ValueError, match=f"no increment 999: choose one from 0 to {len(response.path) - 1}"):
         draw_cracks(response, 999, tmp_path / "none.png")
 
