@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spannin
 from scipy.spatial import ConvexHull
 
 import solver
+from blockvis.text import width_text
 
 from .joint_faces import InitialJoints, initial_joints
 from .joints import Faces, carried_faces, opening_and_slip
@@ -158,7 +159,7 @@ def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
         ends = np.round(crack.ends, 3 - int(np.floor(np.log10(longest)))) + 0.0
         first, last = (f"({', '.join(f'{x:.3g}' for x in end)})" for end in ends)
         size = f"{crack.size:.3g} {'m' if len(crack.at) == 2 else 'm²'}"
-        words = f"{1e3 * crack.width:.3g} mm at {crack.widest}; {size}, {crack.inclination:.0f}°, "
+        words = f"{width_text(crack.width)} at {crack.widest}; {size}, {crack.inclination:.0f}°, "
         words += f"from {first} to {last} m"
         if set(crack.places) - {"", "inside"}:
             words += f": {' to '.join(crack.places)}"

@@ -13,6 +13,7 @@ import blockvis
 import solver
 from blockvis.layout.layout import layout_of, standing
 from blockvis.results.cracks import crack_rows, cracks_of
+from blockvis.text import width_text
 
 
 def moved(assembly, **motions):
@@ -82,7 +83,7 @@ def test_the_cracks_of_an_arch_are_its_hinges(tmp_path):
     # Places are numbers that can be read: 0, not 5.66e-17.
     assert not re.search(r"\de-\d", " ".join(words for _, words in crack_rows(cracks, len(cracks))))
     page = report_of(arch)
-    assert f"{1e3 * cracks[0].width:.3g} mm at {cracks[0].widest}" in page
+    assert f"{width_text(cracks[0].width)} at {cracks[0].widest}" in page
 
 
 def test_every_key_of_a_crack_is_named_in_the_manual():
