@@ -303,6 +303,9 @@ def _add_render(verbs: Any) -> None:
     render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
+    render.add_argument(
+        "--cracks", type=int, metavar="N", help="nothing but cracks.png, of increment N (-1: the last equilibrium)"
+    )
     _add_sight(render)
     render.set_defaults(verb=_render)
 
@@ -912,6 +915,7 @@ def _layout(options: argparse.Namespace) -> int:
 
 
 def _render(options: argparse.Namespace) -> int:
+    from .pictures.crack_drawing import draw_cracks
     from .pictures.render import animate, draw_mechanism, draw_still
     from .runs.progress import DrawingProgress
     from .runs.reopen import open_results
@@ -920,6 +924,10 @@ def _render(options: argparse.Namespace) -> int:
     folder = Path(options.results)
     response = open_results(folder)
     size = _size(options.size)
+    if options.cracks is not None:
+        draw_cracks(response, options.cracks, folder / "cracks.png", size=size)
+        print(f"drawn in {folder}/: cracks.png")
+        return 0
     underlay = stored_underlay(folder)
     fall = _write_report(response, folder)
     drawn = ["report.html"]
@@ -939,6 +947,9 @@ def _render(options: argparse.Namespace) -> int:
     draw_still(response, last, folder / "last.png", size=size, **look, **seen_from)
     draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **seen_from)
     drawn += ["last.png", "mechanism.png"]
+    if response.assembly.dimension == 2:
+        draw_cracks(response, -1, folder / "cracks.png")
+        drawn.append("cracks.png")
     if options.animation != "none":
         progress = DrawingProgress()
         try:

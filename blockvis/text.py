@@ -21,6 +21,18 @@ def length_text(length: float) -> str:
     return f"{length:g} m"
 
 
+def width_text(width: float) -> str:
+    """Write the width of a crack [m] in mm: three digits, and no decimals from 10 mm on.
+
+    Examples
+    --------
+    >>> width_text(0.00012), width_text(0.0034567), width_text(0.01234), width_text(1.234)
+    ('0.12 mm', '3.46 mm', '12 mm', '1230 mm')
+    """
+    digits = float(f"{1e3 * width:.3g}")
+    return f"{digits:.0f} mm" if digits >= 10.0 else f"{digits:g} mm"
+
+
 def force_text(force: float, moment: bool = False) -> str:
     """Write a force [N], or a moment [N·m], with four digits and the unit that suits it.
 

@@ -354,7 +354,8 @@ def started_cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen, list[
     workers = [subprocess.Popen([*dask, *join], **common) for _ in range(2)]
     try:
         deadline = time.monotonic() + 60
-        while not file.exists():
+        # A file that is there may not be written yet.
+        while not (file.exists() and file.read_text(encoding="utf-8").rstrip().endswith("}")):
             assert time.monotonic() < deadline
             time.sleep(0.05)
         yield json.loads(file.read_text(encoding="utf-8"))["address"], scheduler, workers

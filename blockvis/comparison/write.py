@@ -12,6 +12,7 @@ from string import Template
 from blockvis.results.about import about
 from blockvis.results.folder import VIDEO_SUFFIXES, ResultsExist, refuse_results
 from blockvis.system.atomic_files import make_folder, write_atomic
+from blockvis.text import width_text
 
 from .compared import Comparison, compared
 from .pictures import draw_curves, draw_stations, film_in_step
@@ -85,7 +86,7 @@ def comparison_html(found: Comparison, curves: bytes, stations: bytes, film: str
     report = files("blockvis") / "report"
     heads = ("", *(side.label for side in found.sides))
     cracks = [
-        (pair.place, *("–" if width == 0.0 else f"{1e3 * width:.3g} mm" for width in pair.widths))
+        (pair.place, *("–" if width == 0.0 else width_text(width) for width in pair.widths))
         for pair in found.cracks(found.common_end)
     ]
     where = found.place_text(found.common_end) if found.is_path else "the limit load"

@@ -219,9 +219,11 @@ def _draw_line(
     if len(total) <= MOST_DOTS:
         axes.plot(total, values, "o", color=blue, markersize=3.0, zorder=3)
     if first:
+        # On the side that the curve leaves free.
+        above = values[0] > values[1]
         axes.annotate(
-            "at rest", (total[0], values[0]), xytext=(8, 0), textcoords="offset points", va="center",
-            fontsize=0.9 * text,
+            "at rest", (total[0], values[0]), xytext=(8, 4 if above else -4), textcoords="offset points",
+            va="bottom" if above else "top", fontsize=0.9 * text,
         )  # fmt: skip
 
 

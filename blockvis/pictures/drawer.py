@@ -13,9 +13,9 @@ from PIL import Image
 import solver
 from blockvis.dynamics.fall import CAPTION, Fall, falling_increment
 from blockvis.layout.sights import Cut, Sight
-from blockvis.results.cracks import cracks_of
-from blockvis.results.joints import faces_at, initial_joints
-from blockvis.text import force_text, rounded_length
+from blockvis.results.cracks import cracks_of, main_cracks
+from blockvis.results.joints import end_openings, faces_at, initial_joints
+from blockvis.text import force_text, rounded_length, width_text
 from solver import mechanics
 
 from . import palette
@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
 
-#: Most crack lines whose width is written, and the least part of the widest that is worth a word.
-MOST_WIDTHS, LEAST_WIDTH = 6, 0.05
+#: Something falls where a corner moves by more pixels than this in so many seconds: the badge says so.
+VISIBLE, MOMENT = 1.0, 0.12
 
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
@@ -324,7 +324,7 @@ class Drawer:
         *,
         title: str = "",
         note: str = "",
-        badge: str = "",
+        badge: str | None = None,
         blocks_only: bool = False,
         widths: bool = False,
     ) -> Image.Image:
@@ -362,7 +362,7 @@ class Drawer:
             picture,
             title=title or head,
             detail=note or detail,
-            badge=badge or (badge_of(self.response) if falling else FAILED_BADGE if failed else ""),
+            badge=(badge_of(self.response) if falling else FAILED_BADGE if failed else "") if badge is None else badge,
             keys=self._keys_drawn(increment),
             places=self.keys(),
             pixel=self.scene.pixel,
@@ -376,9 +376,15 @@ class Drawer:
             falling_increment(self.response, self.fall.at(time)),
             title=f"Fall   ·   {time:.2f} s after the last equilibrium",
             note=f"{CAPTION}   ·   true scale",
-            badge=FALL_BADGE,
+            badge=FALL_BADGE if self._moves(time) else "",
             blocks_only=True,
         )
+
+    def _moves(self, time: float) -> bool:
+        """Whether something moves visibly from a time [s] of the fall on."""
+        assert self.fall is not None
+        now, then = (mechanics.moved_vertices(self.assembly, self.fall.at(t)) for t in (time, time + MOMENT))
+        return bool(np.linalg.norm(then - now, axis=1).max(initial=0.0) > VISIBLE * self.scene.pixel)
 
     def show_motion(self, swing: Swing) -> None:
         """Show by tints, edges and arrows how the parts of a mechanism move.
@@ -434,7 +440,7 @@ class Drawer:
     def _keys_of_joints(self) -> list[Key]:
         seen, keys = self._seen, []
         if seen.cracks:
-            kind, widest = ("area", "") if self._flat else ("line", f", up to {_opening_text(seen.widest)}")
+            kind, widest = ("area", "") if self._flat else ("line", f", up to {width_text(seen.widest)}")
             keys.append(Key(kind, f"open joint{widest}", palette.OPEN, layers=("crack", "crack edge")))
         marked = [
             *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),
@@ -463,10 +469,11 @@ class Drawer:
     def _keys_drawn(self, increment: solver.Increment) -> list[Key]:
         """Return the legend of the picture that the scene holds; what was left out is told where statics has it."""
         falling = increment.status == solver.Status.FALLING
+        untinted = [] if self._acts(increment) else self._keys_of_tints()
         return [
             key
             for key in self.keys()
-            if (self.scene.holds(*key.layers) if key.layers else bool(key.kind) or not falling)
+            if key not in untinted and (self.scene.holds(*key.layers) if key.layers else bool(key.kind) or not falling)
         ]
 
     def _keys_of_tints(self) -> list[Key]:
@@ -527,13 +534,13 @@ class Drawer:
         self, picture: Image.Image, increment: solver.Increment, shown: solver.Pose, dots: np.ndarray
     ) -> None:
         """Write the widths of the widest crack lines of an increment beside them, where there is room."""
-        cracks = cracks_of(self.assembly, increment.pose, self.joints, increment.fallen)[: 2 * MOST_WIDTHS]
-        cracks = [crack for crack in cracks if crack.width >= LEAST_WIDTH * cracks[0].width]
+        cracks = main_cracks(cracks_of(self.assembly, increment.pose, self.joints, increment.fallen))
         on_a, on_b, _ = faces_at(self.assembly, self.joints, shown)
         widest = [int(crack.joints[0]) for crack in cracks]
-        places = self.scene.at_pixel((on_a + on_b)[widest].mean(axis=1) / 2.0)
-        words = [f"{1e3 * crack.width:.3g} mm" for crack in cracks]
-        write_labels(picture, places, words, self.sheet.text, MOST_WIDTHS, self.scene.at_pixel(dots))
+        ends = end_openings(self.assembly, self.joints, increment.pose)[widest].argmax(axis=1)
+        places = self.scene.at_pixel((on_a + on_b)[widest, ends] / 2.0)
+        words = [width_text(crack.width) for crack in cracks]
+        write_labels(picture, places, words, self.sheet.text, self.scene.at_pixel(dots))
 
     def _draw_forces(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if self.force_scale == 0.0:
@@ -625,10 +632,6 @@ def largest_displacement(assembly: solver.Assembly, increment: solver.Increment)
     """Largest displacement [m] of a corner of a free block since the layout."""
     moved = mechanics.moved_vertices(assembly, increment.pose) - assembly.vertices
     return float(np.linalg.norm(moved, axis=1)[assembly.free[assembly.block_of_vertex]].max(initial=0.0))
-
-
-def _opening_text(length: float) -> str:
-    return f"{1e3 * length:.2g} mm" if length < 0.0995 else f"{length:.2g} m"
 
 
 def size_of(box: tuple[int, int, int, int]) -> tuple[int, int]:

@@ -133,14 +133,13 @@ def _falling(drawer: Drawer, fps: float) -> list[Draw]:
         pseudo = [increment for increment in drawer.increments if increment.status == solver.Status.FALLING]
         found = [(partial(drawer.picture, increment), increment.pose) for increment in pseudo]
     shown: list[Draw] = []
-    drawn = None
+    drawn, rests = None, False
     for draw, pose in found:
         corners = mechanics.moved_vertices(drawer.assembly, pose)
-        if drawn is not None and np.abs(corners - drawn).max() <= STILL * drawer.scene.pixel:
-            shown.append(shown[-1])
-            continue
-        shown.append(draw)
-        drawn = corners
+        still = drawn is not None and np.abs(corners - drawn).max() <= STILL * drawer.scene.pixel
+        # What has come to rest in a fall is drawn once more, without the badge of what moves.
+        shown.append(shown[-1] if still and (rests or fall is None) else draw)
+        rests, drawn = still, drawn if still else corners
     if drawer.response.swings:
         # Out, back and out again: a mechanism to first order goes either way.
         return [*shown, *shown[-2::-1], *shown[1:]]

@@ -55,6 +55,8 @@ class FlatScene:
         Colours of the blocks.
     underlay : Underlay, optional
         A photograph, of which the blocks carry their part.
+    outline : (int, int, int)
+        Colour of their edges.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class FlatScene:
         size: tuple[int, int],
         block_fill: np.ndarray,
         underlay: Underlay | None = None,
+        outline: Colour = palette.OUTLINE,
     ) -> None:
         self.assembly, self.size = assembly, size
         self.frame = frame.fitted(*size)
@@ -78,7 +81,7 @@ class FlatScene:
         self._renderer: RendererAgg | None = None
         self._outlines = _rings(np.diff(assembly.offsets))
         self._paint(block_fill)
-        self._layers["outline"] = _Layer(palette.OUTLINE, *self._outlines, width=self._outline_width())
+        self._layers["outline"] = _Layer(outline, *self._outlines, width=self._outline_width())
         self._hatch()
         self.pose(solver.Pose.initial(assembly))
 

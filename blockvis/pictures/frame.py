@@ -19,6 +19,15 @@ from . import palette
 #: Height of the text as a fraction of the height of the picture, and its least size in pixels.
 TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 36.0, 12
 
+#: How far labels lie from their places, in heights of the text: the nearest where there is room.
+LABELS_AWAY = (0.6, 1.8, 3.0)
+
+#: A label over the leader of another is as bad as over so many dots.
+CROSSED = 10
+
+#: To which side a label may lie, to the right and down, the best first.
+BESIDE = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, -1), (1, 1), (-1, 1))
+
 #: Between two entries of the legend, in heights of its letters.
 LEGEND_GAP = 1.3
 
@@ -255,11 +264,16 @@ class Sheet:
 
 
 def write_labels(
-    picture: Image.Image, places: np.ndarray, words: Sequence[str], text: int, most: int, dots: np.ndarray
+    picture: Image.Image,
+    places: np.ndarray,
+    words: Sequence[str],
+    text: int,
+    dots: np.ndarray,
+    colours: Sequence[tuple[int, int, int]] = (),
 ) -> None:
     """Write labels on paper beside places of a picture, in their order, each where none lies yet.
 
-    They leave dots free where there is room beside them.
+    They leave dots free where there is room beside them; farther from its place a label has a leader.
 
     Parameters
     ----------
@@ -270,35 +284,82 @@ def write_labels(
         One per place.
     text : int
         Height of the text in pixels.
-    most : int
-        Labels written at most.
     dots : (n, 2) array [pixel]
+    colours : sequence of (int, int, int)
+        Of their rims, one per place; that of open joints by default.
     """
     draw, font = ImageDraw.Draw(picture), _font(round(0.85 * text))
     high, pad, rim = 1.2 * text, 0.25 * text, 0.4 * text
-    written: list[tuple[float, float, float, float]] = []
-    for (x, y), label in zip(places.tolist(), words, strict=True):
+    written: list[Label] = []
+    for (x, y), label, colour in zip(places.tolist(), words, colours or [palette.OPEN] * len(words), strict=True):
+        if not (0.0 <= x <= picture.width and 0.0 <= y <= picture.height):
+            continue
         wide = font.getlength(label) + 2.0 * pad
-        corners = (
-            (x + 0.6 * text, y - high / 2.0),
-            (x - 0.6 * text - wide, y - high / 2.0),
-            (x - wide / 2.0, y - 0.6 * text - high),
-            (x - wide / 2.0, y + 0.6 * text),
-        )
-        free: list[tuple[int, int, tuple[float, float, float, float]]] = []
-        for left, top in corners:
-            box = (left, top, left + wide, top + high)
-            inside = box[0] >= 0 and box[1] >= 0 and box[2] <= picture.width and box[3] <= picture.height
-            if inside and not any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in written):
-                hidden = int(((dots > np.subtract(box[:2], rim)) & (dots < np.add(box[2:], rim))).all(axis=1).sum())
-                free.append((hidden, len(free), box))
+        free: list[tuple[float, int, Label]] = []
+        for away in np.multiply(LABELS_AWAY, text):
+            for right, down in BESIDE:
+                middle = x + right * (wide / 2.0 + away), y + down * (high / 2.0 + away)
+                one = Label((x, y), (middle[0] - wide / 2.0, middle[1] - high / 2.0, wide, high), label, colour)
+                if one.inside(picture.size) and not any(one.overlaps(other) for other in written):
+                    left, top = one.box[:2]
+                    hidden = (dots > (left - rim, top - rim)) & (dots < (left + wide + rim, top + high + rim))
+                    crossed = sum(one.crosses(other) or other.crosses(one) for other in written)
+                    free.append((int(hidden.all(axis=1).sum()) + away / text + CROSSED * crossed, len(free), one))
         if free:
-            box = min(free)[2]
-            draw.rounded_rectangle(box, 0.25 * text, fill=palette.PAPER, outline=palette.OPEN)
-            draw.text((box[0] + wide / 2.0, box[1] + high / 2.0), label, palette.INK, font, anchor="mm")
-            written.append(box)
-        if len(written) == most:
-            return
+            written.append(min(free, key=lambda one: one[:2])[2])
+    for one in written:
+        if np.hypot(*np.subtract(one.nearest, one.place)) > text:
+            # Grey and with a dot at its end: a coloured one would look like a crack.
+            draw.line((*one.place, *one.nearest), fill=palette.FAINT, width=max(1, text // 16))
+            draw.circle(one.place, text / 8.0, fill=palette.FAINT)
+    for one in written:
+        left, top, wide, high = one.box
+        box = (left, top, left + wide, top + high)
+        draw.rounded_rectangle(box, 0.25 * text, fill=palette.PAPER, outline=one.colour, width=max(1, text // 15))
+        draw.text((left + wide / 2.0, top + high / 2.0), one.words, palette.INK, font, anchor="mm")
+
+
+@dataclass(frozen=True)
+class Label:
+    """Words beside a place of a picture.
+
+    Attributes
+    ----------
+    place : (float, float) [pixel]
+    box : (float, float, float, float) [pixel]
+        Left, top, width and height.
+    words : str
+    colour : (int, int, int)
+        Of its rim.
+    """
+
+    place: tuple[float, float]
+    box: tuple[float, float, float, float]
+    words: str
+    colour: tuple[int, int, int]
+
+    @property
+    def nearest(self) -> tuple[float, float]:
+        """Where a leader from the place meets the box."""
+        (x, y), (left, top, wide, high) = self.place, self.box
+        return min(max(x, left), left + wide), min(max(y, top), top + high)
+
+    def inside(self, size: tuple[int, int]) -> bool:
+        """Whether it lies inside a picture."""
+        left, top, wide, high = self.box
+        return left >= 0.0 and top >= 0.0 and left + wide <= size[0] and top + high <= size[1]
+
+    def overlaps(self, other: Label) -> bool:
+        """Whether its box lies over that of another."""
+        left, top, wide, high = self.box
+        x, y, across, up = other.box
+        return left < x + across and x < left + wide and top < y + up and y < top + high
+
+    def crosses(self, other: Label) -> bool:
+        """Whether its box lies over the leader of another."""
+        left, top, wide, high = self.box
+        leader = np.linspace(other.place, other.nearest, 12)[1:]
+        return bool(((leader > (left, top)) & (leader < (left + wide, top + high))).all(axis=1).any())
 
 
 def write_words(picture: Image.Image, place: tuple[float, float], words: str, text: int) -> None:

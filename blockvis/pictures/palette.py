@@ -44,6 +44,11 @@ PARTS = np.array(
     [(151, 190, 224), (172, 208, 160), (196, 178, 222), (236, 206, 136), (231, 178, 186), (150, 208, 204)], dtype=float
 )
 
+#: Edges of the blocks and the main cracks in a drawing of cracks, the widest first: red, blue, green,
+#: violet, ochre, teal.
+PALE_OUTLINE = (204, 199, 191)
+SURVEYED = ((190, 30, 30), (20, 92, 168), (46, 125, 50), (126, 55, 178), (184, 110, 0), (0, 121, 125))
+
 #: Of the colour of blocks that stand still while others move so much is left: the eye goes to what moves.
 STILL = 0.45
 

@@ -227,11 +227,16 @@ def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
             return f"no equilibrium {when}   ·   {bodies}"
         return f"{response.stop}: the motion that would follow   ·   {bodies}"
     collapse = response.collapse
-    low, high = (f"{end:.5g} {collapse.unit}" for end in collapse.bracket)
+    low, high = (f"{end:.{_digits(collapse.bracket)}g} {collapse.unit}" for end in collapse.bracket)
     loss = loss_of(response)
     what = "collapse mechanism" if loss is None or not loss.local else "local loss"
     falls = "" if loss is None else f"   ·   {100.0 * loss.share:.3g} % of W fall"
     return f"{what}   ·   {collapse.lost} at {low}, none at {high}   ·   {bodies}{falls}"
+
+
+def _digits(bracket: tuple[float, float]) -> int:
+    """So many digits tell the ends of a bracket apart."""
+    return next((n for n in range(5, 9) if f"{bracket[0]:.{n}g}" != f"{bracket[1]:.{n}g}"), 9)
 
 
 def _check_response(response: solver.Response) -> None:

@@ -24,7 +24,7 @@ from blockvis.results.about import about
 from blockvis.results.cracks import Crack, cracks_of
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.system.atomic_files import write_atomic
-from blockvis.text import force_text
+from blockvis.text import force_text, width_text
 
 from .page import certificate_rows, headline_of, range_rows, summary_rows
 
@@ -138,9 +138,7 @@ def _crack_table(cracks: Sequence[Crack]) -> tuple[Sequence[str], list[tuple[str
     for number, crack in enumerate(cracks[:MOST_CRACKS], start=1):
         ends = [", ".join(f"{x:.2f}" for x in end + 0.0) for end in crack.ends]
         size = f"{crack.size:.3g} {'m' if plane else 'm²'}"
-        rows.append(
-            (str(number), f"{1e3 * crack.width:.3g} mm", crack.widest, size, f"{crack.inclination:.0f}°", *ends)
-        )
+        rows.append((str(number), width_text(crack.width), crack.widest, size, f"{crack.inclination:.0f}°", *ends))
     if len(cracks) > MOST_CRACKS:
         rows.append(("", "", f"and {len(cracks) - MOST_CRACKS} narrower ones", "", "", "", ""))
     return head, rows, (8.0, 20.0, 56.0, 18.0, 16.0, 28.0, 28.0)

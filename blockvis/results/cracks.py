@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spannin
 from scipy.spatial import ConvexHull
 
 import solver
+from blockvis.text import width_text
 
 from .joint_faces import InitialJoints, initial_joints
 from .joints import Faces, carried_faces, opening_and_slip
@@ -29,6 +30,9 @@ TURN = 1.5
 
 #: Most crack lines that a summary lists, the widest first.
 MOST_LISTED = 100
+
+#: Most main cracks, and the least part of the largest area of opening that one of them has.
+MOST_MAIN, LEAST_MAIN = 6, 0.05
 
 #: Joints in space belong to one crack where their blocks part by the same, up to this part of it.
 ALIKE = 0.5
@@ -139,6 +143,13 @@ def cracks_of(
     return sorted((crack for crack in found if crack.width > least), key=lambda crack: -crack.width)
 
 
+def main_cracks(cracks: Sequence[Crack]) -> list[Crack]:
+    """Choose the cracks that pictures tell apart, those with the largest areas of opening, in the given order."""
+    areas = np.array([crack.mean_width * crack.size for crack in cracks])
+    largest = np.sort(np.argsort(-areas, kind="stable")[:MOST_MAIN])
+    return [cracks[k] for k in largest.tolist() if areas[k] >= LEAST_MAIN * areas.max()]
+
+
 def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
     """Name and say in words the widest crack lines, for a table."""
     rows = []
@@ -148,7 +159,7 @@ def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
         ends = np.round(crack.ends, 3 - int(np.floor(np.log10(longest)))) + 0.0
         first, last = (f"({', '.join(f'{x:.3g}' for x in end)})" for end in ends)
         size = f"{crack.size:.3g} {'m' if len(crack.at) == 2 else 'm²'}"
-        words = f"{1e3 * crack.width:.3g} mm at {crack.widest}; {size}, {crack.inclination:.0f}°, "
+        words = f"{width_text(crack.width)} at {crack.widest}; {size}, {crack.inclination:.0f}°, "
         words += f"from {first} to {last} m"
         if set(crack.places) - {"", "inside"}:
             words += f": {' to '.join(crack.places)}"

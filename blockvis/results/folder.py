@@ -47,7 +47,8 @@ _LISTS = (
 )
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz")
 _PICTURES = (
-    *("report.html", "report.pdf", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
+    *("report.html", "report.pdf", "curve.png", "curve.svg", "mechanism.png", "cracks.png", "last.png"),
+    "paraview_colours.py",
     *(f"collapse{suffix}" for suffix in VIDEO_SUFFIXES),
 )
 

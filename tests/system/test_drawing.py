@@ -117,8 +117,14 @@ def test_film_and_pictures_may_be_left_out(case, tmp_path, monkeypatch):
     assert {"summary.json", "blocks.pvd", "fall.pvd"} <= film
     run = RUN.resume_run(tmp_path / "film", film=False)
     there = {path.name for path in run.folder.iterdir()}
-    assert {"report.html", "curve.png", "mechanism.png"} <= there
+    assert {"report.html", "curve.png", "mechanism.png", "cracks.png"} <= there
     assert "collapse.mp4" not in there
+    last = (run.folder / "cracks.png").read_bytes()
+    assert main(["render", str(run.folder), "--cracks", "-1", "--size", "1920x1080"]) == 0
+    assert (run.folder / "cracks.png").read_bytes() == last
+    assert main(["render", str(run.folder), "--cracks", "0", "--size", "1920x1080"]) == 0
+    assert (run.folder / "cracks.png").read_bytes() != last
+    assert main(["render", str(run.folder), "--cracks", "99"]) == 2
 
 
 @pytest.mark.slow

@@ -126,7 +126,7 @@ def test_the_legend_of_the_fall_names_no_joints_and_no_forces(words):
     fall = fall_of(response)
     drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.path, fall=fall)
     drawer.picture(response.path[-1])
-    drawer.falling_picture(float(fall.times[-1]) / 2.0)
+    drawer.falling_picture(0.5)
     standing, falling = ([key.text for key in said["keys"]] for said in words)
     assert words[1]["badge"] == FALL_BADGE
     assert falling == ["parts of the last mechanism"]
@@ -169,7 +169,7 @@ def test_widths_are_written_of_cracks_that_count(monkeypatch, tmp_path):
     written, response = [], arch_response()
     monkeypatch.setattr(drawing, "write_labels", lambda picture, places, words, *_: written.extend(words))
     widest = drawing.cracks_of(response.assembly, response.path[-1].pose)[0]
-    cracks = [replace(widest, width=width) for width in (0.04, 0.004, 0.0004)]
+    cracks = [replace(widest, width=width, mean_width=width) for width in (0.04, 0.004, 0.0004)]
     monkeypatch.setattr(drawing, "cracks_of", lambda *_: cracks)
     draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL)
     assert written == ["40 mm", "4 mm"]
@@ -179,7 +179,7 @@ def test_widths_leave_hinges_free_where_there_is_room():
     dot, place = np.array([[60.0, 50.0]]), np.array([[50.0, 50.0]])
     for dots, hidden in ((dot, False), (np.zeros((0, 2)), True)):
         picture = Image.new("RGB", (200, 100), "green")
-        write_labels(picture, place, ["9 mm"], 10, 1, dots)
+        write_labels(picture, place, ["9 mm"], 10, dots)
         assert (picture.getpixel((60, 50)) != (0, 128, 0)) is hidden
         assert np.any(np.asarray(picture) != (0, 128, 0)), "it is written in any case"
 
@@ -220,3 +220,27 @@ def test_tiles_of_studies_hold_supports_and_their_arrow():
     low, high = pictures._frame([shape])
     assert (low < shape["vertices"].min(axis=0)).all()
     assert (shape["vertices"].max(axis=0) < high).all()
+
+
+def test_labels_lie_apart_and_tell_by_leaders_where_they_belong():
+    places = np.array([[100.0, 60.0]] * 4 + [[100.0, 72.0]])
+    picture = Image.new("RGB", (300, 200), "green")
+    colours = [(200, 10 * k, 0) for k in range(5)]
+    write_labels(picture, places, ["12 mm"] * 5, 12, np.zeros((0, 2)), colours)
+    pixels = np.asarray(picture)
+    for colour in colours:
+        assert (pixels == colour).all(axis=2).sum() > 50, "each label has its rim"
+    assert (pixels == palette.PAPER).all(axis=2).sum() > 5 * 150
+
+
+def test_what_lies_still_has_no_badge_of_falling(words):
+    response = arch_response()
+    fall = fall_of(response)
+    drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.path, fall=fall)
+    *_, last = film_of(drawer, 4.0, 1.0)[1]
+    drawer.falling_picture(float(fall.times[-1]))
+    badges = [said["badge"] for said in words if said["title"].startswith("Fall")]
+    assert FALL_BADGE in badges
+    assert badges[-2:] == ["", ""]
+    pixels = np.asarray(last).astype(int)
+    assert not (np.abs(pixels - palette.WARNING) <= 8).all(axis=2).any()

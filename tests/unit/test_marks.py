@@ -37,7 +37,7 @@ from blockvis.report.page import summary_rows
 from blockvis.results.cracks import crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.results.swinging import corner_speeds, swing_factors, swung_increment
-from blockvis.text import rounded_length
+from blockvis.text import rounded_length, width_text
 from solver import mechanics
 
 
@@ -318,7 +318,7 @@ def test_the_cracks_of_an_arch_are_its_hinges(tmp_path):
     # Places are numbers that can be read: 0, not 5.66e-17.
     assert not re.search(r"\de-\d", " ".join(words for _, words in crack_rows(cracks, len(cracks))))
     page = report_of(arch)
-    assert f"{1e3 * cracks[0].width:.3g} mm at {cracks[0].widest}" in page
+    assert f"{width_text(cracks[0].width)} at {cracks[0].widest}" in page
 
 
 def test_every_key_of_a_crack_is_named_in_the_manual():

@@ -1,0 +1,127 @@
+"""The drawing of the cracks: those of one increment on the pale layout, as a survey has them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+import solver
+from blockvis.results.cracks import Crack, cracks_of, main_cracks
+from blockvis.results.joint_faces import InitialJoints, initial_joints
+from blockvis.results.joints import end_openings
+from blockvis.system.atomic_files import atomic_file
+from blockvis.text import width_text
+
+from . import palette
+from .captions import state_text
+from .flat_scene import FlatScene
+from .frame import Key, Sheet, framed, write_labels
+from .render import STILL_SIZE
+
+#: Thickness of a crack that only slides and of the widest one, in heights of the picture; the latter in block sizes at
+#: most, or the steps of a fine bond would run into each other.
+THIN, THICK, OF_BLOCK = 1.0 / 540.0, 1.0 / 60.0, 0.35
+
+#: Of the colour of the blocks so much is left.
+PALE = 0.3
+
+
+def draw_cracks(
+    response: solver.Response,
+    number: int,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[int, int] = STILL_SIZE,
+) -> Path:
+    """Draw the cracks of an increment in the plane alone, on the layout.
+
+    Each main crack has a colour of its own and its largest width written at its widest point; the others are grey.
+
+    Parameters
+    ----------
+    response : solver.Response
+    number : int
+        Of the increment; -1 is the last equilibrium.
+    path : path
+    size : (int, int)
+        Width and height in pixels.
+
+    Returns
+    -------
+    pathlib.Path
+
+    Raises
+    ------
+    ValueError
+        For blocks in space, and for a number that no increment in equilibrium has.
+    """
+    assembly = response.assembly
+    if assembly.dimension == 3:
+        raise ValueError("cracks.png is of blocks in the plane, these lie in space: see their cracks in last.png")
+    increments = response.path or response.increments
+    if not -len(increments) <= number < len(increments):
+        raise ValueError(f"there is no increment {number}: choose one from 0 to {len(increments) - 1}, or -1, the last")
+    increment = increments[number]
+    joints = initial_joints(assembly)
+    cracks = cracks_of(assembly, increment.pose, joints, increment.fallen)
+    main = main_cracks(cracks)
+    openings = np.maximum(end_openings(assembly, joints, increment.pose), 0.0)
+    widest = cracks[0].width if cracks else 1.0
+
+    sheet = Sheet(size)
+    fill = palette.block_colours(assembly.materials, assembly.free)
+    fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), PALE)
+    frame = framed(assembly, [solver.Pose.initial(assembly)])
+    scene = FlatScene(assembly, frame, sheet.inside_size, fill, outline=palette.PALE_OUTLINE)
+    others = [crack for crack in cracks if id(crack) not in {id(one) for one in main}]
+    layers = [*zip(main, palette.SURVEYED, strict=False), *((crack, palette.FAINT) for crack in others)]
+    height = float(scene.frame.size[1])
+    thin, thick = THIN * height, max(min(THICK * height, OF_BLOCK * assembly.block_size), 2.0 * THIN * height)
+    # The main ones are drawn last, on top.
+    for k, (crack, colour) in list(enumerate(layers))[::-1]:
+        half = (thin + (thick - thin) * openings[crack.joints] / widest) / 2.0
+        scene.polygons(f"crack edge/{k}", _bars(joints.ends[crack.joints], half), colour)
+    picture = scene.image()
+    if main:
+        spread = np.concatenate([joints.ends[crack.joints] for crack in cracks])
+        along = np.linspace(0.0, 1.0, 5)[:, None, None]
+        dots = ((1.0 - along) * spread[:, 0] + along * spread[:, 1]).reshape(-1, 2)
+        places = scene.at_pixel(np.array([_widest_point(crack, joints, openings) for crack in main]))
+        words = [width_text(crack.width) for crack in main]
+        colours = palette.SURVEYED[: len(main)]
+        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours)
+    # Numbered as in the report.
+    number_of = {id(crack): k for k, crack in enumerate(cracks, start=1)}
+    keys = [Key("line", f"crack {number_of[id(c)]}", palette.SURVEYED[k]) for k, c in enumerate(main)]
+    if others:
+        keys.append(Key("line", f"{len(others)} smaller", palette.FAINT))
+    none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
+    said = f"{len(cracks)} crack{'s' if len(cracks) != 1 else ''}   ·   lines as thick as they are open, the thickest "
+    page = sheet.composed(
+        picture,
+        title=f"Cracks   ·   {state_text(increment, response)}",
+        detail=f"{said}{width_text(widest)}   ·   drawn on the layout" if cracks else none,
+        keys=keys,
+        pixel=scene.pixel,
+    )
+    with atomic_file(path) as partial:
+        page.save(partial)
+    return Path(path)
+
+
+def _bars(ends: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """(n, 4, 2) array [m]: lines with ends (n, 2, 2), at each so far (n, 2) to both sides, a little longer to meet."""
+    along = ends[:, 1] - ends[:, 0]
+    unit = along / np.maximum(np.hypot(*along.T), 1e-300)[:, None]
+    side = np.stack([-unit[:, 1], unit[:, 0]], axis=1)[:, None] * half[:, :, None]
+    longer = unit[:, None] * half.min(axis=1)[:, None, None] * np.array([[-1.0], [1.0]])
+    left, right = ends + longer + side, ends + longer - side
+    return np.stack([left[:, 0], left[:, 1], right[:, 1], right[:, 0]], axis=1)
+
+
+def _widest_point(crack: Crack, joints: InitialJoints, openings: np.ndarray) -> np.ndarray:
+    """(2,) array [m]: the end of its widest joint that is open most, in the layout."""
+    widest = crack.joints[0]
+    return np.asarray(joints.ends[widest, openings[widest].argmax()])
