@@ -462,6 +462,7 @@ LOADS = Section(
             "corner", 2, otherwise="the faces in the way of direction"),
         Key("positions", _PLACES,
             "Places x of a live force that moves over what is topmost there", [-1.9, 1.9, 77], "m", otherwise="none"),
+        Key("y", NUMBER, "The y of all positions, of blocks in space", 0.5, "m", otherwise="none"),
     ),
     several=True,
 )  # fmt: skip

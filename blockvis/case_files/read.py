@@ -308,6 +308,8 @@ def _load(table: Table) -> LoadCase:
             raise table.error(key, "is that of a pressure; add pressure = ... [Pa]")
     if load.edge is not None and "direction" in given:
         raise table.error("direction", "and edge are both given; pressure on an edge is perpendicular to it")
+    if load.y is not None and not load.positions:
+        raise table.error("y", "is that of positions; add positions = [first x, last x, number of places]")
     if load.positions:
         if load.kind != "live" or not load.has_force:
             raise table.error("positions", 'are those of a live force; give kind = "live" and force = [fx, fy]')

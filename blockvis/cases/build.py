@@ -17,7 +17,7 @@ from blockvis.layout import layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.facing import DEFAULT_FACING
 from blockvis.layout.repair import DeepOverlap
-from blockvis.layout.units import doubt
+from blockvis.layout.units import better_unit, doubt
 from blockvis.text import nearest
 from solver import mechanics
 
@@ -61,9 +61,12 @@ def case_assembly(case: Case) -> solver.Assembly:
     Raises
     ------
     ValueError
-        For a layout that cannot be read or built, and for settlements without a moving support.
+        For a layout that cannot be read or built, for a file whose unit is in doubt while the case gives none, and for
+        settlements without a moving support.
     """
-    sketch = with_roles_by_place(_case_layout(case), case.role_places)
+    sketch = _case_layout(case)
+    _refuse_doubted_unit(case, sketch)
+    sketch = with_roles_by_place(sketch, case.role_places)
     _note_density(case, sketch)
     if case.densities:
         sketch = _with_densities(case, sketch)
@@ -119,6 +122,18 @@ def _refuse_idle_settlements(case: Case, assembly: solver.Assembly) -> None:
                 f"{where} ({named}) are no moving supports, so that nothing would move; "
                 f"those of the case are {', '.join(moving[:12])}"
             )
+
+
+def _refuse_doubted_unit(case: Case, sketch: layout.Layout) -> None:
+    """Refuse blocks far from the size of masonry where another unit would make them masonry and the case gives none."""
+    given = case.unit is not None or any(case.image.get(key) for key in ("width", "height", "pixel"))
+    if case.file is None or given or case.bonds:
+        return
+    size = float(np.median(sketch.sizes))
+    better = better_unit(sketch.unit, size)
+    if better:
+        remedy = f'give [geometry] unit = "{better}", or unit = "{sketch.unit}" if it is right'
+        raise ValueError(f"{case.source}: '{case.file.name}': {doubt(sketch.unit, size, remedy=remedy)}")
 
 
 def _refuse_unknown_materials(case: Case, assembly: solver.Assembly) -> None:

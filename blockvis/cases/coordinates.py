@@ -38,9 +38,12 @@ def check_coordinates(case: Case, assembly: solver.Assembly) -> None:
         if moment is not None and (d == 3) != isinstance(moment, tuple):
             wanted = "three numbers [mx, my, mz]" if d == 3 else "one number"
             raise ValueError(f"{case.source}: [{table}] moment: the blocks are {where}; give {wanted}")
-        if d == 3 and (load.pressure is not None or load.positions):
-            key = "positions" if load.positions else "pressure"
-            raise ValueError(f"{case.source}: [{table}] {key} belongs to blocks in the plane; in space give forces")
+        if d == 3 and load.pressure is not None:
+            raise ValueError(f"{case.source}: [{table}] pressure belongs to blocks in the plane; in space give forces")
+        if d == 3 and load.positions and load.y is None:
+            raise ValueError(f"{case.source}: [{table}] positions: the blocks are in space; add the line's y = ... [m]")
+        if d == 2 and load.y is not None:
+            raise ValueError(f"{case.source}: [{table}] y is that of positions in space; the blocks are {where}")
     control = case.settings if isinstance(case.settings, solver.ControlDisplacement) else None
     given += [("control", key, getattr(control, key, None)) for key in ("direction", "point")]
     for table, key, numbers in given:

@@ -14,6 +14,7 @@ import solver
 from blockvis.text import force_text, nearest
 
 from .block_at import block_at
+from .topmost import load_on_top_in_space
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class LoadCase:
         Number of the edge, from 1, that the pressure pushes into: counter-clockwise from the first corner.
     positions : tuple of float [m]
         Places x of a force that moves over the topmost surface of the structure; empty for other loads.
+    y : float, optional [m]
+        Of all positions, in space.
     """
 
     kind: str = "dead"
@@ -51,6 +54,7 @@ class LoadCase:
     direction: tuple[float, float] = (0.0, -1.0)
     edge: int | None = None
     positions: tuple[float, ...] = ()
+    y: float | None = None
 
     @property
     def has_force(self) -> bool:
@@ -124,7 +128,7 @@ def moving_loads(
     positions : (n,) array [m]
         Empty if no load moves.
     live : function of int
-        The live load (n_blocks, 3) [N, N·m] at a position, by its number.
+        The live load (n_blocks, n_dof) [N, N·m] at a position, by its number.
 
     Raises
     ------
@@ -135,13 +139,19 @@ def moving_loads(
     if moving is None:
         return np.zeros(0), lambda k: np.zeros((assembly.n_blocks, 3))
     number, load = moving
+
+    def at(x: float) -> np.ndarray:
+        if assembly.dimension == 2:
+            return solver.load_on_top(assembly, x, load.force)
+        return load_on_top_in_space(assembly, x, load.y or 0.0, load.force)
+
     for x in load.positions:
         try:
-            solver.load_on_top(assembly, x, load.force)
+            at(x)
         except ValueError as error:
             raise ValueError(f"{source}: [loads {number}] positions: {error}") from None
     # Made one at a time: each array is as long as the list of blocks.
-    return np.array(load.positions), lambda k: solver.load_on_top(assembly, load.positions[k], load.force)
+    return np.array(load.positions), lambda k: at(load.positions[k])
 
 
 def with_moving_load(

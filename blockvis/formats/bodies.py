@@ -18,9 +18,11 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import outlines_of_cells, rectangle
 from blockvis.layout.refusal import Refused
 from blockvis.layout.selection import MORTAR
-from blockvis.layout.solids import volume
+from blockvis.layout.solids import volume, width_of
 from blockvis.layout.views import VIEWS, axis_across, view_along
 from solver import mechanics
+
+from .accepted import bend_of, bent_note, pieces_note
 
 #: In a prism the sine of the angle between a face's normal and the axis, or the plane across it, is at most this.
 SQUARE = 1e-3
@@ -61,12 +63,13 @@ ECCENTRIC = 1e-3
 
 @dataclass(frozen=True)
 class Body:
-    """A closed surface of triangles: name, (n, 3) points, (m, 3) faces, and edges of holes that were closed."""
+    """A closed surface of triangles: name, (n, 3) points, (m, 3) faces, edges of closed holes, object it is part of."""
 
     name: str
     points: np.ndarray
     faces: np.ndarray
     n_hole_edges: int = 0
+    piece_of: str = ""
 
 
 def body_of_polygons(name: str, points: np.ndarray, faces: Sequence[Sequence[int]]) -> Body:
@@ -208,7 +211,7 @@ def layout_of_bodies(
         blocks=best.outlines,
         names=tuple(body.name for body in bodies),
         unit=found.unit,
-        notes=(*notes, *_holes_note(bodies), *found.notes),
+        notes=(*notes, *_accepted(bodies), *found.notes),
     )
     layout = replace(with_rows(layout, rows), thickness=best.high - best.low)
     return replace(layout, left_out=asked.left_out(found, name, ignore))
@@ -237,8 +240,7 @@ def solids_of_bodies(
     """
     asked = _selected(found, path, ignore, only)
     lying = found.up == "y" if view is None else view == "xy"
-    solids, warped, changed = [], [], []
-
+    solids, warped, changed, bent = [], [], [], []
     for body in asked.bodies:
         plane = with_plane_faces(body.points, body.faces)
         points, faces = plane.solid
@@ -258,6 +260,9 @@ def solids_of_bodies(
             )
         if plane.warp:
             warped.append((plane.warp, body.name, plane.place))
+        bend, corner = bend_of(points, faces)
+        if bend:
+            bent.append((bend, width_of(points, faces), body.name, corner))
         drawn = abs(volume(body.points, body.faces))
         changed.append((volume(points, faces) / drawn - 1.0, body.name))
         solids.append((points[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if lying else points, faces))
@@ -281,7 +286,12 @@ def solids_of_bodies(
         blocks=tuple(solids),
         names=tuple(body.name for body in asked.bodies),
         unit=found.unit,
-        notes=(*(Note(CHANGED, text) for text in said), *_holes_note(asked.bodies), *found.notes),
+        notes=(
+            *(Note(CHANGED, text) for text in said),
+            *_accepted(asked.bodies),
+            *bent_note(bent, len(solids)),
+            *found.notes,
+        ),
     )
     return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", ignore))
 
@@ -331,13 +341,14 @@ def _labels(row: Mapping[str, Any]) -> list[str]:
     return [str(row.get(key, "")) for key in ("name", "group", "material")]
 
 
-def _holes_note(bodies: Sequence[Body]) -> tuple[Note, ...]:
-    """Say which bodies had holes that were closed."""
+def _accepted(bodies: Sequence[Body]) -> tuple[Note, ...]:
+    """Say which bodies had holes that were closed, and which objects became several blocks."""
+    pieces = pieces_note([body.piece_of for body in bodies if body.piece_of], sum(not one.piece_of for one in bodies))
     holed = [f"'{body.name}' ({body.n_hole_edges} edges)" for body in bodies if body.n_hole_edges]
     if not holed:
-        return ()
+        return pieces
     more = f" and {len(holed) - 6} more" if len(holed) > 6 else ""
-    return (Note(CHANGED, f"small holes in the surface of {', '.join(holed[:6])}{more} were closed"),)
+    return (Note(CHANGED, f"small holes in the surface of {', '.join(holed[:6])}{more} were closed"), *pieces)
 
 
 def _selected(found: Bodies, path: Path | str, ignore: Sequence[str], only: Sequence[str]) -> _Selection:

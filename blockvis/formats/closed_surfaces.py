@@ -145,7 +145,10 @@ def _pieces(
     for k in range(n):
         own = faces[piece == k]
         n_hole_edges = 0 if holes is None else int(np.isin(holes, own).all(axis=1).sum())
-        bodies.append(Body(name if n == 1 else f"{name} {k + 1}", points, own, n_hole_edges))
+        whole = n == 1
+        bodies.append(
+            Body(name if whole else f"{name} {k + 1}", points, own, n_hole_edges, piece_of="" if whole else name)
+        )
     return bodies
 
 

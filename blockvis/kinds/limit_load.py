@@ -39,6 +39,11 @@ FLOWS = ("associative", "non-associative")
 #: What faces of blocks in space resist when they turn in their own plane.
 TORSIONS = ("points", "uniform")
 
+#: What a limit load that has not converged is worth.
+UNPROVED = (
+    ': the value is that of the last program and no limit load; flow = "associative" gives a proved upper bound of it'
+)
+
 #: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the
 #: structure.
 SWINGING_FRAMES, SWING = 30, 0.05
@@ -248,7 +253,8 @@ class LimitLoadKind(AnalysisKind):
             f"live load            {state.reaction:12.6g} N   {state.reaction / response.total_weight:.6f} W",
         ]
         if said["limit_load_status"] != solver.LimitStatus.FOUND:
-            lines.append(f"status: {said['limit_load_status']}")
+            unproved = said["limit_load_status"] == solver.LimitStatus.NOT_CONVERGED
+            lines.append(f"status: {said['limit_load_status']}{UNPROVED if unproved else ''}")
         if "limit_load_torsion" in said:
             by = "friction at their points" if said["limit_load_torsion"] == "points" else "a uniform pressure"
             lines.append(f"torsion of the faces: that of {by}")

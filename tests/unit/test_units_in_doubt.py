@@ -6,6 +6,7 @@ from structures import assembly_of, case_from, drawn
 
 import solver
 from blockvis import read_layout, write_layout
+from blockvis.cli import main
 
 
 def bricks(path, factor, **more):
@@ -64,6 +65,20 @@ COLUMN = '[geometry]\nlayout = "column"\n'
 def test_likely_unit_mistakes_are_named(tmp_path, keys, note):
     with pytest.warns(UserWarning, match=note):
         assembled(tmp_path, COLUMN + keys)
+
+
+def test_a_unit_in_doubt_stops_a_run_until_the_case_gives_one(tmp_path, capsys):
+    bricks(tmp_path / "a.msh", 1000.0)
+    text = "[geometry]\nfile = 'a.msh'\n{}\n[settlement]\ndirection = [0, -1]\nincrement = 1e-4\nlimit = 1e-3\n"
+    case = tmp_path / "case.toml"
+    case.write_text(text.format("") + "[roles]\nblock_1 = 'moving'\n")
+    assert main(["run", str(case), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "unit m in doubt: it makes the median block 131 m across; mm would make it 0.131 m" in said
+    assert 'give [geometry] unit = "mm", or unit = "m" if it is right' in said
+    for unit, width in (("mm", 0.72), ("m", 720.0)):
+        assembly = assembled(tmp_path, f"[geometry]\nfile = 'a.msh'\nunit = '{unit}'\n")
+        assert np.ptp(assembly.vertices[assembly.vertices[:, 1] > -1.0, 0]) == pytest.approx(width)
 
 
 def test_density_of_the_file_wins_with_a_note(tmp_path):

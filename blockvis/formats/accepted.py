@@ -1,0 +1,94 @@
+"""Notes on what a file draws that is no plane-faced stone, and is accepted as some."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from blockvis.layout.notes import CHANGED, Note
+
+#: Cosine of the fold between two triangles up to which they are read as one bent face: 30 degrees.
+BENT_FACE = 0.866
+
+
+def bend_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> tuple[float, np.ndarray]:
+    """Find how far a corner is out of the plane of a face of four corners that was cut into two triangles.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    faces : sequence of sequences of int
+        Points around each face.
+
+    Returns
+    -------
+    bend : float
+        In the unit of the points; 0 where no two triangles make such a face.
+    corner : (3,) array
+        The corner that is farthest.
+    """
+    triangles = [list(ring) for ring in faces if len(ring) == 3]
+    of_edge = {(ring[k - 1], ring[k]): (number, ring[k - 2]) for number, ring in enumerate(triangles) for k in range(3)}
+    normals = [np.cross(points[b] - points[a], points[c] - points[a]) for a, b, c in triangles]
+    worst, place = 0.0, points[0]
+    for (a, b), (number, apex) in of_edge.items():
+        beside, other = of_edge.get((b, a), (-1, -1))
+        if beside < 0:
+            continue
+        one, two = normals[number], normals[beside]
+        sizes = float(np.linalg.norm(one) * np.linalg.norm(two))
+        if sizes <= 0.0 or float(one @ two) < BENT_FACE * sizes:
+            continue
+        bend = abs(float((points[other] - points[apex]) @ one)) / float(np.linalg.norm(one))
+        if bend > worst:
+            worst, place = bend, points[other]
+    return worst, place
+
+
+def bent_note(bent: Sequence[tuple[float, float, str, np.ndarray]], n_blocks: int) -> tuple[Note, ...]:
+    """Say that bent faces were accepted, cut into triangles.
+
+    Parameters
+    ----------
+    bent : sequence of (bend, width of the block, name of the block, (3,) corner)
+        In the unit of the file.
+    n_blocks : int
+    """
+    if not bent:
+        return ()
+    bend, width, name, corner = max(bent, key=lambda one: one[0] / one[1])
+    place = ", ".join(f"{x:.6g}" for x in corner)
+    return (
+        Note(
+            CHANGED,
+            f"bent faces of {len(bent)} of {n_blocks} blocks were cut into triangles: a corner up to {bend:.3g} in the "
+            f"file's unit, {100.0 * bend / width:.2g} % of the block, out of the plane of the others, of '{name}' at "
+            f"({place}); draw plane faces if the stone has some",
+        ),
+    )
+
+
+def pieces_note(objects: Sequence[str], n_others: int) -> tuple[Note, ...]:
+    """Say which objects hold several closed bodies, each of which became a block.
+
+    Parameters
+    ----------
+    objects : sequence of str
+        Of each body that is a piece of an object, the object's name.
+    n_others : int
+        Bodies that are a whole object. A file of a single object holds all blocks by intention.
+    """
+    counts = Counter(objects)
+    if not counts or (len(counts) == 1 and n_others == 0):
+        return ()
+    shown = ", ".join(f"'{name}' ({n} blocks)" for name, n in list(counts.items())[:6])
+    more = f" and {len(counts) - 6} more" if len(counts) > 6 else ""
+    return (
+        Note(
+            CHANGED,
+            f"objects of several closed bodies that do not share a face became as many blocks: {shown}{more}; join "
+            "them in the drawing if each is one stone",
+        ),
+    )
