@@ -85,7 +85,7 @@ print("TOLD" + json.dumps(told))
 def folder(tmp_path_factory):
     """The results of the reference arch, and the script that a run writes beside its own."""
     path = blockvis.write(arch_response(), tmp_path_factory.mktemp("results") / "out")
-    case = structures.case_from(CASE, path.parent)
+    case = structures.case_from(CASE.format(shape="moved"), path.parent)
     run = blockvis.run_case(case, path.parent / "run", film=False)
     shutil.copy(run.folder / "paraview_colours.py", path)
     return path
