@@ -35,6 +35,7 @@ def informed(capsys, *arguments):
     return code, *capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_a_mask_becomes_a_run_that_ends_in_a_curve_over_its_photograph(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     image, n = drawn_wall()

@@ -67,6 +67,7 @@ def test_the_reader_says_what_it_assumed_of_the_unit(layout, suffix, tmp_path):
     assert said == (suffix not in (".json", ".dxf", ".svg"))
 
 
+@pytest.mark.slow
 def test_a_bigger_layout_survives_a_chain_of_formats(tmp_path):
     bricks = [
         [[x, y], [x + 0.25, y], [x + 0.25, y + 0.065], [x, y + 0.065]]

@@ -17,6 +17,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memor
 HARMLESS = {"uses.svg": "1 blocks", "face.off": "1 blocks"}
 
 
+@pytest.mark.slow
 def test_hostile_files_are_refused_within_bounds(tmp_path):
     paths = written(tmp_path)
     outcomes = {Path(str(o["file"])).name: o for o in read_all(paths, tmp_path)}

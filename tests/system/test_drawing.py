@@ -60,6 +60,7 @@ def test_what_fails_in_the_process_is_raised_here(tmp_path):
         process.wait(lambda *_: None)
 
 
+@pytest.mark.slow
 def test_the_process_writes_what_viewers_open_and_says_what_fails(arch, arch_results):
     written = {path: path.read_bytes() for path in [*arch_results.rglob("*.vtu"), *arch_results.glob("*.pvd")]}
     assert len(written) == 3 * len(arch.increments) + 3

@@ -495,6 +495,7 @@ def test_one_command_from_case_to_pictures_and_again(tmp_path, monkeypatch, caps
     ]
 
 
+@pytest.mark.slow
 def test_what_a_layout_in_space_holds_is_drawn(tmp_path, capsys):
     file = tmp_path / "arch.obj"
     blockvis.save_layout(vault_response().assembly, file)

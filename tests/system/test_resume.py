@@ -195,6 +195,7 @@ def test_run_killed_by_the_signal_resumes(whole, tmp_path):
         *(pytest.param(moments, marks=pytest.mark.thorough) for moments in ((30, 40), (2,), (75,), (100,))),
     ],
 )
+@pytest.mark.slow
 def test_killed_run_resumes(whole, tmp_path, moments):
     out = tmp_path / "out"
     arguments = [whole / "case.toml", "-o", out]

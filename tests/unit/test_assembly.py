@@ -118,6 +118,7 @@ def test_refused(what):
         solver.Assembly.from_outlines(outlines, **given)
 
 
+@pytest.mark.slow
 def test_results_show_themselves_in_one_line():
     """A wall of a thousand blocks at a prompt or in a notebook: no screens of numbers."""
     response = arch_response()

@@ -56,6 +56,7 @@ def without(hidden, *arguments):
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
 
 
+@pytest.mark.slow
 def test_sweep_without_its_packages_names_the_command(study, tmp_path):
     done = without(EXTRAS["studies"], "sweep", study, "-o", tmp_path / "out")
     assert (done.returncode, done.stdout) == (2, "")
@@ -66,6 +67,7 @@ def test_sweep_without_its_packages_names_the_command(study, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_all_but_studies_runs_without_their_packages(study, tmp_path):
     done = without(EXTRAS["studies"], "run", tmp_path / "case.toml", "-o", tmp_path / "out", "--no-film")
     assert done.returncode in (0, 4), done.stderr

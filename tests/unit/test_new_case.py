@@ -43,6 +43,7 @@ def test_white_stones_on_a_black_page_are_stones_and_no_openings_of_a_wall(tmp_p
     assert ("bond" not in values) == stones
 
 
+@pytest.mark.slow
 def test_a_dxf_with_mortar_and_no_supports_gets_a_ground_of_two_halves(tmp_path, capsys):
     """Three courses of running bond in mm with joints of 10 mm."""
     drawing = ezdxf.new("R2010")

@@ -250,6 +250,7 @@ def test_the_caption_of_a_frame_is_of_the_frame(monkeypatch):
     np.testing.assert_allclose(settlements, np.linspace(0.0, 50.0, 100), atol=0.006)
 
 
+@pytest.mark.slow
 def test_frames_of_the_fall_end_where_nothing_moves():
     falling = parted(wall(6, 5), 4, 3)
     resting = replace(falling, increments=(*falling.increments, *[falling.increments[-1]] * 9))

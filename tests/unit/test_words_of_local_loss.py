@@ -14,6 +14,7 @@ from blockvis import draw_curve
 from blockvis.cli import _in_words
 
 
+@pytest.mark.slow
 def test_summary_console_report_and_curve_tell_them_apart(tmp_path):
     response = dropped_brick()
     summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
