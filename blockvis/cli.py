@@ -234,7 +234,7 @@ def _parser() -> argparse.ArgumentParser:
     layout.set_defaults(verb=_layout)
     added = (
         *(_add_render, _add_bond, _add_compare, _add_report, _add_explain, _add_sweep, _add_new, _add_schema),
-        _add_completion,
+        *(_add_example, _add_completion),
     )
     for add in added:
         add(verbs)
@@ -440,6 +440,13 @@ def _add_schema(verbs: Any) -> None:
     schema.set_defaults(verb=_schema)
 
 
+def _add_example(verbs: Any) -> None:
+    example = verbs.add_parser("example", help="copy a shipped case and its drawing into this folder, or list all")
+    example.add_argument("example", metavar="NAME", nargs="?", help="without it all are listed")
+    example.add_argument("--force", action="store_true", help="replace files that are there already")
+    example.set_defaults(verb=_example)
+
+
 def _completion(options: argparse.Namespace) -> int:
     import shtab
 
@@ -622,6 +629,19 @@ def _schema(options: argparse.Namespace) -> int:
     # ASCII, so that it is valid JSON in whatever encoding a shell writes it to a file.
     schema = study_schema() if options.file == "study" else case_schema()
     print(json.dumps(schema, indent=2))
+    return 0
+
+
+def _example(options: argparse.Namespace) -> int:
+    from .case_files.shipped_cases import copy_case, first_sentence, shipped_cases
+
+    if options.example is None:
+        cases = shipped_cases()
+        width = max(map(len, cases))
+        print("\n".join(f"{name:<{width}}  {first_sentence(case)}" for name, case in cases.items()))
+        return 0
+    case, *drawings = copy_case(options.example, overwrite=options.force)
+    print(f"copied {', '.join(str(path) for path in (case, *drawings))}; blockvis run {case} solves it")
     return 0
 
 

@@ -72,11 +72,9 @@ GENERATED = HERE / "generated"
 
 
 def write_generated(app) -> None:
-    """Write the pages that come from the code: the keys of case and study files, and the validation tables."""
+    """Write the pages that come from the code: pictures and the validation tables."""
     GENERATED.mkdir(exist_ok=True)
     shutil.copytree(ROOT / "assets", HERE / "_static" / "assets", dirs_exist_ok=True)
-    keys = ROOT / "tools" / "key_reference.py"
-    subprocess.run([sys.executable, str(keys), str(GENERATED)], check=True, cwd=ROOT)
     tables = GENERATED / "validation_tables.md"
     # Single pages are looked at with -D plot_gallery=0, which leaves out whatever takes long.
     if str(app.config.overrides.get("plot_gallery", 1)) in ("0", "False"):

@@ -1,4 +1,4 @@
-"""Write the reference of what case, study and observation files hold: python tools/key_reference.py docs/reference."""
+"""Write the reference of what case, study and observation files hold: python tools/key_reference.py docs/keys."""
 
 from __future__ import annotations
 

@@ -1,0 +1,83 @@
+"""The cases that come with blockvis: from the wheel, or from the folder ``examples`` of a clone."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from pathlib import Path, PurePosixPath
+
+from blockvis.system.atomic_files import write_atomic
+from blockvis.text import nearest
+
+_PACKAGE = Path(__file__).parents[1]
+
+#: What lies before the name of a drawing in a shipped case.
+_DRAWINGS = "../assets/"
+
+
+def shipped_cases() -> dict[str, Path]:
+    """Return the case files that come with blockvis by their names.
+
+    Returns
+    -------
+    dict of str to Path
+
+    Raises
+    ------
+    FileNotFoundError
+        Where the installation has none.
+    """
+    # The wheel has them inside the package; a clone, also one installed for editing, beside it.
+    for root in (_PACKAGE / "shipped", _PACKAGE.parent):
+        found = sorted((root / "examples").glob("*.toml"))
+        if found:
+            return {path.stem: path for path in found}
+    raise FileNotFoundError(f"{_PACKAGE}: this installation has no shipped cases; install blockvis again")
+
+
+def first_sentence(case: Path) -> str:
+    """Return what a shipped case says of itself in the first sentence of its remarks."""
+    lines = itertools.takewhile(lambda line: line.startswith("#"), case.read_text(encoding="utf-8").splitlines())
+    remarks = " ".join(line.lstrip("# ") for line in lines)
+    return re.split(r"(?<=\.)\s", remarks, maxsplit=1)[0]
+
+
+def copy_case(name: str, folder: str | Path = ".", *, overwrite: bool = False) -> list[Path]:
+    """Copy a shipped case and the drawing that it names into one folder.
+
+    Parameters
+    ----------
+    name : str
+        With or without ``.toml``.
+    folder : str or Path
+        It is made if it is missing.
+    overwrite : bool
+        Whether files that are there may be replaced.
+
+    Returns
+    -------
+    list of Path
+        The case first.
+
+    Raises
+    ------
+    ValueError
+        Where there is no such case.
+    FileExistsError
+        Where a file is there already; nothing is written then.
+    """
+    cases = shipped_cases()
+    stem = name.removesuffix(".toml")
+    if stem not in cases:
+        raise ValueError(f"there is no example '{name}'{nearest(stem, list(cases))}; there are {', '.join(cases)}")
+    source = cases[stem]
+    text = source.read_text(encoding="utf-8")
+    contents: dict[str, str | bytes] = {source.name: text.replace(_DRAWINGS, "")}
+    for quoted in text.split('"')[1::2]:
+        if quoted.startswith(_DRAWINGS):
+            contents[PurePosixPath(quoted).name] = (source.parent / quoted).read_bytes()
+    targets = {Path(folder) / file: content for file, content in contents.items()}
+    for target in targets:
+        if target.exists() and not overwrite:
+            raise FileExistsError(f"{target} is there already; --force replaces it")
+    return [write_atomic(target, content) for target, content in targets.items()]

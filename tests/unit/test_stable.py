@@ -1,0 +1,72 @@
+"""Nothing that the page ``docs/stable.md`` promises goes; more may come."""
+
+import argparse
+import csv
+import json
+from pathlib import Path
+
+import pytest
+import pyvista as pv
+
+import blockvis
+import solver
+from blockvis import cli
+from blockvis.case_files import case_keys
+from blockvis.studies import study_keys
+
+PROMISED = json.loads((Path(__file__).parents[1] / "stable.json").read_text(encoding="utf-8"))
+
+CASE = """
+[geometry]
+layout = "{layout}"
+[settlement]
+direction = {direction}
+increment = 0.001
+limit = 0.001
+"""
+
+
+def _keys(sections):
+    return {f"[{section.name}] {key}".strip() for section in sections for key in ("", *(k.name for k in section.keys))}
+
+
+def _options():
+    actions = cli._parser()._actions
+    (verbs,) = (action.choices for action in actions if isinstance(action, argparse._SubParsersAction))
+    yield from (word for action in actions for word in action.option_strings)
+    for verb, parser in verbs.items():
+        yield verb
+        yield from (f"{verb} {word}" for action in parser._actions for word in action.option_strings)
+
+
+def _written(folder, layout, direction):
+    """Columns and arrays of the files of a small run."""
+    (folder / "case.toml").write_text(CASE.format(layout=layout, direction=direction), encoding="utf-8")
+    out = folder / "out"
+    blockvis.run_case(folder / "case.toml", out, outputs=())
+    for name in ("response.csv", "joints.csv"):
+        with (out / name).open(encoding="utf-8", newline="") as table:
+            yield from (f"{name} {column}" for column in next(csv.reader(table)))
+    for what in ("blocks", "contacts", "joints"):
+        grid = pv.read(min((out / "increments").glob(f"{what}_*.vtu")))
+        for place, data in (("point", grid.point_data), ("cell", grid.cell_data), ("file", grid.field_data)):
+            yield from (f"{what} {place} {name}" for name in data)
+
+
+def _present(what, folder):
+    if what == "results in the plane":
+        return set(_written(folder, "arch", [1.0, 0.0]))
+    if what == "results in space":
+        return set(_written(folder, "extruded arch", [1.0, 0.0, 0.0]))
+    return {
+        "blockvis": lambda: {name for name in blockvis.__all__ if hasattr(blockvis, name)},
+        "solver": lambda: {name for name in solver.__all__ if hasattr(solver, name)},
+        "case keys": lambda: _keys(case_keys.SECTIONS),
+        "study keys": lambda: _keys(study_keys.SECTIONS),
+        "command line": lambda: set(_options()),
+    }[what]()
+
+
+@pytest.mark.parametrize("what", PROMISED)
+def test_nothing_that_is_promised_goes(what, tmp_path):
+    assert sorted(set(PROMISED[what]) - _present(what, tmp_path)) == []
