@@ -56,6 +56,8 @@ WHITE_BOX = {
     "unit/test_programs.py": 18,
     "unit/test_refusal_pictures.py": 8,
     "unit/test_render.py": 11,
+    "unit/test_shipped_cases.py": 1,
+    "unit/test_stable.py": 2,
     "unit/test_studies.py": 16,
     "unit/test_tolerances.py": 1,
     "unit/test_video.py": 3,
