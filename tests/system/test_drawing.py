@@ -110,6 +110,7 @@ def test_a_process_that_is_ended_leaves_all_but_the_film(case, tmp_path, monkeyp
     assert "collapse.mp4" not in names
 
 
+@pytest.mark.slow
 def test_film_and_pictures_may_be_left_out(case, tmp_path, monkeypatch):
     monkeypatch.setattr(film_process, "FilmProcess", lambda: pytest.fail("a process was started for no film"))
     monkeypatch.setattr(render, "animate", lambda *_, **__: pytest.fail("a film was drawn"))

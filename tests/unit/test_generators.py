@@ -239,6 +239,7 @@ def _open_area(wall: solver.Assembly, number: int, opening: dict) -> float:
 @settings(deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow], max_examples=10)
 @given(walls())
 @example(({"bricks": 16, "courses": 16, "bond": "running", "openings": [CORNER]}, 4.0, 1.6))
+@pytest.mark.slow
 def test_bricks_fill_any_wall_around_its_openings_without_overlap(sample):
     parameters, length, height = sample
     wall = generators.build("wall", parameters)
