@@ -15,7 +15,7 @@ from solver import mechanics
 from .candidates import Candidate, Twin
 from .forward import Run, Variant, pose_of
 from .observations import Observations
-from .places import block_at, corners_of, on_faces
+from .places import corners_of, nearest_block, on_faces
 
 #: Amounts at which the likelihood is worked out, each larger than the one before by the same factor: from this fraction
 #: of the largest on.
@@ -100,7 +100,7 @@ class Comparison:
         names = {name: i for i, name in enumerate(assembly.names)}
         self.blocks = np.array(
             [
-                names[name] if name in names else block_at(assembly, point)
+                names[name] if name in names else nearest_block(assembly, point)
                 for name, point in zip(given.blocks, given.points, strict=True)
             ],
             dtype=int,

@@ -23,7 +23,7 @@ from blockvis.results.joints import InitialJoints, initial_joints, opening_and_s
 from blockvis.text import files_like, nearest
 
 from .observation_keys import COLUMNS, LENGTHS, OBSERVATION
-from .places import block_at, corners_of, on_faces, place_text
+from .places import corners_of, nearest_block, on_faces, place_text
 
 #: Uncertainty of a width, as a fraction of it, and the least [m], where the observations give none.
 WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4
@@ -404,7 +404,7 @@ def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray,
         point = assembly.centroids[block] if None in place else np.array(place, dtype=float)
     elif None not in place:
         point = np.array(place, dtype=float)
-        block = block_at(assembly, point)
+        block = nearest_block(assembly, point)
     else:
         raise cells.error("block", f"is missing; give the block, or {_listed(axes)}, of the displaced point")
     if None not in there:

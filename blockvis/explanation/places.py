@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 import solver
+from blockvis.cases.block_at import distances_to
 from blockvis.results.joint_faces import InitialJoints
 
 
@@ -59,16 +60,9 @@ def _on_lines(points: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndar
     return np.hypot(apart[..., 0], apart[..., 1]), np.stack([1.0 - along, along], axis=2)
 
 
-def block_at(assembly: solver.Assembly, point: np.ndarray) -> int:
-    """Find the block in which a point lies, or the nearest; in space by the planes of its faces."""
-    if assembly.dimension == 2:
-        outlines = [shapely.Polygon(assembly.outline(i)) for i in range(assembly.n_blocks)]
-        return int(np.argmin(shapely.distance(shapely.Point(point), outlines)))
-    solids = assembly.polyhedra
-    faces = solids.faces(assembly.vertices)
-    above = np.full(assembly.n_blocks, -np.inf)
-    np.maximum.at(above, solids.block_of_face, ((point - faces.middles) * faces.normals).sum(axis=1))
-    return int(np.argmin(above))
+def nearest_block(assembly: solver.Assembly, point: np.ndarray) -> int:
+    """Find the block in which a point lies, or the nearest."""
+    return int(np.argmin(distances_to(assembly, point)))
 
 
 def place_text(place: Iterable[float], digits: int = 4) -> str:
