@@ -24,6 +24,7 @@ from .results.increment import Increment, Status
 from .results.response import Collapse, Envelope, LimitLoad, LimitStatus, LocalLoss, Response
 from .structure import Structure, limit_load, pushover, settle
 from .surface_loads import edge_pressure, load_on_top, surface_pressure
+from .ties import Tie
 
 __all__ = [
     "GRAVITY",
@@ -47,6 +48,7 @@ __all__ = [
     "SolveError",
     "Status",
     "Structure",
+    "Tie",
     "edge_pressure",
     "limit_load",
     "load_on_top",

@@ -21,6 +21,7 @@ from .path.drivers import ControlDisplacement
 from .results.increment import Increment
 from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, Quantity, reaction_to, settlement_in
 from .results.response import Control, Envelope, LimitLoad, Response
+from .ties import Tie
 from .views import Shown
 
 
@@ -37,6 +38,8 @@ class Structure(Shown):
         Self-weight by default.
     friction_coefficient : float, optional
         Of every interface.
+    ties : sequence of Tie, optional
+        Ties, props and bars.
 
     Raises
     ------
@@ -49,6 +52,7 @@ class Structure(Shown):
     assembly: Assembly
     interfaces: Interfaces
     loads: Loads
+    ties: tuple[Tie, ...]
 
     def __init__(
         self,
@@ -57,6 +61,7 @@ class Structure(Shown):
         loads: Loads | None = None,
         *,
         friction_coefficient: float | None = None,
+        ties: Sequence[Tie] = (),
     ) -> None:
         if (interfaces is None) == (friction_coefficient is None):
             raise TypeError("a structure needs either a friction_coefficient or interfaces; give one of them")
@@ -65,6 +70,7 @@ class Structure(Shown):
         object.__setattr__(self, "assembly", assembly)
         object.__setattr__(self, "interfaces", interfaces)
         object.__setattr__(self, "loads", checked_loads(assembly, loads))
+        object.__setattr__(self, "ties", tuple(ties))
 
     def __repr__(self) -> str:
         """Say how many blocks it has."""

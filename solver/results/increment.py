@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
+from solver.ties import TieForces
 from solver.tolerances import DILATANCY_SLACK, SMALLEST_FORCE, SMALLEST_RATE, USED_UP
 
 from .certificate import Certificate
@@ -97,6 +98,8 @@ class State:
         Resultant of the structure on each support about its centroid; zero for free blocks.
     fell_at : (n_blocks,) array
         Parameter at which blocks have fallen, nan for the others; empty where none have.
+    ties : TieForces
+        Empty where there are none.
     """
 
     pose: Pose
@@ -107,6 +110,7 @@ class State:
     velocity: np.ndarray
     support_forces: np.ndarray
     fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    ties: TieForces = field(default_factory=TieForces)
 
 
 class StoredState(Protocol):
@@ -138,6 +142,11 @@ class HasState:
     def pose(self) -> Pose:
         """Where the blocks are."""
         return self.state.pose
+
+    @property
+    def ties(self) -> TieForces:
+        """What ties, props and bars do."""
+        return self.state.ties
 
     @property
     def contacts(self) -> Contacts:

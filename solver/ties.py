@@ -1,0 +1,118 @@
+"""Ties, props and bars: straight members between two points of a structure, or a point and the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .assembly import Assembly
+from .kinematics import Pose, carried
+
+#: Members that carry tension only, compression only, and both.
+TIE, PROP, BAR = KINDS = ("tie", "prop", "bar")
+
+#: What a member does at an increment, by number: not yet or no longer there, without force, elastic, yielding, broken.
+STATES = ABSENT, SLACK, ELASTIC, YIELDING, BROKEN = range(5)
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A straight member between two points, each held by a block or by the ground.
+
+    Attributes
+    ----------
+    name : str
+    blocks : (int or None, int or None)
+        Number of the block that holds each end; None for the ground.
+    points : ((d,) tuple of float, (d,) tuple of float) [m]
+        The ends, in the drawing.
+    stiffness : float [N/m]
+        Of the whole member: modulus times area over length.
+    kind : str
+        ``"tie"`` carries tension, ``"prop"`` compression, ``"bar"`` both.
+    strength : float [N]
+        Force at which it yields; infinite by default.
+    brittle : bool
+        Whether it breaks at its strength instead.
+    prestress : float [N]
+        Force with which it is installed: of a prop compression, otherwise tension.
+    phase : int
+        Settlement, from 1, before which it is installed, at the geometry then.
+
+    Raises
+    ------
+    ValueError
+        For an unknown kind, ends at one place or in one block, or a number outside its range.
+    """
+
+    name: str
+    blocks: tuple[int | None, int | None]
+    points: tuple[tuple[float, ...], tuple[float, ...]]
+    stiffness: float
+    kind: str = TIE
+    strength: float = np.inf
+    brittle: bool = False
+    prestress: float = 0.0
+    phase: int = 1
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        who = f"tie '{self.name}'"
+        if self.kind not in KINDS:
+            raise ValueError(f"{who} is of kind '{self.kind}'; kinds are {', '.join(KINDS)}")
+        points = np.asarray(self.points, dtype=float)
+        if points.ndim != 2 or points.shape[0] != 2 or not np.isfinite(points).all():
+            raise ValueError(f"{who} needs two points with finite coordinates; it has {self.points}")
+        if not np.linalg.norm(points[1] - points[0]) > 0.0:
+            raise ValueError(f"{who} has no length: both ends are at {tuple(points[0])}; give two places")
+        if self.blocks[0] == self.blocks[1]:
+            held = "the ground" if self.blocks[0] is None else f"block {self.blocks[0]}"
+            raise ValueError(f"{who} has both ends in {held}, where it carries nothing; join two blocks")
+        if not (np.isfinite(self.stiffness) and self.stiffness > 0.0):
+            raise ValueError(f"{who} has a stiffness of {self.stiffness:g} N/m; it must be positive and finite")
+        if not self.strength > 0.0:
+            raise ValueError(f"{who} has a strength of {self.strength:g} N; it must be positive")
+        if not 0.0 <= self.prestress < self.strength:
+            raise ValueError(
+                f"{who} has a prestress of {self.prestress:g} N; it must be at least 0 and below its strength"
+            )
+        if self.phase < 1:
+            raise ValueError(f"{who} has phase {self.phase}; settlements count from 1")
+
+
+@dataclass(frozen=True)
+class TieForces:
+    """What the members do at an increment.
+
+    Attributes
+    ----------
+    forces : (n_ties,) array [N]
+        Tension positive.
+    elongations : (n_ties,) array [m]
+        Change of length since they were installed.
+    states : (n_ties,) int array
+        Numbers of :data:`STATES`.
+    ends : (n_ties, 2, d) array [m]
+    """
+
+    forces: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    elongations: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    states: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
+
+
+def tie_ends(ties: Sequence[Tie], assembly: Assembly, pose: Pose) -> np.ndarray:
+    """(n_ties, 2, d) array [m]: where the ends of members are at a pose.
+
+    Parameters
+    ----------
+    ties : sequence of Tie
+    assembly : Assembly
+    pose : Pose
+    """
+    drawn = np.array([tie.points for tie in ties], dtype=float).reshape(len(ties), 2, assembly.dimension)
+    blocks = np.array([[-1 if b is None else b for b in tie.blocks] for tie in ties], dtype=int).reshape(-1, 2)
+    moved = carried(drawn.reshape(-1, assembly.dimension), blocks.ravel(), Pose.initial(assembly), pose)
+    return np.where((blocks < 0)[:, :, None], drawn, moved.reshape(drawn.shape))
