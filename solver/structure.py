@@ -125,7 +125,7 @@ class Structure(Shown):
         """
         phases = _phases(settlement)
         increments = settlement_increments(
-            self.assembly, phases, interfaces=self.interfaces, loads=self.loads, controls=controls
+            self.assembly, phases, interfaces=self.interfaces, loads=self.loads, controls=controls, ties=self.ties
         )
         found = increments.all(on_increment)
         unit = phases[0].unit

@@ -275,7 +275,7 @@ class _Problem:
         rows = ContactRows(wrench_matrix(self.contacts, self.pose, self.length), free)
         load, near = self.dead + balanced.multiplier * self.live, np.zeros((len(self.contacts), d))
         try:
-            forces = nearest_equilibrium(rows, near, Stepper.compliance(self.contacts), self.friction, load)
+            forces = nearest_equilibrium(rows, near, Stepper.joint_compliance(self.contacts), self.friction, load)
         except NotSolved:
             forces = balanced.forces
         return np.asarray(forces[:, 0])
