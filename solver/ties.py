@@ -10,12 +10,16 @@ import numpy as np
 from .assembly import Assembly
 from .geometry.contacts import Contacts
 from .kinematics import Pose, carried
+from .tolerances import SMALLEST_FORCE
 
 #: Members that carry tension only, compression only, and both.
 TIE, PROP, BAR = KINDS = ("tie", "prop", "bar")
 
 #: Kind of the contact points that stand for members, in their features: then the member, and its sense.
 MEMBER = 9
+
+#: Part of its strength from which on a member is told to yield: forces of an equilibrium may be a little below it.
+TOLD_YIELDING = 1.0 - 1e-3
 
 #: What a member does at an increment, by number: not yet or no longer there, without force, elastic, yielding, broken.
 STATES = ABSENT, SLACK, ELASTIC, YIELDING, BROKEN = range(5)
@@ -96,6 +100,8 @@ class TieForces:
         Tension positive.
     elongations : (n_ties,) array [m]
         Change of length since they were installed.
+    rest : (n_ties,) array [m]
+        Lengths without force; nan where a member is absent or broken.
     states : (n_ties,) int array
         Numbers of :data:`STATES`.
     ends : (n_ties, 2, d) array [m]
@@ -103,6 +109,7 @@ class TieForces:
 
     forces: np.ndarray = field(default_factory=lambda: np.zeros(0))
     elongations: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
     states: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
@@ -148,6 +155,13 @@ def tie_ends(ties: Sequence[Tie], assembly: Assembly, pose: Pose) -> np.ndarray:
 def tie_lengths(ends: np.ndarray) -> np.ndarray:
     """(n_ties,) array [m]: lengths between ends (n_ties, 2, d)."""
     return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
+
+def installed_lengths(ties: Sequence[Tie], ends: np.ndarray) -> np.ndarray:
+    """(n_ties, 2) array [m]: lengths of members that are installed between ends (n_ties, 2, d): then, and unloaded."""
+    length = tie_lengths(ends)
+    give = [tie.prestress / tie.stiffness * (-1.0 if tie.kind == PROP else 1.0) for tie in ties]
+    return np.stack([length, length - np.array(give)], axis=1)
 
 
 def is_member(contacts: Contacts) -> np.ndarray:
@@ -202,6 +216,38 @@ def member_contacts(
         slip=np.zeros((len(features), d - 1)),
         areas=np.zeros(len(features)),
     )
+
+
+def plastic_forces(
+    ties: Sequence[Tie], assembly: Assembly, pose: Pose, contacts: Contacts, forces: np.ndarray
+) -> TieForces:
+    """Return what members do at a limit load, where their elongation has no meaning.
+
+    Parameters
+    ----------
+    ties : sequence of Tie
+    assembly : Assembly
+    pose : Pose
+    contacts : Contacts
+    forces : (n_contacts, d) array [N]
+    """
+    force, ends = member_forces(contacts, forces, len(ties)), tie_ends(ties, assembly, pose)
+    strength = np.array([tie.strength for tie in ties])
+    state = member_states(np.abs(force), strength, float(np.abs(forces).max(initial=0.0)))
+    return TieForces(force, np.zeros(len(ties)), tie_lengths(ends), state, ends) if ties else TieForces()
+
+
+def member_forces(contacts: Contacts, forces: np.ndarray, n_ties: int) -> np.ndarray:
+    """(n_ties,) array: tension of members, from the forces (n_contacts, d) of all contact points."""
+    members = is_member(contacts)
+    tension = np.where(contacts.features[members, 2] == 1, -1.0, 1.0) * forces[members, 0]
+    return np.bincount(contacts.features[members, 1], tension, n_ties)
+
+
+def member_states(size: np.ndarray, strength: np.ndarray, largest: float) -> np.ndarray:
+    """(n_ties,) int array: slack, elastic or yielding, from sizes of forces, strengths and the largest force."""
+    carried = np.where(size >= TOLD_YIELDING * strength, YIELDING, ELASTIC)
+    return np.where(size > SMALLEST_FORCE * largest, carried, SLACK)
 
 
 def _blocks(ties: Sequence[Tie]) -> np.ndarray:

@@ -13,13 +13,12 @@ from solver.program.model import Model
 from solver.ties import (
     ABSENT,
     BROKEN,
-    ELASTIC,
-    PROP,
-    SLACK,
-    YIELDING,
     TieForces,
+    installed_lengths,
     is_member,
     member_contacts,
+    member_forces,
+    member_states,
     present_members,
     tie_ends,
     tie_lengths,
@@ -29,6 +28,9 @@ from .state import Place
 
 #: Part of its strength from which on a member yields or breaks.
 AT_STRENGTH = 1.0 - 1e-9
+
+#: Error of the length of a member, as a part of the gap of contact points that carry: that of the geometry.
+GIVE = 1e-2
 
 
 class Members:
@@ -52,16 +54,17 @@ class Members:
             dtype=bool,
         )
 
-    def installed(self, place: Place, phase: int) -> Place:
-        """Install the members of a phase, from 0, at the geometry of a place."""
+    def installed(self, place: Place, phase: int, told: TieForces | None = None) -> Place:
+        """Install the members of a phase, from 0, at the geometry of a place, or all as an increment tells of them."""
         if not self.ties:
             return place
+        if told is not None:
+            before = np.where(told.states == ABSENT, np.nan, tie_lengths(told.ends) - told.elongations)
+            return replace(place, tie_lengths=np.stack([before, told.rest], axis=1))
         lengths = place.tie_lengths if len(place.tie_lengths) else np.full((len(self.ties), 2), np.nan)
         new = np.array([tie.phase == phase + 1 for tie in self.ties])
-        length = tie_lengths(tie_ends(self.ties, self.model.assembly, place.pose))
-        shortened = np.array([-tie.prestress if tie.kind == PROP else tie.prestress for tie in self.ties])
-        rest = length - shortened / self.stiffness
-        return replace(place, tie_lengths=np.where(new[:, None], np.stack([length, rest], axis=1), lengths))
+        now = installed_lengths(self.ties, tie_ends(self.ties, self.model.assembly, place.pose))
+        return replace(place, tie_lengths=np.where(new[:, None], now, lengths))
 
     def contacts(self, pose: Pose, lengths: np.ndarray) -> Contacts | None:
         """The contact points of the members that are there; None where there are none."""
@@ -85,13 +88,13 @@ class Members:
     def force_limits(self, contacts: Contacts, gap: float) -> np.ndarray | None:
         """(n, 2) array: least and largest normal forces of contact points at a pose; None without members.
 
-        A member may carry what it carries anywhere within a gap, in block sizes.
+        A member may carry what it carries anywhere within a part of the gap of contact points, in block sizes.
         """
         members = is_member(contacts)
         if not members.any():
             return None
         limits, number = unlimited(len(contacts)), contacts.features[members, 1]
-        give = gap * np.array([-1.0, 1.0])
+        give = GIVE * gap * np.array([-1.0, 1.0])
         forces = (give - contacts.gaps[members, None] / self.model.length) / self.compliance[number, None]
         limits[members] = np.clip(forces, 0.0, self.strength[number, None])
         return limits
@@ -113,14 +116,11 @@ class Members:
         """What the members do at a place, from forces in units of the program."""
         if not self.ties:
             return TieForces()
-        members, ends = is_member(contacts), tie_ends(self.ties, self.model.assembly, pose)
-        tension = np.where(contacts.features[members, 2] == 1, -1.0, 1.0) * forces[members, 0]
-        force = np.bincount(contacts.features[members, 1], tension, len(self.ties))
-        size = np.abs(force)
-        state = np.where(size > 1e-9, np.where(size >= AT_STRENGTH * self.strength, YIELDING, ELASTIC), SLACK)
+        force, ends = member_forces(contacts, forces, len(self.ties)), tie_ends(self.ties, self.model.assembly, pose)
+        state = member_states(np.abs(force), self.strength, float(np.abs(forces).max(initial=0.0)))
         state = np.where(np.isnan(lengths[:, 1]), BROKEN, state)
         state = np.where(np.isnan(lengths[:, 0]) | ~self.held, ABSENT, state)
-        return TieForces(force * self.model.force, tie_lengths(ends) - lengths[:, 0], state, ends)
+        return TieForces(force * self.model.force, tie_lengths(ends) - lengths[:, 0], lengths[:, 1], state, ends)
 
 
 def with_members(contacts: Contacts, members: Contacts | None) -> Contacts:

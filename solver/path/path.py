@@ -14,7 +14,7 @@ from solver.kinematics import Pose
 from solver.loads import GRAVITY
 from solver.program.model import Model
 from solver.results.increment import Increment, Status
-from solver.ties import is_member
+from solver.ties import TieForces, is_member
 from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, JUMP
 
 from .collapse import MECHANISM, REFINED, Fall
@@ -108,7 +108,7 @@ class Path:
 
     # The start ---------------------------------------------------------------------------------------------------
 
-    def begin(self, start: Pose, before: PathState | None = None) -> PathState:
+    def begin(self, start: Pose, before: PathState | None = None, ties_at: TieForces | None = None) -> PathState:
         """The state at the start of the phase: of the drawing at rest, or after the phase before."""
         fell_at = np.zeros(0)
         if before is not None:
@@ -117,7 +117,7 @@ class Path:
             self._remove_blocks(fell_at)
             place = self.stepper.members.installed(place, self.number)
         else:
-            place = self.stepper.members.installed(Place.unloaded(start), self.number)
+            place = self.stepper.members.installed(Place.unloaded(start), self.number, ties_at)
             resting = self._at_rest(place)
             if resting is None:
                 # Joints that the drawing leaves open close.
