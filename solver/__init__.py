@@ -13,6 +13,7 @@ This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 """
 
 from .assembly import Assembly
+from .backfill import Backfill
 from .interfaces import InterfaceLaw, Interfaces, JointScatter
 from .kinematics import Pose
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
@@ -28,6 +29,7 @@ from .surface_loads import edge_pressure, load_on_top, surface_pressure
 __all__ = [
     "GRAVITY",
     "Assembly",
+    "Backfill",
     "Certificate",
     "Collapse",
     "ControlDisplacement",

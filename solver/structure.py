@@ -83,7 +83,7 @@ class Structure(Shown):
             raise TypeError("with_live needs either the live loads or an acceleration; give one of them")
         if acceleration is not None:
             live = weight_fraction(self.assembly, acceleration)
-        return replace(self, loads=Loads(self.loads.dead, np.asarray(live, dtype=float)))
+        return replace(self, loads=replace(self.loads, live=np.asarray(live, dtype=float)))
 
     def settle(
         self,

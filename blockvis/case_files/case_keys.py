@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 import solver
+from blockvis.cases.backfill import BACKFILL
 from blockvis.cases.bonds import BOND
 from blockvis.cases.build import DENSITY, THICKNESS
 from blockvis.cases.explain_settings import EXPLAIN
@@ -520,6 +521,7 @@ SECTIONS = (
     SETTLEMENT,
     PROFILE,
     LOADS,
+    BACKFILL,
     ANALYSIS,
     *(section for kind in KINDS.values() for section in kind.sections),
     EXPLAIN,

@@ -10,6 +10,7 @@ from typing import Any
 
 import solver
 from blockvis import generators
+from blockvis.cases.backfill import read_backfill
 from blockvis.cases.bonds import Bonding, read_bond
 from blockvis.cases.contents import Case
 from blockvis.cases.explain_settings import read_explain
@@ -159,6 +160,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         settlements=tuple(settlement for settlement, _ in motions),
         profiles=tuple(profile for _, profile in motions),
         loads=tuple(_load(table) for table in top.tables("loads")),
+        backfills=tuple(map(read_backfill, top.tables("backfill"))),
         analysis=asked["kind"],
         settings=settings[asked["kind"]],
         increment_seconds=asked["increment_seconds"],

@@ -21,6 +21,7 @@ from blockvis.layout.units import better_unit, doubt
 from blockvis.text import nearest
 from solver import mechanics
 
+from .backfill import backfills
 from .bonds import bonded
 from .contents import Case
 from .coordinates import check_coordinates
@@ -287,8 +288,9 @@ def case_interfaces(case: Case) -> solver.Interfaces:
 
 
 def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
-    """Sum self-weight and the loads of a case that do not move [N, N·m]."""
-    return loads_of(case.loads, assembly, case.source)
+    """Sum self-weight and the loads of a case that do not move [N, N·m], and lay its fill over the blocks."""
+    loads = loads_of(case.loads, assembly, case.source)
+    return replace(loads, fills=backfills(case.backfills, assembly, case.source))
 
 
 def case_settlements(case: Case, assembly: solver.Assembly) -> tuple[solver.Settlement, ...]:

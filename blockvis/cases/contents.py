@@ -12,6 +12,7 @@ import solver
 from blockvis.formats.image_scale import ImageKeys
 from blockvis.layout.sights import Cut, Sight
 
+from .backfill import BackfillCase
 from .bonds import Bonding
 from .explain_settings import ExplainSettings
 from .imperfections import Imperfection
@@ -89,6 +90,7 @@ class Case:
     settlements: tuple[solver.Settlement, ...] = ()
     profiles: tuple[Profile | None, ...] = ()
     loads: tuple[LoadCase, ...] = ()
+    backfills: tuple[BackfillCase, ...] = ()
     analysis: str = "settlement"
     settings: Any = None
     controls: solver.Controls = field(default_factory=solver.Controls)

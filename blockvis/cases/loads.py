@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -161,7 +161,7 @@ def with_moving_load(
     places, live = moving_loads(entries, assembly, source)
     if x is None or len(places) == 0:
         return loads
-    return solver.Loads(loads.dead, loads.live + live(int(np.argmin(np.abs(places - x)))))
+    return replace(loads, live=loads.live + live(int(np.argmin(np.abs(places - x)))))
 
 
 def _loaded(load: LoadCase, chosen: np.ndarray, assembly: solver.Assembly, where: str) -> list[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -52,6 +53,8 @@ def settlement_increments(
     by_program = controls.increments == LINEAR_PROGRAM
     if by_program and assembly.dimension == 3:
         raise ValueError("increments = 'linear program' is for blocks in the plane; leave it out for blocks in space")
+    if by_program and loads.fills:
+        raise ValueError("increments = 'linear program' has loads that stay as they are; leave it out, or the backfill")
     if resume is not None and (resume.phase >= len(phases) or len(resume.start.rotations) != assembly.n_blocks):
         raise ValueError(
             f"the checkpoint is of phase {resume.phase + 1} with {len(resume.start.rotations)} blocks; there are "
@@ -59,6 +62,7 @@ def settlement_increments(
         )
     origin = at_origin(assembly)
     near, local = (assembly, phases) if not origin.any() else without_origin(origin, assembly, phases)
+    loads = replace(loads, fills=tuple(fill.shifted(-origin) for fill in loads.fills))
     if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
     follow = linear_program_increments if by_program else partial(_increments, on_step=on_step)
@@ -100,18 +104,20 @@ def model_of(
     assembly: Assembly, loads: Loads, interfaces: Interfaces, controls: Controls, live: np.ndarray | None = None
 ) -> Model:
     """The units and loads of a path."""
-    force = float(np.linalg.norm(loads.dead[assembly.free, : assembly.dimension], axis=1).mean())
+    drawn = loads.dead_at(assembly, Pose.initial(assembly))
+    force = float(np.linalg.norm(drawn[assembly.free, : assembly.dimension], axis=1).mean())
     if force == 0.0:
         raise ValueError("no load acts on any free block; give them a weight")
     length = assembly.block_size
     return Model(
         assembly,
         interfaces,
-        loads.dead,
+        drawn,
         length,
         force,
         length / 4.0,
         live=live,
+        fills=loads.fills,
         compliance=controls.compliance_factor,
         imperfection=controls.imperfection_factor,
     )

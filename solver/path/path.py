@@ -377,7 +377,7 @@ class Path:
         started = measure_contacts(model.assembly, moved_vertices(model.assembly, before.pose), contacts)
         slipped = (contacts.slip - started.slip) / model.length
         done = (
-            float((model.scaled_load * free * motion).sum()),
+            float((model.scaled_load_at(after.pose) * free * motion).sum()),
             after.multiplier * live_size * float((live * free * motion).sum()),
             float((np.where(free, 0.0, resultant) * motion).sum()),
             -float((after.forces[:, 1:] * slipped).sum()),

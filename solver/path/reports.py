@@ -45,7 +45,7 @@ class Reports:
         resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
         live, live_size = model.scaled_live
         multiplier = check.measured * live_size if model.live is not None else 0.0
-        balance = (resultant + model.scaled_load + multiplier * live)[model.assembly.free]
+        balance = (resultant + model.scaled_load_at(place.pose) + multiplier * live)[model.assembly.free]
         certificate = Certificate(
             equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
             friction_excess=friction_excess(check.forces, check.friction) / model.total_load,

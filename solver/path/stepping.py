@@ -36,6 +36,9 @@ LINEARISATIONS = 6
 #: and where they only hinge.
 EXACT_SLIDING, EXACT = 1e-6, 1e-8
 
+#: Change of the load of a fill that has followed the blocks, in block weights, up to which a step is not repeated.
+SAME_LOAD = 1e-6
+
 #: Penetration, in block sizes, at which a step is refused, and gap up to which blocks touch as drawn.
 LARGEST_PENETRATION = 1e-4
 
@@ -232,16 +235,16 @@ class Stepper:
         friction, compliance = self.friction(start), self.compliance(start, model.compliance)
         bound = friction * followed
         resisting, before = self._resistance(place, length, in_time, viscosity)
-        load = (model.scaled_load + (0.0 if in_time else viscosity) * self.imperfection)[free].ravel()
         closed = np.inf if in_time or viscosity == 1.0 else EXACT
         live, live_size = model.scaled_live
         multiplier = place.multiplier * live_size
-        motion_so_far, normal, shear = np.zeros_like(load), forces[:, 0], forces[:, 1:]
+        motion_so_far, normal, shear = np.zeros_like(before), forces[:, 0], forces[:, 1:]
         pose = self._with_supports(place.pose, supports)
         contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
         for number in range(LINEARISATIONS):
             rows = ContactRows(wrench_matrix(contacts, pose, model.length), free)
             control = driver.control(pose) if model.live is not None else None
+            load = self._load(pose, 0.0 if in_time else viscosity)
             problem = ContactProblem(
                 rows=rows,
                 gap=contacts.gaps / model.length,
@@ -276,6 +279,7 @@ class Stepper:
             residual = max(
                 np.abs(gap)[carries].max(initial=0.0) / closed,
                 np.abs(gap - predicted)[carries].max(initial=0.0) / exact,
+                np.abs(self._load(pose, 0.0 if in_time else viscosity) - load).max() / SAME_LOAD,
             )
             control_error = 0.0 if control is None else abs(s - driver.control_displacement(pose)) / model.length
             if residual <= 1.0 and control_error <= EXACT:
@@ -297,6 +301,10 @@ class Stepper:
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
         return new, motion / scales, StepError(lag, turn, movement_size, float(-gap[carries].min(initial=0.0)))
+
+    def _load(self, pose: Pose, imperfection: float) -> np.ndarray:
+        """(n_free n_dof,) array: loads on the free blocks at a pose, with so many times the imperfection."""
+        return (self.model.scaled_load_at(pose) + imperfection * self.imperfection)[self.free].ravel()
 
     def _resistance(
         self, place: Place, length: float, in_time: bool, viscosity: float

@@ -163,7 +163,7 @@ class _StaticProgram:
         balance = sp.csc_array(matrix[free] @ self.rays)
         self.rows, self.n = balance.shape
         self.d, self.friction, self.total, self.programs = d, friction[closed], model.total_load, 0
-        self.load, self.tolerance = model.scaled_load.ravel()[free], BALANCE_TOLERANCE * model.total_load
+        self.load, self.tolerance = model.scaled_load_at(pose).ravel()[free], BALANCE_TOLERANCE * model.total_load
         live, self.live_size = model.scaled_live
         columns, objective = [balance], np.zeros(self.n)
         if self.live_size > 0.0:

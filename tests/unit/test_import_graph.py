@@ -48,6 +48,7 @@ ORDER = (
     "solver.results",
     "solver.surface_loads",
     "solver.loads",
+    "solver.backfill",
     "solver.equilibrium",
     "solver.kinematics",
     "solver.interfaces",
