@@ -19,6 +19,7 @@ from .kinematics import Pose
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
 from .path.controls import Controls
 from .path.drivers import ControlDisplacement
+from .phases import PhaseChange
 from .programs.problem import SolveError
 from .results.certificate import Certificate
 from .results.increment import Increment, Status
@@ -43,6 +44,7 @@ __all__ = [
     "LimitStatus",
     "Loads",
     "LocalLoss",
+    "PhaseChange",
     "Pose",
     "Response",
     "Settlement",

@@ -18,6 +18,7 @@ from .explain_settings import ExplainSettings
 from .imperfections import Imperfection
 from .loads import LoadCase
 from .profiles import Profile
+from .removals import Removal
 from .role_places import RolePlace
 
 
@@ -91,6 +92,7 @@ class Case:
     profiles: tuple[Profile | None, ...] = ()
     loads: tuple[LoadCase, ...] = ()
     backfills: tuple[BackfillCase, ...] = ()
+    removals: tuple[Removal, ...] = ()
     analysis: str = "settlement"
     settings: Any = None
     controls: solver.Controls = field(default_factory=solver.Controls)

@@ -18,6 +18,7 @@ from solver.path.drivers import SupportMotion
 from solver.path.local_origin import at_origin, in_global_coordinates, without_origin
 from solver.path.path import Path
 from solver.path.state import PathState
+from solver.phases import PhaseChange, loads_in, removed_before
 from solver.program.model import Model
 from solver.programs.problem import SolveError
 from solver.results.increment import Increment, Status
@@ -32,6 +33,7 @@ def settlement_increments(
     interfaces: Interfaces,
     loads: Loads,
     controls: Controls | None = None,
+    changes: Sequence[PhaseChange] = (),
     resume: PathState | None = None,
     on_step: Callable[[PathState], None] | None = None,
 ) -> Increments:
@@ -48,13 +50,16 @@ def settlement_increments(
         Called with the :class:`PathState` after every step within an increment.
     """
     controls = controls or Controls()
-    check_settlement(assembly, phases, controls)
+    check_settlement(assembly, phases, controls, changes)
     interfaces.refuse_strength("a settlement")
     by_program = controls.increments == LINEAR_PROGRAM
     if by_program and assembly.dimension == 3:
         raise ValueError("increments = 'linear program' is for blocks in the plane; leave it out for blocks in space")
-    if by_program and loads.fills:
-        raise ValueError("increments = 'linear program' has loads that stay as they are; leave it out, or the backfill")
+    if by_program and (loads.fills or changes):
+        raise ValueError(
+            "increments = 'linear program' knows one structure under loads that stay as they are; leave it out, or "
+            "fill and changes between phases"
+        )
     if resume is not None and (resume.phase >= len(phases) or len(resume.start.rotations) != assembly.n_blocks):
         raise ValueError(
             f"the checkpoint is of phase {resume.phase + 1} with {len(resume.start.rotations)} blocks; there are "
@@ -65,7 +70,7 @@ def settlement_increments(
     loads = replace(loads, fills=tuple(fill.shifted(-origin) for fill in loads.fills))
     if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
-    follow = linear_program_increments if by_program else partial(_increments, on_step=on_step)
+    follow = linear_program_increments if by_program else partial(_increments, changes=changes, on_step=on_step)
     steps = follow(near, local, interfaces, loads, controls, resume)
     return TimedIncrements(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
 
@@ -77,6 +82,7 @@ def _increments(
     loads: Loads,
     controls: Controls,
     resume: PathState | None,
+    changes: Sequence[PhaseChange],
     on_step: Callable[[PathState], None] | None,
 ) -> Generator[Increment, None, Ending]:
     first = 0 if resume is None else resume.phase
@@ -85,11 +91,13 @@ def _increments(
     for number, phase in enumerate(phases[first:], start=first):
         start = Pose.initial(assembly) if before is None else before.place.pose
         start = start if resume is None else resume.start
-        model = model_of(assembly, loads, interfaces, controls)
+        model = model_of(assembly, loads_in(loads, changes, number), interfaces, controls)
         path = Path(model, SupportMotion(assembly, phase, start), number, controls, on_step)
         at = 0.0
         try:
             state = path.begin(start, before) if resume is None else resume
+            if resume is None and any(change.phase == number for change in changes):
+                state = path.changed(state, removed_before(changes, number, assembly.n_blocks))
             at = state.place.s
             ending = yield from path.follow(state, resume is not None)
         except SolveError as error:
@@ -123,13 +131,19 @@ def model_of(
     )
 
 
-def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls: Controls | None = None) -> None:
+def check_settlement(
+    assembly: Assembly,
+    phases: Sequence[Settlement],
+    controls: Controls | None = None,
+    changes: Sequence[PhaseChange] = (),
+) -> None:
     """Refuses what cannot be analysed, before anything is solved or written.
 
     Raises
     ------
     ValueError
-        For no settlement, no free block, a phase that moves no support, blocks that overlap (both named, with depth).
+        For no settlement, no free block, a phase that moves no support or none that is still there, a change before a
+        phase that does not exist, blocks that overlap (both named, with depth).
     """
     controls = controls or Controls()
     if not phases:
@@ -142,4 +156,14 @@ def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls:
             if phase.blocks is not None and assembly.moving.any():
                 raise ValueError(f"{which} moves no support: of its blocks ({named}) none has the role 'moving'")
             raise ValueError(f"{which} moves no support: give one of the blocks the role 'moving': {named}")
+    for change in changes:
+        if not 0 <= change.phase < len(phases):
+            raise ValueError(f"a change comes before settlement phase {change.phase + 1}; there are {len(phases)}")
+    gone = np.zeros(assembly.n_blocks, dtype=bool)
+    for number, phase in enumerate(phases):
+        gone |= removed_before(changes, number, assembly.n_blocks)
+        if not (phase.taking_part(assembly) & ~gone).any():
+            raise ValueError(f"settlement phase {number + 1} moves only supports that have been taken away; keep one")
+        if not (assembly.free & ~gone).any():
+            raise ValueError(f"before settlement phase {number + 1} all free blocks are taken away; keep one")
     check_blocks(assembly, controls.overlap_tolerance)

@@ -47,6 +47,7 @@ ORDER = (
     "solver.programs",
     "solver.results",
     "solver.surface_loads",
+    "solver.phases",
     "solver.loads",
     "solver.backfill",
     "solver.equilibrium",
