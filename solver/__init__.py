@@ -13,11 +13,13 @@ This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 """
 
 from .assembly import Assembly
+from .backfill import Backfill
 from .interfaces import InterfaceLaw, Interfaces, JointScatter
 from .kinematics import Pose
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
 from .path.controls import Controls
 from .path.drivers import ControlDisplacement
+from .phases import PhaseChange
 from .programs.problem import SolveError
 from .results.certificate import Certificate
 from .results.increment import Increment, Status
@@ -29,6 +31,7 @@ from .ties import Tie
 __all__ = [
     "GRAVITY",
     "Assembly",
+    "Backfill",
     "Certificate",
     "Collapse",
     "ControlDisplacement",
@@ -42,6 +45,7 @@ __all__ = [
     "LimitStatus",
     "Loads",
     "LocalLoss",
+    "PhaseChange",
     "Pose",
     "Response",
     "Settlement",

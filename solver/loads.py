@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .assembly import Assembly
+from .backfill import Backfill
 from .kinematics import Pose, composed_rotations, cross_rows, dimension_of, moved, rotation_count, turned
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
@@ -25,10 +26,17 @@ class Loads:
         space fx, fy, fz, mx, my, mz.
     live : (n_blocks, n_dof) array [N, N·m]
         Loads that the load multiplier scales.
+    fills : tuple of Backfill
+        Fill over the blocks, whose load follows them.
     """
 
     dead: np.ndarray
     live: np.ndarray
+    fills: tuple[Backfill, ...] = ()
+
+    def dead_at(self, assembly: Assembly, pose: Pose) -> np.ndarray:
+        """(n_blocks, n_dof) array: dead load with that of the fill where the blocks are."""
+        return sum((fill.load(assembly, pose) for fill in self.fills), self.dead)
 
     def total(self, multiplier: float = 0.0) -> np.ndarray:
         """(n_blocks, n_dof) array: dead load + multiplier · live load."""

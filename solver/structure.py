@@ -18,6 +18,7 @@ from .kinematics import Pose
 from .loads import Loads, Settlement, checked_loads, weight_fraction
 from .path.controls import Controls
 from .path.drivers import ControlDisplacement
+from .phases import PhaseChange
 from .results.increment import Increment
 from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, Quantity, reaction_to, settlement_in
 from .results.response import Control, Envelope, LimitLoad, Response
@@ -89,13 +90,14 @@ class Structure(Shown):
             raise TypeError("with_live needs either the live loads or an acceleration; give one of them")
         if acceleration is not None:
             live = weight_fraction(self.assembly, acceleration)
-        return replace(self, loads=Loads(self.loads.dead, np.asarray(live, dtype=float)))
+        return replace(self, loads=replace(self.loads, live=np.asarray(live, dtype=float)))
 
     def settle(
         self,
         settlement: Settlement | Sequence[Settlement] | Sequence[float],
         *,
         controls: Controls | None = None,
+        changes: Sequence[PhaseChange] = (),
         on_increment: Callable[[Increment], None] | None = None,
     ) -> Response:
         """Follow the structure from its drawing through the settlement of its supports to collapse.
@@ -105,6 +107,8 @@ class Structure(Shown):
         settlement : Settlement, sequence of Settlement or (d,) sequence of float
             One phase, or several one after another; or only the direction in which the moving supports go.
         controls : Controls, optional
+        changes : sequence of PhaseChange
+            What changes before a settlement begins: blocks that are taken away, dead loads.
         on_increment : callable, optional
             Called with every :class:`Increment` as it is found.
 
@@ -125,11 +129,18 @@ class Structure(Shown):
         """
         phases = _phases(settlement)
         increments = settlement_increments(
-            self.assembly, phases, interfaces=self.interfaces, loads=self.loads, controls=controls, ties=self.ties
+            self.assembly,
+            phases,
+            interfaces=self.interfaces,
+            loads=self.loads,
+            controls=controls,
+            ties=self.ties,
+            changes=changes,
         )
         found = increments.all(on_increment)
         unit = phases[0].unit
-        return self._response(increments, found, "settlement", settlement_in(unit), reaction_to(unit), phases)
+        response = self._response(increments, found, "settlement", settlement_in(unit), reaction_to(unit), phases)
+        return replace(response, changes=tuple(changes))
 
     def pushover(
         self,

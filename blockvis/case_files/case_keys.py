@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 import solver
+from blockvis.cases.backfill import BACKFILL
 from blockvis.cases.bonds import BOND
 from blockvis.cases.build import DENSITY, THICKNESS
 from blockvis.cases.explain_settings import EXPLAIN
@@ -35,6 +36,7 @@ from blockvis.cases.key import (
     whole,
 )
 from blockvis.cases.profiles import PROFILE, PROFILES
+from blockvis.cases.removals import REMOVE
 from blockvis.cases.toml_table import Table, is_number, shortened
 from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
@@ -463,6 +465,7 @@ LOADS = Section(
         Key("positions", _PLACES,
             "Places x of a live force that moves over what is topmost there", [-1.9, 1.9, 77], "m", otherwise="none"),
         Key("y", NUMBER, "The y of all positions, of blocks in space", 0.5, "m", otherwise="none"),
+        Key("phase", whole(1), "Number of the [[settlement]] from which on a dead load acts", 2, default=1),
     ),
     several=True,
 )  # fmt: skip
@@ -520,6 +523,8 @@ SECTIONS = (
     SETTLEMENT,
     PROFILE,
     LOADS,
+    BACKFILL,
+    REMOVE,
     ANALYSIS,
     *(section for kind in KINDS.values() for section in kind.sections),
     EXPLAIN,

@@ -10,6 +10,7 @@ from typing import Any
 
 import solver
 from blockvis import generators
+from blockvis.cases.backfill import read_backfill
 from blockvis.cases.bonds import Bonding, read_bond
 from blockvis.cases.contents import Case
 from blockvis.cases.explain_settings import read_explain
@@ -17,6 +18,7 @@ from blockvis.cases.imperfections import Imperfection, read_imperfection
 from blockvis.cases.key import read_keys
 from blockvis.cases.loads import LoadCase
 from blockvis.cases.profiles import Profile
+from blockvis.cases.removals import read_removal
 from blockvis.cases.role_places import PLACES, read_places
 from blockvis.cases.toml_table import Table, shortened, toml_value
 from blockvis.cases.value_paths import parse_path, put
@@ -159,6 +161,8 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         settlements=tuple(settlement for settlement, _ in motions),
         profiles=tuple(profile for _, profile in motions),
         loads=tuple(_load(table) for table in top.tables("loads")),
+        backfills=tuple(map(read_backfill, top.tables("backfill"))),
+        removals=tuple(map(read_removal, top.tables("remove"))),
         analysis=asked["kind"],
         settings=settings[asked["kind"]],
         increment_seconds=asked["increment_seconds"],
@@ -219,9 +223,26 @@ def _checked(case: Case, settings: Mapping[str, Any]) -> Case:
     for name, other in KINDS.items():
         if name != case.analysis:
             other.refuse(settings[name], case)
+    _check_phases(case)
     case = KINDS[case.analysis].checked(case)
     refuse_increment_seconds(case, case.increment_seconds)
     return case
+
+
+def _check_phases(case: Case) -> None:
+    """Refuse changes before a settlement that does not exist, and phases of live loads."""
+    given = [(f"{one.where} phase", one.phase) for one in case.removals]
+    for number, load in enumerate(case.loads, start=1):
+        where = f"{case.source}: [loads {number}] phase"
+        if load.phase > 1 and load.kind == "live":
+            raise ValueError(f"{where} is {load.phase}; a live load acts after all settlements: leave it out")
+        given += [(where, load.phase)] * (load.phase > 1)
+    for where, phase in given:
+        if phase > len(case.settlements):
+            raise ValueError(
+                f"{where} is {phase}; the case has {len(case.settlements)} [[settlement]]: give at most that number, "
+                "or add one"
+            )
 
 
 def refuse_increment_seconds(case: Case, seconds: float | None) -> None:

@@ -21,12 +21,14 @@ from blockvis.layout.units import better_unit, doubt
 from blockvis.text import nearest
 from solver import mechanics
 
+from .backfill import backfills
 from .bonds import bonded
 from .contents import Case
 from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
 from .profiles import cut_ground, with_profiles
+from .removals import removed_blocks
 from .role_places import with_roles_by_place
 
 #: The weight of a block lighter than this fraction of the whole may be lost in rounding errors of the other forces.
@@ -287,8 +289,31 @@ def case_interfaces(case: Case) -> solver.Interfaces:
 
 
 def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
-    """Sum self-weight and the loads of a case that do not move [N, N·m]."""
-    return loads_of(case.loads, assembly, case.source)
+    """Sum self-weight and the loads of a case that do not move [N, N·m], and lay its fill over the blocks."""
+    loads = loads_of(case.loads, assembly, case.source)
+    return replace(loads, fills=backfills(case.backfills, assembly, case.source))
+
+
+def case_changes(case: Case, assembly: solver.Assembly) -> tuple[solver.PhaseChange, ...]:
+    """Find what changes between the settlements of a case: blocks that are taken away, loads that begin to act.
+
+    Raises
+    ------
+    ValueError
+        For a name that no block has, and for an analysis that is asked of one structure under one set of loads.
+    """
+    later = [load.phase for load in case.loads if load.phase > 1]
+    if case.analysis != "settlement" and (case.removals or later):
+        what = "[[remove]]" if case.removals else f"[[loads]] phase = {later[0]}"
+        raise ValueError(
+            f'{case.source}: {what} belongs to [analysis] kind = "settlement"; a {case.analysis} has the blocks and '
+            "loads of the drawing: leave it out"
+        )
+    changes = [solver.PhaseChange(one.phase - 1, removed_blocks(one, assembly)) for one in case.removals]
+    for phase in sorted({load.phase for load in case.loads} - {1}):
+        added = loads_of(case.loads, assembly, case.source, phase)
+        changes.append(solver.PhaseChange(phase - 1, dead=added.dead))
+    return tuple(changes)
 
 
 def case_settlements(case: Case, assembly: solver.Assembly) -> tuple[solver.Settlement, ...]:

@@ -12,11 +12,13 @@ import solver
 from blockvis.formats.image_scale import ImageKeys
 from blockvis.layout.sights import Cut, Sight
 
+from .backfill import BackfillCase
 from .bonds import Bonding
 from .explain_settings import ExplainSettings
 from .imperfections import Imperfection
 from .loads import LoadCase
 from .profiles import Profile
+from .removals import Removal
 from .role_places import RolePlace
 
 
@@ -89,6 +91,8 @@ class Case:
     settlements: tuple[solver.Settlement, ...] = ()
     profiles: tuple[Profile | None, ...] = ()
     loads: tuple[LoadCase, ...] = ()
+    backfills: tuple[BackfillCase, ...] = ()
+    removals: tuple[Removal, ...] = ()
     analysis: str = "settlement"
     settings: Any = None
     controls: solver.Controls = field(default_factory=solver.Controls)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -42,6 +42,8 @@ class LoadCase:
         Places x of a force that moves over the topmost surface of the structure; empty for other loads.
     y : float, optional [m]
         Of all positions, in space.
+    phase : int
+        Number of the settlement, from 1, from which on it acts.
     """
 
     kind: str = "dead"
@@ -55,6 +57,7 @@ class LoadCase:
     edge: int | None = None
     positions: tuple[float, ...] = ()
     y: float | None = None
+    phase: int = 1
 
     @property
     def has_force(self) -> bool:
@@ -67,8 +70,10 @@ class LoadCase:
         return bool(np.any(self.moment))
 
 
-def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path) -> solver.Loads:
-    """Sum self-weight and the loads that do not move.
+def loads_of(
+    entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path, phase: int | None = None
+) -> solver.Loads:
+    """Sum self-weight and the loads that do not move and act from the start.
 
     Parameters
     ----------
@@ -76,6 +81,8 @@ def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Pat
     assembly : solver.Assembly
     source : Path
         The case file, for messages.
+    phase : int, optional
+        Instead of those all loads, without self-weight, that begin to act with this settlement, counted from 1.
 
     Returns
     -------
@@ -89,9 +96,9 @@ def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Pat
         does not have.
     """
     weight = solver.self_weight(assembly)
-    parts = {"dead": weight.dead.copy(), "live": weight.live.copy()}
+    parts = {"dead": weight.dead * (phase is None), "live": weight.live.copy()}
     for number, load in enumerate(entries):
-        if load.positions:
+        if load.positions or load.phase != (phase or 1):
             continue
         chosen = _chosen(load, assembly, f"{source}: [loads {number + 1}] blocks")
         if load.weight_fraction is not None:
@@ -161,7 +168,7 @@ def with_moving_load(
     places, live = moving_loads(entries, assembly, source)
     if x is None or len(places) == 0:
         return loads
-    return solver.Loads(loads.dead, loads.live + live(int(np.argmin(np.abs(places - x)))))
+    return replace(loads, live=loads.live + live(int(np.argmin(np.abs(places - x)))))
 
 
 def _loaded(load: LoadCase, chosen: np.ndarray, assembly: solver.Assembly, where: str) -> list[int]:

@@ -237,7 +237,7 @@ class _Engine:
         # Loads beside gravity act on as they did.
         own = solver.self_weight(assembly).dead
         per_force = self.scale / assembly.masses[assembly.free].mean()
-        extra = (response.loads.dead - own) * assembly.free[:, None] * per_force
+        extra = (response.loads.dead_at(assembly, response.path[-1].pose) - own) * assembly.free[:, None] * per_force
         extra[np.abs(extra) < 1e-9 * np.abs(own).max()] = 0.0
         self.loaded = [(self.bodies[k], tuple(map(float, extra[k]))) for k in np.flatnonzero(extra.any(axis=1))]
 

@@ -40,7 +40,7 @@ class Engine:
         self.n_blocks = drawn.n_blocks
         assembly = _on_ground(drawn, last, ground)
         dead = np.zeros((assembly.n_blocks, 6))
-        dead[: self.n_blocks] = response.loads.dead
+        dead[: self.n_blocks] = response.loads.dead_at(drawn, last)
         controls = solver.Controls()
         law = replace(response.interfaces, scatter=None)
         model = mechanics.model_of(assembly, solver.Loads(dead, np.zeros_like(dead)), law, controls)

@@ -55,6 +55,7 @@ class RunInput:
     assembly: solver.Assembly
     interfaces: solver.Interfaces
     loads: solver.Loads
+    changes: tuple[solver.PhaseChange, ...] = ()
     listeners: list[Callable[[mechanics.PathState], None]] = field(default_factory=list)
 
     def step(self, state: mechanics.PathState) -> None:
@@ -112,6 +113,7 @@ class AnalysisRun:
             parameter=self.course.parameter,
             measured=self.course.measured,
             control=self.course.control,
+            changes=self.given.changes,
         )
 
 

@@ -120,6 +120,8 @@ class SettlementKind(AnalysisKind):
             ]
             loss = loss_of(response)
             lines += [] if loss is None else [str(loss)]
+            if response.changes and high == 0.0:
+                lines.append(f"once changed before settlement {response.increments[-1].phase + 1}: {response.message}")
         elif len(path) > 1:
             last = path[-1]
             lines.append(f"last reaction        {reaction(last.reaction, last)}")
@@ -225,6 +227,7 @@ def settlement_steps(
         interfaces=given.interfaces,
         loads=given.loads,
         controls=replace(case.controls, local_loss=0.0) if whole else case.controls,
+        changes=given.changes,
         resume=resume,
         on_step=given.step,
     )

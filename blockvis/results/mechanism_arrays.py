@@ -27,7 +27,7 @@ def block_motion(
     """
     parts, d = mechanics.rigid_parts(assembly, increment), assembly.dimension
     if falls is None:
-        falls = increment.fallen | ((increment.status == solver.Status.FALLING) & (parts >= 0))
+        falls = (increment.fallen & ~increment.removed) | ((increment.status == solver.Status.FALLING) & (parts >= 0))
     velocity = increment.velocity
     flat = np.zeros((assembly.n_blocks, 3 - d))
     return {
@@ -79,7 +79,7 @@ def falling_in(response: solver.Response) -> np.ndarray:
         With an increment in equilibrium.
     """
     last = at_last_equilibrium(response)
-    falls = last.fallen
+    falls = last.fallen & ~last.removed
     if response.collapse is not None and response.collapse.lost == "equilibrium":
         falls = falls | (mechanics.rigid_parts(response.assembly, last) >= 0)
     return falls

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import solver
-from blockvis.cases.build import case_controls, case_interfaces, case_loads, case_settlements
+from blockvis.cases.build import case_changes, case_controls, case_interfaces, case_loads, case_settlements
 from blockvis.cases.contents import Case
 from blockvis.kinds.kind import AnalysisRun, RunInput
 from blockvis.kinds.kinds import KINDS
@@ -45,7 +45,8 @@ def planned(
         profiles=(),
         controls=case_controls(case, assembly),
     )
-    given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly))
+    changes = case_changes(case, assembly)
+    given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly), changes)
     if case.settlements:
-        mechanics.check_settlement(assembly, case.settlements, case.controls)
+        mechanics.check_settlement(assembly, case.settlements, case.controls, changes)
     return kind.start(given, resume, found)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import solver
 from blockvis.case_files.read import parse_case
-from blockvis.cases.build import case_interfaces, case_loads
+from blockvis.cases.build import case_changes, case_interfaces, case_loads
 from blockvis.cases.loads import with_moving_load
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import stored_case, stored_response
@@ -54,5 +54,6 @@ def open_results(folder: str | Path) -> solver.Response:
     return replace(
         response,
         interfaces=case_interfaces(case),
+        changes=case_changes(case, response.assembly),
         loads=with_moving_load(loads, case.loads, response.assembly, case.source, summary.get("governing_position")),
     )

@@ -149,7 +149,7 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
     }
     if path:
         weights = assembly.masses * assembly.free
-        found["lost_share"] = float(weights[path[-1].fallen].sum() / weights.sum())
+        found["lost_share"] = float(weights[path[-1].fallen & ~path[-1].removed].sum() / weights.sum())
     if collapse is not None and path:
         low, high = (float(before[path[-1].phase] + s) for s in collapse.bracket)
         found |= {"collapse_displacement": (low + high) / 2.0, "bracket_low": low, "bracket_high": high}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,6 +18,7 @@ from solver.path.drivers import SupportMotion
 from solver.path.local_origin import at_origin, in_global_coordinates, without_origin
 from solver.path.path import Path
 from solver.path.state import PathState
+from solver.phases import PhaseChange, loads_in, removed_before
 from solver.program.model import Model
 from solver.programs.problem import SolveError
 from solver.results.increment import Increment, Status
@@ -33,6 +35,7 @@ def settlement_increments(
     loads: Loads,
     controls: Controls | None = None,
     ties: Sequence[Tie] = (),
+    changes: Sequence[PhaseChange] = (),
     resume: PathState | None = None,
     on_step: Callable[[PathState], None] | None = None,
 ) -> Increments:
@@ -49,7 +52,7 @@ def settlement_increments(
         Called with the :class:`PathState` after every step within an increment.
     """
     controls = controls or Controls()
-    check_settlement(assembly, phases, controls)
+    check_settlement(assembly, phases, controls, changes, ties)
     interfaces.refuse_strength("a settlement")
     by_program = controls.increments == LINEAR_PROGRAM
     if by_program and ties:
@@ -57,6 +60,11 @@ def settlement_increments(
     check_ties(ties, assembly, len(phases))
     if by_program and assembly.dimension == 3:
         raise ValueError("increments = 'linear program' is for blocks in the plane; leave it out for blocks in space")
+    if by_program and (loads.fills or changes):
+        raise ValueError(
+            "increments = 'linear program' knows one structure under loads that stay as they are; leave it out, or "
+            "fill and changes between phases"
+        )
     if resume is not None and (resume.phase >= len(phases) or len(resume.start.rotations) != assembly.n_blocks):
         raise ValueError(
             f"the checkpoint is of phase {resume.phase + 1} with {len(resume.start.rotations)} blocks; there are "
@@ -66,9 +74,12 @@ def settlement_increments(
     near, local, near_ties = assembly, tuple(phases), tuple(ties)
     if origin.any():
         near, local, near_ties = without_origin(origin, assembly, phases, ties)
+    loads = replace(loads, fills=tuple(fill.shifted(-origin) for fill in loads.fills))
     if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
-    follow = linear_program_increments if by_program else partial(_increments, ties=near_ties, on_step=on_step)
+    follow = linear_program_increments
+    if not by_program:
+        follow = partial(_increments, ties=near_ties, changes=changes, on_step=on_step)
     steps = follow(near, local, interfaces, loads, controls, resume)
     return TimedIncrements(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
 
@@ -81,6 +92,7 @@ def _increments(
     controls: Controls,
     resume: PathState | None,
     ties: tuple[Tie, ...],
+    changes: Sequence[PhaseChange],
     on_step: Callable[[PathState], None] | None,
 ) -> Generator[Increment, None, Ending]:
     first = 0 if resume is None else resume.phase
@@ -89,11 +101,15 @@ def _increments(
     for number, phase in enumerate(phases[first:], start=first):
         start = Pose.initial(assembly) if before is None else before.place.pose
         start = start if resume is None else resume.start
-        model = model_of(assembly, loads, interfaces, controls, ties=ties)
+        model = model_of(assembly, loads_in(loads, changes, number), interfaces, controls, ties=ties)
         path = Path(model, SupportMotion(assembly, phase, start), number, controls, on_step)
         at = 0.0
         try:
             state = path.begin(start, before) if resume is None else resume
+            now = [change for change in changes if change.phase == number]
+            if resume is None and (now or (number and any(tie.phase == number + 1 for tie in ties))):
+                gone = {name for change in now for name in change.ties}
+                state = path.changed(state, removed_before(changes, number, assembly.n_blocks), gone)
             at = state.place.s
             ending = yield from path.follow(state, resume is not None)
         except SolveError as error:
@@ -113,31 +129,40 @@ def model_of(
     ties: tuple[Tie, ...] = (),
 ) -> Model:
     """The units and loads of a path."""
-    force = float(np.linalg.norm(loads.dead[assembly.free, : assembly.dimension], axis=1).mean())
+    drawn = loads.dead_at(assembly, Pose.initial(assembly))
+    force = float(np.linalg.norm(drawn[assembly.free, : assembly.dimension], axis=1).mean())
     if force == 0.0:
         raise ValueError("no load acts on any free block; give them a weight")
     length = assembly.block_size
     return Model(
         assembly,
         interfaces,
-        loads.dead,
+        drawn,
         length,
         force,
         length / 4.0,
         live=live,
         ties=ties,
+        fills=loads.fills,
         compliance=controls.compliance_factor,
         imperfection=controls.imperfection_factor,
     )
 
 
-def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls: Controls | None = None) -> None:
+def check_settlement(
+    assembly: Assembly,
+    phases: Sequence[Settlement],
+    controls: Controls | None = None,
+    changes: Sequence[PhaseChange] = (),
+    ties: Sequence[Tie] = (),
+) -> None:
     """Refuses what cannot be analysed, before anything is solved or written.
 
     Raises
     ------
     ValueError
-        For no settlement, no free block, a phase that moves no support, blocks that overlap (both named, with depth).
+        For no settlement, no free block, a phase that moves no support or none that is still there, a change before a
+        phase that does not exist, blocks that overlap (both named, with depth).
     """
     controls = controls or Controls()
     if not phases:
@@ -150,4 +175,19 @@ def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls:
             if phase.blocks is not None and assembly.moving.any():
                 raise ValueError(f"{which} moves no support: of its blocks ({named}) none has the role 'moving'")
             raise ValueError(f"{which} moves no support: give one of the blocks the role 'moving': {named}")
+    for change in changes:
+        if not 0 <= change.phase < len(phases):
+            raise ValueError(f"a change comes before settlement phase {change.phase + 1}; there are {len(phases)}")
+        for name in change.ties:
+            if name not in {tie.name for tie in ties if tie.phase <= change.phase}:
+                raise ValueError(
+                    f"no tie '{name}' is there to be taken away before settlement phase {change.phase + 1}"
+                )
+    gone = np.zeros(assembly.n_blocks, dtype=bool)
+    for number, phase in enumerate(phases):
+        gone |= removed_before(changes, number, assembly.n_blocks)
+        if not (phase.taking_part(assembly) & ~gone).any():
+            raise ValueError(f"settlement phase {number + 1} moves only supports that have been taken away; keep one")
+        if not (assembly.free & ~gone).any():
+            raise ValueError(f"before settlement phase {number + 1} all free blocks are taken away; keep one")
     check_blocks(assembly, controls.overlap_tolerance)

@@ -84,7 +84,7 @@ class EquilibriumChecks:
         closed = (contacts.gaps <= gap * model.length) | is_member(contacts)
         matrix = wrench_matrix(contacts, place.pose, model.length)
         live, live_size = model.scaled_live
-        load = (model.scaled_load + place.multiplier * live_size * live)[free].ravel()
+        load = (model.scaled_load_at(place.pose) + place.multiplier * live_size * live)[free].ravel()
         reference = np.zeros_like(contacts.points) if at_rest else self.stepper.transferred(place, contacts)[0]
         # The program is that of the normal forces beyond the least ones.
         base = np.zeros_like(reference)

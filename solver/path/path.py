@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import replace
 from enum import Enum
 
@@ -96,6 +96,7 @@ class Path:
         self._remove_blocks(np.zeros(0))
         self.largest_lag = LAG_PER_ERROR * controls.step_tolerance
         self.largest_turn = TURN_PER_ERROR * controls.step_tolerance
+        self.disturbed = False
         self.reported, self.failure, self.wedged = -np.inf, "", Place.unloaded(driver.supports(0.0))
 
     def _remove_blocks(self, fell_at: np.ndarray) -> None:
@@ -126,10 +127,34 @@ class Path:
             place = resting or place
         return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
 
-    def _at_rest(self, place: Place) -> Place | None:
-        """The place with the forces of least elastic energy in equilibrium; None where there are none."""
+    def changed(self, state: PathState, removed: np.ndarray, ties: Collection[str] = ()) -> PathState:
+        """The state once blocks, (n_blocks,) bool array, and ties are taken away and the others have come to rest.
+
+        Where they do not, it is that from which they fall; :meth:`follow` finds that.
+        """
+        if removed.any():
+            fell_at = np.where(removed, -np.inf, state.fell_at if len(state.fell_at) else np.nan)
+            self._remove_blocks(fell_at)
+            state = replace(state, fell_at=fell_at)
+            self.reports.notes = [Note(0.0, self.reports.taken_away(removed))]
+        if ties:
+            lengths = state.place.tie_lengths.copy()
+            lengths[[tie.name in ties for tie in self.model.ties]] = np.nan
+            state = replace(state, place=replace(state.place, tie_lengths=lengths))
+        self.disturbed = True
+        if not self._in_equilibrium(state.place):
+            end, at_rest = self.fall.relax(state.place)
+            settled = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
+            if settled is None:
+                return state
+            state = settled
+        place = self._at_rest(state.place, anew=False) or state.place
+        return replace(state, place=place, history=(place,))
+
+    def _at_rest(self, place: Place, anew: bool = True) -> Place | None:
+        """The place with forces in equilibrium, of least elastic energy or nearest to its own; None without any."""
         try:
-            forces = self.checks.nearest(replace(place, multiplier=0.0), COMPUTED_GAP, at_rest=True)
+            forces = self.checks.nearest(replace(place, multiplier=0.0), COMPUTED_GAP, at_rest=anew)
         except NotSolved:
             bounds = self.checks.bounds(place)
             if not bounds.in_equilibrium:
@@ -196,6 +221,10 @@ class Path:
         place, model = state.place, self.model
         check = self._check(place)
         bounds = check.bounds
+        if not bounds.in_equilibrium and self.disturbed:
+            check, words = replace(check, measured=self._reaction(place)), [note.words for note in self.reports.notes]
+            ending = yield from self.fall.collapse(check, place, place.s, None)
+            return replace(ending, message="; ".join([*words, ending.message]))
         if not bounds.in_equilibrium:
             motion = next((motion for _, motion, *_ in self.fall.time_steps(place)), self.stepper.weights)
             yield self.reports.falling_increment(place, motion * model.lengths, place.s)
@@ -378,7 +407,7 @@ class Path:
         started, members = self.stepper.measured(contacts, before.pose, before.tie_lengths), is_member(contacts)
         slipped, closed = (contacts.slip - started.slip) / model.length, (contacts.gaps - started.gaps) / model.length
         done = (
-            float((model.scaled_load * free * motion).sum()),
+            float((model.scaled_load_at(after.pose) * free * motion).sum()),
             after.multiplier * live_size * float((live * free * motion).sum()),
             float((np.where(free, 0.0, resultant) * motion).sum()),
             -float((after.forces[:, 1:] * slipped).sum() + (after.forces[:, 0] * closed)[members].sum()),
@@ -405,7 +434,8 @@ class Path:
         weights = self.model.assembly.masses * self.model.assembly.free * GRAVITY
         leaving = self.fall.movements(state.place, end) > FALLEN
         fell_at = np.where(leaving, state.place.s, state.fell_at if len(state.fell_at) else np.nan)
-        if not leaving.any() or weights[~np.isnan(fell_at)].sum() > self.local_loss * weights.sum():
+        too_much = weights[np.isfinite(fell_at)].sum() > self.local_loss * weights.sum()
+        if not leaving.any() or too_much or not weights[np.isnan(fell_at)].any():
             return None
         before, notes, programs = state.fell_at, self.reports.notes, self.stepper.programs
         weight = float(weights[leaving].sum())

@@ -10,6 +10,7 @@ from solver.assembly import Assembly
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose, moved_vertices, relative_velocities
+from solver.loads import GRAVITY
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Increment, State, Status
 from solver.ties import TieForces, is_member
@@ -46,7 +47,7 @@ class Reports:
         resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
         live, live_size = model.scaled_live
         multiplier = check.measured * live_size if model.live is not None else 0.0
-        balance = (resultant + model.scaled_load + multiplier * live)[model.assembly.free]
+        balance = (resultant + model.scaled_load_at(place.pose) + multiplier * live)[model.assembly.free]
         ties = self.stepper.members.told(contacts, check.forces, place.pose, place.tie_lengths)
         support_forces = on_supports(model, contacts, place.pose, check.forces)
         between = ~is_member(contacts)
@@ -147,6 +148,12 @@ class Reports:
             f"{self._named(np.flatnonzero(fallen))} {falls}, {weight:.4g} N, {100.0 * share:.2g} % of the weight; "
             "the path goes on without"
         )
+
+    def taken_away(self, removed: np.ndarray) -> str:
+        """Message that names the blocks that are taken away."""
+        assembly = self.model.assembly
+        weight = float(assembly.masses[removed & assembly.free].sum()) * GRAVITY
+        return f"{self._named(np.flatnonzero(removed))} taken away before settlement {self.number + 1}, {weight:.4g} N"
 
     def _named(self, blocks: np.ndarray) -> str:
         return f"block{'' if len(blocks) == 1 else 's'} {_listed(self.model.assembly, blocks, 4)}"

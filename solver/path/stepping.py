@@ -38,6 +38,9 @@ LINEARISATIONS = 6
 #: and where they only hinge.
 EXACT_SLIDING, EXACT = 1e-6, 1e-8
 
+#: Change of the load of a fill that has followed the blocks, in block weights, up to which a step is not repeated.
+SAME_LOAD = 1e-6
+
 #: Penetration, in block sizes, at which a step is refused, and gap up to which blocks touch as drawn.
 LARGEST_PENETRATION = 1e-4
 
@@ -257,17 +260,17 @@ class Stepper:
         friction, compliance, members = self.friction(start), self.compliance(start), is_member(start)
         bound = friction * followed
         resisting, before = self._resistance(place, length, in_time, viscosity)
-        load = (model.scaled_load + (0.0 if in_time else viscosity) * self.imperfection)[free].ravel()
         closed = np.inf if in_time or viscosity == 1.0 else EXACT
         live, live_size = model.scaled_live
         multiplier = place.multiplier * live_size
         # The give of members stays.
-        motion_so_far, normal, shear = np.zeros_like(load), np.where(members, 0.0, forces[:, 0]), forces[:, 1:]
+        motion_so_far, normal, shear = np.zeros_like(before), np.where(members, 0.0, forces[:, 0]), forces[:, 1:]
         pose = self._with_supports(place.pose, supports)
         contacts = self.measured(start, pose, place.tie_lengths)
         for number in range(LINEARISATIONS):
             rows = ContactRows(wrench_matrix(contacts, pose, model.length), free)
             control = driver.control(pose) if model.live is not None else None
+            load = self._load(pose, 0.0 if in_time else viscosity)
             problem = ContactProblem(
                 rows=rows,
                 gap=contacts.gaps / model.length,
@@ -296,7 +299,10 @@ class Stepper:
             pose = self._with_supports(moved(place.pose, full), supports)
             predicted = problem.gap + rows.relative(solution.motion)[:, 0]
             contacts = self.measured(start, pose, place.tie_lengths)
-            residual = self._linearisation_error(contacts, predicted, forces, bound, closed)
+            residual = max(
+                self._linearisation_error(contacts, predicted, forces, bound, closed),
+                self._largest(self._load(pose, 0.0 if in_time else viscosity) - load) / SAME_LOAD,
+            )
             control_error = 0.0 if control is None else abs(s - driver.control_displacement(pose)) / model.length
             if residual <= 1.0 and control_error <= EXACT:
                 break
@@ -334,6 +340,10 @@ class Stepper:
         slides = (np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * bound)[touches].any()
         exact = EXACT_SLIDING if slides else EXACT
         return max(self._largest(gap[touches]) / closed, self._largest((gap - predicted)[carries]) / exact)
+
+    def _load(self, pose: Pose, imperfection: float) -> np.ndarray:
+        """(n_free n_dof,) array: loads on the free blocks at a pose, with so many times the imperfection."""
+        return (self.model.scaled_load_at(pose) + imperfection * self.imperfection)[self.free].ravel()
 
     def _resistance(
         self, place: Place, length: float, in_time: bool, viscosity: float

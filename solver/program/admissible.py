@@ -189,7 +189,8 @@ class _StaticProgram:
         self.least = np.zeros((len(contacts), d))
         self.least[closed, 0] = least[closed]
         given = matrix @ self.least.ravel()
-        self.load, self.tolerance = model.scaled_load.ravel()[free] + given[free], BALANCE_TOLERANCE * model.total_load
+        self.load = model.scaled_load_at(pose).ravel()[free] + given[free]
+        self.tolerance = BALANCE_TOLERANCE * model.total_load
         live, self.live_size = model.scaled_live
         columns, objective = [balance], np.zeros(self.n)
         if self.live_size > 0.0:

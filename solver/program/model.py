@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.assembly import Assembly
+from solver.backfill import Backfill
 from solver.interfaces import Interfaces
-from solver.kinematics import dimension_of, unit_lengths
+from solver.kinematics import Pose, dimension_of, unit_lengths
 from solver.ties import Tie
 
 
@@ -21,7 +22,7 @@ class Model:
     assembly : Assembly
     interfaces : Interfaces
     load : (n_blocks, n_dof) array [N, N·m]
-        Forces and moments, n_dof = 3 in the plane and 6 in space.
+        Forces and moments with the blocks as drawn, n_dof = 3 in the plane and 6 in space.
     length : float [m]
     force : float [N]
         Block size and mean load of a free block: the program is written in these units.
@@ -32,6 +33,8 @@ class Model:
     fallen : (n_blocks,) bool array, optional
         Blocks that have left the structure, without loads and contact points.
     ties : tuple of Tie
+    fills : tuple of Backfill
+        Fill whose load as drawn is a part of ``load`` and follows the blocks.
     compliance, imperfection : float
         Times those of :mod:`solver.tolerances`.
     """
@@ -45,12 +48,14 @@ class Model:
     live: np.ndarray | None = None
     fallen: np.ndarray | None = None
     ties: tuple[Tie, ...] = ()
+    fills: tuple[Backfill, ...] = ()
     compliance: float = 1.0
     imperfection: float = 1.0
 
     def without(self, fallen: np.ndarray) -> Model:
         """Return the model once blocks, (n_blocks,) bool array, have left it."""
-        return replace(self, load=np.where(fallen[:, None], 0.0, self.load), fallen=fallen)
+        fills = tuple(fill.without(fallen) for fill in self.fills)
+        return replace(self, load=np.where(fallen[:, None], 0.0, self.load), fallen=fallen, fills=fills)
 
     @property
     def n_dof(self) -> int:
@@ -71,6 +76,14 @@ class Model:
     def scaled_load(self) -> np.ndarray:
         """(n_blocks, n_dof) array: the load in units of the program."""
         return self.load / (self.force * unit_lengths(self.n_dof, self.length))
+
+    def scaled_load_at(self, pose: Pose) -> np.ndarray:
+        """(n_blocks, n_dof) array: the load at a pose, where fill has followed the blocks, in units of the program."""
+        if not self.fills:
+            return self.scaled_load
+        drawn = Pose.initial(self.assembly)
+        moved = sum(fill.load(self.assembly, pose) - fill.load(self.assembly, drawn) for fill in self.fills)
+        return self.scaled_load + moved / (self.force * unit_lengths(self.n_dof, self.length))
 
     @property
     def scaled_live(self) -> tuple[np.ndarray, float]:

@@ -97,7 +97,8 @@ class State:
     support_forces : (n_blocks, n_dof) array [N, N·m]
         Resultant of the structure on each support about its centroid; zero for free blocks.
     fell_at : (n_blocks,) array
-        Parameter at which blocks have fallen, nan for the others; empty where none have.
+        Parameter at which blocks have fallen, minus infinity for those that were taken away, nan for the others; empty
+        where none have.
     ties : TieForces
         Empty where there are none.
     """
@@ -254,10 +255,16 @@ class Increment(HasState):
 
     @property
     def fallen(self) -> np.ndarray:
-        """(n_blocks,) bool array: blocks that have fallen, and are out of the structure."""
+        """(n_blocks,) bool array: blocks that have fallen or were taken away, and are out of the structure."""
         # Read once: the arrays may be in a file.
         state = self.state
         return ~np.isnan(state.fell_at) if len(state.fell_at) else np.zeros(len(state.pose.positions), dtype=bool)
+
+    @property
+    def removed(self) -> np.ndarray:
+        """(n_blocks,) bool array: blocks that were taken away before a settlement."""
+        state = self.state
+        return np.isneginf(state.fell_at) if len(state.fell_at) else np.zeros(len(state.pose.positions), dtype=bool)
 
     @property
     def states(self) -> np.ndarray:

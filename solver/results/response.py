@@ -15,6 +15,7 @@ from solver.geometry.contacts import Contacts
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose, relative_velocities
 from solver.loads import GRAVITY, Loads, Settlement
+from solver.phases import PhaseChange
 from solver.views import Shown, views
 
 from .certificate import Certificate
@@ -122,6 +123,8 @@ class Response(Shown):
         What is measured along them.
     control : optional
         What drives the parameter where no settlement does: the ControlDisplacement of a pushover.
+    changes : tuple of PhaseChange
+        Of blocks and dead loads between the settlements.
     """
 
     assembly: Assembly
@@ -137,6 +140,7 @@ class Response(Shown):
     parameter: Quantity = SETTLEMENT
     measured: Quantity = REACTION
     control: Control | None = None
+    changes: tuple[PhaseChange, ...] = ()
 
     def __repr__(self) -> str:
         """One line: what was analysed, and how it ended."""
@@ -159,7 +163,7 @@ class Response(Shown):
         fell_at = self.path[-1].state.fell_at if self.path else np.zeros(0)
         weights = self.assembly.masses * GRAVITY
         losses = []
-        for value in np.unique(fell_at[~np.isnan(fell_at)]):
+        for value in np.unique(fell_at[np.isfinite(fell_at)]):
             fallen = np.flatnonzero(fell_at == value)
             weight = float(weights[fallen].sum())
             names = tuple(self.assembly.names[k] for k in fallen)

@@ -36,6 +36,8 @@ EVERY_TABLE: dict[str, Any] = {
     "analysis": {"kind": "pushover"},
     "control": {"block": "brick 1-1"},
     "bond": [{"walls": ["A-WALL*"]}],
+    "remove": [{"phase": 1, "blocks": "brick 1-2"}],
+    "backfill": [{"over": "brick *", "surface": 3.0, "unit_weight": 18000.0}],
     "explain": {},
     "output": {},
 }

@@ -1,0 +1,82 @@
+"""What is taken away between the settlements of a case: the tables [[remove]]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+import solver
+from blockvis.text import nearest
+
+from .key import TEXTS, Key, Section, whole
+from .toml_table import Table
+
+REMOVE = Section(
+    "remove",
+    "Blocks or ties that are taken away before a settlement; what stands comes to rest without them first",
+    (
+        Key("phase", whole(1), "Number of the [[settlement]] before which they are taken away", 2, required=True,
+            remedy="give the number of the [[settlement]] before which they are taken away, from 1"),
+        Key("blocks", TEXTS, "Names of the blocks, or patterns of them", ["prop", "brick 4-*"], otherwise="none",
+            default=()),
+        Key("ties", TEXTS, "Names of the ties, or patterns of them", ["tie 1"], otherwise="none", default=()),
+    ),
+    several=True,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Removal:
+    """A table [[remove]].
+
+    Attributes
+    ----------
+    phase : int
+        Number of the settlement, from 1, before which they are taken away.
+    blocks, ties : tuple of str
+        Names or patterns.
+    where : str
+        File and table, for messages.
+    """
+
+    phase: int
+    blocks: tuple[str, ...] = ()
+    ties: tuple[str, ...] = ()
+    where: str = ""
+
+
+def read_removal(table: Table) -> Removal:
+    """Read a table [[remove]]."""
+    values = REMOVE.read(table)
+    if not values["blocks"] and not values["ties"]:
+        raise table.error("blocks", 'is missing; name what is taken away: blocks = ["prop"]')
+    if values["ties"]:
+        raise table.error("ties", f"names '{values['ties'][0]}', but the case has no ties; name blocks")
+    return Removal(**values, where=f"{table.source}: [{table.where}]")
+
+
+def removed_blocks(removal: Removal, assembly: solver.Assembly) -> np.ndarray:
+    """(n_blocks,) bool array: blocks that a table takes away.
+
+    Parameters
+    ----------
+    removal : Removal
+    assembly : solver.Assembly
+
+    Raises
+    ------
+    ValueError
+        For a name that no block has.
+    """
+    chosen = np.zeros(assembly.n_blocks, dtype=bool)
+    for pattern in removal.blocks:
+        named = np.array([fnmatchcase(name, pattern) for name in assembly.names])
+        if not named.any():
+            raise ValueError(
+                f"{removal.where} blocks: no block is named '{pattern}'{nearest(pattern, assembly.names)}; the blocks "
+                f"are {', '.join(assembly.names[:12])}{' ...' if assembly.n_blocks > 12 else ''}"
+            )
+        chosen |= named
+    return chosen

@@ -1,0 +1,84 @@
+"""Backfill: loose fill over an extrados, whose pressure follows the blocks as they move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .assembly import Assembly
+from .kinematics import Pose, cross_rows, rotation_matrices
+
+#: Places in a triangle and in a segment at which quadratic functions are summed exactly, each with the same weight.
+_PLACES = {3: (1.0 + 3.0 * np.eye(3)) / 6.0, 2: np.array([[1.0, -1.0], [-1.0, 1.0]]) / np.sqrt(12.0) + 0.5}
+
+
+@dataclass(frozen=True)
+class Backfill:
+    """Loose fill up to a level surface over pieces of the blocks, which looked upwards and saw it in the drawing.
+
+    Attributes
+    ----------
+    pieces : (n, d, d) array [m]
+        Corners of each piece in the drawing: of a segment of an edge in the plane, of a triangle of a face in space,
+        counter-clockwise seen from outside the block.
+    block : (n,) int array
+        The block each belongs to.
+    surface : float [m]
+        Height of the fill's top.
+    unit_weight : float [N/m³]
+    pressure_coefficient : float
+        Horizontal pressure as a part of the vertical one.
+    thickness : (n,) array [m], optional
+        In the plane, out of it.
+
+    Notes
+    -----
+    At every pose a piece carries the column of fill between where it is then and the surface: on an area dA with the
+    outward normal n, z below the surface, the force unit_weight · z · (-k n_horizontal, -n_vertical) dA with k the
+    pressure coefficient. Where z or the upward part of n is negative there is none.
+    """
+
+    pieces: np.ndarray
+    block: np.ndarray
+    surface: float
+    unit_weight: float
+    pressure_coefficient: float = 0.0
+    thickness: np.ndarray | None = None
+
+    def corners(self, assembly: Assembly, pose: Pose) -> np.ndarray:
+        """(n, d, d) array [m]: corners of the pieces at a pose."""
+        arms = self.pieces - assembly.centroids[self.block][:, None]
+        turned = np.einsum("nij,nkj->nki", rotation_matrices(pose.rotations)[self.block], arms)
+        return pose.positions[self.block][:, None] + turned
+
+    def load(self, assembly: Assembly, pose: Pose) -> np.ndarray:
+        """(n_blocks, n_dof) array [N, N·m]: what the fill does to each block at a pose, moments about its centroid."""
+        corners, d = self.corners(assembly, pose), assembly.dimension
+        first = corners[:, 1] - corners[:, 0]
+        if d == 2:
+            assert self.thickness is not None
+            areas = self.thickness[:, None] * np.stack([first[:, 1], -first[:, 0]], axis=1)
+        else:
+            areas = np.cross(first, corners[:, 2] - corners[:, 0]) / 2.0
+        along = -areas * np.where(np.arange(d) < d - 1, self.pressure_coefficient, 1.0)
+        along[areas[:, -1] <= 0.0] = 0.0
+        places = _PLACES[d]
+        pressures = self.unit_weight * np.maximum(self.surface - corners[:, :, -1], 0.0) @ places.T / d
+        points = np.einsum("pk,nkj->npj", places, corners)
+        load = np.zeros((assembly.n_blocks, d + pose.rotations.shape[1]))
+        for place in range(d):
+            force = pressures[:, place, None] * along
+            arms = cross_rows(points[:, place] - pose.positions[self.block])
+            np.add.at(load, self.block, np.hstack([force, np.einsum("nrd,nd->nr", arms, force)]))
+        return load
+
+    def without(self, gone: np.ndarray) -> Backfill:
+        """Return the fill over the other blocks once some, (n_blocks,) bool array, have left with theirs."""
+        kept = ~gone[self.block]
+        thickness = None if self.thickness is None else self.thickness[kept]
+        return replace(self, pieces=self.pieces[kept], block=self.block[kept], thickness=thickness)
+
+    def shifted(self, by: np.ndarray) -> Backfill:
+        """Return the fill in a drawing moved by (d,) [m]."""
+        return replace(self, pieces=self.pieces + by, surface=self.surface + float(by[-1]))

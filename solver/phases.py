@@ -1,0 +1,47 @@
+"""Phases: what changes before a settlement begins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .loads import Loads
+
+
+@dataclass(frozen=True)
+class PhaseChange:
+    """What changes before a settlement begins; joints keep the forces that they have, and blocks come to rest first.
+
+    Attributes
+    ----------
+    phase : int
+        Number of the settlement, from 0.
+    removed : (n_blocks,) bool array, optional
+        Blocks that are taken away.
+    dead : (n_blocks, n_dof) array, optional [N, N·m]
+        Dead loads that are added from then on.
+    ties : tuple of str
+        Names of ties that are taken away.
+    """
+
+    phase: int
+    removed: np.ndarray | None = None
+    dead: np.ndarray | None = None
+    ties: tuple[str, ...] = ()
+
+
+def removed_before(changes: Sequence[PhaseChange], phase: int, n_blocks: int) -> np.ndarray:
+    """(n_blocks,) bool array: blocks that are taken away before a settlement."""
+    removed = np.zeros(n_blocks, dtype=bool)
+    for change in changes:
+        if change.phase == phase and change.removed is not None:
+            removed |= change.removed
+    return removed
+
+
+def loads_in(loads: Loads, changes: Sequence[PhaseChange], phase: int) -> Loads:
+    """Return the loads during a settlement, by its number from 0."""
+    added = [change.dead for change in changes if change.phase <= phase and change.dead is not None]
+    return replace(loads, dead=sum(added, loads.dead)) if added else loads

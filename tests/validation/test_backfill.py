@@ -1,0 +1,128 @@
+"""Fill over arches: reactions and thrusts by hand, of the columns of fill over the extrados where it then is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis.case_files.read import read_case
+from blockvis.cases.backfill import BackfillCase, backfills
+from blockvis.cases.build import case_assembly
+from blockvis.runs.plan import planned
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DENSITY, UNIT_WEIGHT, SURFACE, COEFFICIENT = 2000.0, 18000.0, 2.5, 0.2
+#: Places, half the weight each, at which a quadratic is summed exactly.
+GAUSS = 0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0)
+#: Left half of an arch of two blocks: springing on the ground from x = -2 to -1.6, upright joint at the crown.
+HALF = np.array([[-2.0, 0.0], [-1.6, 0.0], [0.0, 1.6], [0.0, 2.0]])
+GROUND = np.array([[-2.1, -0.3], [-1.5, -0.3], [-1.5, 0.0], [-2.1, 0.0]])
+
+
+def mirrored(outline: np.ndarray) -> np.ndarray:
+    return (outline * [-1.0, 1.0])[::-1]
+
+
+def prism(outline: np.ndarray) -> tuple[np.ndarray, list[list[int]]]:
+    """The outline in the plane y = 0, one metre deep."""
+    n = len(outline)
+    front, back = (np.column_stack([outline[:, 0], np.full(n, y), outline[:, 1]]) for y in (0.0, 1.0))
+    sides = [[n + k, n + (k + 1) % n, (k + 1) % n, k] for k in range(n)]
+    return np.vstack([front, back]), [list(range(n)), list(range(2 * n - 1, n - 1, -1)), *sides]
+
+
+def two_block_arch(dimension: int) -> solver.Assembly:
+    outlines = [HALF, mirrored(HALF), GROUND, mirrored(GROUND)]
+    labels = {"names": ["left", "right", "ground", "moving"], "roles": ["free", "free", "fixed", "moving"]}
+    if dimension == 2:
+        return solver.Assembly.from_outlines(outlines, density=DENSITY, **labels)
+    return solver.Assembly.from_solids([prism(outline) for outline in outlines], density=DENSITY, **labels)
+
+
+def with_fill(assembly: solver.Assembly) -> solver.Structure:
+    fill = BackfillCase(("left", "right"), SURFACE, UNIT_WEIGHT, COEFFICIENT)
+    weight = solver.self_weight(assembly)
+    loads = solver.Loads(weight.dead, weight.live, backfills([fill], assembly, "case.toml"))
+    return solver.Structure(assembly, loads=loads, friction_coefficient=3.0)
+
+
+def thrust_by_hand(spread: float) -> float:
+    """At the springing, of three hinges: at the inner ends of the springings and at the top of the crown."""
+    hinge, crown = HALF[1], HALF[3]
+    before, after = crown - hinge, np.array([spread / 2.0 + 1.6, 0.0])
+    after[1] = np.sqrt(before @ before - after[0] ** 2)
+    angle = np.arctan2(after[1], after[0]) - np.arctan2(before[1], before[0])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    centroid = solver.Assembly.from_outlines([HALF]).centroids[0]
+    weight = 0.72 * DENSITY * solver.GRAVITY
+    moment = weight * (turn @ (centroid - hinge))[0]
+    # Over the straight extrados from crown to springing: p = γ (s - y), down p |dx|, inwards k p |dy|.
+    low, high = (turn @ (point - hinge) for point in (HALF[0], crown))
+    push, (width, height) = 0.0, high - low
+    for share in GAUSS:
+        place = low + share * (high - low)
+        pressure = UNIT_WEIGHT * (SURFACE - place[1]) / 2.0
+        push += COEFFICIENT * pressure * height
+        moment += pressure * width * place[0] + COEFFICIENT * pressure * height * place[1]
+    return float(moment / after[1] - push)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_thrust_of_a_filled_arch_of_two_blocks_is_that_of_three_hinges(dimension: int) -> None:
+    settlement = solver.Settlement(np.eye(dimension)[0], increment=0.05, limit=0.1)
+    response = with_fill(two_block_arch(dimension)).settle(settlement)
+    assert response.path[0].least == pytest.approx(thrust_by_hand(0.0), rel=1e-7)
+    for increment in response.path[1:]:
+        assert increment.reaction == pytest.approx(thrust_by_hand(increment.parameter), rel=1e-5)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_supports_carry_the_weight_of_arch_and_fill(dimension: int) -> None:
+    assembly = two_block_arch(dimension)
+    response = with_fill(assembly).settle(solver.Settlement(np.eye(dimension)[0], increment=1e-3, limit=1e-3))
+    # Over each half a trapezoid of fill, 0.5 and 2.5 m high and 2 m wide.
+    weights = 2.0 * (0.72 * DENSITY * solver.GRAVITY + 3.0 * UNIT_WEIGHT)
+    assert -response.path[0].support_forces[:, dimension - 1].sum() == pytest.approx(weights, rel=1e-9)
+
+
+def test_the_supports_of_a_voussoir_arch_carry_its_weight_and_that_of_its_fill() -> None:
+    case = read_case(EXAMPLES / "arch_with_fill.toml")
+    assembly = case_assembly(case)
+    run = planned(case, assembly)
+    first = next(run.steps)
+    n = case.parameters["voussoirs"]
+    radius = 2.5 + 0.3
+    angles = np.pi / 2.0 + np.arcsin(2.0 / 2.5) * np.linspace(-1.0, 1.0, n + 1)
+    x, y = radius * np.cos(angles), radius * np.sin(angles) - 1.5
+    columns = 18000.0 * np.sum((1.6 - (y[1:] + y[:-1]) / 2.0) * (x[:-1] - x[1:]))
+    weights = assembly.masses[assembly.free].sum() * solver.GRAVITY + columns
+    assert -first.support_forces[:, 1].sum() == pytest.approx(weights, rel=1e-9)
+
+
+def test_a_limit_load_under_fill_is_that_of_a_block_by_hand() -> None:
+    block, ground = [[0, 0], [1, 0], [1, 2], [0, 2]], [[-1, -1], [2, -1], [2, 0], [-1, 0]]
+    assembly = solver.Assembly.from_outlines([block, ground], names=["block", "ground"], roles=["free", "fixed"])
+    weight = solver.self_weight(assembly)
+    fills = backfills([BackfillCase(("block",), 3.0, UNIT_WEIGHT)], assembly, "case.toml")
+    own, over = 4000.0 * solver.GRAVITY, UNIT_WEIGHT
+    structure = solver.Structure(
+        assembly, loads=solver.Loads(weight.dead, weight.live, fills), friction_coefficient=5.0
+    )
+    # It overturns: half the width against half the height.
+    found = structure.limit_load(acceleration=[1.0, 0.0])
+    assert found.multiplier == pytest.approx((own + over) * 0.5 / own, rel=1e-9)
+    # Leaning by 0.1, its top is where the fill is less deep over the higher corner.
+    lean = solver.Pose(np.array([[1.0, 0.0], [0.5, -0.5]]), np.array([[-0.1], [0.0]]))
+    corner = np.array([0.5, -1.0])
+    turn = np.array([[np.cos(0.1), np.sin(0.1)], [-np.sin(0.1), np.cos(0.1)]])
+    lean.positions[0] = np.array([1.0, 0.0]) - turn @ corner
+    a, b = (turn @ (np.array(p) - [1.0, 0.0]) for p in ([0.0, 2.0], [1.0, 2.0]))
+    moment = own * -(lean.positions[0] - [1.0, 0.0])[0]
+    for share in GAUSS:
+        place = a + share * (b - a)
+        moment -= UNIT_WEIGHT * (3.0 - place[1]) * (b - a)[0] * place[0] / 2.0
+    leaning = structure.limit_load(acceleration=[1.0, 0.0], pose=lean)
+    assert leaning.multiplier == pytest.approx(moment / (own * lean.positions[0][1]), rel=1e-7)
