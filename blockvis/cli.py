@@ -967,7 +967,7 @@ def _render(options: argparse.Namespace) -> int:
     draw_still(response, last, folder / "last.png", size=size, **look, **seen_from)
     draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **seen_from)
     drawn += ["last.png", "mechanism.png"]
-    if response.assembly.dimension == 2:
+    if response.assembly.dimension == 2 and response.parameter.is_path:
         draw_cracks(response, -1, folder / "cracks.png")
         drawn.append("cracks.png")
     if options.animation != "none":

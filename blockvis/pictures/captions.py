@@ -8,7 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.results.about import loss_of
-from blockvis.text import force_text
+from blockvis.text import force_text, padded_text
 from solver import mechanics
 
 #: Warning on frames of a fall in real time.
@@ -177,13 +177,13 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
     name = measured.name.capitalize()
     if measured.is_force:
         moment = measured.unit == "N·m"
-        text = f"{name} {force_text(increment.measured, moment)}"
+        text = f"{name} {force_text(increment.measured, moment, padded=True)}"
         return text if moment else f"{text} = {increment.measured / response.total_weight:.4f} W"
     if not np.isfinite(increment.measured):
         return f"{name} {measured.symbol} unbounded"
-    text = f"{name} {measured.symbol} = {increment.measured:.5g} {measured.unit}".rstrip()
+    text = f"{name} {measured.symbol} = {padded_text(increment.measured, 5)} {measured.unit}".rstrip()
     live = increment.reaction if measured == mechanics.LOAD_MULTIPLIER else 0.0
-    return text + (f"   ·   Live load {force_text(live)}" if live else "")
+    return text + (f"   ·   Live load {force_text(live, padded=True)}" if live else "")
 
 
 def badge_of(response: solver.Response) -> str:

@@ -112,8 +112,8 @@ def _along(drawer: Drawer, path: list[solver.Increment], n: int, pause: int) -> 
     total = mechanics.path_parameters(path)
     if not drawer.response.parameter.is_path or total[-1] <= total[0]:
         draws: list[Draw] = [partial(drawer.picture, increment) for increment in path]
-        lasting = min(n, len(path) * pause)
-        return [draws[k] for k in np.linspace(0, len(path) - 1, lasting).round().astype(int)]
+        each = int(np.clip(round(n / len(path)), 1, pause))
+        return [draw for draw in draws for _ in range(each)]
     return [partial(_drawn_at, drawer, path, total, float(at)) for at in np.linspace(total[0], total[-1], n)]
 
 

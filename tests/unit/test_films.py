@@ -1,0 +1,38 @@
+"""Films between increments and at states that stand by themselves, and what of a run is drawn."""
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis import animate
+from blockvis.pictures.film import state_at
+from blockvis.pictures.live_load import LiveLoads
+
+SIZE = (320, 180)
+
+
+def sideways_block(steps=3):
+    """Give the response of a block that is pushed over: its increments have live loads."""
+    assembly = solver.Assembly.from_outlines(
+        [[[0, 0], [0.2, 0], [0.2, 1], [0, 1]], [[0, -1], [0.2, -1], [0.2, 0], [0, 0]]],
+        roles=["free", "fixed"],
+        names=["block", "ground"],
+    )
+    live = solver.weight_fraction(assembly, (1.0, 0.0), np.array([0]))
+    loads = solver.Loads(solver.self_weight(assembly).dead, live)
+    control = solver.ControlDisplacement("block", (1, 0), increment=0.02, limit=0.02 * steps)
+    return solver.pushover(assembly, control, loads=loads, friction_coefficient=2.0)
+
+
+def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
+    response = sideways_block()
+    loads = LiveLoads(response, response.path, 1.0)
+    before, after = response.path[:2]
+    state = state_at(response, (before.parameter + after.parameter) / 2.0)
+    lengths = [
+        np.linalg.norm(np.subtract(*loads.arrows(one, one.pose)), axis=1)[0] / one.load_multiplier
+        for one in (before, state, after)
+    ]
+    assert lengths == pytest.approx([lengths[0]] * 3)
+    assert state.load_multiplier == pytest.approx((before.load_multiplier + after.load_multiplier) / 2.0)
+    assert len(list(animate(response, tmp_path / "frames", size=SIZE, fps=5, seconds=1.0).iterdir())) == 5 + 4
