@@ -96,7 +96,7 @@ def draw_cracks(
     number_of = {id(crack): k for k, crack in enumerate(cracks, start=1)}
     keys = [Key("line", f"crack {number_of[id(c)]}", palette.SURVEYED[k]) for k, c in enumerate(main)]
     if others:
-        keys.append(Key("line", f"{len(others)} smaller", palette.FAINT))
+        keys.append(Key("line", f"{len(others)} others", palette.FAINT))
     none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
     said = f"{len(cracks)} crack{'s' if len(cracks) != 1 else ''}   ·   lines as thick as they are open, the thickest "
     page = sheet.composed(
