@@ -150,10 +150,10 @@ class Drawing(Output):
                 from blockvis.pictures.render import draw_mechanism
 
                 draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **eye)
-                if response.assembly.dimension == 2 and response.parameter.is_path:
+                if response.parameter.is_path:
                     from blockvis.pictures.crack_drawing import draw_cracks
 
-                    draw_cracks(response, -1, folder / "cracks.png")
+                    draw_cracks(response, -1, folder / "cracks.png", **eye)
         with clock.counting("fall"):
             fall = _fall(response, apart, progress) if stored is None else stored
             progress.done()
