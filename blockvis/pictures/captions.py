@@ -17,6 +17,9 @@ FALL_BADGE = "FALLING · real time"
 #: Warning on pictures of runs that the solver could not follow to their end.
 FAILED_BADGE = "SOLVER FAILED"
 
+#: Reactions below this part of the weight [1, or m of a moment] are rounding.
+ROUNDING = 1e-9
+
 #: Multipliers above this many times the lowest of an envelope are not shown: over a support a load may grow nearly
 #: without limit.
 MOST_OVER_LOWEST = 8.0
@@ -177,7 +180,9 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
     name = measured.name.capitalize()
     if measured.is_force:
         moment = measured.unit == "N·m"
-        text = f"{name} {force_text(increment.measured, moment, padded=True)}"
+        # Rounding is no reaction.
+        force = increment.measured if abs(increment.measured) > ROUNDING * response.total_weight else 0.0
+        text = f"{name} {force_text(force, moment, padded=True)}"
         return text if moment else f"{text} = {increment.measured / response.total_weight:.4f} W"
     if not np.isfinite(increment.measured):
         return f"{name} {measured.symbol} unbounded"
@@ -228,6 +233,9 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
     if not (response.swings and increment.status == solver.Status.FALLING):
         parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")
     parts.append(f"W = {force_text(response.total_weight)}")
+    lost = int(increment.fallen.sum())
+    if lost and increment.status != solver.Status.FALLING:
+        parts.append(f"{lost} block{'s' if lost != 1 else ''} lost")
     return state_text(increment, response), "   ·   ".join(parts)
 
 

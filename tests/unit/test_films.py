@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from structures import dropped_brick
 
 import solver
 from blockvis import animate
-from blockvis.pictures.film import state_at
+from blockvis.pictures.drawer import Drawer, Look
+from blockvis.pictures.film import film_of, state_at
 from blockvis.pictures.live_load import LiveLoads
 
 SIZE = (320, 180)
@@ -22,6 +24,22 @@ def sideways_block(steps=3):
     loads = solver.Loads(solver.self_weight(assembly).dead, live)
     control = solver.ControlDisplacement("block", (1, 0), increment=0.02, limit=0.02 * steps)
     return solver.pushover(assembly, control, loads=loads, friction_coefficient=2.0)
+
+
+def test_a_film_tells_what_is_lost_and_goes_on():
+    response = dropped_brick(0.05)
+    shown = response.path
+    drawer = Drawer(response, Look(forces="none"), SIZE, shown)
+    told = []
+    drawer.picture = lambda state, badge=None: told.append((state.parameter, badge, bool(state.fallen.any())))
+    list(film_of(drawer, 10.0, 3.0)[1])
+    gone = response.losses[0].settlement
+    named = [parameter for parameter, badge, _ in told if badge == "LOST · brick"]
+    assert len(named) == 10
+    assert gone < named[0] < gone + 0.1
+    assert told[-1][0] == pytest.approx(1.0)
+    assert [badge for parameter, badge, _ in told if parameter < gone] == [None] * sum(p < gone for p, *_ in told)
+    assert all(lost for parameter, _, lost in told if parameter >= named[0])
 
 
 def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
