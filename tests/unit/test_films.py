@@ -1,14 +1,17 @@
 """Films between increments and at states that stand by themselves, and what of a run is drawn."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from structures import dropped_brick
+from structures import box, dropped_brick, posed
 
 import solver
 from blockvis import animate
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of, state_at
 from blockvis.pictures.live_load import LiveLoads
+from blockvis.pictures.solid_view import chosen_view
 
 SIZE = (320, 180)
 
@@ -54,3 +57,14 @@ def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
     assert lengths == pytest.approx([lengths[0]] * 3)
     assert state.load_multiplier == pytest.approx((before.load_multiplier + after.load_multiplier) / 2.0)
     assert len(list(animate(response, tmp_path / "frames", size=SIZE, fps=5, seconds=1.0).iterdir())) == 5 + 4
+
+
+def test_what_falls_is_not_hidden_by_what_stands():
+    """A small block that slides along x behind a tall one is seen from behind it, where from the front it is not."""
+    assembly = solver.Assembly.from_solids([box((0, 0, 0), (2, 0.3, 2)), box((0.8, 0.4, 0), (1.2, 0.8, 0.4))])
+    motion = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
+    response = replace(posed(assembly, solver.Pose.initial(assembly)), increments=())
+    assert chosen_view(response, motion).axes[2, 1] > 0.0
+    alone = solver.Assembly.from_solids([box((0.8, 0.4, 0), (1.2, 0.8, 0.4))])
+    alone = replace(posed(alone, solver.Pose.initial(alone)), increments=())
+    assert chosen_view(alone, motion[1:]).axes[2, 1] < 0.0
