@@ -944,8 +944,9 @@ def _render(options: argparse.Namespace) -> int:
     folder = Path(options.results)
     response = open_results(folder)
     size = _size(options.size)
+    seen_from = _seen_from(options, folder, response)
     if options.cracks is not None:
-        draw_cracks(response, options.cracks, folder / "cracks.png", size=size)
+        draw_cracks(response, options.cracks, folder / "cracks.png", size=size, **seen_from)
         print(f"drawn in {folder}/: cracks.png")
         return 0
     underlay = stored_underlay(folder)
@@ -962,13 +963,12 @@ def _render(options: argparse.Namespace) -> int:
         "curve": options.curve,
         "underlay": underlay,
     }
-    seen_from = _seen_from(options, folder, response)
     last = response.path[-1] if response.path else response.increments[-1]
     draw_still(response, last, folder / "last.png", size=size, **look, **seen_from)
     draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **seen_from)
     drawn += ["last.png", "mechanism.png"]
-    if response.assembly.dimension == 2:
-        draw_cracks(response, -1, folder / "cracks.png")
+    if response.parameter.is_path:
+        draw_cracks(response, -1, folder / "cracks.png", **seen_from)
         drawn.append("cracks.png")
     if options.animation != "none":
         progress = DrawingProgress()

@@ -33,8 +33,10 @@ def width_text(width: float) -> str:
     return f"{digits:.0f} mm" if digits >= 10.0 else f"{digits:g} mm"
 
 
-def force_text(force: float, moment: bool = False) -> str:
+def force_text(force: float, moment: bool = False, *, padded: bool = False) -> str:
     """Write a force [N], or a moment [N·m], with four digits and the unit that suits it.
+
+    In captions of films zeros at the end are ``padded``: words that stand behind would jump from frame to frame.
 
     Examples
     --------
@@ -43,7 +45,22 @@ def force_text(force: float, moment: bool = False) -> str:
     """
     size = abs(force)
     factor, unit = next((f, u) for f, u in ((1e6, "MN"), (1e3, "kN"), (1.0, "N")) if size >= f or f == 1.0)
-    return f"{force / factor:.4g} {unit}" + ("·m" if moment else "")
+    return f"{_digits(force / factor, 4, padded)} {unit}" + ("·m" if moment else "")
+
+
+def padded_text(value: float, digits: int) -> str:
+    """Write a number with so many digits, zeros at the end included.
+
+    Examples
+    --------
+    >>> padded_text(0.3598, 5), padded_text(1053.0, 4)
+    ('0.35980', '1053')
+    """
+    return _digits(value, digits, True)
+
+
+def _digits(value: float, digits: int, padded: bool) -> str:
+    return f"{value:#.{digits}g}".rstrip(".") if padded and value else f"{value:.{digits}g}"
 
 
 def rounded_length(largest: float) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.results.about import loss_of
-from blockvis.text import force_text
+from blockvis.text import force_text, padded_text
 from solver import mechanics
 
 #: Warning on frames of a fall in real time.
@@ -16,6 +16,9 @@ FALL_BADGE = "FALLING · real time"
 
 #: Warning on pictures of runs that the solver could not follow to their end.
 FAILED_BADGE = "SOLVER FAILED"
+
+#: Reactions below this part of the weight [1, or m of a moment] are rounding.
+ROUNDING = 1e-9
 
 #: Multipliers above this many times the lowest of an envelope are not shown: over a support a load may grow nearly
 #: without limit.
@@ -177,13 +180,15 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
     name = measured.name.capitalize()
     if measured.is_force:
         moment = measured.unit == "N·m"
-        text = f"{name} {force_text(increment.measured, moment)}"
+        # Rounding is no reaction.
+        force = increment.measured if abs(increment.measured) > ROUNDING * response.total_weight else 0.0
+        text = f"{name} {force_text(force, moment, padded=True)}"
         return text if moment else f"{text} = {increment.measured / response.total_weight:.4f} W"
     if not np.isfinite(increment.measured):
         return f"{name} {measured.symbol} unbounded"
-    text = f"{name} {measured.symbol} = {increment.measured:.5g} {measured.unit}".rstrip()
+    text = f"{name} {measured.symbol} = {padded_text(increment.measured, 5)} {measured.unit}".rstrip()
     live = increment.reaction if measured == mechanics.LOAD_MULTIPLIER else 0.0
-    return text + (f"   ·   Live load {force_text(live)}" if live else "")
+    return text + (f"   ·   Live load {force_text(live, padded=True)}" if live else "")
 
 
 def badge_of(response: solver.Response) -> str:
@@ -228,6 +233,9 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
     if not (response.swings and increment.status == solver.Status.FALLING):
         parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")
     parts.append(f"W = {force_text(response.total_weight)}")
+    lost = int(increment.fallen.sum())
+    if lost and increment.status != solver.Status.FALLING:
+        parts.append(f"{lost} block{'s' if lost != 1 else ''} lost")
     return state_text(increment, response), "   ·   ".join(parts)
 
 

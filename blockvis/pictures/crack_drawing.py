@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from PIL import Image
 
 import solver
+from blockvis.layout.sights import Cut, Sight
 from blockvis.results.cracks import Crack, cracks_of, main_cracks
 from blockvis.results.joint_faces import InitialJoints, initial_joints
 from blockvis.results.joints import end_openings
@@ -18,14 +22,11 @@ from . import palette
 from .captions import state_text
 from .flat_scene import FlatScene
 from .frame import Key, Sheet, framed, write_labels
-from .render import STILL_SIZE
+from .render import STILL_SIZE, seen_from
 
 #: Thickness of a crack that only slides and of the widest one, in heights of the picture; the latter in block sizes at
 #: most, or the steps of a fine bond would run into each other.
 THIN, THICK, OF_BLOCK = 1.0 / 540.0, 1.0 / 60.0, 0.35
-
-#: Of the colour of the blocks so much is left.
-PALE = 0.3
 
 
 def draw_cracks(
@@ -34,10 +35,14 @@ def draw_cracks(
     path: str | os.PathLike[str],
     *,
     size: tuple[int, int] = STILL_SIZE,
+    view: str | Mapping[str, float] | Sight | None = None,
+    section: str | Mapping[str, Any] | Cut | None = None,
 ) -> Path:
-    """Draw the cracks of an increment in the plane alone, on the layout.
+    """Draw the cracks of an increment alone, on the layout.
 
-    Each main crack has a colour of its own and its largest width written at its widest point; the others are grey.
+    In the plane each main crack has a colour of its own and its largest width written at its widest point; the others
+    are grey. In space lines are the darker and the thicker the more joints are open there, in classes of width; main
+    cracks have their numbers and widths.
 
     Parameters
     ----------
@@ -47,6 +52,8 @@ def draw_cracks(
     path : path
     size : (int, int)
         Width and height in pixels.
+    view, section
+        Of blocks in space, as of :func:`blockvis.draw_still`.
 
     Returns
     -------
@@ -55,24 +62,58 @@ def draw_cracks(
     Raises
     ------
     ValueError
-        For blocks in space, and for a number that no increment in equilibrium has.
+        For a number that no increment in equilibrium has, and a view or a section of blocks in the plane.
     """
     assembly = response.assembly
-    if assembly.dimension == 3:
-        raise ValueError("cracks.png is of blocks in the plane, these lie in space: see their cracks in last.png")
     increments = response.path or response.increments
     if not -len(increments) <= number < len(increments):
         raise ValueError(f"there is no increment {number}: choose one from 0 to {len(increments) - 1}, or -1, the last")
     increment = increments[number]
     joints = initial_joints(assembly)
     cracks = cracks_of(assembly, increment.pose, joints, increment.fallen)
+    widest = width_text(cracks[0].width) if cracks else ""
+    sheet = Sheet(size)
+    if assembly.dimension == 2:
+        if view is not None or section is not None:
+            raise ValueError("view and section are of blocks in space; these lie in the plane: leave both out")
+        thickness = "lines as thick as they are open, the thickest "
+        picture, keys, pixel = _drawn_in_plane(assembly, increment, joints, cracks, sheet)
+    else:
+        # VTK takes seconds to import, and pictures in the plane need none.
+        from .cracks_in_space import CracksInSpace
+
+        thickness = "the widest "
+        drawing = CracksInSpace(response, increment, joints, sheet, *seen_from(view, section))
+        main = main_cracks(cracks)
+        picture = drawing.image(main, _numbers(main, cracks))
+        keys, pixel = drawing.keys, drawing.pixel
+    none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
+    counted = f"{len(cracks)} crack{'s' if len(cracks) != 1 else ''}"
+    page = sheet.composed(
+        picture,
+        title=f"Cracks   ·   {state_text(increment, response)}",
+        detail=f"{counted}   ·   {thickness}{widest}   ·   drawn on the layout" if cracks else none,
+        keys=keys if cracks else [],
+        pixel=pixel,
+    )
+    with atomic_file(path) as partial:
+        page.save(partial)
+    return Path(path)
+
+
+def _drawn_in_plane(
+    assembly: solver.Assembly,
+    increment: solver.Increment,
+    joints: InitialJoints,
+    cracks: list[Crack],
+    sheet: Sheet,
+) -> tuple[Image.Image, list[Key], float]:
+    """Draw the cracks of blocks in the plane; returns the picture, its legend and the size of a pixel [m]."""
     main = main_cracks(cracks)
     openings = np.maximum(end_openings(assembly, joints, increment.pose), 0.0)
     widest = cracks[0].width if cracks else 1.0
-
-    sheet = Sheet(size)
     fill = palette.block_colours(assembly.materials, assembly.free)
-    fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), PALE)
+    fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
     frame = framed(assembly, [solver.Pose.initial(assembly)])
     scene = FlatScene(assembly, frame, sheet.inside_size, fill, outline=palette.PALE_OUTLINE)
     others = [crack for crack in cracks if id(crack) not in {id(one) for one in main}]
@@ -92,23 +133,17 @@ def draw_cracks(
         words = [width_text(crack.width) for crack in main]
         colours = palette.SURVEYED[: len(main)]
         write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours)
-    # Numbered as in the report.
-    number_of = {id(crack): k for k, crack in enumerate(cracks, start=1)}
-    keys = [Key("line", f"crack {number_of[id(c)]}", palette.SURVEYED[k]) for k, c in enumerate(main)]
+    named = zip(_numbers(main, cracks), palette.SURVEYED, strict=False)
+    keys = [Key("line", f"crack {number}", colour) for number, colour in named]
     if others:
-        keys.append(Key("line", f"{len(others)} smaller", palette.FAINT))
-    none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
-    said = f"{len(cracks)} crack{'s' if len(cracks) != 1 else ''}   ·   lines as thick as they are open, the thickest "
-    page = sheet.composed(
-        picture,
-        title=f"Cracks   ·   {state_text(increment, response)}",
-        detail=f"{said}{width_text(widest)}   ·   drawn on the layout" if cracks else none,
-        keys=keys,
-        pixel=scene.pixel,
-    )
-    with atomic_file(path) as partial:
-        page.save(partial)
-    return Path(path)
+        keys.append(Key("line", f"{len(others)} others", palette.FAINT))
+    return picture, keys, scene.pixel
+
+
+def _numbers(main: list[Crack], cracks: list[Crack]) -> list[int]:
+    """Count the main cracks as the report does."""
+    number_of = {id(crack): k for k, crack in enumerate(cracks, start=1)}
+    return [number_of[id(crack)] for crack in main]
 
 
 def _bars(ends: np.ndarray, half: np.ndarray) -> np.ndarray:

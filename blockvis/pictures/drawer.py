@@ -57,6 +57,9 @@ ARROW, ARROW_IN_SPACE = 0.055, 0.09
 #: Arrows of a mechanism of many parts stand apart by this fraction of the picture, in the plane and in space.
 CELL, CELL_IN_SPACE = 0.07, 0.09
 
+#: Arrows of a mechanism shorter than this fraction of the picture are specks, and left out.
+SPECK = 0.02
+
 #: Supports in space are shown whole where the picture is no larger for it than this many times the blocks: part of a
 #: slab that ends just outside looks like a mistake.
 WHOLE = 1.4
@@ -226,6 +229,8 @@ class Drawer:
         self._acting: dict[tuple[int, float], bool] = {}
         #: Where the blocks are drawn while a mechanism is shown.
         self._drawn_at: solver.Pose | None = None
+        #: Points (n, d) [m] along the arrows in the picture, by layer: labels leave them free.
+        self._along_arrows: dict[str, np.ndarray] = {}
         self._keys: list[Key] | None = None
 
     def _chosen_views(self) -> tuple[View, ...]:
@@ -403,6 +408,10 @@ class Drawer:
             weight = volumes[blocks] / volumes[blocks].sum()
             tails[k] = weight @ pose.positions[blocks]
             tips[k] = mechanics.carried(tails[[k]], blocks[:1], pose, swing.displaced)[0]
+        lengths = np.linalg.norm(self._projected(tips - tails)[:, :2], axis=1)
+        shown = lengths >= min(SPECK * float(self.scene.frame.size.max()), lengths.max(initial=0.0))
+        tails, tips = tails[shown], tips[shown]
+        self._along_arrows["motion"] = _along(tails, tips)
         self.tints = mechanism_colours(self.assembly, self.fill, swing)
         self._drawn_at = self.scene.show_motion(swing, tails, tips)
 
@@ -412,12 +421,14 @@ class Drawer:
             return [np.flatnonzero(swing.parts == part) for part in range(swing.n_parts)]
         positions = swing.increment.pose.positions
         moves = np.flatnonzero(swing.parts >= 0)
-        if self._views:
-            # Of the blocks behind each other the first is seen.
-            moves = moves[np.argsort(-self._views[0].depth(positions[moves]), kind="stable")]
         width = (CELL if self._flat else CELL_IN_SPACE) * self.scene.frame.size.max()
-        cell = np.floor(self._projected(positions)[:, :2] / width).astype(np.int64)
-        _, first = np.unique(cell[moves], axis=0, return_index=True)
+        place = self._projected(positions[moves])[:, :2] / width
+        cell = np.floor(place)
+        # Of the blocks behind each other the first is seen; else arrows stand as evenly as blocks allow.
+        off = -self._views[0].depth(positions[moves]) if self._views else np.abs(place - cell - 0.5).max(axis=1)
+        order = np.argsort(np.round(off, 6), kind="stable")
+        moves, cell = moves[order], cell[order]
+        _, first = np.unique(cell, axis=0, return_index=True)
         return [moves[[k]] for k in first]
 
     def keys(self) -> list[Key]:
@@ -514,7 +525,10 @@ class Drawer:
             return True
         place = increment.phase, increment.parameter
         if place not in self._acting:
-            same = np.array_equal(mechanics.rigid_parts(self.assembly, increment), swing.parts)
+            # Of states that stand by themselves some move in the same parts, here and there.
+            same = self.response.parameter.is_path and np.array_equal(
+                mechanics.rigid_parts(self.assembly, increment), swing.parts
+            )
             self._acting[place] = same or place == (swing.increment.phase, swing.increment.parameter)
         return self._acting[place]
 
@@ -540,6 +554,7 @@ class Drawer:
         ends = end_openings(self.assembly, self.joints, increment.pose)[widest].argmax(axis=1)
         places = self.scene.at_pixel((on_a + on_b)[widest, ends] / 2.0)
         words = [width_text(crack.width) for crack in cracks]
+        dots = np.concatenate([dots, *self._along_arrows.values()])
         write_labels(picture, places, words, self.sheet.text, self.scene.at_pixel(dots))
 
     def _draw_forces(self, increment: solver.Increment, shown: solver.Pose) -> None:
@@ -587,12 +602,16 @@ class Drawer:
     def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose) -> None:
         """Draw the live load times its multiplier as arrows to scale that end where it acts."""
         if self.live.largest > 0.0:
-            self.scene.arrows("live", *self.live.arrows(increment, shown), palette.LIVE)
+            self._draw_arrows("live", *self.live.arrows(increment, shown), palette.LIVE)
 
     def _draw_settlement(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if self.response.settlements:
             seen = self.scene.frame if self._flat else None
-            self.scene.arrows("arrow", *self._settlement_arrows(increment, shown, seen), palette.SETTLEMENT)
+            self._draw_arrows("arrow", *self._settlement_arrows(increment, shown, seen), palette.SETTLEMENT)
+
+    def _draw_arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
+        self._along_arrows[layer] = _along(tails, tips)
+        self.scene.arrows(layer, tails, tips, colour)
 
     def _settlement_arrows(
         self, increment: solver.Increment, shown: solver.Pose, seen: Frame | None = None
@@ -605,6 +624,11 @@ class Drawer:
         _, places, directions = settlement_arrows(self.assembly, phase, shown, seen)
         half = 0.5 * self._arrow * directions
         return (places - half, places + half) if self._flat else (places, places + 2.0 * half)
+
+
+def _along(tails: np.ndarray, tips: np.ndarray) -> np.ndarray:
+    """(3 n, d) array [m]: both ends and the middle of arrows."""
+    return np.concatenate([tails, (tails + tips) / 2.0, tips])
 
 
 def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:

@@ -16,8 +16,8 @@ from solver import mechanics
 from .captions import matters
 from .drawer import Drawer
 
-#: Seconds for which the last equilibrium and the end of the film are held.
-PAUSE, END = 0.5, 0.8
+#: Seconds for which the last equilibrium and the end of the film are held, and those for which a loss is told.
+PAUSE, END, TOLD = 0.5, 0.8, 1.0
 
 #: Nothing moves from one frame of a fall to the next where no corner moves by more than this [pixels].
 STILL = 0.3
@@ -49,7 +49,7 @@ def film_of(
     """
     path = [increment for increment in drawer.increments if matters(increment, drawer.response)]
     pause = max(1, round(PAUSE * fps))
-    along = _along(drawer, path, max(2, round(fps * seconds)), pause)
+    along = _along(drawer, path, max(2, round(fps * seconds)), pause, round(TOLD * fps))
     falling = _falling(drawer, fps)
     draws = [*along, *along[-1:] * (pause if falling else 0), *falling]
     draws += draws[-1:] * round(END * fps)
@@ -102,24 +102,48 @@ def _between(before: solver.Increment, after: solver.Increment, part: float) -> 
     ).with_arrays(pose=pose, contacts=replace(contacts, points=points))
 
 
-def _along(drawer: Drawer, path: list[solver.Increment], n: int, pause: int) -> list[Draw]:
-    """List what draws ``n`` states at even steps of the parameter.
+def _along(drawer: Drawer, path: list[solver.Increment], n: int, pause: int, told: int) -> list[Draw]:
+    """List what draws ``n`` states at even steps of the parameter; losses are ``told`` for so many.
 
-    Those that stand by themselves stand equally long, for no more than a pause.
+    States that stand by themselves stand equally long, for no more than a pause.
     """
     if not path:
         return []
     total = mechanics.path_parameters(path)
     if not drawer.response.parameter.is_path or total[-1] <= total[0]:
         draws: list[Draw] = [partial(drawer.picture, increment) for increment in path]
-        lasting = min(n, len(path) * pause)
-        return [draws[k] for k in np.linspace(0, len(path) - 1, lasting).round().astype(int)]
-    return [partial(_drawn_at, drawer, path, total, float(at)) for at in np.linspace(total[0], total[-1], n)]
+        each = int(np.clip(round(n / len(path)), 1, pause))
+        return [draw for draw in draws for _ in range(each)]
+    places = np.linspace(total[0], total[-1], n)
+    return [
+        partial(_drawn_at, drawer, path, total, float(at), words)
+        for at, words in zip(places, _losses_told(drawer.response, path, total, places, told), strict=True)
+    ]
 
 
-def _drawn_at(drawer: Drawer, path: Sequence[solver.Increment], total: np.ndarray, at: float) -> Image.Image:
+def _drawn_at(
+    drawer: Drawer, path: Sequence[solver.Increment], total: np.ndarray, at: float, badge: str | None
+) -> Image.Image:
     # Worked out when it is drawn: increments may read their arrays from files, and a film holds none of them.
-    return drawer.picture(_state_at(path, total, at))
+    return drawer.picture(_state_at(path, total, at), badge=badge)
+
+
+def _losses_told(
+    response: solver.Response, path: Sequence[solver.Increment], total: np.ndarray, places: np.ndarray, lasting: int
+) -> list[str | None]:
+    """Say for each place of a film which blocks have left for good at the increments just before it, if any have."""
+    words: list[str | None] = [None] * len(places)
+    if not response.losses:
+        return words
+    before = path[0].fallen
+    for increment, at in zip(path[1:], total[1:], strict=True):
+        gone = np.flatnonzero(increment.fallen & ~before)
+        before = increment.fallen
+        if len(gone):
+            name = response.assembly.names[gone[0]] if len(gone) == 1 else f"{len(gone)} blocks"
+            first = int(np.searchsorted(places, at))
+            words[first : first + lasting] = [f"LOST · {name}"] * len(words[first : first + lasting])
+    return words
 
 
 def _falling(drawer: Drawer, fps: float) -> list[Draw]:

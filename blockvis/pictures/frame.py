@@ -22,7 +22,7 @@ TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 36.0, 12
 #: How far labels lie from their places, in heights of the text: the nearest where there is room.
 LABELS_AWAY = (0.6, 1.8, 3.0)
 
-#: A label over the leader of another is as bad as over so many dots.
+#: A label over the leader or the place of another is as bad as over so many dots.
 CROSSED = 10
 
 #: To which side a label may lie, to the right and down, the best first.
@@ -291,6 +291,8 @@ def write_labels(
     draw, font = ImageDraw.Draw(picture), _font(round(0.85 * text))
     high, pad, rim = 1.2 * text, 0.25 * text, 0.4 * text
     written: list[Label] = []
+    # A label over the place of another would seem to be its.
+    dots = np.concatenate([dots, np.repeat(places, CROSSED, axis=0)])
     for (x, y), label, colour in zip(places.tolist(), words, colours or [palette.OPEN] * len(words), strict=True):
         if not (0.0 <= x <= picture.width and 0.0 <= y <= picture.height):
             continue

@@ -108,13 +108,16 @@ class LiveLoads:
         self._dimension = response.assembly.dimension
         self._swinging = bool(response.limits) and response.collapse is None
         self._loads: dict[tuple[int, float], LiveLoad] = {}
+        self._multipliers: dict[tuple[int, float], float] = {}
         if response.measured == mechanics.LOAD_MULTIPLIER:
             # Frames of a swinging mechanism have the load of their limit state.
             states = {_place(state): state for state in response.path}
             for increment in increments:
                 place = _place(increment)
                 if place not in self._loads:
-                    self._loads[place] = live_load_of(response, states.get(place, increment), extent)
+                    state = states.get(place, increment)
+                    self._loads[place] = live_load_of(response, state, extent)
+                    self._multipliers[place] = state.load_multiplier
         self._places = not response.parameter.is_path and len(self._loads) > 1
         if self._places:
             # The limit varies a hundredfold from place to place: all arrows get one length and show the place alone.
@@ -138,19 +141,28 @@ class LiveLoads:
         return np.concatenate([np.zeros((0, self._dimension)), *tails])
 
     def arrows(self, increment: solver.Increment, pose: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
-        """Tails and tips (n, d) [m] of one of the increments, its blocks at a pose; none in a fall.
+        """Tails and tips (n, d) [m] of one of the increments, or of a state between two; none in a fall.
 
         Parameters
         ----------
         increment : solver.Increment
         pose : solver.Pose
+            Of its blocks, as drawn.
         """
         nothing = np.zeros((0, self._dimension))
         if self.largest == 0.0 or (increment.status == solver.Status.FALLING and not self._swinging):
             return nothing, nothing
-        load = self._loads[_place(increment)]
+        load, grown = self._load_at(increment)
         tips = load.carried(pose)
-        return tips - load.forces * self._scale, tips
+        return tips - grown * load.forces * self._scale, tips
+
+    def _load_at(self, increment: solver.Increment) -> tuple[LiveLoad, float]:
+        """Find the load of an increment and by what it has grown: between two of a path it is the one before's."""
+        if _place(increment) in self._loads:
+            return self._loads[_place(increment)], 1.0
+        before = max(place for place in self._loads if place <= _place(increment))
+        multiplier = self._multipliers[before]
+        return self._loads[before], increment.load_multiplier / multiplier if multiplier else 1.0
 
 
 def _place(increment: solver.Increment) -> tuple[int, float]:
@@ -181,15 +193,22 @@ def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.nd
 
 
 def _gathered(points: np.ndarray, forces: np.ndarray, blocks: np.ndarray, pose: solver.Pose, cell: float) -> LiveLoad:
-    """Resultants of the loads in each cell of a grid, where their weights meet."""
+    """Resultants of the loads in each cell of a grid, at the load nearest to where their weights meet.
+
+    Where they meet itself may lie in an opening.
+    """
     place = np.floor((points - points.min(axis=0)) / cell).astype(np.int64)
-    _, first, which = np.unique(place, axis=0, return_index=True, return_inverse=True)
-    which, n = which.ravel(), len(first)
+    cells, which = np.unique(place, axis=0, return_inverse=True)
+    which, n = which.ravel(), len(cells)
     size = np.hypot(*forces.T)
     weight = np.bincount(which, weights=size, minlength=n)
     sums = [np.bincount(which, weights=forces[:, k], minlength=n) for k in (0, 1)]
     middles = [np.bincount(which, weights=size * points[:, k], minlength=n) / weight for k in (0, 1)]
-    return LiveLoad(np.stack(middles, axis=1), np.stack(sums, axis=1), blocks[first], _of(blocks[first], pose))
+    away = np.linalg.norm(points - np.stack(middles, axis=1)[which], axis=1)
+    order = np.lexsort((away, which))
+    nearest = order[np.searchsorted(which[order], np.arange(n))]
+    blocks = blocks[nearest]
+    return LiveLoad(points[nearest], np.stack(sums, axis=1), blocks, _of(blocks, pose))
 
 
 def _of(blocks: np.ndarray, pose: solver.Pose) -> solver.Pose:

@@ -49,6 +49,9 @@ PARTS = np.array(
 PALE_OUTLINE = (204, 199, 191)
 SURVEYED = ((190, 30, 30), (20, 92, 168), (46, 125, 50), (126, 55, 178), (184, 110, 0), (0, 121, 125))
 
+#: Of the colour of blocks so much is left in a drawing of cracks.
+SURVEY = 0.3
+
 #: Of the colour of blocks that stand still while others move so much is left: the eye goes to what moves.
 STILL = 0.45
 
@@ -127,6 +130,11 @@ def part_colours(fill: np.ndarray, parts: np.ndarray) -> np.ndarray:
     """
     tint = PARTS[parts % len(PARTS)]
     return np.where(parts[:, None] >= 0, np.rint(0.3 * fill + 0.7 * tint), fill).astype(np.uint8)
+
+
+def crack_colours(count: int) -> np.ndarray:
+    """(count, 3) uint8 array: colours of classes of cracks in space, from narrow to wide; of one the middle one."""
+    return _on_ramp(CRACKS, np.linspace(0.0, 1.0, count) if count > 1 else np.full(count, 0.5))
 
 
 def displacement_colours(fraction: np.ndarray) -> np.ndarray:

@@ -87,6 +87,8 @@ class SolidScene:
         Blocks of which the edges alone are drawn.
     hidden_hinges : bool
         Whether hinges behind blocks are dashed.
+    outline : (int, int, int)
+        Colour of the edges.
     """
 
     def __init__(
@@ -102,6 +104,7 @@ class SolidScene:
         cut: np.ndarray | None = None,
         outlined: np.ndarray | None = None,
         hidden_hinges: bool = True,
+        outline: tuple[int, int, int] = palette.OUTLINE,
     ) -> None:
         self.assembly, self.view, self.size = assembly, view, size
         self.frame = frame.fitted(*size)
@@ -135,7 +138,7 @@ class SolidScene:
         self._edges = pv.PolyData(np.array(assembly.vertices), lines=_line_cells(self.edges))
         self._shadow: tuple[pv.PolyData, float] | None = None
         width = float(np.clip(assembly.block_size / self.pixel / 40.0, 0.6, size[1] / 700.0))
-        self._add("edges", self._edges, palette.OUTLINE, width=width, forward=1.0)
+        self._add("edges", self._edges, outline, width=width, forward=1.0)
 
     def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
         """Put the blocks where they are drawn.

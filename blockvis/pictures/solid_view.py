@@ -13,6 +13,8 @@ from blockvis.layout.sights import BELOW, Cut, Sight
 from blockvis.results.joint_faces import InitialJoints
 from solver import mechanics
 
+from .sight_lines import SightLines
+
 #: Directions that are tried, from the structure to the eye: three-quarter views, in degrees around and above the level.
 AROUND = (-60.0, -30.0, -120.0, -150.0, 30.0, 60.0, 120.0, 150.0)
 ABOVE = 24.0
@@ -172,7 +174,7 @@ def _above(assembly: solver.Assembly) -> float:
 
 
 def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View] | None = None) -> View:
-    """Choose from where the motion of a structure is seen best: across it, with what moves in front.
+    """Choose from where the motion of a structure is seen best: across it, and not behind what stands.
 
     Parameters
     ----------
@@ -198,8 +200,11 @@ def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View]
         return views[0]
     middle = assembly.centroids[assembly.free].mean(axis=0) if assembly.free.any() else assembly.centroids.mean(axis=0)
     centre = weights @ assembly.centroids / weights.sum()
+    states = path or response.increments
+    lines = SightLines(assembly, states[-1 if path else 0].pose if states else solver.Pose.initial(assembly), weights)
+    volumes, n = assembly.shapes.volumes, assembly.n_blocks
     seen = [
-        float((assembly.shapes.volumes * np.linalg.norm(motion @ view.axes[:2].T, axis=1)).sum() / weights.sum())
+        float((volumes * lines.seen(view.axes, n)) @ np.linalg.norm(motion @ view.axes[:2].T, axis=1) / weights.sum())
         + IN_FRONT * float(view.depth((centre - middle)[None])[0]) / float(size.max())
         - FROM_THE_FRONT * float(view.axes[2, 1])
         for view in views

@@ -17,8 +17,8 @@ from .frame import framed
 #: of :class:`Swing`.
 ENOUGH_FRAMES, SWING_FRAMES, SWING_REACH = 8, 15, 1.2
 
-#: Up to this many parts of a mechanism are tinted one by one.
-MOST_PARTS = 16
+#: Up to this many parts of a mechanism are tinted one by one: each has a colour of its own.
+MOST_PARTS = len(palette.PARTS)
 
 
 @dataclass(frozen=True)

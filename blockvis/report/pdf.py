@@ -17,6 +17,7 @@ import solver
 from blockvis.dynamics.fall import Fall
 from blockvis.pictures import palette
 from blockvis.pictures.captions import failure_text, parameter_text
+from blockvis.pictures.crack_drawing import draw_cracks
 from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.render import draw_mechanism, draw_still
 from blockvis.pictures.underlay import Underlay
@@ -101,6 +102,8 @@ def write_pdf(
             paper.tabulate("States", *_states(response))
             cracks = cracks_of(response.assembly, last.pose, fallen=last.fallen)
             if cracks:
+                paper.heading("Cracks", 12.0, PICTURE)
+                paper.picture(draw_cracks(response, -1, Path(folder) / "cracks.png"))
                 paper.tabulate("Cracks at the last equilibrium", *_crack_table(cracks))
     certificate = certificate_rows(response)
     if certificate:
@@ -136,7 +139,7 @@ def _crack_table(cracks: Sequence[Crack]) -> tuple[Sequence[str], list[tuple[str
     head = ("", "widest", "between", "length" if plane else "area", "inclined", "from", "to [m]")
     rows = []
     for number, crack in enumerate(cracks[:MOST_CRACKS], start=1):
-        ends = [", ".join(f"{x:.2f}" for x in end + 0.0) for end in crack.ends]
+        ends = [", ".join(f"{x:.2f}" for x in np.round(end, 2) + 0.0) for end in crack.ends]
         size = f"{crack.size:.3g} {'m' if plane else 'm²'}"
         rows.append((str(number), width_text(crack.width), crack.widest, size, f"{crack.inclination:.0f}°", *ends))
     if len(cracks) > MOST_CRACKS:

@@ -134,9 +134,9 @@
     const falling = model.frames[k].falling, entries = [];
     const add = (kind, text, colour) => entries.push([kind, text, colour]);
     const marked = state.magnify === 1;
-    if (state.cracks && model.space) add("ramp", `open joint, to ${+(1000 * model.widest_crack).toPrecision(2)} mm`, `linear-gradient(90deg, ${model.cracks.join(",")})`);
+    if (state.cracks && model.space) add("ramp", `open joint, to ${+(1000 * model.widest_crack).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.cracks.join(",")})`);
     else if (state.cracks) add("area", "open joint", model.colours.open);
-    if (layers.hinges && marked && countOf(k, 1)) add(model.space ? "line" : "dot", "hinge", model.colours.hinge);
+    if (layers.hinges && marked && countOf(k, 1)) add(model.space ? "line" : "dot", model.space ? "hinge, faint where hidden" : "hinge", model.colours.hinge);
     if (layers.sliding && marked && countOf(k, 2)) add("line", "sliding joint", model.colours.sliding);
     if (layers.forces && marked && !falling && model.has_forces) add("line", "resultant of a joint", model.colours.force);
     if (layers.thrust && marked && !falling && thrustLine(k).length) add("line", "thrust line", model.colours.force);

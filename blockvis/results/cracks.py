@@ -28,6 +28,12 @@ MEETING = 0.02
 #: A crack turns where it leaves a straight line by more than this, in block sizes: the steps of a bond do not.
 TURN = 1.5
 
+#: A crack goes first along joints whose blocks have moved apart by this part of the widest, or more.
+CORE = 0.25
+
+#: A joint has only slid where it has opened by less than this part of its slip.
+SHUT = 0.05
+
 #: Most crack lines that a summary lists, the widest first.
 MOST_LISTED = 100
 
@@ -136,7 +142,7 @@ def cracks_of(
     if assembly.dimension == 3:
         found = [_crack(assembly, joints, moved, chosen[group]) for group in _groups(meeting, np.arange(len(chosen)))]
     else:
-        courses = _courses(joints, moved[chosen, 0], chosen, meeting, assembly.block_size)
+        courses = _courses(joints, moved[chosen], chosen, meeting, assembly.block_size)
         open_ones = [course for course in courses if moved[course, 0].max() > least]
         places = Places(assembly) if open_ones else None
         found = [_crack(assembly, joints, moved, course, places) for course in open_ones]
@@ -181,7 +187,7 @@ def _groups(meeting: np.ndarray, members: np.ndarray) -> list[np.ndarray]:
 
 
 def _courses(
-    joints: InitialJoints, openings: np.ndarray, chosen: np.ndarray, meeting: np.ndarray, block_size: float
+    joints: InitialJoints, moved: np.ndarray, chosen: np.ndarray, meeting: np.ndarray, block_size: float
 ) -> list[np.ndarray]:
     """Part the chosen joints into courses: numbers of joints, one after another from end to end.
 
@@ -189,11 +195,14 @@ def _courses(
     """
     middles, sizes = joints.ends[chosen].mean(axis=1), joints.sizes[chosen]
     # A joint that only slides is part of a course, too.
-    width = np.maximum(openings, 0.0) + 1e-9 * block_size
+    width = np.maximum(moved[:, 0], 0.0) + 1e-9 * block_size
+    # What has opened goes on where blocks have moved as far along each other and nothing opens: up the steps of a bond.
+    slip = np.abs(moved[:, 1])
+    apart = np.where(width < SHUT * slip, slip, width)
     found, left = [], _groups(meeting, np.arange(len(chosen)))
     while left:
         members = left.pop()
-        course = _main_course(meeting, width, width * sizes, members)
+        course = _main_course(meeting, apart, width * sizes, members)
         line = shapely.linestrings(middles[course]) if len(course) > 2 else None
         turns = [] if line is None else shapely.get_coordinates(shapely.simplify(line, TURN * block_size))[1:-1]
         cuts = [int(np.linalg.norm(middles[course] - turn, axis=1).argmin()) for turn in turns]
@@ -204,28 +213,48 @@ def _courses(
     return found
 
 
-def _main_course(meeting: np.ndarray, width: np.ndarray, area: np.ndarray, members: np.ndarray) -> np.ndarray:
+def _main_course(meeting: np.ndarray, apart: np.ndarray, area: np.ndarray, members: np.ndarray) -> np.ndarray:
     """Order the joints of the course with the largest area of opening among some that all meet through each other.
 
-    The course is the longest path of the tree that joins all by the widest.
+    The course is the longest path of the tree that joins all by those whose blocks have moved most apart: first among
+    what has moved nearly as far as anything here, and from both its ends on along what has moved less.
     """
     n = len(members)
-    place = np.full(len(width), -1)
+    place = np.full(len(apart), -1)
     place[members] = np.arange(n)
     one, other = place[meeting]
     pairs = (one >= 0) & (other >= 0) & (one < other)
     one, other = one[pairs], other[pairs]
-    own, area = width[members], area[members]
+    own, area = apart[members], area[members]
     narrow = 2.0 * own.max() - np.minimum(own[one], own[other])
     tree = minimum_spanning_tree(sp.coo_array((narrow, (one, other)), shape=(n, n))).tocoo()
     length = (area[tree.row] + area[tree.col]) / 2.0
     tree = sp.coo_array((length, (tree.row, tree.col)), shape=(n, n)).tocsr()
-    first = int(np.argmax(dijkstra(tree, directed=False, indices=int(area.argmax())) + area / 2.0))
-    far, before = dijkstra(tree, directed=False, indices=first, return_predecessors=True)
-    course = [int(np.argmax(far + area / 2.0))]
-    while before[course[-1]] >= 0:
-        course.append(int(before[course[-1]]))
-    return members[course]
+    apart_far = own >= CORE * own.max()
+    core, start = _among(tree, apart_far), int(np.where(apart_far, area, -1.0).argmax())
+    course = _longest_path(core, area, _longest_path(core, area, start)[-1])
+    for _ in range(2):
+        left = np.ones(n, dtype=bool)
+        left[course[:-1]] = False
+        course = course[:-1] + _longest_path(_among(tree, left), area, course[-1])
+        course.reverse()
+    return members[course[::-1]]
+
+
+def _among(graph: sp.csr_array, chosen: np.ndarray) -> sp.csr_array:
+    """Leave the edges of a graph between chosen nodes, (n,) bool array."""
+    edges = graph.tocoo()
+    both = chosen[edges.row] & chosen[edges.col]
+    return sp.coo_array((edges.data[both], (edges.row[both], edges.col[both])), shape=graph.shape).tocsr()
+
+
+def _longest_path(tree: sp.csr_array, area: np.ndarray, start: int) -> list[int]:
+    """List the nodes from a start to that which is farthest by areas (n,) on the way."""
+    far, before = dijkstra(tree, directed=False, indices=start, return_predecessors=True)
+    path = [int(np.where(np.isfinite(far), far + area / 2.0, -1.0).argmax())]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    return path[::-1]
 
 
 def _crack(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import solver
 from blockvis.cases.contents import Case
 from blockvis.dynamics.fall import Fall, fall_of
+from blockvis.kinds.kinds import KINDS
 from blockvis.results.fall_files import stored_fall, write_fall
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.viewer_files import ViewerFormat
@@ -109,6 +110,9 @@ class Drawing(Output):
         """Whether the last of what is drawn is there."""
         animation = self._animation(case)
         names = ["report.html", "mechanism.png", *([animation] if animation else [])] if self._pictures else []
+        # A limit load is of the layout, in which nothing is open.
+        if self._pictures and KINDS[case.analysis].course(case).parameter.is_path:
+            names.append("cracks.png")
         return all((folder / name).exists() for name in names)
 
     def _shown_underlay(self, case: Case, response: solver.Response) -> Underlay | None:
@@ -146,10 +150,10 @@ class Drawing(Output):
                 from blockvis.pictures.render import draw_mechanism
 
                 draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **eye)
-                if response.assembly.dimension == 2:
+                if response.parameter.is_path:
                     from blockvis.pictures.crack_drawing import draw_cracks
 
-                    draw_cracks(response, -1, folder / "cracks.png")
+                    draw_cracks(response, -1, folder / "cracks.png", **eye)
         with clock.counting("fall"):
             fall = _fall(response, apart, progress) if stored is None else stored
             progress.done()

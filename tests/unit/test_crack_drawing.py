@@ -1,15 +1,14 @@
 """The drawing of the cracks: each main crack in its colour, as thick as it is open, with its width."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response
+from structures import arch_response, box, posed
 
-from blockvis import generators
+import solver
 from blockvis.pictures import crack_drawing, palette
 from blockvis.pictures.crack_drawing import draw_cracks
+from blockvis.pictures.cracks_in_space import class_limits
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.results.cracks import cracks_of, main_cracks
 from blockvis.text import width_text
@@ -21,9 +20,9 @@ def pixels(path):
     return np.asarray(Image.open(path).convert("RGB")).astype(int)
 
 
-def covered(picture, colour):
+def covered(picture, colour, tolerance=6):
     """Pixels of the blocks' picture, without caption and legend, in a colour."""
-    return int((np.abs(picture[50:310] - colour) <= 6).all(axis=2).sum())
+    return int((np.abs(picture[50:310] - colour) <= tolerance).all(axis=2).sum())
 
 
 def test_each_main_crack_has_its_colour_and_its_width(tmp_path, monkeypatch):
@@ -47,10 +46,32 @@ def test_any_increment_is_drawn_on_demand(tmp_path):
     assert not any(covered(at_rest, colour) for colour in palette.SURVEYED)
     last = draw_cracks(response, len(response.path) - 1, tmp_path / "last.png", size=SIZE)
     assert last.read_bytes() == draw_cracks(response, -1, tmp_path / "same.png", size=SIZE).read_bytes()
-    with pytest.raises(ValueError, match="these lie in space"):
-        draw_cracks(replace(response, assembly=generators.dome()), 0, tmp_path / "none.png")
+    with pytest.raises(ValueError, match="these lie in the plane: leave both out"):
+        draw_cracks(response, 0, tmp_path / "none.png", view="front")
     with pytest.raises(ValueError, match=f"no increment 999: choose one from 0 to {len(response.path) - 1}"):
         draw_cracks(response, 999, tmp_path / "none.png")
+
+
+def test_cracks_in_space_are_darker_where_they_are_wider(tmp_path, monkeypatch):
+    """Two boxes whose joint opens like a wedge by up to 80 mm: four classes, and the label of the only crack."""
+    assembly = solver.Assembly.from_solids([box((-1, 0, 0), (0, 1, 1)), box((0, 0, 0), (1, 1, 1))])
+    response = posed(assembly, solver.Pose.initial(assembly))
+    at_rest = pixels(draw_cracks(response, 0, tmp_path / "rest.png", size=SIZE))
+    pose = solver.Pose.initial(assembly)
+    pose.positions[1] += 0.04, 0.0, 0.0
+    pose.rotations[1] = 0.0, 0.08, 0.0
+    written = []
+    monkeypatch.setattr(
+        "blockvis.pictures.cracks_in_space.write_labels", lambda picture, places, words, *_: written.extend(words)
+    )
+    picture = pixels(draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE))
+    width = cracks_of(assembly, pose)[0].width
+    assert written == [f"1: {width_text(width)}"]
+    assert class_limits(width) == [0.01, 0.02, 0.05]
+    narrow, *_, wide = (covered(picture, colour, 30) for colour in palette.crack_colours(4))
+    assert wide > 50
+    assert wide > narrow
+    assert not any(covered(at_rest, colour) for colour in palette.crack_colours(4))
 
 
 def test_labels_stand_at_the_widest_point_of_a_joint(monkeypatch):

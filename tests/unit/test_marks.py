@@ -496,6 +496,16 @@ def test_cracks_that_fork_and_turn_are_told_one_by_one():
     assert sum(len(crack.joints) for crack in cracks) == 9
 
 
+def test_a_crack_goes_up_the_steps_of_a_bond_not_along_a_hairline_beside_them():
+    """The lower right of a wall sinks along steps, its lowest course a little more."""
+    wall = squares(*((x, y) for y in range(4) for x in range(8)))
+    sinks = {(x, y): -0.036 if y == 0 and x > 1 else -0.03 for y in range(4) for x in range(y + 1, 8)}
+    cracks = cracks_of(wall, moved(wall, **{f"block_{8 * y + x}": (0.0, dy, 0.0) for (x, y), dy in sinks.items()}))
+    assert [crack.width for crack in cracks] == pytest.approx([0.03, 0.006])
+    # Three beds that open and the joints between their ends, which slide.
+    assert cracks[0].mean_width * cracks[0].size == pytest.approx(3 * 0.03)
+
+
 def test_places_are_told_by_openings():
     """A ring of squares around a window whose right column goes."""
     wall = squares(*((x, y) for y in range(3) for x in range(3) if (x, y) != (1, 1)))

@@ -1,0 +1,70 @@
+"""Films between increments and at states that stand by themselves, and what of a run is drawn."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from structures import box, dropped_brick, posed
+
+import solver
+from blockvis import animate
+from blockvis.pictures.drawer import Drawer, Look
+from blockvis.pictures.film import film_of, state_at
+from blockvis.pictures.live_load import LiveLoads
+from blockvis.pictures.solid_view import chosen_view
+
+SIZE = (320, 180)
+
+
+def sideways_block(steps=3):
+    """Give the response of a block that is pushed over: its increments have live loads."""
+    assembly = solver.Assembly.from_outlines(
+        [[[0, 0], [0.2, 0], [0.2, 1], [0, 1]], [[0, -1], [0.2, -1], [0.2, 0], [0, 0]]],
+        roles=["free", "fixed"],
+        names=["block", "ground"],
+    )
+    live = solver.weight_fraction(assembly, (1.0, 0.0), np.array([0]))
+    loads = solver.Loads(solver.self_weight(assembly).dead, live)
+    control = solver.ControlDisplacement("block", (1, 0), increment=0.02, limit=0.02 * steps)
+    return solver.pushover(assembly, control, loads=loads, friction_coefficient=2.0)
+
+
+def test_a_film_tells_what_is_lost_and_goes_on():
+    response = dropped_brick(0.05)
+    shown = response.path
+    drawer = Drawer(response, Look(forces="none"), SIZE, shown)
+    told = []
+    drawer.picture = lambda state, badge=None: told.append((state.parameter, badge, bool(state.fallen.any())))
+    list(film_of(drawer, 10.0, 3.0)[1])
+    gone = response.losses[0].settlement
+    named = [parameter for parameter, badge, _ in told if badge == "LOST · brick"]
+    assert len(named) == 10
+    assert gone < named[0] < gone + 0.1
+    assert told[-1][0] == pytest.approx(1.0)
+    assert [badge for parameter, badge, _ in told if parameter < gone] == [None] * sum(p < gone for p, *_ in told)
+    assert all(lost for parameter, _, lost in told if parameter >= named[0])
+
+
+def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
+    response = sideways_block()
+    loads = LiveLoads(response, response.path, 1.0)
+    before, after = response.path[:2]
+    state = state_at(response, (before.parameter + after.parameter) / 2.0)
+    lengths = [
+        np.linalg.norm(np.subtract(*loads.arrows(one, one.pose)), axis=1)[0] / one.load_multiplier
+        for one in (before, state, after)
+    ]
+    assert lengths == pytest.approx([lengths[0]] * 3)
+    assert state.load_multiplier == pytest.approx((before.load_multiplier + after.load_multiplier) / 2.0)
+    assert len(list(animate(response, tmp_path / "frames", size=SIZE, fps=5, seconds=1.0).iterdir())) == 5 + 4
+
+
+def test_what_falls_is_not_hidden_by_what_stands():
+    """A small block that slides along x behind a tall one is seen from behind it, where from the front it is not."""
+    assembly = solver.Assembly.from_solids([box((0, 0, 0), (2, 0.3, 2)), box((0.8, 0.4, 0), (1.2, 0.8, 0.4))])
+    motion = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
+    response = replace(posed(assembly, solver.Pose.initial(assembly)), increments=())
+    assert chosen_view(response, motion).axes[2, 1] > 0.0
+    alone = solver.Assembly.from_solids([box((0.8, 0.4, 0), (1.2, 0.8, 0.4))])
+    alone = replace(posed(alone, solver.Pose.initial(alone)), increments=())
+    assert chosen_view(alone, motion[1:]).axes[2, 1] < 0.0
