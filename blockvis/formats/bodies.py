@@ -15,7 +15,7 @@ from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, Note
-from blockvis.layout.outlines import outlines_of_cells, rectangle
+from blockvis.layout.outlines import outlines_of_cells, rectangle, spread_of
 from blockvis.layout.refusal import Refused
 from blockvis.layout.selection import MORTAR
 from blockvis.layout.solids import volume, width_of
@@ -23,6 +23,7 @@ from blockvis.layout.views import VIEWS, axis_across, view_along
 from solver import mechanics
 
 from .accepted import bend_of, bent_note, pieces_note
+from .reading import Reading
 
 #: In a prism the sine of the angle between a face's normal and the axis, or the plane across it, is at most this.
 SQUARE = 1e-3
@@ -158,13 +159,7 @@ def _refused(message: str, found: Bodies, wrong: Body) -> Refused:
     return Refused(message, as_drawn(found), [k for k, body in enumerate(_drawable(found)) if body is wrong])
 
 
-def layout_of_bodies(
-    found: Bodies,
-    path: Path | str,
-    view: str | None = None,
-    ignore: Sequence[str] = (),
-    only: Sequence[str] = (),
-) -> Layout:
+def layout_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layout:
     """Make a layout of prismatic bodies: outlines across the axis of their extrusion, thicknesses along it.
 
     Parameters
@@ -172,18 +167,16 @@ def layout_of_bodies(
     found : Bodies
     path : Path or str
         Named in messages.
-    view : {"xy", "xz", "yz"}, optional
-        The view to take; by default one in which no body lies behind another, of several that in which the bodies
-        come closest to lying between the same two planes.
-    ignore, only : sequences of str, optional
-        Groups, materials and names of bodies, or patterns of them, that are left out, and beside which all others are.
+    reading : Reading
+        Without a view one is taken in which no body lies behind another, of several that in which the bodies come
+        closest to lying between the same two planes.
 
     Raises
     ------
     ValueError
         If the bodies are not prisms side by side.
     """
-    asked = _selected(found, path, ignore, only)
+    asked, view = _selected(found, path, reading), reading.view
     bodies, rows, size = asked.bodies, asked.rows, asked.size
     axes = (2, 1, 0) if view is None else (axis_across(view),)
     seen = [_projected(axis, bodies, size) for axis in axes]
@@ -214,31 +207,25 @@ def layout_of_bodies(
         notes=(*notes, *_accepted(bodies), *found.notes),
     )
     layout = replace(with_rows(layout, rows), thickness=best.high - best.low)
-    return replace(layout, left_out=asked.left_out(found, name, ignore))
+    return replace(layout, left_out=asked.left_out(found, name, reading.ignore))
 
 
-def solids_of_bodies(
-    found: Bodies,
-    path: Path | str,
-    view: str | None = None,
-    ignore: Sequence[str] = (),
-    only: Sequence[str] = (),
-) -> Layout:
+def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layout:
     """Make a layout in space of bodies of any shape.
 
     Parameters
     ----------
-    found, path, ignore, only
+    found, path
         As of :func:`layout_of_bodies`.
-    view : {"xy", "xz", "yz"}, optional
-        The last of its coordinates is up: y of "xy", else z; by default what the format has as up.
+    reading : Reading
+        The last coordinate of its view is up: y of "xy", else z; without a view what the format has as up.
 
     Raises
     ------
     ValueError
         For bodies without a volume, or with more faces than a block may have.
     """
-    asked = _selected(found, path, ignore, only)
+    asked, view = _selected(found, path, reading), reading.view
     lying = found.up == "y" if view is None else view == "xy"
     solids, warped, changed, bent = [], [], [], []
     for body in asked.bodies:
@@ -293,26 +280,19 @@ def solids_of_bodies(
             *found.notes,
         ),
     )
-    return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", ignore))
+    return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", reading.ignore))
 
 
-def in_dimension(
-    found: Bodies,
-    path: Path | str,
-    dimension: int | None,
-    view: str | None = None,
-    ignore: Sequence[str] = (),
-    only: Sequence[str] = (),
-) -> Layout:
+def in_dimension(found: Bodies, path: Path | str, reading: Reading) -> Layout:
     """Make a layout in the plane, 2, or in space, 3; by default in space where bodies are not prisms side by side."""
-    if dimension == 3:
-        return solids_of_bodies(found, path, view, ignore, only)
+    if reading.dimension == 3:
+        return solids_of_bodies(found, path, reading)
     try:
-        return layout_of_bodies(found, path, view, ignore, only)
+        return layout_of_bodies(found, path, reading)
     except NotFlat as error:
-        if dimension == 2 or view is not None:
+        if reading.dimension == 2 or reading.view is not None:
             raise
-        layout = solids_of_bodies(found, path, None, ignore, only)
+        layout = solids_of_bodies(found, path, reading)
         return replace(layout, notes=(Note(CHANGED, f"blocks in space: {error.reason}"), *layout.notes))
 
 
@@ -351,23 +331,19 @@ def _accepted(bodies: Sequence[Body]) -> tuple[Note, ...]:
     return (Note(CHANGED, f"small holes in the surface of {', '.join(holed[:6])}{more} were closed"), *pieces)
 
 
-def _selected(found: Bodies, path: Path | str, ignore: Sequence[str], only: Sequence[str]) -> _Selection:
+def _selected(found: Bodies, path: Path | str, reading: Reading) -> _Selection:
     """Choose the bodies that are asked for, and check their coordinates."""
     if not found.bodies:
         raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
     labels = [_labels(row) for row in found.rows]
-    wanted = [not matches(words, ignore) and (not only or matches(words, only)) for words in labels]
-    dropped = {k: "asked" for k, keep in enumerate(wanted) if not keep}
-    dropped |= {k: "mortar" for k in _mortar(found, labels, only) if k not in dropped}
+    dropped = {k: "asked" for k, words in enumerate(labels) if not reading.wants(words)}
+    dropped |= {k: "mortar" for k in _mortar(found, labels, reading.only) if k not in dropped}
     kept = [k for k in range(len(labels)) if k not in dropped]
     if not kept:
         raise ValueError(f"'{path}' draws no block: all that it draws is left out as asked (ignore, only)")
     bodies = [found.bodies[k] for k in kept]
     every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
-    if not np.isfinite(every).all():
-        bad = every[~np.isfinite(every).all(axis=1)][0]
-        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
-    size = float(np.ptp(every, axis=0).max())
+    size = float(spread_of(every, f"'{path}'").max())
     if not 0.0 < size < LARGEST_SIZE:
         raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
     return _Selection(bodies, [_with_role(found.rows[k]) for k in kept], size, dropped)

@@ -18,7 +18,7 @@ import numpy as np
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import Note
-from blockvis.layout.outlines import FLAT
+from blockvis.layout.outlines import FLAT, spread_of
 from solver import mechanics
 
 from .bodies import Bodies, fans
@@ -81,15 +81,13 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies 
     if not meshes:
         return None
     every = np.concatenate([mesh.points for mesh in meshes])
-    if not np.isfinite(every).all():
-        bad = every[~np.isfinite(every).all(axis=1)][0]
-        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    spread = spread_of(every, f"'{path}'")
     names = [str(mesh.row["name"]) for mesh in meshes]
     if len(set(names)) < len(names):
         # COMPAS names a mesh after its class unless it is told otherwise.
         meshes = [replace(mesh, row={**mesh.row, "name": f"block {mesh.row['key']}"}) for mesh in meshes]
-    size = float(np.ptp(every, axis=0).max())
-    if float(np.ptp(every, axis=0).min()) <= FLAT * size:
+    size = float(spread.max())
+    if spread.min() <= FLAT * size:
         return _flat(meshes, path, reading.view)
     planes = [mesh for mesh in meshes if len(mesh.faces) == 1]
     if len(planes) < len(meshes):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import FLAT
+from blockvis.layout.outlines import FLAT, spread_of
 
 from .bodies import Bodies, Body, fans
 from .cells import layout_of_cells
@@ -107,11 +107,9 @@ def layout_of_meshes(
             "or leave it out (ignore)"
         )
     every = np.concatenate([mesh.points for mesh in meshes])
-    if not np.isfinite(every).all():
-        bad = every[~np.isfinite(every).all(axis=1)][0]
-        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
-    size = float(np.ptp(every, axis=0).max())
-    if float(np.ptp(every, axis=0).min()) <= FLAT * size:
+    spread = spread_of(every, f"'{path}'")
+    size = float(spread.max())
+    if spread.min() <= FLAT * size:
         return _flat(meshes, path, reading, unit, notes)
     bodies: list[Body] = []
     rows: list[dict[str, Any]] = []

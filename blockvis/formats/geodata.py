@@ -21,7 +21,7 @@ from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
-from blockvis.layout.outlines import FLAT, ring_area
+from blockvis.layout.outlines import FLAT, ring_area, spread_of
 from blockvis.layout.units import DOUBTED, UNITS
 from blockvis.layout.views import VIEWS, axis_across, upright_note
 from blockvis.system.extras import require
@@ -366,10 +366,7 @@ def _points(line: Any) -> np.ndarray:
 
 def _order(points: np.ndarray, view: str | None, path: Path) -> tuple[list[int], list[str]]:
     """Choose the two coordinates in which the outlines lie, and say what that changes."""
-    if not np.isfinite(points).all():
-        bad = points[~np.isfinite(points).all(axis=1)][0].tolist()
-        raise ValueError(f"'{path}' has a point at {bad}; coordinates must be finite numbers: repair the file")
-    spread = np.ptp(points, axis=0)
+    spread = spread_of(points, f"'{path}'")
     flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
     if view is not None and flat and view not in flat:
         raise ValueError(

@@ -268,7 +268,7 @@ def layout_of_dataset(
         In the plane or in space; by default in space where bodies are not prisms side by side.
     """
     found = found_in_dataset(data, path, view)
-    return in_dimension(found, path, dimension, view) if isinstance(found, Bodies) else found
+    return in_dimension(found, path, Reading(view=view, dimension=dimension)) if isinstance(found, Bodies) else found
 
 
 def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:

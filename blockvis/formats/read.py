@@ -98,11 +98,9 @@ def read_layout(
     ValueError
         With the reason and the remedy, for a file that is missing, damaged or no layout.
     """
-    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
+    reading = _reading(unit, chord_tolerance, view, ignore, only, dimension, image)
     try:
-        layout = _blocks(
-            Path(path), unit, chord_tolerance, view, ignore, only, checked_window(window), dimension, image
-        )
+        layout = _blocks(Path(path), reading, checked_window(window))
     except Refused as error:
         if error.layout is not None and not error.layout.source:
             # Readers name places in the unit of the file, and so does the picture beside what they say.
@@ -112,25 +110,30 @@ def read_layout(
     return standing(layout, thickness) if dimension == 3 and layout.dimension == 2 else layout
 
 
-def _blocks(
-    path: Path,
+def _reading(
     unit: str | None,
     chord_tolerance: float | None,
     view: str | None,
-    ignore: tuple[str, ...],
-    only: tuple[str, ...],
-    corners: tuple[float, ...],
+    ignore: str | Sequence[str],
+    only: str | Sequence[str],
     dimension: int | str,
     image: ImageKeys,
-) -> Layout:
+) -> Reading:
+    if unit is not None:
+        metres_per(unit)
+    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
+    return Reading(unit, chord_tolerance, checked_view(view), ignore, only, checked_dimension(dimension), {**image})
+
+
+def _blocks(path: Path, reading: Reading, corners: tuple[float, ...]) -> Layout:
     """Read what a file draws, in metres, without what is no block."""
-    drawn = _outlines(path, unit, chord_tolerance, view, ignore, only, dimension, image)
+    drawn = _outlines(path, reading)
     if drawn.dimension == 3:
         if corners:
             raise ValueError(f"'{path}' was read in space, and window is of the plane; choose blocks by ignore or only")
         return noted(drawn)
     with carrying(lambda: drawn):
-        layout = sorted_out(drawn, ignore, only, corners)
+        layout = sorted_out(drawn, reading.ignore, reading.only, corners)
     for k, (name, ring) in enumerate(zip(layout.names, layout.outlines, strict=True)):
         if len(ring) > MOST_CORNERS:
             raise Refused(
@@ -163,32 +166,21 @@ def read_outlines(
     Layout
         Outlines with holes are in ``left_out``; none is taken for a frame, a background or debris.
     """
-    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
-    layout = _outlines(Path(path), unit, None, view, ignore, only, "auto", image)
-    return within_window(without_ignored(layout, ignore, only), checked_window(window))
+    reading = _reading(unit, None, view, ignore, only, "auto", image)
+    layout = _outlines(Path(path), reading)
+    return within_window(without_ignored(layout, reading.ignore, reading.only), checked_window(window))
 
 
-def _outlines(
-    path: Path,
-    unit: str | None,
-    chord_tolerance: float | None,
-    view: str | None,
-    ignore: tuple[str, ...],
-    only: tuple[str, ...],
-    dimension: int | str,
-    image: ImageKeys,
-) -> Layout:
+def _outlines(path: Path, reading: Reading) -> Layout:
     """Read what a file draws, in metres and checked, before what is no block is left out."""
-    if unit is not None:
-        metres_per(unit)
-    reading = Reading(unit, chord_tolerance, checked_view(view), ignore, only, {**image})
     # Who gives the size of an image leaves no doubt about its unit.
-    unit = unit or ("m" if any(image.get(key) for key in ("width", "height", "pixel")) else None)
+    sized = any(reading.image.get(key) for key in ("width", "height", "pixel"))
+    unit = reading.unit or ("m" if sized else None)
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
     content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
     with carrying(lambda: as_drawn(content)):
-        layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
+        layout = _in_dimension(content, path, reading)
     layout = replace(layout, source=str(path))
     if layout.dimension == 3:
         return _in_metres(layout, unit)
@@ -204,20 +196,13 @@ def _outlines(
     return _in_metres(layout, unit)
 
 
-def _in_dimension(
-    content: Layout | Bodies,
-    path: Path,
-    dimension: int | None,
-    view: str | None,
-    ignore: Sequence[str],
-    only: Sequence[str],
-) -> Layout:
+def _in_dimension(content: Layout | Bodies, path: Path, reading: Reading) -> Layout:
     """Make a layout of what a file holds, in the plane or in space."""
     if isinstance(content, Layout):
-        if content.dimension == 3 and dimension == 2:
+        if content.dimension == 3 and reading.dimension == 2:
             raise ValueError(f"'{path}' draws its blocks in space; leave out dimension = 2")
         return content
-    return in_dimension(content, path, dimension, view, ignore, only)
+    return in_dimension(content, path, reading)
 
 
 def _apart(content: Layout | Bodies, path: Path) -> Layout | Bodies:

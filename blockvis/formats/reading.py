@@ -26,6 +26,8 @@ class Reading:
         Layers, groups, materials and names, or patterns of them, that are left out, and beside which all others are.
         Readers of drawings ask :meth:`wants` for loose lines, which later are no lines any more; of outlines it is
         asked when all are read.
+    dimension : {2, 3} or None
+        Whether bodies are read in the plane or in space; None for space where they are not prisms side by side.
     image : mapping
         What is said of an image; see :class:`blockvis.formats.image_scale.ImageKeys`.
     """
@@ -35,6 +37,7 @@ class Reading:
     view: str | None = None
     ignore: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    dimension: int | None = None
     image: Mapping[str, Any] = field(default_factory=dict)
 
     def wants(self, labels: Iterable[str]) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import FLAT
+from blockvis.layout.outlines import FLAT, spread_of
 from blockvis.layout.solids import Solid, area_vectors, prism, triangles_of
 from blockvis.system.extras import MissingExtra
 
@@ -99,9 +99,7 @@ def _checked_size(parts: list[tuple[str, np.ndarray, np.ndarray]], path: Path) -
     if not parts:
         raise ValueError(f"'{path}' has no surface cells; export the blocks as closed bodies or a flat mesh")
     every = np.concatenate([points for _, points, _ in parts])
-    if not np.isfinite(every).all():
-        bad = every[~np.isfinite(every).all(axis=1)][0]
-        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    spread = spread_of(every, f"'{path}'")
     for name, points, faces in parts:
         outside = faces[(faces < 0) | (faces >= len(points))]
         if len(outside):
@@ -109,7 +107,7 @@ def _checked_size(parts: list[tuple[str, np.ndarray, np.ndarray]], path: Path) -
                 f"'{path}': a face of '{name}' uses point {int(outside[0])}, but there are {len(points)}; "
                 "export it again"
             )
-    return float(np.ptp(every, axis=0).max())
+    return float(spread.max())
 
 
 def _are_flat(parts: list[tuple[str, np.ndarray, np.ndarray]], size: float) -> bool:

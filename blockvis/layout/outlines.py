@@ -72,10 +72,7 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
         points = np.column_stack([points, np.zeros(len(points))])
     if len(points) == 0:
         return points[:, :2], ""
-    if not np.isfinite(points).all():
-        bad = points[~np.isfinite(points).all(axis=1)][0]
-        raise ValueError(f"{where} has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
-    spread = np.ptp(points, axis=0)
+    spread = spread_of(points, where)
     flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
     if not flat:
         raise ValueError(
@@ -87,6 +84,14 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
     chosen = view or flat[0]
     note = "" if chosen == "xy" else upright_note(chosen)
     return points[:, VIEWS[chosen]], note
+
+
+def spread_of(points: np.ndarray, where: str) -> np.ndarray:
+    """(d,) array: how far points spread along each axis; ValueError for coordinates that are not finite."""
+    if not np.isfinite(points).all():
+        bad = points[~np.isfinite(points).all(axis=1)][0]
+        raise ValueError(f"{where} has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    return np.asarray(np.ptp(points, axis=0))
 
 
 def outlines_of_cells(

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -119,6 +120,8 @@ def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path,
     stored = pd.read_parquet(out / "table.parquet")
     pd.testing.assert_frame_equal(stored, table, check_dtype=False)
     assert len(pd.read_csv(out / "table.csv")) == 10
+    manual = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    assert [column for column in table if f"`{column}`" not in manual] == ["mu"], "the manual names all others"
     for name in ("fragility.png", "sensitivity.png", "scatter.png", "mechanisms.png", "summary.json"):
         assert (out / name).stat().st_size > 400
 

@@ -1,10 +1,8 @@
 """A limit load that has not converged says what to do."""
 
 import pytest
-from structures import case_from
 
-from blockvis import run_case
-from blockvis.kinds.kinds import KINDS
+from blockvis.cli import main
 
 CASE = """
 [geometry]
@@ -21,10 +19,10 @@ weight_fraction = [1, 0]
 
 
 @pytest.mark.slow
-def test_the_upper_bound_is_named(tmp_path, monkeypatch):
+def test_the_upper_bound_is_named(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("solver.analysis.limit_load.PROGRAMS", 1)
-    run = run_case(case_from(CASE, tmp_path), tmp_path / "out", pictures=False, film=False, outputs=())
-    said = [line for line in KINDS["limit load"].lines(run.response) if line.startswith("status")]
-    assert len(said) == 1
-    assert "not converged" in said[0]
-    assert 'flow = "associative" gives a proved upper bound' in said[0]
+    (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
+    assert main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out"), "--no-pictures"]) == 3
+    (said,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("status"))
+    assert "not converged" in said
+    assert 'flow = "associative" gives a proved upper bound' in said

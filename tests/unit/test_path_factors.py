@@ -1,21 +1,21 @@
 """Factors of the model's constants that a path is given: compliance of the joints, imperfection."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import solver
 from blockvis.generators import build
-from solver.analysis.settlement import model_of
-from solver.path.drivers import SupportMotion
-from solver.path.stepping import Stepper
+from solver import mechanics
 
 
 def stepper(**factors):
     arch = build("arch", {"voussoirs": 6})
-    model = model_of(arch, solver.self_weight(arch), solver.Interfaces(), solver.Controls(**factors))
-    start = solver.Pose.initial(arch)
-    driver = SupportMotion(arch, solver.Settlement(direction=(1, 0), increment=0.1, limit=0.2), start)
-    return Stepper(model, driver), start
+    model = mechanics.model_of(arch, solver.self_weight(arch), solver.Interfaces(), solver.Controls(**factors))
+    to_the_right = np.tile([1.0, 0.0, 0.0], (arch.n_blocks, 1))
+    driver = SimpleNamespace(lever=arch.block_size, rate=lambda s: to_the_right)
+    return mechanics.Stepper(model, driver), solver.Pose.initial(arch)
 
 
 def test_the_compliance_of_all_joints_is_multiplied():
