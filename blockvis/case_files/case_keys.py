@@ -35,6 +35,7 @@ from blockvis.cases.key import (
     whole,
 )
 from blockvis.cases.profiles import PROFILE, PROFILES
+from blockvis.cases.ties import TIES
 from blockvis.cases.toml_table import Table, is_number, shortened
 from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
@@ -303,6 +304,8 @@ GEOMETRY = Section(
             ["axes", "dim*"], default=()),
         Key("only", TEXTS, "Layers, groups, materials and names, or patterns of them, beside which all is left out",
             ["stones"], default=()),
+        Key("ties", TEXTS, "Layers of a .dxf or .svg, or patterns of them, whose lines are ties, see [[ties]] "
+            "layer; they are no joints and no outlines", ["TIES"], default=()),
         Key("window", _WINDOW, "What is read of a drawing in the plane: [x0, y0, x1, y1], as blockvis info prints them",
             [0.0, 0.0, 6.0, 3.5], "m", otherwise="all of it"),
         Key("width", POSITIVE, "Width of an image, or of that of annotations", 1.2, "m",
@@ -520,6 +523,7 @@ SECTIONS = (
     SETTLEMENT,
     PROFILE,
     LOADS,
+    TIES,
     ANALYSIS,
     *(section for kind in KINDS.values() for section in kind.sections),
     EXPLAIN,

@@ -18,6 +18,7 @@ from .imperfections import Imperfection
 from .loads import LoadCase
 from .profiles import Profile
 from .role_places import RolePlace
+from .ties import TieCase
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,8 @@ class Case:
         The case file as it was read.
     role_places : tuple of RolePlace
         Roles by place, under those by name.
+    tie_layers : tuple of str
+        Layers of the drawing whose lines are ties.
     bonds : tuple of Bonding
         Walls of the drawing that are filled with stones.
     analysis : str
@@ -68,6 +71,7 @@ class Case:
     dimension: int | str = "auto"
     ignore: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    tie_layers: tuple[str, ...] = ()
     window: tuple[float, ...] | None = None
     image: ImageKeys = field(default_factory=ImageKeys)
     thickness: float | None = None
@@ -89,6 +93,7 @@ class Case:
     settlements: tuple[solver.Settlement, ...] = ()
     profiles: tuple[Profile | None, ...] = ()
     loads: tuple[LoadCase, ...] = ()
+    ties: tuple[TieCase, ...] = ()
     analysis: str = "settlement"
     settings: Any = None
     controls: solver.Controls = field(default_factory=solver.Controls)

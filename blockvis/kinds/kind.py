@@ -55,6 +55,7 @@ class RunInput:
     assembly: solver.Assembly
     interfaces: solver.Interfaces
     loads: solver.Loads
+    ties: tuple[solver.Tie, ...] = ()
     listeners: list[Callable[[mechanics.PathState], None]] = field(default_factory=list)
 
     def step(self, state: mechanics.PathState) -> None:
