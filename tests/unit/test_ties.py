@@ -34,10 +34,14 @@ def ties_of(folder, *ties, **tables):
     return case_ties(case, case_assembly(case))
 
 
+def plan(folder, *ties, **tables):
+    case = case_with(folder, *ties, **tables)
+    return planned(case, case_assembly(case))
+
+
 def refused(folder, *ties, **tables) -> str:
     with pytest.raises(ValueError) as error:
-        case = case_with(folder, *ties, **tables)
-        planned(case, case_assembly(case))
+        plan(folder, *ties, **tables)
     message = str(error.value)
     assert "\n" not in message
     assert str(folder / "case.toml") in message
