@@ -31,12 +31,14 @@ def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc
     n_dof = d + pose.rotations.shape[1]
     force = np.swapaxes(contacts.frames, 1, 2)
     values, rows = [], []
-    for block, sign in ((contacts.block_a, 1.0), (contacts.block_b, -1.0)):
+    for blocks, sign in ((contacts.block_a, 1.0), (contacts.block_b, -1.0)):
+        # The ground, -1, has no rows.
+        on_ground, block = blocks < 0, np.maximum(blocks, 0)
         arms = cross_rows(contacts.points - pose.positions[block])
         # Summed coordinate by coordinate, as the rounding of small matrix products depends on the processor.
         products = [arms[:, :, k, None] * force[:, None, k] for k in range(d)]
         moment = sum(products[1:], products[0]) / length
-        values.append(sign * np.concatenate([force, moment], axis=1))
+        values.append(np.where(on_ground, 0.0, sign)[:, None, None] * np.concatenate([force, moment], axis=1))
         rows.append(n_dof * block[:, None] + np.arange(n_dof))
     # Column by column: the entries of block a, then of block b.
     data = np.swapaxes(np.concatenate(values, axis=1), 1, 2)

@@ -21,7 +21,7 @@ from .path.drivers import ControlDisplacement
 from .results.increment import Increment
 from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, Quantity, reaction_to, settlement_in
 from .results.response import Control, Envelope, LimitLoad, Response
-from .ties import Tie
+from .ties import Tie, TieForces
 from .views import Shown
 
 
@@ -125,7 +125,7 @@ class Structure(Shown):
         """
         phases = _phases(settlement)
         increments = settlement_increments(
-            self.assembly, phases, interfaces=self.interfaces, loads=self.loads, controls=controls
+            self.assembly, phases, interfaces=self.interfaces, loads=self.loads, controls=controls, ties=self.ties
         )
         found = increments.all(on_increment)
         unit = phases[0].unit
@@ -137,6 +137,7 @@ class Structure(Shown):
         *,
         controls: Controls | None = None,
         pose: Pose | None = None,
+        ties_at: TieForces | None = None,
         on_increment: Callable[[Increment], None] | None = None,
     ) -> Response:
         """Follow the structure under growing displacement from its limit load down to where it carries none.
@@ -149,6 +150,8 @@ class Structure(Shown):
         controls : Controls, optional
         pose : Pose, optional
             Where to start, for instance after a settlement; the drawing by default. Displacements count from there.
+        ties_at : TieForces, optional
+            ``ties`` of the increment that the pose is from; new ones by default.
         on_increment : callable, optional
             Called with every :class:`Increment` as it is found.
 
@@ -171,7 +174,14 @@ class Structure(Shown):
         control displacement as one more equation.
         """
         increments = pushover_increments(
-            self.assembly, control, loads=self.loads, interfaces=self.interfaces, controls=controls, pose=pose
+            self.assembly,
+            control,
+            loads=self.loads,
+            interfaces=self.interfaces,
+            controls=controls,
+            pose=pose,
+            ties=self.ties,
+            ties_at=ties_at,
         )
         found = increments.all(on_increment)
         return self._response(increments, found, "pushover", CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, control=control)
@@ -186,6 +196,7 @@ class Structure(Shown):
         displacement: float = 0.0,
         overlap_tolerance: float | None = None,
         torsion: str = "points",
+        ties_at: TieForces | None = None,
     ) -> LimitLoad:
         """Find the largest multiplier of the live loads at which the structure can be in equilibrium.
 
@@ -212,6 +223,9 @@ class Structure(Shown):
         torsion : {"points", "uniform"}
             What a face of blocks in space resists when it turns in its own plane: what friction at its contact
             points does, or what it does under a uniform pressure, which is up to 1.85 times less.
+        ties_at : TieForces, optional
+            ``ties`` of the increment that the pose is from, which tell what is broken; by default all carry up to
+            their strength.
 
         Returns
         -------
@@ -242,6 +256,8 @@ class Structure(Shown):
             displacement=displacement,
             overlap_tolerance=overlap_tolerance,
             torsion=torsion,
+            ties=self.ties,
+            ties_at=ties_at,
         )
         return replace(found, analysed=(self.assembly, self.interfaces, under.loads))
 

@@ -8,10 +8,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .assembly import Assembly
+from .geometry.contacts import Contacts
 from .kinematics import Pose, carried
+from .tolerances import SMALLEST_FORCE
 
 #: Members that carry tension only, compression only, and both.
 TIE, PROP, BAR = KINDS = ("tie", "prop", "bar")
+
+#: Kind of the contact points that stand for members, in their features: then the member, and its sense.
+MEMBER = 9
+
+#: Part of its strength from which on a member is told to yield: forces of an equilibrium may be a little below it.
+TOLD_YIELDING = 1.0 - 1e-3
 
 #: What a member does at an increment, by number: not yet or no longer there, without force, elastic, yielding, broken.
 STATES = ABSENT, SLACK, ELASTIC, YIELDING, BROKEN = range(5)
@@ -92,6 +100,8 @@ class TieForces:
         Tension positive.
     elongations : (n_ties,) array [m]
         Change of length since they were installed.
+    rest : (n_ties,) array [m]
+        Lengths without force; nan where a member is absent or broken.
     states : (n_ties,) int array
         Numbers of :data:`STATES`.
     ends : (n_ties, 2, d) array [m]
@@ -99,8 +109,32 @@ class TieForces:
 
     forces: np.ndarray = field(default_factory=lambda: np.zeros(0))
     elongations: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
     states: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
+
+
+def check_ties(ties: Sequence[Tie], assembly: Assembly, n_phases: int) -> None:
+    """Refuse ties that do not belong to an assembly.
+
+    Raises
+    ------
+    ValueError
+        For a block or a phase that is not there, a name used twice, or points of the wrong dimension.
+    """
+    names = [tie.name for tie in ties]
+    for tie in ties:
+        for block in tie.blocks:
+            if block is not None and not 0 <= block < assembly.n_blocks:
+                raise ValueError(f"tie '{tie.name}' ends in block {block}; the assembly has {assembly.n_blocks} blocks")
+        if any(len(point) != assembly.dimension for point in tie.points):
+            raise ValueError(
+                f"tie '{tie.name}' has points {tie.points}; give {assembly.dimension} coordinates, as the blocks have"
+            )
+        if tie.phase > n_phases:
+            raise ValueError(f"tie '{tie.name}' has phase {tie.phase}, and there are {n_phases} settlements")
+        if names.count(tie.name) > 1:
+            raise ValueError(f"two ties are named '{tie.name}'; give each its own name")
 
 
 def tie_ends(ties: Sequence[Tie], assembly: Assembly, pose: Pose) -> np.ndarray:
@@ -113,6 +147,119 @@ def tie_ends(ties: Sequence[Tie], assembly: Assembly, pose: Pose) -> np.ndarray:
     pose : Pose
     """
     drawn = np.array([tie.points for tie in ties], dtype=float).reshape(len(ties), 2, assembly.dimension)
-    blocks = np.array([[-1 if b is None else b for b in tie.blocks] for tie in ties], dtype=int).reshape(-1, 2)
+    blocks = _blocks(ties)
     moved = carried(drawn.reshape(-1, assembly.dimension), blocks.ravel(), Pose.initial(assembly), pose)
     return np.where((blocks < 0)[:, :, None], drawn, moved.reshape(drawn.shape))
+
+
+def tie_lengths(ends: np.ndarray) -> np.ndarray:
+    """(n_ties,) array [m]: lengths between ends (n_ties, 2, d)."""
+    return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
+
+def installed_lengths(ties: Sequence[Tie], ends: np.ndarray) -> np.ndarray:
+    """(n_ties, 2) array [m]: lengths of members that are installed between ends (n_ties, 2, d): then, and unloaded."""
+    length = tie_lengths(ends)
+    give = [tie.prestress / tie.stiffness * (-1.0 if tie.kind == PROP else 1.0) for tie in ties]
+    return np.stack([length, length - np.array(give)], axis=1)
+
+
+def is_member(contacts: Contacts) -> np.ndarray:
+    """(n,) bool array: which contact points stand for members."""
+    return np.asarray(contacts.features[:, 0] == MEMBER)
+
+
+def present_members(ties: Sequence[Tie], rest: np.ndarray) -> np.ndarray:
+    """(n, 4) int array: features of the contact points of the members that are there.
+
+    A contact point pushes only: one that pulls the ends together for tension, one that pushes them apart for
+    compression, a bar has both.
+
+    Parameters
+    ----------
+    ties : sequence of Tie
+    rest : (n_ties,) array [m]
+        Lengths without force; nan where a member is absent or broken.
+    """
+    senses = {TIE: (0,), PROP: (1,), BAR: (0, 1)}
+    rows = [(MEMBER, i, k, -1) for i in np.flatnonzero(~np.isnan(rest)).tolist() for k in senses[ties[i].kind]]
+    return np.array(rows, dtype=np.int64).reshape(-1, 4)
+
+
+def member_contacts(
+    ties: Sequence[Tie], assembly: Assembly, pose: Pose, rest: np.ndarray, features: np.ndarray
+) -> Contacts:
+    """Return the contact points of members; their gap is how far they are from carrying, negative where they carry.
+
+    Parameters
+    ----------
+    ties : sequence of Tie
+    assembly : Assembly
+    pose : Pose
+    rest : (n_ties,) array [m]
+    features : (n, 4) int array
+        Of :func:`present_members`.
+    """
+    number, pushes = features[:, 1], features[:, 2] == 1
+    ends, blocks = tie_ends(ties, assembly, pose)[number], _blocks(ties)[number]
+    length = tie_lengths(ends)
+    # Of block a: towards block b in tension.
+    along = (ends[:, 1] - ends[:, 0]) / length[:, None] * np.where(pushes, -1.0, 1.0)[:, None]
+    d = assembly.dimension
+    return Contacts(
+        features=features,
+        block_a=blocks[:, 0],
+        block_b=blocks[:, 1],
+        points=ends[:, 0],
+        frames=_frames(along),
+        gaps=np.where(pushes, 1.0, -1.0) * (length - rest[number]),
+        slip=np.zeros((len(features), d - 1)),
+        areas=np.zeros(len(features)),
+    )
+
+
+def plastic_forces(
+    ties: Sequence[Tie], assembly: Assembly, pose: Pose, contacts: Contacts, forces: np.ndarray
+) -> TieForces:
+    """Return what members do at a limit load, where their elongation has no meaning.
+
+    Parameters
+    ----------
+    ties : sequence of Tie
+    assembly : Assembly
+    pose : Pose
+    contacts : Contacts
+    forces : (n_contacts, d) array [N]
+    """
+    force, ends = member_forces(contacts, forces, len(ties)), tie_ends(ties, assembly, pose)
+    strength = np.array([tie.strength for tie in ties])
+    state = member_states(np.abs(force), strength, float(np.abs(forces).max(initial=0.0)))
+    return TieForces(force, np.zeros(len(ties)), tie_lengths(ends), state, ends) if ties else TieForces()
+
+
+def member_forces(contacts: Contacts, forces: np.ndarray, n_ties: int) -> np.ndarray:
+    """(n_ties,) array: tension of members, from the forces (n_contacts, d) of all contact points."""
+    members = is_member(contacts)
+    tension = np.where(contacts.features[members, 2] == 1, -1.0, 1.0) * forces[members, 0]
+    return np.bincount(contacts.features[members, 1], tension, n_ties)
+
+
+def member_states(size: np.ndarray, strength: np.ndarray, largest: float) -> np.ndarray:
+    """(n_ties,) int array: slack, elastic or yielding, from sizes of forces, strengths and the largest force."""
+    carried = np.where(size >= TOLD_YIELDING * strength, YIELDING, ELASTIC)
+    return np.where(size > SMALLEST_FORCE * largest, carried, SLACK)
+
+
+def _blocks(ties: Sequence[Tie]) -> np.ndarray:
+    """(n_ties, 2) int array: blocks of the ends, -1 for the ground."""
+    return np.array([[-1 if b is None else b for b in tie.blocks] for tie in ties], dtype=np.int64).reshape(-1, 2)
+
+
+def _frames(normals: np.ndarray) -> np.ndarray:
+    """(n, d, d) array: frames of contact points with these normals."""
+    if normals.shape[1] == 2:
+        return np.stack([normals, np.stack([-normals[:, 1], normals[:, 0]], axis=1)], axis=1)
+    other = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    first = np.cross(normals, other)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([normals, first, np.cross(normals, first)], axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from solver.contact_step.balance import nearest_equilibrium
 from solver.contact_step.problem import NotSolved
 from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
-from solver.geometry.contacts import Contacts
+from solver.geometry.contacts import Contacts, joined_contacts
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose, dimension_of, moved_vertices, unit_lengths
 from solver.loads import Loads, checked_loads
@@ -23,7 +24,19 @@ from solver.program.without_dilatancy import solve_without_dilatancy
 from solver.programs.problem import Unbounded
 from solver.programs.solve import solve_between
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
+from solver.results.increment import State
 from solver.results.response import LimitLoad, LimitStatus, limit_state
+from solver.ties import (
+    Tie,
+    TieForces,
+    check_ties,
+    is_member,
+    member_contacts,
+    plastic_forces,
+    present_members,
+    tie_ends,
+    tie_lengths,
+)
 from solver.tolerances import CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
@@ -55,6 +68,8 @@ def find_limit_load(
     displacement: float = 0.0,
     overlap_tolerance: float | None = None,
     torsion: str = POINTS,
+    ties: Sequence[Tie] = (),
+    ties_at: TieForces | None = None,
 ) -> LimitLoad:
     """The limit load of a structure; parameters as those of :meth:`solver.Structure.limit_load`.
 
@@ -104,14 +119,19 @@ def find_limit_load(
         raise ValueError(f"torsion is '{torsion}'; it is 'points' or 'uniform'")
     if torsion == UNIFORM and assembly.dimension == 2:
         raise ValueError("torsion is 'uniform', but faces of blocks in the plane have none; leave it out")
+    if torsion == UNIFORM and ties:
+        raise ValueError(f"torsion = 'uniform' knows no ties ('{ties[0].name}'); take torsion = 'points'")
     check_blocks(assembly, overlap_tolerance)
+    check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
     loads = checked_live(assembly, loads)
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
     if not (np.isfinite(displacement) and displacement >= 0.0):
         raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
-    problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap, displacement, torsion)
+    rest = tie_lengths(tie_ends(ties, assembly, pose)) if ties_at is None else ties_at.rest
+    standing = tuple(tie for tie, length in zip(ties, rest, strict=True) if not np.isnan(length))
+    problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap, displacement, torsion, standing)
     balanced, status = problem.balanced(with_live=False), LimitStatus.FOUND
     if balanced.falls:
         falling, status = balanced, LimitStatus.HELD
@@ -161,6 +181,7 @@ class _Problem:
     price: np.ndarray
     cohesion: np.ndarray
     crushing: np.ndarray
+    ties: tuple[Tie, ...] = ()
     faces: Faces | None = None
 
     @classmethod
@@ -173,6 +194,7 @@ class _Problem:
         closed_gap: float,
         displacement: float,
         torsion: str,
+        ties: tuple[Tie, ...],
     ) -> _Problem:
         length, free = assembly.block_size, assembly.free
         reach = max(closed_gap, REACH * length) if displacement > 0.0 else closed_gap
@@ -180,6 +202,14 @@ class _Problem:
         contacts = find_contacts(assembly, vertices, reach)
         around = contacts if interfaces.dry else find_contacts(assembly, vertices, max(reach, REACH * length))
         cohesion, crushing = point_strength(assembly, interfaces, contacts, around)
+        friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
+        if ties:
+            # Each is as long as it is, so that all carry.
+            rest = tie_lengths(tie_ends(ties, assembly, pose))
+            members = member_contacts(ties, assembly, pose, rest, present_members(ties, rest))
+            strength = np.array([ties[i].strength for i in members.features[:, 1]])
+            contacts, crushing = joined_contacts([contacts, members]), np.append(crushing, strength)
+            cohesion, friction = (np.append(of, np.zeros(len(members))) for of in (cohesion, friction))
         n_dof = loads.dead.shape[1]
         d = dimension_of(n_dof)
         units = unit_lengths(n_dof, length)
@@ -200,7 +230,7 @@ class _Problem:
             assembly=assembly,
             pose=pose,
             contacts=contacts,
-            friction=interfaces.friction(assembly, contacts.block_a, contacts.block_b),
+            friction=friction,
             length=length,
             force=force,
             matrix=sp.csr_array(matrix)[np.repeat(free, n_dof)],
@@ -211,6 +241,7 @@ class _Problem:
             price=price,
             cohesion=cohesion / force,
             crushing=crushing / force,
+            ties=ties,
             faces=faces,
         )
 
@@ -275,7 +306,8 @@ class _Problem:
         rows = ContactRows(wrench_matrix(self.contacts, self.pose, self.length), free)
         load, near = self.dead + balanced.multiplier * self.live, np.zeros((len(self.contacts), d))
         try:
-            forces = nearest_equilibrium(rows, near, Stepper.compliance(self.contacts), self.friction, load)
+            compliance = Stepper.joint_compliance(self.contacts)
+            forces = nearest_equilibrium(rows, near, compliance, self.friction, load, most=self.crushing)
         except NotSolved:
             forces = balanced.forces
         return np.asarray(forces[:, 0])
@@ -373,8 +405,14 @@ class _Problem:
             live_force=self.live_force,
             programs=programs,
             torsion=POINTS if self.faces is None else UNIFORM,
-            held=limit_state(self.pose, self.contacts, forces * self.force, self.friction, mechanism),
+            held=self._held(forces * self.force, mechanism),
         )
+
+    def _held(self, forces: np.ndarray, mechanism: np.ndarray) -> State:
+        """The arrays of a limit load, from forces [N]."""
+        between = ~is_member(self.contacts)
+        state = limit_state(self.pose, self.contacts[between], forces[between], self.friction[between], mechanism)
+        return replace(state, ties=plastic_forces(self.ties, self.assembly, self.pose, self.contacts, forces))
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:

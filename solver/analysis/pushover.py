@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 
 from solver.assembly import Assembly, check_blocks
 from solver.interfaces import Interfaces
@@ -12,8 +12,10 @@ from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
 from solver.path.drivers import ControlDisplacement, ControlledLoad
 from solver.path.path import Path
 from solver.path.state import PathState
+from solver.program.model import Model
 from solver.programs.problem import SolveError
 from solver.results.increment import Increment, Status
+from solver.ties import Tie, TieForces, check_ties
 
 from .increments import Increments, TimedIncrements
 from .limit_load import checked_live
@@ -28,6 +30,8 @@ def pushover_increments(
     interfaces: Interfaces,
     controls: Controls | None = None,
     pose: Pose | None = None,
+    ties: Sequence[Tie] = (),
+    ties_at: TieForces | None = None,
     resume: PathState | None = None,
     on_step: Callable[[PathState], None] | None = None,
 ) -> Increments:
@@ -35,6 +39,8 @@ def pushover_increments(
 
     Parameters
     ----------
+    ties_at : TieForces, optional
+        Of the increment that the pose is from; new ones by default.
     resume : PathState, optional
         Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
         for bit as if the loop had not been interrupted. ``pose`` is not looked at then.
@@ -55,27 +61,27 @@ def pushover_increments(
             f"the checkpoint has {len(resume.place.pose.rotations)} blocks, the assembly {assembly.n_blocks}: it "
             "belongs to another run"
         )
-    return TimedIncrements(_increments(assembly, control, loads, interfaces, controls, pose, resume, on_step))
+    check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
+    model = model_of(assembly, loads, interfaces, controls, loads.live, tuple(ties))
+    return TimedIncrements(_increments(model, control, controls, pose, ties_at, resume, on_step))
 
 
 def _increments(
-    assembly: Assembly,
+    model: Model,
     control: ControlDisplacement,
-    loads: Loads,
-    interfaces: Interfaces,
     controls: Controls,
     pose: Pose | None,
+    ties_at: TieForces | None,
     resume: PathState | None,
     on_step: Callable[[PathState], None] | None,
 ) -> Generator[Increment, None, Ending]:
-    start = Pose.initial(assembly) if pose is None else pose
+    start = Pose.initial(model.assembly) if pose is None else pose
     if resume is not None:
         start = resume.start
-    model = model_of(assembly, loads, interfaces, controls, loads.live)
-    path = Path(model, ControlledLoad(assembly, control, start), 0, controls, on_step)
+    path = Path(model, ControlledLoad(model.assembly, control, start), 0, controls, on_step)
     at = 0.0
     try:
-        state = path.begin(start) if resume is None else resume
+        state = path.begin(start, ties_at=ties_at) if resume is None else resume
         at = state.place.s
         return (yield from path.follow(state, resume is not None))
     except SolveError as error:

@@ -20,6 +20,7 @@ from solver.path.state import PathState
 from solver.program.model import Model
 from solver.programs.problem import SolveError
 from solver.results.increment import Increment, Status
+from solver.ties import Tie, check_ties
 
 from .increments import Increments, TimedIncrements
 
@@ -31,6 +32,7 @@ def settlement_increments(
     interfaces: Interfaces,
     loads: Loads,
     controls: Controls | None = None,
+    ties: Sequence[Tie] = (),
     resume: PathState | None = None,
     on_step: Callable[[PathState], None] | None = None,
 ) -> Increments:
@@ -50,6 +52,9 @@ def settlement_increments(
     check_settlement(assembly, phases, controls)
     interfaces.refuse_strength("a settlement")
     by_program = controls.increments == LINEAR_PROGRAM
+    if by_program and ties:
+        raise ValueError(f"increments = 'linear program' knows no ties ('{ties[0].name}'); leave the key out")
+    check_ties(ties, assembly, len(phases))
     if by_program and assembly.dimension == 3:
         raise ValueError("increments = 'linear program' is for blocks in the plane; leave it out for blocks in space")
     if resume is not None and (resume.phase >= len(phases) or len(resume.start.rotations) != assembly.n_blocks):
@@ -58,10 +63,12 @@ def settlement_increments(
             f"{len(phases)} phases and {assembly.n_blocks} blocks: it belongs to another run"
         )
     origin = at_origin(assembly)
-    near, local = (assembly, phases) if not origin.any() else without_origin(origin, assembly, phases)
+    near, local, near_ties = assembly, tuple(phases), tuple(ties)
+    if origin.any():
+        near, local, near_ties = without_origin(origin, assembly, phases, ties)
     if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
-    follow = linear_program_increments if by_program else partial(_increments, on_step=on_step)
+    follow = linear_program_increments if by_program else partial(_increments, ties=near_ties, on_step=on_step)
     steps = follow(near, local, interfaces, loads, controls, resume)
     return TimedIncrements(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
 
@@ -73,6 +80,7 @@ def _increments(
     loads: Loads,
     controls: Controls,
     resume: PathState | None,
+    ties: tuple[Tie, ...],
     on_step: Callable[[PathState], None] | None,
 ) -> Generator[Increment, None, Ending]:
     first = 0 if resume is None else resume.phase
@@ -81,7 +89,7 @@ def _increments(
     for number, phase in enumerate(phases[first:], start=first):
         start = Pose.initial(assembly) if before is None else before.place.pose
         start = start if resume is None else resume.start
-        model = model_of(assembly, loads, interfaces, controls)
+        model = model_of(assembly, loads, interfaces, controls, ties=ties)
         path = Path(model, SupportMotion(assembly, phase, start), number, controls, on_step)
         at = 0.0
         try:
@@ -97,7 +105,12 @@ def _increments(
 
 
 def model_of(
-    assembly: Assembly, loads: Loads, interfaces: Interfaces, controls: Controls, live: np.ndarray | None = None
+    assembly: Assembly,
+    loads: Loads,
+    interfaces: Interfaces,
+    controls: Controls,
+    live: np.ndarray | None = None,
+    ties: tuple[Tie, ...] = (),
 ) -> Model:
     """The units and loads of a path."""
     force = float(np.linalg.norm(loads.dead[assembly.free, : assembly.dimension], axis=1).mean())
@@ -112,6 +125,7 @@ def model_of(
         force,
         length / 4.0,
         live=live,
+        ties=ties,
         compliance=controls.compliance_factor,
         imperfection=controls.imperfection_factor,
     )

@@ -2,7 +2,7 @@
 
 Over the forces f = (N, T) of the closed contact points, with their compliance as metric::
 
-    minimise  1/2 Σ c (f - f⁰)²   subject to   A f + load = 0,   |T| ≤ μ N,   and, optionally,   r · f = R
+    minimise  1/2 Σ c (f - f⁰)²   subject to   A f + load = 0,   |T| ≤ μ N ≤ μ M,   and, optionally,   r · f = R
 
 From f⁰ = 0 these are the forces of least elastic energy, which are unique: those of a structure at rest. Primal-dual
 interior method in the scaling of Nesterov & Todd, see :mod:`.cones`.
@@ -27,16 +27,17 @@ ACCEPTED = 1e-9
 
 @dataclass(frozen=True)
 class _Change:
-    """A change of the forces, of their multipliers z, and of the movement and multiplier of the equations."""
+    """A change of the forces, of their multipliers z and w, and of the movement and multiplier of the equations."""
 
     forces: np.ndarray
     z: np.ndarray
+    yielding: np.ndarray
     motion: np.ndarray
     rho: float
 
 
 class _Iterate:
-    """Forces f inside their friction cones, (μ N, T) = u, with multipliers z inside theirs."""
+    """Forces f inside their friction cones, (μ N, T) = u, with multipliers z inside theirs, and w of the limits M."""
 
     def __init__(
         self,
@@ -44,26 +45,36 @@ class _Iterate:
         reference: np.ndarray,
         compliance: np.ndarray,
         friction: np.ndarray,
+        most: np.ndarray,
         load: np.ndarray,
         unit_reaction: np.ndarray | None,
         reaction: float,
     ) -> None:
+        self.limited = np.flatnonzero(np.isfinite(most))
+        self.most = most[self.limited]
         self.rows, self.reference, self.load = rows, reference, load
         self.unit_reaction, self.reaction = unit_reaction, reaction
         n, self.d = reference.shape
         self.slope = np.ones((n, self.d))
         self.slope[:, 0] = np.maximum(friction, 1e-9)  # A cone without width has no interior.
-        self.weight = compliance / float(compliance[:, 0].mean())
+        rigid = np.isinf(most) if np.isinf(most).any() else np.ones(n, dtype=bool)
+        self.weight = compliance / float(compliance[rigid, 0].mean())
         # The start lies well inside the cones.
         self.forces = reference.copy()
-        self.forces[:, 0] = np.maximum(reference[:, 0], 0.1)
+        self.forces[:, 0] = np.minimum(np.maximum(reference[:, 0], 0.1), 0.5 * most)
         length = np.sqrt((reference[:, 1:] ** 2).sum(axis=1))
         limit = 0.9 * self.slope[:, 0] * self.forces[:, 0]
         self.forces[:, 1:] *= np.minimum(1.0, limit / np.maximum(length, 1e-300))[:, None]
         self.z = np.zeros((self.d, n))
         self.z[0] = np.maximum(1e-2, 1e-2 / (self.slope * self.forces)[:, 0])
-        self.motion, self.rho = np.zeros_like(load), 0.0
+        self.yielding = 1e-2 / self.reserve
+        self.motion, self.rho, self.count = np.zeros_like(load), 0.0, 2 * n + len(self.limited)
         self.measure()
+
+    @property
+    def reserve(self) -> np.ndarray:
+        """(k,) array: what is missing from limited normal forces to their limit."""
+        return np.asarray(self.most - self.forces[self.limited, 0])
 
     def measure(self) -> None:
         """Compute the forces out of balance and the mean product."""
@@ -72,7 +83,7 @@ class _Iterate:
         self.reaction_error = 0.0
         if self.unit_reaction is not None:
             self.reaction_error = self.reaction - self._reaction_of(self.forces)
-        self.mean = float((self.u * self.z).sum()) / (2 * len(self.forces))
+        self.mean = float((self.u * self.z).sum() + self.reserve @ self.yielding) / self.count
         self.residual = max(float(np.abs(self.unbalanced).max()), abs(self.reaction_error))
 
     def factorise(self) -> None:
@@ -86,10 +97,12 @@ class _Iterate:
         self.scaling = Scaling(self.u, self.z)
         self.hessian = self.scaling.hessian()
         local = self.slope[:, :, None] * self.hessian * self.slope[:, None, :]
+        local[self.limited, 0, 0] += self.yielding / self.reserve
         self.stiffness = np.linalg.inv(self.weight[:, :, None] * np.eye(self.d) + local)
         self.solve = self.rows.factorised(self.stiffness, np.zeros_like(self.load))
         metric = self.weight * (self.forces - self.reference)
         self.error = metric + self.rows.relative(self.motion) - self.slope * self.z.T
+        self.error[self.limited, 0] += self.yielding
         if self.unit_reaction is not None:
             self.error = self.error + self.rho * self.unit_reaction
             self.unit_forces = self._forces_by(self.unit_reaction)
@@ -103,10 +116,12 @@ class _Iterate:
     def _forces_by(self, distances: np.ndarray) -> np.ndarray:
         return np.einsum("nij,nj->ni", self.stiffness, distances)
 
-    def direction(self, products: np.ndarray) -> _Change:
-        """Newton's direction with what the products in the scaling are to change by."""
+    def direction(self, products: np.ndarray, yielding_products: np.ndarray) -> _Change:
+        """Newton's direction with what the products, those of cones in the scaling, are to change by."""
         target = self.scaling.scaled(quotient(products, self.scaling.scaled_point))
-        forces = self._forces_by(self.slope * target.T - self.error)
+        distances = self.slope * target.T - self.error
+        distances[self.limited, 0] -= yielding_products / self.reserve
+        forces = self._forces_by(distances)
         motion, rho = self.solve(self.unbalanced + self.rows.resultant(forces)), 0.0
         if self.unit_reaction is not None:
             by_motion = float(self.unit_resultant @ motion)
@@ -115,20 +130,27 @@ class _Iterate:
             forces = forces - rho * self.unit_forces
         forces = forces - self._forces_by(self.rows.relative(motion))
         z = target - np.einsum("nij,jn->in", self.hessian, (self.slope * forces).T)
-        return _Change(forces, z, motion, rho)
+        yielding = (yielding_products + self.yielding * forces[self.limited, 0]) / self.reserve
+        return _Change(forces, z, yielding, motion, rho)
 
     def longest(self, change: _Change) -> float:
         """Largest part of a change, at most 1, that keeps everything inside."""
-        return min(1.0, longest_step(self.u, (self.slope * change.forces).T), longest_step(self.z, change.z))
+        steepest = float((change.forces[self.limited, 0] / self.reserve).max(initial=1.0))
+        steepest = float((-change.yielding / self.yielding).max(initial=steepest))
+        in_cones = min(longest_step(self.u, (self.slope * change.forces).T), longest_step(self.z, change.z))
+        return min(1.0 / steepest, in_cones)
 
     def mean_after(self, change: _Change, part: float) -> float:
         """Mean product after a part of a change."""
         u = self.u + part * (self.slope * change.forces).T
-        return float((u * (self.z + part * change.z)).sum()) / (2 * len(self.forces))
+        reserve = self.reserve - part * change.forces[self.limited, 0]
+        of_limits = float(reserve @ (self.yielding + part * change.yielding))
+        return (float((u * (self.z + part * change.z)).sum()) + of_limits) / self.count
 
     def take(self, change: _Change, part: float) -> None:
         """Add a part of a change."""
         self.forces, self.z = self.forces + part * change.forces, self.z + part * change.z
+        self.yielding = self.yielding + part * change.yielding
         self.motion, self.rho = self.motion + part * change.motion, self.rho + part * change.rho
         self.measure()
 
@@ -142,6 +164,7 @@ def nearest_equilibrium(
     load: np.ndarray,
     unit_reaction: np.ndarray | None = None,
     reaction: float = 0.0,
+    most: np.ndarray | None = None,
 ) -> np.ndarray:
     """Find the forces in equilibrium within friction that are nearest to given ones.
 
@@ -160,6 +183,8 @@ def nearest_equilibrium(
         r: the reaction of unit forces.
     reaction : float
         R.
+    most : (n,) array, optional
+        M; no limits by default.
 
     Returns
     -------
@@ -174,7 +199,8 @@ def nearest_equilibrium(
         if np.abs(load).max(initial=0.0) > ACCEPTED:
             raise NotSolved("nothing touches the free blocks")
         return reference
-    point = _Iterate(rows, reference, compliance, friction, load, unit_reaction, reaction)
+    most = np.full(len(reference), np.inf) if most is None else most
+    point = _Iterate(rows, reference, compliance, friction, most, load, unit_reaction, reaction)
     best, part = (point.residual, point.forces), 1.0
     for _ in range(ITERATIONS):
         converged = point.residual < BALANCED and point.mean < CONVERGED * max(1.0, float(point.forces[:, 0].max()))
@@ -186,7 +212,8 @@ def nearest_equilibrium(
             break
         scaled_point = point.scaling.scaled_point
         present = product(scaled_point, scaled_point)
-        change = point.direction(-present)
+        yielding_products = point.reserve * point.yielding
+        change = point.direction(-present, -yielding_products)
         part = point.longest(change)
         centring = min(max((point.mean_after(change, part) / point.mean) ** 3, 1e-4), 0.5)
         correction = product(point.scaling.scaled((point.slope * change.forces).T), point.scaling.unscaled(change.z))
@@ -194,7 +221,8 @@ def nearest_equilibrium(
         correction *= np.minimum(1.0, 10.0 * point.mean / np.maximum(np.abs(correction).sum(axis=0), 1e-300))
         products = -present - correction
         products[0] += 2.0 * centring * point.mean
-        change = point.direction(products)
+        closing = np.clip(-change.forces[point.limited, 0] * change.yielding, -10.0 * point.mean, 10.0 * point.mean)
+        change = point.direction(products, centring * point.mean - yielding_products - closing)
         part = 0.995 * point.longest(change)
         point.take(change, part)
         if not np.isfinite(point.residual):

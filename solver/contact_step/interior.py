@@ -1,8 +1,9 @@
 """An interior method for the program of a step: as many iterations for a large step as for a small one.
 
-The program's conditions, with the opening y of each contact point and the slide z = (σ₀, σ) of its disc of friction::
+The program's conditions, with the opening y of each contact point, its closing w beyond the largest normal force M
+where that is finite, and the slide z = (σ₀, σ) of its disc of friction::
 
-    N y = β                     y = gap + n·v + c_n (N - N⁰)                            N, y > 0
+    N y = β,  (M - N) w = β     y - w = gap + n·v + c_n (N - N⁰)                        0 < N < M,  y, w > 0
     (B, T) ∘ (σ₀, σ) = 2β (1, 0)    σ = slip + t·v + c_t (T - T⁰)                       |T| < B, |σ| < σ₀
 
 with the product ∘ of the round cone's algebra; β to 0 by Newton's method with Mehrotra's predictor and corrector
@@ -32,17 +33,19 @@ class _Change:
     multiplier: float
     normal: np.ndarray
     opening: np.ndarray
+    yielding: np.ndarray
     shear: np.ndarray
     slide: np.ndarray
 
 
 class _Iterate:
-    """Forces N, u = (B, T), openings y and slides z of a problem's contact points, all inside their bounds."""
+    """Forces N, u = (B, T), openings y, yielding w and slides z of a problem's contact points, inside their bounds."""
 
     def __init__(self, problem: ContactProblem, multiplier: float) -> None:
         self.problem, self.multiplier = problem, multiplier
         self.motion = np.zeros_like(problem.load)
         self.rough = np.flatnonzero(problem.bound > 1e-8)
+        self.limited = np.flatnonzero(np.isfinite(problem.most))
         self.relative = problem.rows.relative(self.motion)
         # In smaller steps the compliance of the joints decides.
         self.size = max(problem.size, 1e-5)
@@ -52,13 +55,20 @@ class _Iterate:
         normal = np.maximum(before, 0.3)
         self.opening = np.maximum(problem.gap + self.relative[:, 0], mean / normal)
         self.normal = np.where(before > 0.0, normal, np.minimum(normal, mean / self.opening))
+        self.normal = np.minimum(self.normal, 0.5 * problem.most)
+        self.yielding = mean / self.reserve
         shear, slip = problem.forces[self.rough, 1:].T, problem.slip[self.rough].T
         length = np.sqrt((shear**2).sum(axis=0))
         self.shear = np.concatenate([bound[None], shear * np.minimum(1.0, 0.9 * bound / np.maximum(length, 1e-300))])
         self.slide = np.concatenate([(np.sqrt((slip**2).sum(axis=0)) + 2.0 * mean / bound)[None], slip])
         self.factorisations = 0
-        self.count = len(problem.gap) + 2 * len(self.rough)
+        self.count = len(problem.gap) + len(self.limited) + 2 * len(self.rough)
         self._measure()
+
+    @property
+    def reserve(self) -> np.ndarray:
+        """(k,) array: what is missing from limited normal forces to their limit."""
+        return np.asarray(self.problem.most[self.limited] - self.normal[self.limited])
 
     def _measure(self) -> None:
         """Compute the residuals of the equations and the mean product."""
@@ -68,9 +78,10 @@ class _Iterate:
         self.control_error = 0.0 if p.control is None else p.control_target - float(p.control @ self.motion)
         shortening = p.compliance[:, 0] * (self.normal - p.forces[:, 0])
         self.gap_error = self.opening - (p.gap + self.relative[:, 0] + shortening)
+        self.gap_error[self.limited] -= self.yielding
         slip = (p.slip[rough] + self.relative[rough, 1:] - p.compliance[rough, 1:] * p.forces[rough, 1:]).T
         self.slip_error = self.slide[1:] - slip - p.compliance[rough, 1] * self.shear[1:]
-        self.mean = self._mean(self.normal, self.opening, self.shear, self.slide)
+        self.mean = self._mean(self.normal, self.opening, self.yielding, self.shear, self.slide)
         geometry_error = max(float(np.abs(self.gap_error).max()), float(np.abs(self.slip_error).max(initial=0.0)))
         self.residual = max(geometry_error, abs(self.control_error))
 
@@ -81,15 +92,20 @@ class _Iterate:
         forces[self.rough, 1:] = shear[1:].T
         return forces
 
-    def _mean(self, normal: np.ndarray, opening: np.ndarray, shear: np.ndarray, slide: np.ndarray) -> float:
-        return float((normal * opening).sum() + (shear * slide).sum()) / self.count
+    def _mean(
+        self, normal: np.ndarray, opening: np.ndarray, yielding: np.ndarray, shear: np.ndarray, slide: np.ndarray
+    ) -> float:
+        reserve = self.problem.most[self.limited] - normal[self.limited]
+        return float((normal * opening).sum() + (reserve * yielding).sum() + (shear * slide).sum()) / self.count
 
     def factorise(self) -> None:
         """Factorise Newton's equations at this iterate."""
         p, d = self.problem, len(self.shear)
         self.factorisations += 1
         self.scaling = Scaling(self.shear, self.slide)
-        self.normal_stiffness = 1.0 / (p.compliance[:, 0] + self.opening / self.normal)
+        yielding = np.zeros_like(self.normal)
+        yielding[self.limited] = self.yielding / self.reserve
+        self.normal_stiffness = 1.0 / (p.compliance[:, 0] + self.opening / self.normal + yielding)
         # (isotropic I + 2 η² w wᵀ)⁻¹ = (I - reduction w wᵀ) / isotropic
         axis, curvature = self.scaling.w[1:].T, 2.0 * self.scaling.square
         isotropic = p.compliance[self.rough, 1] + self.scaling.square
@@ -102,10 +118,13 @@ class _Iterate:
         self.solve = p.rows.factorised(stiffness, p.viscosity)
         self.by_live = None if p.live is None else self.solve(p.live)
 
-    def direction(self, opening_products: np.ndarray, slide_products: np.ndarray) -> _Change:
+    def direction(
+        self, opening_products: np.ndarray, yielding_products: np.ndarray, slide_products: np.ndarray
+    ) -> _Change:
         """Newton's direction with what the products, those of slides in the scaling, are to change by."""
-        p, scaling = self.problem, self.scaling
+        p, scaling, limited = self.problem, self.scaling, self.limited
         normal_target = opening_products / self.normal + self.gap_error
+        normal_target[limited] -= yielding_products / self.reserve
         target = scaling.scaled(quotient(slide_products, scaling.scaled_point))
         slip_target = target[1:] + self.slip_error
 
@@ -120,15 +139,20 @@ class _Iterate:
             motion = motion + multiplier * self.by_live
         relative = p.rows.relative(motion)
         normal = self.normal_stiffness * (normal_target - relative[:, 0])
+        yielding = (yielding_products + self.yielding * normal[limited]) / self.reserve
         opening = relative[:, 0] + p.compliance[:, 0] * normal - self.gap_error
+        opening[limited] += yielding
         shear[1:] = shear_of(slip_target - relative[self.rough, 1:].T)
         first = target[0] - 2.0 * scaling.square * scaling.w[0] * (scaling.w[1:] * shear[1:]).sum(axis=0)
         slide = relative[self.rough, 1:].T + p.compliance[self.rough, 1] * shear[1:] - self.slip_error
-        return _Change(motion, multiplier, normal, opening, shear, np.concatenate([first[None], slide]))
+        return _Change(motion, multiplier, normal, opening, yielding, shear, np.concatenate([first[None], slide]))
 
     def longest(self, change: _Change) -> float:
         """Largest part of a change, at most 1, that keeps everything inside."""
         steepest = max(1.0, float((-change.normal / self.normal).max()), float((-change.opening / self.opening).max()))
+        if len(self.limited):
+            steepest = max(steepest, float((change.normal[self.limited] / self.reserve).max()))
+            steepest = max(steepest, float((-change.yielding / self.yielding).max()))
         return min(1.0 / steepest, longest_step(self.shear, change.shear), longest_step(self.slide, change.slide))
 
     def mean_after(self, change: _Change, part: float) -> float:
@@ -136,6 +160,7 @@ class _Iterate:
         return self._mean(
             self.normal + part * change.normal,
             self.opening + part * change.opening,
+            self.yielding + part * change.yielding,
             self.shear + part * change.shear,
             self.slide + part * change.slide,
         )
@@ -146,6 +171,7 @@ class _Iterate:
         self.multiplier += part * change.multiplier
         self.relative = self.problem.rows.relative(self.motion)
         self.normal, self.opening = self.normal + part * change.normal, self.opening + part * change.opening
+        self.yielding = self.yielding + part * change.yielding
         self.shear, self.slide = self.shear + part * change.shear, self.slide + part * change.slide
         self._measure()
 
@@ -165,19 +191,22 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
         point.factorise()
         scaled_point = point.scaling.scaled_point
         normal_products, slide_products = point.normal * point.opening, product(scaled_point, scaled_point)
-        change = point.direction(-normal_products, -slide_products)
+        yielding_products = point.reserve * point.yielding
+        change = point.direction(-normal_products, -yielding_products, -slide_products)
         part = point.longest(change)
         centring = min(max((point.mean_after(change, part) / point.mean) ** 3, 1e-4), 0.5)
         # Corrections of second order are bounded by the mean product.
         limit = 30.0 * point.mean
         second = np.clip(change.normal * change.opening, -limit, limit)
+        closing = np.clip(-change.normal[point.limited] * change.yielding, -limit, limit)
         third = product(point.scaling.scaled(change.shear), point.scaling.unscaled(change.slide))
         third *= np.minimum(1.0, limit / np.maximum(np.abs(third).sum(axis=0), 1e-300))
         if short:
-            centring, second, third = 1.0, 0.0 * second, 0.0 * third
+            centring, second, closing, third = 1.0, 0.0 * second, 0.0 * closing, 0.0 * third
         slide_target = -slide_products - third
         slide_target[0] += 2.0 * centring * point.mean
-        change = point.direction(centring * point.mean - normal_products - second, slide_target)
+        target = centring * point.mean
+        change = point.direction(target - normal_products - second, target - yielding_products - closing, slide_target)
         part = 0.99 * point.longest(change)
         if not (part > 1e-9 and np.isfinite(change.motion).all()):
             break

@@ -4,7 +4,7 @@ Over the movement v of the free blocks at a linearised geometry, with the moveme
 
     minimise  1/2 (g + v - h V)ᵀ (D/h) (g + v - h V) - fᵀ v + Σ c_n/2 N(v)² + Σ c_t H(P(v); B)
 
-    N = max(N⁰ - (gap + n·v) / c_n, 0)      normal force: a spring that pushes only
+    N = max(N⁰ - (gap + n·v) / c_n, 0)      normal force: a spring that pushes only, or up to its strength
     P = T⁰ - (slip + t·v) / c_t             trial shear force
     T = P min(1, B / |P|)                   shear force within the friction bound B, H Huber's function of |P|
 
@@ -45,6 +45,8 @@ class ContactProblem:
         B.
     compliance : (n, d) array
         c_n, then c_t for each tangent.
+    most : (n,) array
+        Largest normal forces; infinite where there is no limit.
     load : (n_dof,) array
     viscosity : (n_dof,) array
         Force per movement.
@@ -66,6 +68,7 @@ class ContactProblem:
     forces: np.ndarray
     bound: np.ndarray
     compliance: np.ndarray
+    most: np.ndarray
     load: np.ndarray
     viscosity: np.ndarray
     motion_so_far: np.ndarray
@@ -83,7 +86,7 @@ class ContactProblem:
         """(n, d) array: the forces nearest to trial forces that push and stay within the friction bound."""
         shear = trial[:, 1:]
         part = np.minimum(1.0, self.bound / np.maximum(_lengths(shear), 1e-300))
-        return np.column_stack([np.maximum(trial[:, 0], 0.0), shear * part[:, None]])
+        return np.column_stack([np.clip(trial[:, 0], 0.0, self.most), shear * part[:, None]])
 
     def stiffness(self, trial: np.ndarray) -> np.ndarray:
         """(n, d, d) array: derivative of the allowed forces by movements, times -1; symmetric and positive."""
@@ -92,15 +95,16 @@ class ContactProblem:
         along = trial[:, 1:] / np.maximum(size, 1e-300)[:, None]
         d = trial.shape[1]
         out = np.zeros((len(trial), d, d))
-        out[:, 0, 0] = (trial[:, 0] > 0.0) / self.compliance[:, 0]
+        out[:, 0, 0] = ((trial[:, 0] > 0.0) & (trial[:, 0] < self.most)) / self.compliance[:, 0]
         k = part / self.compliance[:, 1]
         out[:, 1:, 1:] = k[:, None, None] * np.eye(d - 1)
         out[:, 1:, 1:] -= (np.where(part < 1.0, k, 0.0)[:, None] * along)[:, :, None] * along[:, None, :]
         return out
 
     def status(self, trial: np.ndarray) -> np.ndarray:
-        """(n,) int array: which points push, and which slide."""
-        return 2 * (trial[:, 0] > 0.0) + (_lengths(trial[:, 1:]) > self.bound)
+        """(n,) int array: which points push, which as much as they can, and which slide."""
+        pushes = 2 * (trial[:, 0] > 0.0) + 2 * (trial[:, 0] >= self.most)
+        return np.asarray(pushes + (_lengths(trial[:, 1:]) > self.bound))
 
     def unbalanced(self, motion: np.ndarray, forces: np.ndarray, multiplier: float) -> np.ndarray:
         """(n_dof,) array: what loads, viscosity and contact forces leave out of balance."""

@@ -21,6 +21,7 @@ class Contacts:
         Kind of contact, feature of ``block_a``, feature of ``block_b``, and what else the geometry needs to measure it
         again. The first three name the contact point; their meaning is that of the geometry.
     block_a, block_b : (n,) int arrays
+        -1 for the ground, which holds ends of ties.
     points : (n, d) array [m]
     frames : (n, d, d) array
         Row 0: unit normal from ``block_b`` into ``block_a``; then the tangents, in the plane one, a quarter turn

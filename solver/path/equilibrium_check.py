@@ -13,8 +13,9 @@ from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import block_forces, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.program.admissible import EquilibriumBounds, admissible, in_equilibrium
+from solver.program.admissible import EquilibriumBounds, admissible, in_equilibrium, unlimited
 from solver.program.model import Model
+from solver.ties import is_member
 from solver.tolerances import COMPUTED_GAP
 
 from .state import EquilibriumCheck, Place
@@ -56,7 +57,8 @@ class EquilibriumChecks:
         except NotSolved:
             contacts, friction = self._contacts_at(place)
             self.stepper.programs += 1
-            return in_equilibrium(self.model, place.pose, contacts, friction, gap)
+            limits = self.stepper.members.force_limits(contacts, gap)
+            return in_equilibrium(self.model, place.pose, contacts, friction, gap, limits)
         return True
 
     def nearest(self, place: Place, gap: float, reaction: float | None = None, at_rest: bool = False) -> np.ndarray:
@@ -77,22 +79,32 @@ class EquilibriumChecks:
         """
         model, free = self.model, self.stepper.free
         contacts, friction = self._contacts_at(place)
-        closed = contacts.gaps <= gap * model.length
+        limits = self.stepper.members.force_limits(contacts, gap)
+        least, most = (unlimited(len(contacts)) if limits is None else limits).T
+        closed = (contacts.gaps <= gap * model.length) | is_member(contacts)
         matrix = wrench_matrix(contacts, place.pose, model.length)
         live, live_size = model.scaled_live
         load = (model.scaled_load + place.multiplier * live_size * live)[free].ravel()
         reference = np.zeros_like(contacts.points) if at_rest else self.stepper.transferred(place, contacts)[0]
+        # The program is that of the normal forces beyond the least ones.
+        base = np.zeros_like(reference)
+        base[:, 0] = least
+        rows = ContactRows(matrix, free)[closed]
         unit_reaction = None if reaction is None else self._reaction_rows(place, matrix, len(contacts))[closed]
+        beyond = 0.0
+        if unit_reaction is not None and reaction is not None:
+            beyond = reaction / (model.force * self.stepper.lever) - float((unit_reaction * base[closed]).sum())
         self.stepper.programs += 1
         forces = np.zeros_like(reference)
-        forces[closed] = nearest_equilibrium(
-            ContactRows(matrix, free)[closed],
-            reference[closed],
-            self.stepper.compliance(contacts, model.compliance)[closed],
+        forces[closed] = base[closed] + nearest_equilibrium(
+            rows,
+            (reference - base)[closed],
+            self.stepper.compliance(contacts)[closed],
             friction[closed],
-            load,
+            load + rows.resultant(base[closed]),
             unit_reaction,
-            0.0 if reaction is None else reaction / (model.force * self.stepper.lever),
+            beyond,
+            (most - least)[closed],
         )
         return forces
 
@@ -155,10 +167,12 @@ class EquilibriumChecks:
     def bounds(self, place: Place, gap: float = COMPUTED_GAP) -> EquilibriumBounds:
         """Bounds of the reaction or multiplier in equilibrium at a place."""
         rate = None if self.model.live is not None else self.driver.rate(place.s)
-        bounds = admissible(self.model, place.pose, *self._contacts_at(place), rate, gap=gap)
+        contacts, friction = self._contacts_at(place)
+        limits = self.stepper.members.force_limits(contacts, gap)
+        bounds = admissible(self.model, place.pose, contacts, friction, rate, gap=gap, limits=limits)
         self.stepper.programs += bounds.programs
         return bounds
 
     def _contacts_at(self, place: Place) -> tuple[Contacts, np.ndarray]:
-        contacts = self.stepper.contacts(place.pose)
+        contacts = self.stepper.contacts_at(place)
         return contacts, self.stepper.friction(contacts)

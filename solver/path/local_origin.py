@@ -11,6 +11,7 @@ from solver.assembly import Assembly
 from solver.kinematics import Pose
 from solver.loads import Settlement
 from solver.results.increment import Increment
+from solver.ties import Tie
 
 #: Distance from the origin in block sizes beyond which rounding of the coordinates, half a nanometre at five thousand
 #: kilometres, would come near what the geometry is corrected to.
@@ -31,11 +32,17 @@ def at_origin(assembly: Assembly) -> np.ndarray:
 
 
 def without_origin(
-    origin: np.ndarray, assembly: Assembly, settlements: Sequence[Settlement]
-) -> tuple[Assembly, tuple[Settlement, ...]]:
-    """The blocks and what moves their supports in coordinates that count from a local origin."""
+    origin: np.ndarray, assembly: Assembly, settlements: Sequence[Settlement], ties: Sequence[Tie]
+) -> tuple[Assembly, tuple[Settlement, ...], tuple[Tie, ...]]:
+    """The blocks, what moves their supports and ties in coordinates that count from a local origin."""
     local = tuple(_nearer(phase, origin) for phase in settlements)
-    return replace(assembly, shapes=assembly.shapes.shifted(-origin)), local
+    near_ties = tuple(replace(tie, points=_shifted(tie, -origin)) for tie in ties)
+    return replace(assembly, shapes=assembly.shapes.shifted(-origin)), local, near_ties
+
+
+def _shifted(tie: Tie, by: np.ndarray) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    first, second = (np.asarray(tie.points) + by).tolist()
+    return tuple(first), tuple(second)
 
 
 def _nearer(phase: Settlement, origin: np.ndarray) -> Settlement:
@@ -49,7 +56,9 @@ def _nearer(phase: Settlement, origin: np.ndarray) -> Settlement:
 
 def in_global_coordinates(increment: Increment, origin: np.ndarray) -> Increment:
     """The increment with its places where the drawing has them; its checkpoint stays in local coordinates."""
-    pose, contacts = increment.pose, increment.contacts
+    pose, contacts, ties = increment.pose, increment.contacts, increment.ties
     return increment.with_arrays(
-        pose=Pose(pose.positions + origin, pose.rotations), contacts=replace(contacts, points=contacts.points + origin)
+        pose=Pose(pose.positions + origin, pose.rotations),
+        contacts=replace(contacts, points=contacts.points + origin),
+        ties=replace(ties, ends=ties.ends + origin) if len(ties.ends) else ties,
     )

@@ -8,13 +8,13 @@ from enum import Enum
 
 import numpy as np
 
-from solver.assembly import measure_contacts
 from solver.contact_step.problem import NotSolved
 from solver.equilibrium import wrench_matrix
-from solver.kinematics import Pose, moved_vertices
+from solver.kinematics import Pose
 from solver.loads import GRAVITY
 from solver.program.model import Model
 from solver.results.increment import Increment, Status
+from solver.ties import TieForces, is_member
 from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, JUMP
 
 from .collapse import MECHANISM, REFINED, Fall
@@ -108,15 +108,16 @@ class Path:
 
     # The start ---------------------------------------------------------------------------------------------------
 
-    def begin(self, start: Pose, before: PathState | None = None) -> PathState:
+    def begin(self, start: Pose, before: PathState | None = None, ties_at: TieForces | None = None) -> PathState:
         """The state at the start of the phase: of the drawing at rest, or after the phase before."""
         fell_at = np.zeros(0)
         if before is not None:
             # Joints keep the forces of the phase before, blocks not their velocity.
             place, fell_at = replace(before.place, s=0.0, velocity=None, works=(0.0, 0.0, 0.0, 0.0)), before.fell_at
             self._remove_blocks(fell_at)
+            place = self.stepper.members.installed(place, self.number)
         else:
-            place = Place.unloaded(start)
+            place = self.stepper.members.installed(Place.unloaded(start), self.number, ties_at)
             resting = self._at_rest(place)
             if resting is None:
                 # Joints that the drawing leaves open close.
@@ -139,7 +140,7 @@ class Path:
                 if not np.isfinite(bounds.high):
                     return None
                 forces, place = bounds.forces, replace(place, multiplier=bounds.high)
-        contacts = self.stepper.contacts(place.pose)
+        contacts = self.stepper.contacts_at(place)
         trial = np.where(forces[:, :1] > 0.0, forces, -np.eye(forces.shape[1])[0])
         return replace(place, contacts=contacts, forces=forces, trial=trial, followed=forces[:, 0])
 
@@ -374,13 +375,13 @@ class Path:
         live, live_size = model.scaled_live
         free = model.assembly.free[:, None]
         resultant = (wrench_matrix(contacts, after.pose, model.length) @ after.forces.ravel()).reshape(motion.shape)
-        started = measure_contacts(model.assembly, moved_vertices(model.assembly, before.pose), contacts)
-        slipped = (contacts.slip - started.slip) / model.length
+        started, members = self.stepper.measured(contacts, before.pose, before.tie_lengths), is_member(contacts)
+        slipped, closed = (contacts.slip - started.slip) / model.length, (contacts.gaps - started.gaps) / model.length
         done = (
             float((model.scaled_load * free * motion).sum()),
             after.multiplier * live_size * float((live * free * motion).sum()),
             float((np.where(free, 0.0, resultant) * motion).sum()),
-            -float((after.forces[:, 1:] * slipped).sum()),
+            -float((after.forces[:, 1:] * slipped).sum() + (after.forces[:, 0] * closed)[members].sum()),
         )
         return tuple(np.add(before.works, done).tolist())
 
@@ -440,7 +441,8 @@ class Path:
         """Multiplier at the place beyond, at or below zero; None where equilibrium itself is lost, not the capacity."""
         if self.model.live is None:
             return None
-        first, bounds = self.checks.bounds(Place.unloaded(state.start)), self.checks.bounds(beyond, CLOSING_GAP)
+        unloaded = self.stepper.members.installed(Place.unloaded(state.start), self.number)
+        first, bounds = self.checks.bounds(unloaded), self.checks.bounds(beyond, CLOSING_GAP)
         vanishes = state.place.multiplier <= VANISHING * first.high
         return bounds.high if vanishes and bounds.in_equilibrium and bounds.high <= 0.0 else None
 

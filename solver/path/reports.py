@@ -12,6 +12,7 @@ from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose, moved_vertices, relative_velocities
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Increment, State, Status
+from solver.ties import TieForces, is_member
 
 from .controls import Ending
 from .equilibrium_check import on_supports
@@ -46,26 +47,32 @@ class Reports:
         live, live_size = model.scaled_live
         multiplier = check.measured * live_size if model.live is not None else 0.0
         balance = (resultant + model.scaled_load + multiplier * live)[model.assembly.free]
+        ties = self.stepper.members.told(contacts, check.forces, place.pose, place.tie_lengths)
+        support_forces = on_supports(model, contacts, place.pose, check.forces)
+        between = ~is_member(contacts)
+        contacts, forces, friction = contacts[between], check.forces[between], check.friction[between]
         certificate = Certificate(
             equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
-            friction_excess=friction_excess(check.forces, check.friction) / model.total_load,
-            carrying_gap=carrying_gap(contacts, check.forces),
+            friction_excess=friction_excess(forces, friction) / model.total_load,
+            carrying_gap=carrying_gap(contacts, forces),
             largest_penetration=largest_penetration(contacts),
             duality_gap=bounds.gap,
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
         notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
         self.notes = []
-        support_forces = on_supports(model, contacts, place.pose, check.forces)
-        state = self._state(place.pose, contacts, check.forces, check.friction, velocity, support_forces)
+        state = self._state(place.pose, contacts, forces, friction, velocity, support_forces, ties)
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
         return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
 
     def falling_increment(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
         """The increment of a place that is not in equilibrium."""
-        contacts = self.stepper.contacts(place.pose)
+        contacts = self.stepper.contacts_at(place)
         forces, friction = self.stepper.transferred(place, contacts)[0], self.stepper.friction(contacts)
-        state = self._state(place.pose, contacts, forces, friction, velocity, np.zeros_like(self.model.load))
+        ties = self.stepper.members.told(contacts, forces, place.pose, place.tie_lengths)
+        between = ~is_member(contacts)
+        contacts, forces, friction = contacts[between], forces[between], friction[between]
+        state = self._state(place.pose, contacts, forces, friction, velocity, np.zeros_like(self.model.load), ties)
         certificate = Certificate(largest_penetration=largest_penetration(contacts))
         return self._increment(s, state, 0.0, certificate, Status.FALLING)
 
@@ -77,10 +84,12 @@ class Reports:
         friction: np.ndarray,
         velocity: np.ndarray,
         support_forces: np.ndarray,
+        ties: TieForces,
     ) -> State:
         """The arrays of an increment, from forces in units of the program."""
         rates = relative_velocities(contacts, pose, velocity)
-        return State(pose, contacts, forces * self.model.force, rates, friction, velocity, support_forces, self.fell_at)
+        newtons = forces * self.model.force
+        return State(pose, contacts, newtons, rates, friction, velocity, support_forces, self.fell_at, ties)
 
     def _increment(
         self, s: float, state: State, measured: float, certificate: Certificate, status: Status

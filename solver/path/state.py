@@ -33,7 +33,10 @@ class Place:
     velocity : (n_blocks, n_dof) array, optional
         Per unit of the parameter, or of time where blocks fall; None at rest.
     works : tuple of float
-        Of dead and live loads, on supports and of friction since the start of the phase, in units of the program.
+        Of dead and live loads, on supports, and of friction and ties since the start of the phase, in units of the
+        program.
+    tie_lengths : (n_ties, 2) array [m]
+        Of each tie when it was installed, nan where it is absent; and without force, nan where it is broken, too.
     """
 
     s: float
@@ -45,6 +48,7 @@ class Place:
     multiplier: float = 0.0
     velocity: np.ndarray | None = None
     works: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    tie_lengths: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
 
     @classmethod
     def unloaded(cls, pose: Pose, s: float = 0.0) -> Place:

@@ -24,9 +24,11 @@ from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.program.model import Model
+from solver.ties import is_member
 from solver.tolerances import COMPLIANCE, FRICTION_MEMORY, IMPERFECTION, SHEAR_COMPLIANCE, VELOCITY_MEMORY, VISCOSITY
 
 from .drivers import Driver
+from .members import Members, with_members
 from .state import Place
 
 #: Linearisations of a step at most.
@@ -41,6 +43,9 @@ LARGEST_PENETRATION = 1e-4
 
 #: Part of its friction bound from which on a contact point slides.
 SLIDES = 0.99
+
+#: Normal force, in block weights, from which on a contact point carries.
+CARRIES = 1e-3
 
 #: Gap, in block sizes, at which half of the friction of a contact point is lost in a step.
 OPEN = 1e-6
@@ -108,7 +113,7 @@ class Stepper:
     """
 
     def __init__(self, model: Model, driver: Driver, damping: float = DAMPING) -> None:
-        self.model, self.driver, self.damping = model, driver, damping
+        self.model, self.driver, self.damping, self.members = model, driver, damping, Members(model)
         self.free = model.assembly.free
         self.weights = viscous_weights(model)
         self.weight = float(np.linalg.norm(model.scaled_load[self.free, : model.dimension].sum(axis=0)))
@@ -124,8 +129,20 @@ class Stepper:
             imperfection = model.imperfection * IMPERFECTION
             self.imperfection[:, :d] = imperfection * self.weights[:, :1] * support_motion / size
 
+    def contacts_at(self, place: Place) -> Contacts:
+        """Return the contact points at a place, those of members last."""
+        return with_members(self.contacts(place.pose), self.members.contacts(place.pose, place.tie_lengths))
+
+    def measured(self, contacts: Contacts, pose: Pose, tie_lengths: np.ndarray) -> Contacts:
+        """Return the same contact points at another pose, with ties of these lengths."""
+        vertices, members = moved_vertices(self.model.assembly, pose), is_member(contacts)
+        if not members.any():
+            return measure_contacts(self.model.assembly, vertices, contacts)
+        of_blocks = measure_contacts(self.model.assembly, vertices, contacts[~members])
+        return with_members(of_blocks, self.members.measured(contacts[members], pose, tie_lengths))
+
     def contacts(self, pose: Pose) -> Contacts:
-        """Return the contact points at a pose; those of the last pose are kept."""
+        """Return the contact points of blocks at a pose; those of the last pose are kept."""
         if self._last is None or self._last[0] is not pose:
             model = self.model
             found = find_contacts(model.assembly, moved_vertices(model.assembly, pose), model.reach)
@@ -136,10 +153,17 @@ class Stepper:
 
     def friction(self, contacts: Contacts) -> np.ndarray:
         """(n,) array: friction coefficients."""
-        return self.model.interfaces.friction(self.model.assembly, contacts.block_a, contacts.block_b)
+        friction = self.model.interfaces.friction(self.model.assembly, contacts.block_a, contacts.block_b)
+        return np.where(is_member(contacts), 0.0, friction)
+
+    def compliance(self, contacts: Contacts) -> np.ndarray:
+        """(n, d) array: that of joints and members, in units of the program."""
+        compliance, members = self.joint_compliance(contacts, self.model.compliance), is_member(contacts)
+        compliance[members, 0] = self.members.compliance[contacts.features[members, 1]]
+        return compliance
 
     @staticmethod
-    def compliance(contacts: Contacts, factor: float = 1.0) -> np.ndarray:
+    def joint_compliance(contacts: Contacts, factor: float = 1.0) -> np.ndarray:
         """(n, d) array: factor times the joint's, shared over its contact points by area, in units of the program."""
         n, d = contacts.points.shape
         pairs, joint = contacts.joints()
@@ -165,7 +189,8 @@ class Stepper:
         followed = np.where(same, place.followed[number], 0.0)
         trial = np.where(same[:, None], place.trial[number], -np.eye(d)[0])
         _, kept = matched_contacts(before, contacts)
-        vanished = np.flatnonzero(~kept & ((place.forces[:, 0] > 0.0) | (place.followed > 0.0)))
+        carried = ~is_member(before) & ((place.forces[:, 0] > 0.0) | (place.followed > 0.0))
+        vanished = np.flatnonzero(~kept & carried)
         is_new = ~same
         if len(vanished):
             apart = np.linalg.norm(before.points[vanished][:, None] - contacts.points[None], axis=2)
@@ -227,18 +252,19 @@ class Stepper:
         scales, n_dof = model.lengths, len(model.lengths)
         # A step in time is solved to a small part of such a movement.
         s, size = (place.s, 1e-3) if in_time else (place.s + length, length / self.unit)
-        supports, start = driver.supports(s), self.contacts(place.pose) if candidates is None else candidates
+        supports, start = driver.supports(s), self.contacts_at(place) if candidates is None else candidates
         forces, trial, followed, is_new = self.transferred(place, start)
-        friction, compliance = self.friction(start), self.compliance(start, model.compliance)
+        friction, compliance, members = self.friction(start), self.compliance(start), is_member(start)
         bound = friction * followed
         resisting, before = self._resistance(place, length, in_time, viscosity)
         load = (model.scaled_load + (0.0 if in_time else viscosity) * self.imperfection)[free].ravel()
         closed = np.inf if in_time or viscosity == 1.0 else EXACT
         live, live_size = model.scaled_live
         multiplier = place.multiplier * live_size
-        motion_so_far, normal, shear = np.zeros_like(load), forces[:, 0], forces[:, 1:]
+        # The give of members stays.
+        motion_so_far, normal, shear = np.zeros_like(load), np.where(members, 0.0, forces[:, 0]), forces[:, 1:]
         pose = self._with_supports(place.pose, supports)
-        contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
+        contacts = self.measured(start, pose, place.tie_lengths)
         for number in range(LINEARISATIONS):
             rows = ContactRows(wrench_matrix(contacts, pose, model.length), free)
             control = driver.control(pose) if model.live is not None else None
@@ -250,6 +276,7 @@ class Stepper:
                 forces=np.column_stack([normal, shear]),
                 bound=bound,
                 compliance=compliance,
+                most=self.members.largest_forces(start),
                 load=load + resisting * before,
                 viscosity=resisting,
                 motion_so_far=motion_so_far,
@@ -262,21 +289,14 @@ class Stepper:
             solution = minimise(problem, trial, multiplier)
             forces, trial, multiplier = solution.forces, solution.trial, solution.multiplier
             # A linearised rotation makes blocks grow: the first linearisation's forces are not kept.
-            normal = forces[:, 0] if number else normal
+            normal = np.where(members, 0.0, forces[:, 0]) if number else normal
             motion_so_far = motion_so_far + solution.motion
             full = np.zeros((assembly.n_blocks, n_dof))
             full[free] = motion_so_far.reshape(-1, n_dof) * scales
             pose = self._with_supports(moved(place.pose, full), supports)
             predicted = problem.gap + rows.relative(solution.motion)[:, 0]
-            contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
-            # In block weights.
-            gap, carries = contacts.gaps / model.length, forces[:, 0] > 1e-3
-            slides = (np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * bound)[carries].any()
-            exact = EXACT_SLIDING if slides else EXACT
-            residual = max(
-                np.abs(gap)[carries].max(initial=0.0) / closed,
-                np.abs(gap - predicted)[carries].max(initial=0.0) / exact,
-            )
+            contacts = self.measured(start, pose, place.tie_lengths)
+            residual = self._linearisation_error(contacts, predicted, forces, bound, closed)
             control_error = 0.0 if control is None else abs(s - driver.control_displacement(pose)) / model.length
             if residual <= 1.0 and control_error <= EXACT:
                 break
@@ -286,17 +306,34 @@ class Stepper:
         if movement_size > LARGEST_PENETRATION:
             missed = self._missed_contacts(start, place.pose, pose, movement_size)
             if len(missed):
-                start = joined_contacts([start, missed])
+                start = joined_contacts([start[~members], missed, start[members]])
                 return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=start)
         # A larger share alternates where the normal force falls as the bound grows.
         share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
         lag, followed = self._updated_bounds(contacts, forces, friction, bound, followed, is_new, share)
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
-        new = Place(s, pose, contacts, forces, trial, followed, multiplier / (live_size or 1.0), velocity)
+        lengths = self.members.after(contacts, forces, place.tie_lengths)
+        multiplier /= live_size or 1.0
+        new = Place(s, pose, contacts, forces, trial, followed, multiplier, velocity, tie_lengths=lengths)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
-        return new, motion / scales, StepError(lag, turn, movement_size, float(-gap[carries].min(initial=0.0)))
+        deepest = float(contacts.gaps[(forces[:, 0] > CARRIES) & ~members].min(initial=0.0)) / model.length
+        return new, motion / scales, StepError(lag, turn, movement_size, -deepest)
+
+    @staticmethod
+    def _largest(values: np.ndarray) -> float:
+        return float(np.abs(values).max(initial=0.0))
+
+    def _linearisation_error(
+        self, contacts: Contacts, predicted: np.ndarray, forces: np.ndarray, bound: np.ndarray, closed: float
+    ) -> float:
+        """Errors of the gaps of contact points that carry, and of what was predicted of them, over what is accepted."""
+        gap, carries = contacts.gaps / self.model.length, forces[:, 0] > CARRIES
+        touches = carries & ~is_member(contacts)
+        slides = (np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * bound)[touches].any()
+        exact = EXACT_SLIDING if slides else EXACT
+        return max(self._largest(gap[touches]) / closed, self._largest((gap - predicted)[carries]) / exact)
 
     def _resistance(
         self, place: Place, length: float, in_time: bool, viscosity: float

@@ -10,8 +10,8 @@ import scipy.sparse as sp
 from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.programs.problem import ConicProgram, LinearProgram, Solution, SolveError, Unbounded
-from solver.programs.solve import solve_cones, solve_lp
+from solver.programs.problem import LinearProgram, Solution, SolveError, Unbounded
+from solver.programs.solve import solve_between, solve_lp
 from solver.tolerances import ACCEPTED_VIOLATION, BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
 
 from .model import Model
@@ -56,7 +56,12 @@ class EquilibriumBounds:
 
 
 def in_equilibrium(
-    model: Model, pose: Pose, contacts: Contacts, friction: np.ndarray, gap: float = COMPUTED_GAP
+    model: Model,
+    pose: Pose,
+    contacts: Contacts,
+    friction: np.ndarray,
+    gap: float = COMPUTED_GAP,
+    limits: np.ndarray | None = None,
 ) -> bool:
     """Whether an equilibrium within friction exists at a pose, under some live load where there is one.
 
@@ -66,7 +71,7 @@ def in_equilibrium(
     ------
     SolveError
     """
-    return _StaticProgram(model, pose, contacts, friction, None, gap).most_balanced()[1] <= FALLING_FRACTION
+    return _StaticProgram(model, pose, contacts, friction, None, gap, limits).most_balanced()[1] <= FALLING_FRACTION
 
 
 def admissible(
@@ -77,6 +82,7 @@ def admissible(
     rate: np.ndarray | None = None,
     *,
     gap: float = COMPUTED_GAP,
+    limits: np.ndarray | None = None,
 ) -> EquilibriumBounds:
     """Bound the reaction or the multiplier of all equilibria within friction at a pose.
 
@@ -92,6 +98,9 @@ def admissible(
         Movement of the supports along which the reaction is bounded.
     gap : float
         Largest one of a contact point that carries force, in block sizes.
+    limits : (n_contacts, 2) array, optional
+        Least and largest normal forces, in units of the program; 0 and infinite by default. Contact points whose
+        limits are not the default carry at any gap.
 
     Raises
     ------
@@ -103,7 +112,7 @@ def admissible(
     round cones: the least and the largest reaction (or multiplier). The least is that of Portioli & Cascini (2017) at
     this geometry. Forces out of balance have a cost above that of any mechanism.
     """
-    program = _StaticProgram(model, pose, contacts, friction, rate, gap)
+    program = _StaticProgram(model, pose, contacts, friction, rate, gap, limits)
     # A bound may stay unknown, except that of a pushover.
     forces_sign = 1.0 if program.live_size == 0.0 else -1.0
     unknown: set[float] = set()
@@ -147,15 +156,28 @@ def admissible(
     return EquilibriumBounds(unbalanced, values[0], values[1], max(gaps), program.programs, ordered[0], other_forces)
 
 
+def unlimited(n: int) -> np.ndarray:
+    """(n, 2) array: limits of normal forces that push only."""
+    return np.tile([0.0, np.inf], (n, 1))
+
+
 class _StaticProgram:
     """The program over all contact forces at a pose; parameters as in :func:`admissible`."""
 
     def __init__(
-        self, model: Model, pose: Pose, contacts: Contacts, friction: np.ndarray, rate: np.ndarray | None, gap: float
+        self,
+        model: Model,
+        pose: Pose,
+        contacts: Contacts,
+        friction: np.ndarray,
+        rate: np.ndarray | None,
+        gap: float,
+        limits: np.ndarray | None,
     ) -> None:
         d, blocks = model.dimension, model.assembly.free
         free = np.repeat(blocks, model.n_dof)
-        closed = np.flatnonzero(contacts.gaps <= gap * model.length)
+        least, most = unlimited(len(contacts)).T if limits is None else limits.T
+        closed = np.flatnonzero((contacts.gaps <= gap * model.length) | (least != 0.0) | np.isfinite(most))
         matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
         # In the plane the two rays of a cone are its forces; in space its three numbers are.
         forces_of = friction_rays(friction) if d == 2 else sp.eye_array(3 * len(contacts), format="csc")
@@ -163,23 +185,34 @@ class _StaticProgram:
         balance = sp.csc_array(matrix[free] @ self.rays)
         self.rows, self.n = balance.shape
         self.d, self.friction, self.total, self.programs = d, friction[closed], model.total_load, 0
-        self.load, self.tolerance = model.scaled_load.ravel()[free], BALANCE_TOLERANCE * model.total_load
+        # The programs are those of the normal forces beyond the least ones.
+        self.least = np.zeros((len(contacts), d))
+        self.least[closed, 0] = least[closed]
+        given = matrix @ self.least.ravel()
+        self.load, self.tolerance = model.scaled_load.ravel()[free] + given[free], BALANCE_TOLERANCE * model.total_load
         live, self.live_size = model.scaled_live
         columns, objective = [balance], np.zeros(self.n)
         if self.live_size > 0.0:
             column = sp.csc_array(live[blocks].reshape(-1, 1))
             columns += [column, -column]
             objective = np.concatenate([objective, np.zeros(2 * self.rows), [1.0, -1.0]])
-            self.unit = 1.0 / self.live_size
+            self.unit, self.constant = 1.0 / self.live_size, 0.0
         else:
             along = np.zeros(len(free)) if rate is None else (rate / model.lengths).ravel()
             # Relative to the speed of the supports, as the cost of forces out of balance is.
             speed = float(np.abs(along).max(initial=0.0)) or 1.0
             along = np.where(free, 0.0, along / speed)
             objective = np.concatenate([self.rays.T @ (matrix.T @ along), np.zeros(2 * self.rows)])
-            self.unit = model.force * model.length * speed
+            self.unit, self.constant = model.force * model.length * speed, float(along @ given)
         self.objective, self.matrix = objective, with_slack(*columns)
-        self.places = np.repeat(pose.positions[blocks], model.n_dof, axis=0)
+        self.places: np.ndarray | None = np.repeat(pose.positions[blocks], model.n_dof, axis=0)
+        limited = np.flatnonzero(np.isfinite(most))
+        self.reserve = (most - least)[limited]
+        if len(limited):
+            normal = sp.csc_array(sp.csr_array(self.rays)[d * limited])
+            beside = sp.csc_array((len(limited), len(objective) - self.n))
+            limits_of = sp.hstack([normal, beside])
+            self.matrix, self.places = sp.csc_array(sp.vstack([self.matrix, limits_of], format="csc")), None
 
     def bound(self, sign: float, *, slack: bool = True) -> Solution | None:
         """Least or, by sign, largest value, or 0 for any; with or without unbalanced forces; None without a bound.
@@ -194,9 +227,12 @@ class _StaticProgram:
             cost, matrix = np.delete(cost, self._slack), matrix[:, np.delete(np.arange(len(cost)), self._slack)]
         self.programs += 1
         try:
+            none = np.zeros_like(self.reserve)
             if self.d == 3:
-                return solve_cones(ConicProgram(cost, matrix, -self.load, self.friction))
-            lower, upper = -self.load - self.tolerance, -self.load + self.tolerance
+                lower, upper = np.append(-self.load, none), np.append(-self.load, self.reserve)
+                return solve_between(cost, matrix, lower, upper, self.friction, 3)
+            lower = np.append(-self.load - self.tolerance, none)
+            upper = np.append(-self.load + self.tolerance, self.reserve)
             return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, places=self.places))
         except Unbounded:
             return None
@@ -233,8 +269,8 @@ class _StaticProgram:
     def value(self, solution: Solution, slack: bool) -> float:
         """Reaction [N or N·m] or multiplier of a solution."""
         objective = self.objective if slack else np.delete(self.objective, self._slack)
-        return float(objective @ solution.x) * self.unit
+        return (float(objective @ solution.x[: len(objective)]) + self.constant) * self.unit
 
     def forces(self, solution: Solution) -> np.ndarray:
         """(n_contacts, d) array: contact forces of a solution, in units of the program."""
-        return np.asarray(self.rays @ solution.x[: self.n]).reshape(-1, self.d)
+        return np.asarray(self.rays @ solution.x[: self.n]).reshape(-1, self.d) + self.least

@@ -9,6 +9,7 @@ import numpy as np
 from solver.assembly import Assembly
 from solver.interfaces import Interfaces
 from solver.kinematics import dimension_of, unit_lengths
+from solver.ties import Tie
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class Model:
         Loads whose multiplier is an unknown of every program.
     fallen : (n_blocks,) bool array, optional
         Blocks that have left the structure, without loads and contact points.
+    ties : tuple of Tie
     compliance, imperfection : float
         Times those of :mod:`solver.tolerances`.
     """
@@ -42,6 +44,7 @@ class Model:
     reach: float
     live: np.ndarray | None = None
     fallen: np.ndarray | None = None
+    ties: tuple[Tie, ...] = ()
     compliance: float = 1.0
     imperfection: float = 1.0
 

@@ -1,0 +1,128 @@
+"""Ties, props and bars along a path: contact points whose give stays, with a largest force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from solver.geometry.contacts import Contacts, joined_contacts
+from solver.kinematics import Pose
+from solver.program.admissible import unlimited
+from solver.program.model import Model
+from solver.ties import (
+    ABSENT,
+    BROKEN,
+    TieForces,
+    installed_lengths,
+    is_member,
+    member_contacts,
+    member_forces,
+    member_states,
+    present_members,
+    tie_ends,
+    tie_lengths,
+)
+
+from .state import Place
+
+#: Part of its strength from which on a member yields or breaks.
+AT_STRENGTH = 1.0 - 1e-9
+
+#: Error of the length of a member, as a part of the gap of contact points that carry: that of the geometry.
+GIVE = 1e-2
+
+
+class Members:
+    """The ties, props and bars of a model.
+
+    Parameters
+    ----------
+    model : Model
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.ties = model, model.ties
+        self.stiffness = np.array([tie.stiffness for tie in self.ties])
+        self.strength = np.array([tie.strength for tie in self.ties]) / model.force
+        self.brittle = np.array([tie.brittle for tie in self.ties], dtype=bool)
+        # In units of the program.
+        self.compliance = model.force / (self.stiffness * model.length)
+        fallen = model.fallen
+        self.held = np.array(
+            [fallen is None or not any(b is not None and fallen[b] for b in tie.blocks) for tie in self.ties],
+            dtype=bool,
+        )
+
+    def installed(self, place: Place, phase: int, told: TieForces | None = None) -> Place:
+        """Install the members of a phase, from 0, at the geometry of a place, or all as an increment tells of them."""
+        if not self.ties:
+            return place
+        if told is not None:
+            before = np.where(told.states == ABSENT, np.nan, tie_lengths(told.ends) - told.elongations)
+            return replace(place, tie_lengths=np.stack([before, told.rest], axis=1))
+        lengths = place.tie_lengths if len(place.tie_lengths) else np.full((len(self.ties), 2), np.nan)
+        new = np.array([tie.phase == phase + 1 for tie in self.ties])
+        now = installed_lengths(self.ties, tie_ends(self.ties, self.model.assembly, place.pose))
+        return replace(place, tie_lengths=np.where(new[:, None], now, lengths))
+
+    def contacts(self, pose: Pose, lengths: np.ndarray) -> Contacts | None:
+        """The contact points of the members that are there; None where there are none."""
+        if not len(lengths):
+            return None
+        rest = np.where(self.held, lengths[:, 1], np.nan)
+        features = present_members(self.ties, rest)
+        return member_contacts(self.ties, self.model.assembly, pose, rest, features) if len(features) else None
+
+    def measured(self, contacts: Contacts, pose: Pose, lengths: np.ndarray) -> Contacts:
+        """The same contact points at another pose."""
+        return member_contacts(self.ties, self.model.assembly, pose, lengths[:, 1], contacts.features)
+
+    def largest_forces(self, contacts: Contacts) -> np.ndarray:
+        """(n,) array: largest normal forces of contact points; infinite between blocks."""
+        members = is_member(contacts)
+        largest = np.full(len(contacts), np.inf)
+        largest[members] = self.strength[contacts.features[members, 1]]
+        return largest
+
+    def force_limits(self, contacts: Contacts, gap: float) -> np.ndarray | None:
+        """(n, 2) array: least and largest normal forces of contact points at a pose; None without members.
+
+        A member may carry what it carries anywhere within a part of the gap of contact points, in block sizes.
+        """
+        members = is_member(contacts)
+        if not members.any():
+            return None
+        limits, number = unlimited(len(contacts)), contacts.features[members, 1]
+        give = GIVE * gap * np.array([-1.0, 1.0])
+        forces = (give - contacts.gaps[members, None] / self.model.length) / self.compliance[number, None]
+        limits[members] = np.clip(forces, 0.0, self.strength[number, None])
+        return limits
+
+    def after(self, contacts: Contacts, forces: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """(n_ties, 2) array: lengths after a step to contact points with these forces: what yields gives for good."""
+        members = is_member(contacts)
+        number, sense = contacts.features[members, 1], np.where(contacts.features[members, 2] == 1, -1.0, 1.0)
+        full = forces[members, 0] >= AT_STRENGTH * self.strength[number]
+        if not full.any():
+            return lengths
+        number, lengths = number[full], lengths.copy()
+        give = -contacts.gaps[members][full] - self.strength[number] * self.compliance[number] * self.model.length
+        lengths[number, 1] += sense[full] * np.maximum(give, 0.0)
+        lengths[number[self.brittle[number]], 1] = np.nan
+        return lengths
+
+    def told(self, contacts: Contacts, forces: np.ndarray, pose: Pose, lengths: np.ndarray) -> TieForces:
+        """What the members do at a place, from forces in units of the program."""
+        if not self.ties:
+            return TieForces()
+        force, ends = member_forces(contacts, forces, len(self.ties)), tie_ends(self.ties, self.model.assembly, pose)
+        state = member_states(np.abs(force), self.strength, float(np.abs(forces).max(initial=0.0)))
+        state = np.where(np.isnan(lengths[:, 1]), BROKEN, state)
+        state = np.where(np.isnan(lengths[:, 0]) | ~self.held, ABSENT, state)
+        return TieForces(force * self.model.force, tie_lengths(ends) - lengths[:, 0], lengths[:, 1], state, ends)
+
+
+def with_members(contacts: Contacts, members: Contacts | None) -> Contacts:
+    """Contact points of blocks and members, in this order."""
+    return contacts if members is None else joined_contacts([contacts, members])

@@ -1,0 +1,194 @@
+"""Ties, props and bars against statics by hand."""
+
+import numpy as np
+import pytest
+
+import solver
+from solver import Tie
+
+
+def _box(x0, y0, x1, y1):
+    return [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+
+
+def _structure(outlines, roles, friction, ties, weight=1000.0):
+    """Blocks of a weight per area [N/m²]."""
+    assembly = solver.Assembly.from_outlines(outlines, roles=roles, density=weight / solver.GRAVITY)
+    return solver.Structure(assembly, friction_coefficient=friction, ties=ties)
+
+
+def _hung(**kwargs):
+    """A block of 1000 N on a support that goes down, on a rope of 1 MN/m."""
+    outlines = [_box(0, 0, 1, 0.2), _box(0, 0.2, 1, 1.2)]
+    rope = Tie("rope", (1, None), ((0.5, 1.0), (0.5, 3.0)), 1e6, **kwargs)
+    return _structure(outlines, ["moving", "free"], 0.6, [rope])
+
+
+def _settled(structure, limit=0.002, direction=(0, -1)):
+    return structure.settle(solver.Settlement(direction, increment=0.0005, limit=limit))
+
+
+def test_a_rope_takes_what_its_elongation_says_until_the_block_hangs():
+    response = _settled(_hung())
+    force = np.array([i.ties.forces[0] for i in response.increments])
+    np.testing.assert_allclose(force, [0.0, 500.0, 1000.0, 1000.0, 1000.0], atol=1.0)
+    np.testing.assert_allclose(response.reaction + force, 1000.0, rtol=1e-5)
+    assert response.increments[-1].ties.elongations[0] == pytest.approx(0.001, rel=1e-4)
+
+
+def test_a_rope_that_yields_leaves_the_rest_to_the_support_and_one_that_breaks_all_of_it():
+    yielding, brittle = _settled(_hung(strength=600.0)), _settled(_hung(strength=600.0, brittle=True))
+    assert yielding.reaction[-1] == pytest.approx(400.0, rel=1e-4)
+    assert yielding.increments[-1].ties.elongations[0] == pytest.approx(0.002, rel=1e-4)
+    assert brittle.reaction[-1] == pytest.approx(1000.0, rel=1e-4)
+    assert np.isnan(brittle.increments[-1].ties.rest[0])
+
+
+@pytest.mark.slow
+def test_a_rope_that_has_yielded_is_as_long_as_it_gave_when_it_is_loaded_again():
+    phases = [solver.Settlement((0, -s), increment=0.0005, limit=0.001) for s in (1, -1, 1)]
+    first, back, again = (
+        [i for i in _hung(strength=600.0).settle(phases).increments if i.phase == k][-1] for k in range(3)
+    )
+    assert first.ties.forces[0] == pytest.approx(600.0, rel=1e-4)
+    assert back.ties.forces[0] == pytest.approx(0.0, abs=1.0)
+    # It gave 0.4 mm for good, so that 1 mm are 0.6 mm again.
+    assert again.ties.rest[0] == pytest.approx(2.0 + 0.0004, abs=2e-6)
+    assert again.ties.forces[0] == pytest.approx(600.0, rel=1e-3)
+
+
+def test_prestress_is_there_from_the_start_and_a_prop_carries_no_tension():
+    assert _settled(_hung(prestress=200.0)).reaction[0] == pytest.approx(800.0, rel=1e-4)
+    np.testing.assert_allclose(_settled(_hung(kind="prop")).reaction, 1000.0, rtol=1e-6)
+
+
+def test_a_bar_hung_up_is_a_rope():
+    for a, b in zip(_settled(_hung()).reaction, _settled(_hung(kind="bar")).reaction, strict=True):
+        assert a == pytest.approx(b, abs=0.02)
+
+
+def _rafters(ties, friction=0.1):
+    """Two blocks that lean on each other, their feet on supports of which the right one moves out."""
+    left = np.array([[0, 0.3], [0.5, 0.3], [2, 1.8], [2, 2.3]])
+    foot = np.array(_box(-0.5, 0, 1, 0.3))
+    mirrored = [np.column_stack([4 - p[:, 0], p[:, 1]])[::-1] for p in (foot, left)]
+    return _structure([foot, mirrored[0], left, mirrored[1]], ["fixed", "moving", "free", "free"], friction, ties)
+
+
+def _thrust(structure, increment):
+    """Thrust by hand: moments about the ridge, of half the structure, its foot where it stands on an edge."""
+    contacts, weight = increment.contacts, structure.assembly.masses[2] * solver.GRAVITY
+    foot = np.isin(contacts.block_a, (0, 2)) & np.isin(contacts.block_b, (0, 2))
+    ridge = np.isin(contacts.block_a, (2, 3)) & np.isin(contacts.block_b, (2, 3))
+    normal = increment.forces[:, 0]
+    x_foot, y_foot = np.average(contacts.points[foot], axis=0, weights=normal[foot])
+    x, y = np.average(contacts.points[ridge], axis=0, weights=normal[ridge])
+    x_centre = increment.pose.positions[2, 0]
+    return weight * ((x - x_foot) - (x - x_centre)), x, y, y_foot
+
+
+def test_a_tie_between_the_feet_of_two_rafters_and_friction_share_their_thrust():
+    tie = Tie("tie", (2, 3), ((0.25, 0.35), (3.75, 0.35)), 1e7)
+    structure = _rafters([tie])
+    weight = structure.assembly.masses[2] * solver.GRAVITY
+    last = structure.settle(solver.Settlement((1, 0), increment=0.05, limit=0.05)).increments[-1]
+    moment, _, y, y_foot = _thrust(structure, last)
+    # The foot slides outwards no more: friction pulls it in by as much as the supports drag, 0.1 W.
+    y_tie = last.ties.ends[0, 0, 1]
+    friction = -0.1 * weight
+    expected = (moment - friction * (y - y_foot)) / (y - y_tie)
+    assert last.ties.forces[0] == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_rafters_fall_where_their_thrust_exceeds_what_tie_and_friction_hold():
+    tie = Tie("tie", (2, 3), ((0.25, 0.35), (3.75, 0.35)), 1e7, strength=200.0)
+    structure = _rafters([tie])
+    weight = structure.assembly.masses[2] * solver.GRAVITY
+    response = structure.settle(solver.Settlement((1, 0), increment=0.02, limit=0.15))
+    assert response.collapse is not None
+    last = response.path[-1]
+    moment, _, y, y_foot = _thrust(structure, last)
+    y_tie = last.ties.ends[0, 0, 1]
+    assert 200.0 * (y - y_tie) + 0.1 * weight * (y - y_foot) == pytest.approx(moment, rel=2e-3)
+    without = _rafters([]).settle(solver.Settlement((1, 0), increment=0.02, limit=0.15))
+    assert without.stop == solver.Status.NO_INITIAL_EQUILIBRIUM
+
+
+def test_a_leaning_block_is_held_by_a_prop_with_the_force_of_its_geometry():
+    angle = np.radians(20.0)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    # It leans to the left, on its lower left corner, and friction keeps it from sliding.
+    block = np.array(_box(0, 0, 0.5, 2)) @ turn.T
+    floor = _box(-1, -1, 1, 0)
+    top = turn @ np.array([0.0, 1.5])
+    prop = Tie("prop", (1, None), (tuple(top), (top[0] - 1.0, 0.0)), 1e8, kind="prop")
+    structure = _structure([floor, block], ["moving", "free"], 2.0, [prop])
+    first = structure.settle(solver.Settlement((0, -1), increment=1e-5, limit=1e-5)).increments[0]
+    pose, end = first.pose, first.ties.ends[0]
+    along = (end[1] - end[0]) / np.linalg.norm(end[1] - end[0])
+    corner = first.contacts.points[np.argmax(first.forces[:, 0])]
+    weight = structure.assembly.masses[1] * solver.GRAVITY
+    arm = end[0] - corner
+    by_prop = -(arm[0] * along[1] - arm[1] * along[0])
+    by_hand = weight * (pose.positions[1, 0] - corner[0]) / by_prop
+    assert -first.ties.forces[0] == pytest.approx(by_hand, rel=1e-5)
+    assert -first.ties.forces[0] > 0.05 * weight
+
+
+def test_a_tie_adds_its_strength_times_its_arm_to_the_acceleration_that_overturns():
+    for strength in (500.0, 250.0):
+        tie = Tie("tie", (1, None), ((0, 2.5), (-2, 2.5)), 1e6, strength=strength)
+        structure = _structure([_box(-2, -0.2, 3, 0), _box(0, 0, 1, 3)], ["fixed", "free"], 2.0, [tie])
+        found = structure.limit_load(acceleration=(1, 0))
+        assert found.multiplier == pytest.approx((3000.0 * 0.5 + strength * 2.5) / (3000.0 * 1.5), rel=1e-9)
+        assert found.state.ties.forces[0] == pytest.approx(strength)
+        pushed = structure.with_live(acceleration=(1, 0)).pushover(
+            solver.ControlDisplacement("block 1", increment=0.05, limit=0.1)
+        )
+        # By then it yields, and the block has turned a little.
+        assert pushed.increments[1].ties.forces[0] == pytest.approx(strength, rel=1e-3)
+        assert found.multiplier - 0.05 < pushed.increments[1].load_multiplier < found.multiplier
+
+
+def test_a_block_hangs_in_space_and_far_from_the_origin():
+    corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
+    faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    for origin in (0.0, 4e5):
+        solids = [(corners * [1, 1, 0.2] + origin, faces), (corners + np.array([0, 0, 0.2]) + origin, faces)]
+        assembly = solver.Assembly.from_solids(solids, roles=["moving", "free"], density=1000.0 / solver.GRAVITY)
+        centre = np.array([0.5, 0.5, 1.2]) + origin
+        rope = Tie("rope", (1, None), (tuple(centre), tuple(centre + np.array([0, 0, 2.0]))), 1e6, strength=600.0)
+        structure = solver.Structure(assembly, friction_coefficient=0.6, ties=[rope])
+        response = structure.settle(solver.Settlement((0, 0, -1), increment=0.001, limit=0.002))
+        assert response.reaction[-1] == pytest.approx(400.0, rel=1e-3)
+        np.testing.assert_allclose(response.increments[-1].ties.ends[0, 0], centre - [0, 0, 0.002], atol=1e-5)
+
+
+def test_ties_as_soft_as_nothing_change_nothing():
+    outlines = [_box(x, 0, x + 1, 0.5) for x in (-1.5, 0.5)] + [_box(-1.0, 0.5, 1.0, 1.0)]
+    roles, settlement = ["fixed", "moving", "free"], solver.Settlement((0, -1), increment=0.05, limit=0.2)
+    soft = Tie("soft", (2, None), ((0.0, 0.75), (0.0, 3.0)), 1e-4)
+    bare, tied = (_structure(outlines, roles, 0.6, ties).settle(settlement) for ties in ([], [soft]))
+    np.testing.assert_allclose(tied.reaction, bare.reaction, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"stiffness": -1.0}, "must be positive"),
+        ({"strength": -1.0}, "must be positive"),
+        ({"kind": "rope"}, "kinds are tie, prop, bar"),
+        ({"points": ((0.5, 1.0), (0.5, 1.0))}, "has no length"),
+        ({"blocks": (1, 1)}, "both ends in block 1"),
+        ({"prestress": 5.0, "strength": 4.0}, "below its strength"),
+        ({"blocks": (1, 7)}, "block 7"),
+        ({"phase": 2}, "1 settlements"),
+    ],
+)
+def test_impossible_ties_are_refused_in_a_line_that_names_them(change, words):
+    given = {"name": "rope", "blocks": (1, None), "points": ((0.5, 1.0), (0.5, 3.0)), "stiffness": 1e6} | change
+    with pytest.raises(ValueError, match=words) as refused:
+        _settled(_structure([_box(0, 0, 1, 0.2), _box(0, 0.2, 1, 1.2)], ["moving", "free"], 0.6, [Tie(**given)]))
+    assert "rope" in str(refused.value)
+    assert "\n" not in str(refused.value)
