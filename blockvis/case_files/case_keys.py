@@ -37,6 +37,7 @@ from blockvis.cases.key import (
 )
 from blockvis.cases.profiles import PROFILE, PROFILES
 from blockvis.cases.removals import REMOVE
+from blockvis.cases.ties import TIES
 from blockvis.cases.toml_table import Table, is_number, shortened
 from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
@@ -305,6 +306,8 @@ GEOMETRY = Section(
             ["axes", "dim*"], default=()),
         Key("only", TEXTS, "Layers, groups, materials and names, or patterns of them, beside which all is left out",
             ["stones"], default=()),
+        Key("ties", TEXTS, "Layers of a .dxf or .svg, or patterns of them, whose lines are ties, see [[ties]] "
+            "layer; they are no joints and no outlines", ["TIES"], default=()),
         Key("window", _WINDOW, "What is read of a drawing in the plane: [x0, y0, x1, y1], as blockvis info prints them",
             [0.0, 0.0, 6.0, 3.5], "m", otherwise="all of it"),
         Key("width", POSITIVE, "Width of an image, or of that of annotations", 1.2, "m",
@@ -525,6 +528,7 @@ SECTIONS = (
     LOADS,
     BACKFILL,
     REMOVE,
+    TIES,
     ANALYSIS,
     *(section for kind in KINDS.values() for section in kind.sections),
     EXPLAIN,

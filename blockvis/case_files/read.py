@@ -20,6 +20,7 @@ from blockvis.cases.loads import LoadCase
 from blockvis.cases.profiles import Profile
 from blockvis.cases.removals import read_removal
 from blockvis.cases.role_places import PLACES, read_places
+from blockvis.cases.ties import DRAWN_IN, read_ties
 from blockvis.cases.toml_table import Table, shortened, toml_value
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats import FORMATS
@@ -163,6 +164,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         loads=tuple(_load(table) for table in top.tables("loads")),
         backfills=tuple(map(read_backfill, top.tables("backfill"))),
         removals=tuple(map(read_removal, top.tables("remove"))),
+        ties=read_ties(top.tables("ties"), geometry["tie_layers"]),
         analysis=asked["kind"],
         settings=settings[asked["kind"]],
         increment_seconds=asked["increment_seconds"],
@@ -192,9 +194,14 @@ def _geometry(table: Table) -> dict[str, Any]:
         raise table.error(
             "unit", f"is {shortened(values['unit'])}, but is of a file's lengths; a layout is in m: leave it out"
         )
-    for key in ("view", "ignore", "only", "window", *keys.OF_IMAGES):
+    for key in ("view", "ignore", "only", "ties", "window", *keys.OF_IMAGES):
         if file is None and values[key] is not None and values[key] != ():
             raise table.error(key, "belongs to a file, not to a layout")
+    values["tie_layers"] = values.pop("ties")
+    if values["tie_layers"] and Path(file).suffix.lower() not in DRAWN_IN:
+        raise table.error(
+            "ties", f"are lines of a {' or '.join(DRAWN_IN)}, and '{file}' has none; give [[ties]] from and to"
+        )
     image = {key: values.pop(key) for key in keys.OF_IMAGES} | {"outline_tolerance": values["outline_tolerance"]}
     return values | {"parameters": dict(values["parameters"]), "image": image}
 

@@ -16,6 +16,7 @@ from blockvis.formats.read import overlap_remedy, read_layout, read_outlines
 from blockvis.layout import layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.facing import DEFAULT_FACING
+from blockvis.layout.left_out import LeftOut
 from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.units import better_unit, doubt
 from blockvis.text import nearest
@@ -30,6 +31,7 @@ from .loads import loads_of
 from .profiles import cut_ground, with_profiles
 from .removals import removed_blocks
 from .role_places import with_roles_by_place
+from .ties import drawn_ties, ties_of, without_tie_lines
 
 #: The weight of a block lighter than this fraction of the whole may be lost in rounding errors of the other forces.
 LIGHTEST = 1e-14
@@ -238,10 +240,15 @@ def case_controls(case: Case, assembly: solver.Assembly) -> solver.Controls:
 
 def _chosen(case: Case) -> dict[str, Any]:
     """Gather what of the file of a case is read, and the scale of an image."""
-    return {"view": case.view, "ignore": case.ignore, "only": case.only, "window": case.window, **case.image}
+    ignore = (*case.ignore, *case.tie_layers)
+    return {"view": case.view, "ignore": ignore, "only": case.only, "window": case.window, **case.image}
 
 
 def _case_layout(case: Case) -> layout.Layout:
+    return without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[0]
+
+
+def _drawn_layout(case: Case) -> layout.Layout:
     thickness = case.thickness or THICKNESS
     if case.file is not None and case.bonds:
         outlines = read_outlines(case.file, unit=case.unit, **_chosen(case))
@@ -314,6 +321,14 @@ def case_changes(case: Case, assembly: solver.Assembly) -> tuple[solver.PhaseCha
         added = loads_of(case.loads, assembly, case.source, phase)
         changes.append(solver.PhaseChange(phase - 1, dead=added.dead))
     return tuple(changes)
+
+
+def case_ties(case: Case, assembly: solver.Assembly) -> tuple[solver.Tie, ...]:
+    """Find the ties of a case, those that its drawing has as lines included."""
+    lines: tuple[LeftOut, ...] = ()
+    if case.tie_layers:
+        lines = without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[1]
+    return ties_of(drawn_ties(case.ties, lines), assembly)
 
 
 def case_settlements(case: Case, assembly: solver.Assembly) -> tuple[solver.Settlement, ...]:

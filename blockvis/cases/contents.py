@@ -20,6 +20,7 @@ from .loads import LoadCase
 from .profiles import Profile
 from .removals import Removal
 from .role_places import RolePlace
+from .ties import TieCase
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class Case:
         The case file as it was read.
     role_places : tuple of RolePlace
         Roles by place, under those by name.
+    tie_layers : tuple of str
+        Layers of the drawing whose lines are ties.
     bonds : tuple of Bonding
         Walls of the drawing that are filled with stones.
     analysis : str
@@ -70,6 +73,7 @@ class Case:
     dimension: int | str = "auto"
     ignore: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    tie_layers: tuple[str, ...] = ()
     window: tuple[float, ...] | None = None
     image: ImageKeys = field(default_factory=ImageKeys)
     thickness: float | None = None
@@ -93,6 +97,7 @@ class Case:
     loads: tuple[LoadCase, ...] = ()
     backfills: tuple[BackfillCase, ...] = ()
     removals: tuple[Removal, ...] = ()
+    ties: tuple[TieCase, ...] = ()
     analysis: str = "settlement"
     settings: Any = None
     controls: solver.Controls = field(default_factory=solver.Controls)

@@ -56,6 +56,7 @@ class RunInput:
     interfaces: solver.Interfaces
     loads: solver.Loads
     changes: tuple[solver.PhaseChange, ...] = ()
+    ties: tuple[solver.Tie, ...] = ()
     listeners: list[Callable[[mechanics.PathState], None]] = field(default_factory=list)
 
     def step(self, state: mechanics.PathState) -> None:

@@ -34,6 +34,7 @@ from .marks import (
 from .scene import OF_STATICS, Scene
 from .solid_view import View, hiding_supports, plane_of, views_of
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
+from .ties import DASH, DrawnTies
 from .underlay import Underlay
 
 if TYPE_CHECKING:
@@ -193,6 +194,7 @@ class Drawer:
         if self._plane is not None and self._plane[1] @ self._views[0].axes[2] > 0.0:
             # What lies between the plane and the eye is left out.
             self._plane = self._plane * [[1.0], [-1.0]]
+        self.ties = DrawnTies(response)
         self._seen = _Series(sampled=sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
@@ -208,7 +210,8 @@ class Drawer:
             self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         self._arrow = ARROW_IN_SPACE * float(frame.size.max())
-        ends = np.concatenate([self.live.tails, *self._arrow_tips(extra)])
+        tied = self.ties.ends([increments[0].pose, increments[-1].pose])
+        ends = np.concatenate([self.live.tails, *self._arrow_tips(extra), tied])
         if self._plane is not None:
             ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
         frame = frame.holding(self._projected(ends))
@@ -309,6 +312,7 @@ class Drawer:
         seen, look = self._seen, self.look
         for number, increment in enumerate(self.increments):
             seen.largest = max(seen.largest, largest_displacement(self.assembly, increment))
+            self.ties.survey(increment)
             if look.joints:
                 found = marks_of(self.assembly, self.joints, self._shown(increment), increment.pose)
                 if increment.status != solver.Status.FALLING:
@@ -357,12 +361,12 @@ class Drawer:
             self._draw_bearings(shown)
             self._draw_settlement(increment, shown)
             self._draw_live_load(increment, shown)
+        self.scene.ties(self.ties.strands(increment, shown, DASH * self.sheet.size[1] / 1080.0 * self.scene.pixel))
         falling = increment.status == solver.Status.FALLING
         failed = self.response.stop == solver.Status.SOLVER_FAILED
         head, detail = caption_of(self.response, increment, self.look.magnification)
         picture = self.scene.image()
-        if widths and self.look.joints and not falling and self._flat:
-            self._write_widths(picture, increment, shown, dots)
+        self._write_labels(picture, increment, shown, dots, widths and self.look.joints and not falling and self._flat)
         return self.sheet.composed(
             picture,
             title=title or head,
@@ -434,7 +438,7 @@ class Drawer:
     def keys(self) -> list[Key]:
         """Return what is marked in any of the increments, each with its place in the legends of all pictures."""
         if self._keys is None:
-            keys = self._keys_of_tints() + self._keys_of_joints() + self._keys_of_forces()
+            keys = [*self._keys_of_tints(), *self._keys_of_joints(), *self._keys_of_forces(), *self.ties.keys()]
             if not self._flat and self.response.settlements and self.assembly.moving.any():
                 keys.append(Key("area", "moving support", palette.MOVING))
             if self.live.largest > 0.0:
@@ -544,18 +548,23 @@ class Drawer:
         self.scene.hinges(found)
         return found.hinges[:, 0]
 
-    def _write_widths(
-        self, picture: Image.Image, increment: solver.Increment, shown: solver.Pose, dots: np.ndarray
+    def _write_labels(
+        self, picture: Image.Image, increment: solver.Increment, shown: solver.Pose, dots: np.ndarray, widths: bool
     ) -> None:
-        """Write the widths of the widest crack lines of an increment beside them, where there is room."""
-        cracks = main_cracks(cracks_of(self.assembly, increment.pose, self.joints, increment.fallen))
-        on_a, on_b, _ = faces_at(self.assembly, self.joints, shown)
-        widest = [int(crack.joints[0]) for crack in cracks]
-        ends = end_openings(self.assembly, self.joints, increment.pose)[widest].argmax(axis=1)
-        places = self.scene.at_pixel((on_a + on_b)[widest, ends] / 2.0)
-        words = [width_text(crack.width) for crack in cracks]
-        dots = np.concatenate([dots, *self._along_arrows.values()])
-        write_labels(picture, places, words, self.sheet.text, self.scene.at_pixel(dots))
+        """Write the forces of ties, and the widths of the widest crack lines, beside them, where there is room."""
+        points, words, colours = self.ties.labels(increment, shown)
+        if widths:
+            cracks = main_cracks(cracks_of(self.assembly, increment.pose, self.joints, increment.fallen))
+            on_a, on_b, _ = faces_at(self.assembly, self.joints, shown)
+            widest = [int(crack.joints[0]) for crack in cracks]
+            ends = end_openings(self.assembly, self.joints, increment.pose)[widest].argmax(axis=1)
+            points = np.concatenate([points, (on_a + on_b)[widest, ends] / 2.0])
+            words += [width_text(crack.width) for crack in cracks]
+            colours += [palette.OPEN] * len(cracks)
+        if words:
+            dots = np.concatenate([dots, *self._along_arrows.values()])
+            places, dots = self.scene.at_pixel(points), self.scene.at_pixel(dots)
+            write_labels(picture, places, words, self.sheet.text, dots, colours)
 
     def _draw_forces(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if self.force_scale == 0.0:

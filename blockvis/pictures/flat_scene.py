@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 import numpy as np
@@ -19,12 +19,14 @@ from .frame import Frame
 from .hatching import hatch_lines
 from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes, part_outlines
 from .swing import MOST_PARTS, Swing
+from .ties import Strands
 from .underlay import COVER, CarriedPhotograph, Underlay
 
 #: The layers, back to front.
 ORDER = (
     "earth", "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding", "motion outline",
-    "force line", "force", "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top",
+    "force line", "force", "tie rim", "tie slack", "tie elastic", "tie yielding", "tie broken", "tie end",
+    "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top",
     "arrow rim", "arrow top",
 )  # fmt: skip
 
@@ -168,6 +170,14 @@ class FlatScene:
         bars = [ends[:, 0] - side, ends[:, 1] - side, ends[:, 1] + side, ends[:, 0] + side]
         self.polygons("force", np.stack(bars, axis=1), palette.FORCE)
         self.lines("force line", line, palette.FORCE, self.size[1] / 500.0)
+
+    def ties(self, strands: Sequence[Strands]) -> None:
+        """Draw lines with a rim of paper, and dots where they are held."""
+        for strand in strands:
+            width, part = max(strand.width * self._thin, THINNEST), strand.layer.removeprefix("tie ")
+            self.lines(f"tie rim/{part}", strand.ends, palette.PAPER, width + max(3.0 * self._thin, 1.0))
+            self.lines(strand.layer, strand.ends, strand.colour, width)
+            self.discs(f"tie end/{part}", strand.anchors, 0.9 * width + 2.0 * self._thin, strand.colour)
 
     def bearings(self, ends: np.ndarray) -> None:
         """Draw a heavy line where supports carry the structure."""

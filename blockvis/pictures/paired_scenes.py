@@ -14,6 +14,7 @@ from .frame import write_words
 from .marks import Marks
 from .solid_scene import SolidScene
 from .swing import Swing
+from .ties import Strands
 
 
 class PairedScenes:
@@ -58,6 +59,11 @@ class PairedScenes:
         """Draw forces."""
         for scene in self._scenes:
             scene.forces(ends, line)
+
+    def ties(self, strands: Sequence[Strands]) -> None:
+        """Draw ties, props and bars."""
+        for scene in self._scenes:
+            scene.ties(strands)
 
     def bearings(self, ends: np.ndarray) -> None:
         """Draw nothing: the blocks show it."""

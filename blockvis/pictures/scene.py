@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +13,7 @@ import solver
 from .frame import Frame
 from .marks import Marks
 from .swing import Swing
+from .ties import Strands
 
 #: Layers that hold what statics knows: a fall in time has none of them.
 OF_STATICS = (
@@ -52,6 +54,9 @@ class Scene(Protocol):
 
     def forces(self, ends: np.ndarray, line: np.ndarray) -> None:
         """Draw forces as bars with ends (n, 2, d) [m], and the line from joint to joint, (m, 2, d) [m]."""
+
+    def ties(self, strands: Sequence[Strands]) -> None:
+        """Draw ties, props and bars."""
 
     def bearings(self, ends: np.ndarray) -> None:
         """Draw where supports carry the structure, lines (n, 2, d) [m]; in space the blocks show it."""

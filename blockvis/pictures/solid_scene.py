@@ -25,6 +25,7 @@ from .marks import Marks, arrow_shapes
 from .solid_view import ABOVE, AROUND, View, showing_faces
 from .surface import section_of, sharp_edges, triangles_of
 from .swing import MOST_PARTS, Swing
+from .ties import DASH, Strands, dashed
 
 #: How much of the light comes from all sides, and from the lamp above the left shoulder.
 AMBIENT, DIFFUSE = 0.58, 0.50
@@ -266,7 +267,7 @@ class SolidScene:
         self.lines("hinge", found.hinges, palette.HINGE, width, forward=5.0)
         if not self._hidden_hinges:
             return
-        dashes = _dashed(found.hinges, 12.0 * max(self._thin, 0.6) * self.pixel)
+        dashes = dashed(found.hinges, 24.0 * max(self._thin, 0.6) * self.pixel)
         self.lines("hidden hinge", dashes, palette.HINGE, 0.22 * width, forward=IN_FRONT_OF_ALL)
 
     def forces(self, ends: np.ndarray, line: np.ndarray) -> None:
@@ -274,6 +275,20 @@ class SolidScene:
         width = max(2.5, self.size[1] / 240.0)
         self.lines("force", ends, palette.FORCE, width, forward=IN_FRONT_OF_ALL)
         self.lines("force line", line, palette.FORCE, 0.6 * width, forward=IN_FRONT_OF_ALL)
+
+    def ties(self, strands: Sequence[Strands]) -> None:
+        """Draw lines and discs where they are held, thin and dashed in front of the blocks that hide them."""
+        angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+        circle = np.stack([np.cos(angles), np.sin(angles)], axis=1) @ self.view.axes[:2]
+        for strand in strands:
+            width = max(strand.width * self._thin, 1.6)
+            radius = (0.9 * width + 2.0 * self._thin) * self.pixel
+            self.lines(strand.layer, strand.ends, strand.colour, width, forward=6.0)
+            self.polygons(
+                f"tie end/{strand.layer}", strand.anchors[:, None] + radius * circle, strand.colour, forward=6.0
+            )
+            hidden = dashed(strand.ends, DASH * max(self._thin, 0.6) * self.pixel)
+            self.lines(f"hidden {strand.layer}", hidden, strand.colour, 0.35 * width, forward=IN_FRONT_OF_ALL)
 
     def bearings(self, ends: np.ndarray) -> None:
         """Draw nothing: the blocks show it."""
@@ -484,17 +499,6 @@ def _quiet() -> Iterator[None]:
         yield
     finally:
         vtkLogger.SetStderrVerbosity(before)
-
-
-def _dashed(ends: np.ndarray, length: float) -> np.ndarray:
-    """(m, 2, 3) array [m]: dashes of a length [m], with gaps as long, along lines (n, 2, 3)."""
-    along = ends[:, 1] - ends[:, 0]
-    counts = np.maximum(1, np.round(np.linalg.norm(along, axis=1) / (2.0 * length))).astype(int)
-    line = np.repeat(np.arange(len(ends)), counts)
-    place = np.arange(len(line)) - np.repeat(np.cumsum(counts) - counts, counts)
-    # Half a gap at either end.
-    shares = (place[:, None] + np.array([0.25, 0.75])) / counts[line][:, None]
-    return ends[line, :1] + shares[:, :, None] * along[line][:, None]
 
 
 def _rimmed_arrows(

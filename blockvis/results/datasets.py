@@ -43,7 +43,7 @@ SHAPES = ("moved", "undeformed")
 UNITS = {
     "displacement": "m", "reference": "m", "to_reference": "m", "mechanism": "m", "translation": "m", "rotation": "rad",
     "force": "N", "normal_force": "N", "shear_force": "N", "shear": "N", "gap": "m", "opening": "m", "slip": "m",
-    "length": "m", "area": "m²",
+    "length": "m", "area": "m²", "elongation": "m",
 }  # fmt: skip
 
 
@@ -102,7 +102,7 @@ def block_grid(
     pose = solver.Pose.initial(assembly) if increment is None else increment.pose
     corners = mechanics.moved_vertices(assembly, pose)
     if assembly.dimension == 2:
-        grid = _grid(corners, assembly.offsets, VTK_POLYGON)
+        grid = grid_of_cells(corners, assembly.offsets, VTK_POLYGON)
     else:
         grid = _polyhedra(assembly.polyhedra, corners)
     materials = sorted(set(assembly.materials))
@@ -117,16 +117,16 @@ def block_grid(
     add_arrays(grid.GetCellData(), cells)
     grid.GetCellData().SetActiveScalars("block_id")
     for name, words in (("name", assembly.names), ("role_name", assembly.roles), ("material", assembly.materials)):
-        grid.GetCellData().AddArray(_strings(name, words))
+        grid.GetCellData().AddArray(strings(name, words))
     ahead = None if increment is None else next_places(assembly, increment, corners, assembly.block_of_vertex)
-    _give_shape(grid, assembly.vertices, shape, ahead)
-    grid.GetFieldData().AddArray(_strings("role_names", mechanics.ROLES))
-    grid.GetFieldData().AddArray(_strings("material_names", materials))
+    give_shape(grid, assembly.vertices, shape, ahead)
+    grid.GetFieldData().AddArray(strings("role_names", mechanics.ROLES))
+    grid.GetFieldData().AddArray(strings("material_names", materials))
     if increment is not None:
         fallen, motion = increment.fallen, block_motion(assembly, increment, falls)
         add_arrays(grid.GetCellData(), {"fallen": fallen.astype(np.int32), **motion})
-        _describe(grid, increment)
-    _state_units(grid)
+        describe(grid, increment)
+    state_units(grid)
     return grid
 
 
@@ -197,9 +197,9 @@ def joint_grid(
     )
     names = assembly.names
     words = (f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True))
-    grid.GetCellData().AddArray(_strings("joint", words))
-    _describe(grid, increment)
-    _state_units(grid)
+    grid.GetCellData().AddArray(strings("joint", words))
+    describe(grid, increment)
+    state_units(grid)
     return grid
 
 
@@ -260,9 +260,9 @@ def contact_grid(
     if in_space:
         points |= {"shear": shear, "slip": _slip(assembly, increment)}
     add_arrays(grid.GetPointData(), points)
-    grid.GetFieldData().AddArray(_strings("state_names", [state.name.lower() for state in mechanics.ContactState]))
-    _describe(grid, increment)
-    _state_units(grid)
+    grid.GetFieldData().AddArray(strings("state_names", [state.name.lower() for state in mechanics.ContactState]))
+    describe(grid, increment)
+    state_units(grid)
     return grid
 
 
@@ -272,7 +272,7 @@ def _as_dataset(grid: vtkUnstructuredGrid) -> pv.UnstructuredGrid:
     return pv.UnstructuredGrid(grid)
 
 
-def _grid(points: np.ndarray, offsets: np.ndarray, kind: int | np.ndarray) -> vtkUnstructuredGrid:
+def grid_of_cells(points: np.ndarray, offsets: np.ndarray, kind: int | np.ndarray) -> vtkUnstructuredGrid:
     """Make a grid of cells of their own points, (n, d) [m]: cell i of offsets[i] to offsets[i + 1]."""
     grid = _grid_of_points(points)
     kinds = np.broadcast_to(np.asarray(kind, dtype=np.uint8), len(offsets) - 1)
@@ -327,13 +327,14 @@ def _grid_between(
     shape: str,
 ) -> vtkUnstructuredGrid:
     """Make a grid of cells whose points lie between two blocks each, (n_points,) int arrays."""
-    grid = _grid(rings.points, rings.offsets, kind)
+    grid = grid_of_cells(rings.points, rings.offsets, kind)
     drawn = mechanics.carried_between(rings.points, *blocks, increment.pose, solver.Pose.initial(assembly))
-    _give_shape(grid, drawn, shape, next_places(assembly, increment, rings.points, *blocks))
+    give_shape(grid, drawn, shape, next_places(assembly, increment, rings.points, *blocks))
     return grid
 
 
-def _describe(grid: vtkUnstructuredGrid, increment: solver.Increment) -> None:
+def describe(grid: vtkUnstructuredGrid, increment: solver.Increment) -> None:
+    """Write the numbers of an increment into the field arrays of a grid."""
     numbers = {
         "settlement": increment.parameter,
         "phase": increment.phase,
@@ -341,7 +342,7 @@ def _describe(grid: vtkUnstructuredGrid, increment: solver.Increment) -> None:
         "reaction": increment.reaction,
     }
     add_arrays(grid.GetFieldData(), {name: np.array([number]) for name, number in numbers.items()})
-    grid.GetFieldData().AddArray(_strings("status", [str(increment.status)]))
+    grid.GetFieldData().AddArray(strings("status", [str(increment.status)]))
 
 
 def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
@@ -358,7 +359,7 @@ def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
         attributes.AddArray(values)
 
 
-def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str, ahead: np.ndarray | None) -> None:
+def give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str, ahead: np.ndarray | None) -> None:
     """Let the points of a moved grid stay or go where the layout has them, (n, d) [m], and say how far they move.
 
     The active vectors are what Warp By Vector takes first: of the layout the displacement, of moved shapes what lies
@@ -378,7 +379,7 @@ def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str, ah
     grid.GetPointData().SetActiveVectors(next(iter(arrays)))
 
 
-def _state_units(grid: vtkUnstructuredGrid) -> None:
+def state_units(grid: vtkUnstructuredGrid) -> None:
     """Write the unit of each array into its metadata and into the field array ``units``."""
     listed = []
     for attributes in (grid.GetPointData(), grid.GetCellData()):
@@ -387,10 +388,10 @@ def _state_units(grid: vtkUnstructuredGrid) -> None:
             if array.GetName() in UNITS:
                 array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), UNITS[array.GetName()])
                 listed.append(f"{array.GetName()} [{UNITS[array.GetName()]}]")
-    grid.GetFieldData().AddArray(_strings("units", dict.fromkeys(listed)))
+    grid.GetFieldData().AddArray(strings("units", dict.fromkeys(listed)))
 
 
-def _strings(name: str, words: Iterable[str]) -> vtkStringArray:
+def strings(name: str, words: Iterable[str]) -> vtkStringArray:
     """Make a VTK array of strings; pyvista's own conversion refuses anything but ASCII."""
     array = vtkStringArray()
     array.SetName(name)

@@ -25,6 +25,8 @@ from .joints import LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
+from .ties import COLUMNS as TIE_COLUMNS
+from .ties import TIES, TieCourses, stored_ties, tie_rows, write_ties
 from .viewer_files import MOVED, ViewerFiles, ViewerFormat, ViewerWriter, restore_grids, write_end, write_lists
 
 #: Where a run can go on from, beside the increments it belongs to.
@@ -43,9 +45,10 @@ FOLDERS = ("increments", "fall")
 STEP_CHECK, RANGE = "step_check.json", "range.csv"
 _LISTS = (
     *("summary.json", STEP_CHECK, RANGE, "response.csv", "joints.csv", "blocks.pvd", "contacts.pvd", "joints.pvd"),
+    *("ties.csv", "ties.pvd"),
     *LIMIT_TABLES,
 )
-_STARTED = (RECORD, CHECKPOINT, "assembly.npz")
+_STARTED = (RECORD, CHECKPOINT, "assembly.npz", TIES)
 _PICTURES = (
     *("report.html", "report.pdf", "curve.png", "curve.svg", "mechanism.png", "cracks.png", "last.png"),
     "paraview_colours.py",
@@ -89,6 +92,8 @@ class ResultsFolder:
         What the increments run over.
     vtu : ViewerFormat
         Of the VTU files.
+    ties : sequence of solver.Tie
+        Of the structure.
 
     Attributes
     ----------
@@ -117,8 +122,9 @@ class ResultsFolder:
         overwrite: bool = False,
         parameter: mechanics.Quantity = mechanics.SETTLEMENT,
         vtu: ViewerFormat = MOVED,
+        ties: Sequence[solver.Tie] = (),
     ) -> None:
-        self.parameter, self.vtu = parameter, vtu
+        self.parameter, self.vtu, self.ties = parameter, vtu, tuple(ties)
         self.path, self.assembly, self.record = Path(path), assembly, record or Record(versions=versions())
         self.increments: list[solver.Increment] = []
         self._files = StoredIncrements(self.path)
@@ -130,6 +136,7 @@ class ResultsFolder:
             (self.path / name).unlink(missing_ok=True)
         self._remove_from(0)
         write_atomic(self.path / "assembly.npz", compressed(flat(assembly)))
+        write_ties(self.path, self.ties)
         write_atomic(self.path / RECORD, self.record.text())
         self._start_table()
         self.viewer = self.own_viewer()
@@ -164,7 +171,7 @@ class ResultsFolder:
         results = cls.__new__(cls)
         results.path, results.parameter, results.vtu = Path(path), parameter, vtu
         results.record = read_record(results.path)
-        results.assembly = stored_assembly(results.path)
+        results.assembly, results.ties = stored_assembly(results.path), stored_ties(results.path)
         results._release = _locked(results, results.path)
         results._files = StoredIncrements(results.path)
         results.increments, checkpoint, count = [], None, 0
@@ -236,6 +243,8 @@ class ResultsFolder:
             last = response.path[-1]
             cracks = cracks_of(self.assembly, last.pose, self._movements.joints, last.fallen)
         listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
+        if self.ties:
+            listed["ties"] = [course.values() for course in self._courses.courses]
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_atomic(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
@@ -249,15 +258,24 @@ class ResultsFolder:
         self._rows = io.StringIO()
         self._table = csv.writer(self._rows, lineterminator="\n")
         self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
+        self._tie_rows = io.StringIO()
+        self._tie_table = csv.writer(self._tie_rows, lineterminator="\n")
+        self._tie_table.writerow(TIE_COLUMNS)
+        self._courses = TieCourses(self.ties)
         self._movements = LargestMovements(self.assembly, self.parameter)
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
             self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
             self._movements.add(increment)
+            if self.ties:
+                self._tie_table.writerows(tie_rows(self.ties, number, increment))
+                self._courses.add(increment)
 
     def _write_table(self, *, durable: bool = False) -> None:
         write_atomic(self.path / "response.csv", self._rows.getvalue(), last=False, durable=durable)
+        if self.ties:
+            write_atomic(self.path / "ties.csv", self._tie_rows.getvalue(), last=False, durable=durable)
 
     def flush(self) -> None:
         """Flush the VTU files to the disk: each increment waits for its state only, of which they are made."""

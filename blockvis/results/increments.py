@@ -16,6 +16,7 @@ import numpy as np
 
 import solver
 from solver import mechanics
+from solver.ties import TieForces
 
 from .npz import checked_arrays, compressed, flat, from_flat
 
@@ -26,8 +27,11 @@ CACHED, AT_LEAST = 8 << 20, 2
 #: Names in the files of fields that are called otherwise.
 _STORED_AS = {"parameter": "settlement"}
 
-#: Fields of an increment that are not in its file by themselves.
-_APART = ("held", "checkpoint")
+#: Fields of an increment that are not in its file by themselves, and of its state one whose arrays have other names.
+_APART, _TIES = ("held", "checkpoint"), ("ties",)
+
+#: How the names of the arrays of ties begin.
+_OF_TIES = "tie_"
 
 
 @dataclass(frozen=True)
@@ -162,7 +166,7 @@ def _arrays_of(state: mechanics.State) -> dict[str, np.ndarray]:
 
     In space they have their own names.
     """
-    arrays = flat(state)
+    arrays = flat(state, without=_TIES) | _tie_arrays(state.ties)
     if state.pose.positions.shape[1] == 3:
         return arrays
     vertex, edge, corner = mechanics.corners_and_edges(arrays.pop("features"))
@@ -175,7 +179,14 @@ def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
     if "features" not in arrays:
         named["features"] = mechanics.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
         named["slip"], named["rotations"] = arrays["along"][:, None], arrays["rotations"][:, None]
-    return from_flat(named, solver.Increment, held=from_flat(named, mechanics.State), checkpoint=None)
+    ties = {name.removeprefix(_OF_TIES): array for name, array in arrays.items() if name.startswith(_OF_TIES)}
+    state = from_flat(named, mechanics.State, ties=from_flat(ties, TieForces) if ties else TieForces())
+    return from_flat(named, solver.Increment, held=state, checkpoint=None)
+
+
+def _tie_arrays(ties: TieForces) -> dict[str, np.ndarray]:
+    """Name the arrays of ties; none where there are none."""
+    return {f"{_OF_TIES}{name}": array for name, array in flat(ties).items()} if len(ties.forces) else {}
 
 
 def _numbers(increment: solver.Increment) -> tuple[float, ...]:
@@ -188,4 +199,4 @@ def _same(one: float, other: float) -> bool:
 
 
 def _bytes_of(increment: solver.Increment) -> int:
-    return sum(array.nbytes for array in flat(increment.state).values())
+    return sum(array.nbytes for array in flat(increment.state, without=_TIES).values())

@@ -14,9 +14,10 @@ from blockvis.system.vtk_files import is_complete, write_pvd, write_vtu
 
 from .joint_faces import InitialJoints, initial_joints
 from .mechanism_arrays import at_last_equilibrium, falling_in
+from .ties import TIES, stored_ties
 
-#: The VTU files of an increment.
-GRIDS = ("blocks", "contacts", "joints")
+#: The VTU files of an increment, and those of one with ties.
+GRIDS, TIE_GRID = ("blocks", "contacts", "joints"), "ties"
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ def write_lists(folder: Path, increments: Sequence[solver.Increment], *, durable
     """
     path = [increment for increment in increments if increment.status == solver.Status.EQUILIBRIUM]
     times = output_times(path or increments)
-    for kind in GRIDS:
+    for kind in grids_in(folder):
         entries = [(t, f"increments/{kind}_{i:05d}.vtu") for i, t in enumerate(times)]
         write_pvd(folder / f"{kind}.pvd", entries, last=False, durable=durable)
 
@@ -132,7 +133,7 @@ def restore_grids(
     """
     lost = 0
     for number, increment in enumerate(increments):
-        if not all(is_complete(grid_file(folder, kind, number)) for kind in GRIDS):
+        if not all(is_complete(grid_file(folder, kind, number)) for kind in grids_in(folder)):
             write_grids(folder, number, assembly, increment, vtu)
             lost += 1
     return lost
@@ -185,12 +186,23 @@ def write_grids(
     # VTK is loaded where its files are written: another process may do that.
     from .datasets import block_grid, contact_grid, joint_grid
 
-    for kind, grid in (
+    grids = [
         ("blocks", block_grid(assembly, increment, shape=vtu.shape, falls=falls)),
         ("contacts", contact_grid(assembly, increment, shape=vtu.shape)),
         ("joints", joint_grid(assembly, increment, shape=vtu.shape, joints=joints)),
-    ):
+    ]
+    ties = stored_ties(folder)
+    if ties:
+        from .tie_grid import tie_grid
+
+        grids.append((TIE_GRID, tie_grid(ties, assembly, increment, shape=vtu.shape)))
+    for kind, grid in grids:
         write_vtu(grid, grid_file(folder, kind, number), strings=vtu.strings, durable=False)
+
+
+def grids_in(folder: Path) -> tuple[str, ...]:
+    """List the kinds of VTU files of a results folder."""
+    return (*GRIDS, TIE_GRID) if (folder / TIES).is_file() else GRIDS
 
 
 def grid_file(folder: Path, kind: str, number: int) -> Path:

@@ -7,10 +7,18 @@ from dataclasses import replace
 from typing import Any
 
 import solver
-from blockvis.cases.build import case_changes, case_controls, case_interfaces, case_loads, case_settlements
+from blockvis.cases.build import (
+    case_changes,
+    case_controls,
+    case_interfaces,
+    case_loads,
+    case_settlements,
+    case_ties,
+)
 from blockvis.cases.contents import Case
 from blockvis.kinds.kind import AnalysisRun, RunInput
 from blockvis.kinds.kinds import KINDS
+from blockvis.kinds.settlement import SettlementKind
 from solver import mechanics
 
 
@@ -19,6 +27,7 @@ def planned(
     assembly: solver.Assembly,
     resume: Any = None,
     found: Sequence[solver.Increment] = (),
+    ties: Sequence[solver.Tie] | None = None,
 ) -> AnalysisRun:
     """Prepare the analysis of a case, its input checked.
 
@@ -30,6 +39,8 @@ def planned(
         Where it goes on from: the checkpoint of an increment, of the type that its kind of analysis has.
     found : sequence of solver.Increment
         Found up to there.
+    ties : sequence of solver.Tie, optional
+        Those of the case by default.
 
     Raises
     ------
@@ -45,8 +56,32 @@ def planned(
         profiles=(),
         controls=case_controls(case, assembly),
     )
+    refuse_ties(case)
     changes = case_changes(case, assembly)
-    given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly), changes)
+    members = case_ties(case, assembly) if ties is None else tuple(ties)
+    given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly), changes, members)
     if case.settlements:
         mechanics.check_settlement(assembly, case.settlements, case.controls, changes)
     return kind.start(given, resume, found)
+
+
+def refuse_ties(case: Case) -> None:
+    """Raise ValueError for ties where no settlement follows them, or before one that there is not."""
+    by_program = case.controls.increments == mechanics.INCREMENTS[1]
+    for tie in case.ties:
+        who = f"{tie.where} '{tie.name}'"
+        if case.analysis != SettlementKind.name or by_program:
+            what = f'increments = "{case.controls.increments}"' if by_program else f"a {case.analysis}"
+            raise ValueError(
+                f"{who}: ties are followed along a settlement by increments = "
+                f'"{mechanics.INCREMENTS[0]}" only, and {what} knows none; leave [[ties]] out, or ask a settlement'
+            )
+        if tie.phase > len(case.settlements):
+            raise ValueError(
+                f"{who}: phase is {tie.phase}, and there {_are(len(case.settlements))}; give the settlement, counted "
+                "from 1, before which it is installed"
+            )
+
+
+def _are(settlements: int) -> str:
+    return "is one settlement" if settlements == 1 else f"are {settlements} settlements"

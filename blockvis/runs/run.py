@@ -135,6 +135,7 @@ def run_case(
                 overwrite=overwrite,
                 parameter=run.course.parameter,
                 vtu=viewer_format(case),
+                ties=run.given.ties,
             )
         except OSError as error:
             raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
@@ -198,7 +199,7 @@ def resume_run(
         parameter, vtu = kind.course(case).parameter, viewer_format(case)
         results, checkpoint = ResultsFolder.reopened(folder, parameter, kind.checkpoint, vtu)
         remove_fall(folder)
-        run = planned(case, results.assembly, checkpoint, tuple(results.increments))
+        run = planned(case, results.assembly, checkpoint, tuple(results.increments), results.ties)
         return _followed(case, results, run, outputs, Clock(), increment_seconds)
 
 

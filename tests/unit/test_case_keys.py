@@ -33,6 +33,7 @@ EVERY_TABLE: dict[str, Any] = {
     "imperfections": [{"kind": "friction", "distribution": "lognormal", "deviation": 0.1}],
     "settlement": [{"direction": [0, -1]}],
     "loads": [{"kind": "live", "force": [1.0, 0.0]}],
+    "ties": [{"name": "tie", "from": [0.0, 1.0], "to": [2.0, 1.0], "stiffness": 1e7}],
     "analysis": {"kind": "pushover"},
     "control": {"block": "brick 1-1"},
     "bond": [{"walls": ["A-WALL*"]}],

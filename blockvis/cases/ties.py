@@ -1,0 +1,411 @@
+"""Ties, props and bars of a case: their keys, and the blocks that hold their ends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut, in_words, matches
+from blockvis.text import nearest
+from solver.ties import KINDS, PROP, TIE, Tie
+
+from .block_at import ON_EDGE, block_at, distances_to
+from .key import NOT_NEGATIVE, POSITIVE, TEXT, TRUE_OR_FALSE, VECTOR, Key, Section, ValueKind, one_of, whole
+from .toml_table import Table, shortened
+
+#: Layout files whose lines may be ties.
+DRAWN_IN = (".dxf", ".svg")
+
+#: A line is straight where its corners lie within this part of its length of the line between its ends.
+STRAIGHT = 1e-3
+
+#: Factors of units in which somebody may have written a place.
+UNITS = {"mm": 1e-3, "cm": 1e-2}
+
+
+@dataclass(frozen=True)
+class TieEnd:
+    """An end of a tie, as a case has it.
+
+    Attributes
+    ----------
+    point : (2,) or (3,) tuple of float [m]
+    block : str
+        Name of the block that holds it; "" for the one that is found at the point.
+    fixed : bool
+        Whether the ground holds it.
+    """
+
+    point: tuple[float, ...]
+    block: str = ""
+    fixed: bool = False
+
+
+@dataclass(frozen=True)
+class TieCase:
+    """One entry of ``[[ties]]``.
+
+    Attributes
+    ----------
+    name : str
+    ends : tuple of TieEnd
+        Two, or none of the lines of a layer.
+    layer : str
+        Whose lines are ties with these properties.
+    stiffness : float, optional [N/m]
+    area, modulus : float, optional [m², Pa]
+        Instead.
+    kind, strength, brittle, prestress, phase
+        As of :class:`solver.ties.Tie`.
+    where : str
+        File and table, for messages.
+    """
+
+    name: str
+    ends: tuple[TieEnd, ...]
+    layer: str
+    kind: str
+    stiffness: float | None
+    area: float | None
+    modulus: float | None
+    strength: float
+    brittle: bool
+    prestress: float
+    phase: int
+    where: str
+
+
+def _end(table: Table, key: Key) -> TieEnd | None:
+    value = table.take(key.name)
+    if not isinstance(value, Mapping):
+        point = table.vector(key.name)
+        return None if point is None else TieEnd(point)
+    inner = Table(value, f"{table.where}.{key.name}", table.source)
+    fixed = inner.vector("fixed")
+    block, point = inner.text("block"), inner.vector("point")
+    inner.finish()
+    if fixed is not None and (block is not None or point is not None):
+        raise inner.error("fixed", "and a block are both given; the ground or a block holds the end: give one of them")
+    if fixed is None and (block is None or point is None):
+        raise table.error(
+            key.name,
+            f'is {shortened(value)}; give [x, y], {{ block = "name", point = [x, y] }} or {{ fixed = [x, y] }}',
+        )
+    return TieEnd(fixed, fixed=True) if fixed is not None else TieEnd(point, block or "")
+
+
+_BY_BLOCK = {
+    "type": "object",
+    "properties": {"block": {"type": "string"}, "point": dict(VECTOR.schema)},
+    "required": ["block", "point"],
+    "additionalProperties": False,
+}
+_ON_GROUND = {
+    "type": "object",
+    "properties": {"fixed": dict(VECTOR.schema)},
+    "required": ["fixed"],
+    "additionalProperties": False,
+}
+_END = ValueKind(
+    "two numbers, in space three, or table: block and point, or fixed",
+    {"anyOf": [VECTOR.schema, _BY_BLOCK, _ON_GROUND]},
+    _end,
+)
+
+TIES = Section(
+    "ties",
+    "A tie, prop or bar between two points, each held by a block or by the ground",
+    (
+        Key("name", TEXT, "Name, in tables and pictures", "tie at the springing",
+            otherwise="required; lines of a layer are called by it and their number"),
+        Key("from", _END, "Where it begins: a point of the drawing, whose block is found; a block by its name and the "
+            "point that goes with it; or a point of the ground, { fixed = [x, y] }", [0.1, 2.0], "m",
+            otherwise="layer is given instead"),
+        Key("to", _END, "Where it ends", {"fixed": [4.0, 2.0]}, "m", otherwise="layer is given instead"),
+        Key("layer", TEXT, "Layer of the drawing, one of [geometry] ties, whose lines are ties with these properties",
+            "TIES", otherwise="from and to are given instead"),
+        Key("kind", one_of(KINDS), "Whether it carries tension only, compression only (prop) or both (bar)", PROP,
+            default=TIE),
+        Key("stiffness", POSITIVE, "Force per elongation of the whole member", 5e7, "N/m",
+            otherwise="modulus times area over length"),
+        Key("area", POSITIVE, "Area of its section, with a modulus", 5e-4, "m²",
+            otherwise="stiffness is given instead"),
+        Key("modulus", POSITIVE, "Modulus of elasticity, with an area", 2.1e11, "Pa",
+            otherwise="stiffness is given instead"),
+        Key("strength", POSITIVE, "Force at which it yields", 1e5, "N", otherwise="infinite"),
+        Key("brittle", TRUE_OR_FALSE, "Whether it breaks at its strength instead of yielding", True, default=False),
+        Key("prestress", NOT_NEGATIVE, "Force with which it is installed, of a prop compression, else tension", 5e3,
+            "N", 0.0),
+        Key("phase", whole(1), "Settlement, from 1, before which it is installed, at the geometry then", 2, default=1),
+    ),
+    several=True,
+)  # fmt: skip
+
+
+def read_ties(tables: Sequence[Table], layers: Sequence[str]) -> tuple[TieCase, ...]:
+    """Read the tables [[ties]].
+
+    Parameters
+    ----------
+    tables : sequence of Table
+    layers : sequence of str
+        ``[geometry] ties``.
+
+    Raises
+    ------
+    ValueError
+        For keys that do not go together, a name used twice, a layer without properties.
+    """
+    found: list[TieCase] = []
+    for table in tables:
+        one = _tie(table)
+        if one.layer and not matches([one.layer], layers):
+            raise table.error("layer", f"is '{one.layer}', which is not in [geometry] ties; add it there")
+        if not one.layer and one.name in [other.name for other in found if not other.layer]:
+            raise table.error("name", f"'{one.name}' is there twice; give each tie its own name")
+        found.append(one)
+    missing = [layer for layer in layers if not any(matches([one.layer], [layer]) for one in found if one.layer)]
+    if missing:
+        where = f"{tables[0].source}: " if tables else ""
+        raise ValueError(
+            f"{where}[geometry] ties names the layer '{missing[0]}', and no [[ties]] says what its lines are; add "
+            f'[[ties]] with layer = "{missing[0]}" and stiffness'
+        )
+    return tuple(found)
+
+
+def _tie(table: Table) -> TieCase:
+    values = TIES.read(table)
+    layer = values["layer"] or ""
+    if layer:
+        for key in ("from", "to"):
+            if values[key] is not None:
+                raise table.error(key, "does not go with layer, whose lines say where its ties begin and end")
+    elif values["name"] is None:
+        raise table.error("name", 'is missing; name the tie, as name = "tie at the springing"')
+    for key in () if layer else ("from", "to"):
+        if values[key] is None:
+            raise table.error(key, f"of '{values['name']}' is missing; give a point [x, y]")
+    by_section = values["area"] is not None or values["modulus"] is not None
+    if values["stiffness"] is not None and by_section:
+        raise table.error("stiffness", "and area or modulus are both given; give stiffness, or area and modulus")
+    if values["stiffness"] is None and (values["area"] is None or values["modulus"] is None):
+        lacks = "modulus" if values["area"] is not None else "area" if values["modulus"] is not None else "stiffness"
+        raise table.error(lacks, "is missing; give stiffness [N/m], or area [m²] and modulus [Pa]")
+    strength = np.inf if values["strength"] is None else values["strength"]
+    if values["prestress"] >= strength:
+        raise table.error("prestress", f"is {values['prestress']:g} N, not below the strength of {strength:g} N")
+    if values["brittle"] and values["strength"] is None:
+        raise table.error("brittle", "is true, and no strength says at which force it breaks; add strength = ... [N]")
+    ends = () if layer else (values["from"], values["to"])
+    own = {key: values[key] for key in ("kind", "stiffness", "area", "modulus", "brittle", "prestress", "phase")}
+    return TieCase(
+        values["name"] or layer, ends, layer, strength=strength, where=f"{table.source}: [{table.where}]", **own
+    )
+
+
+def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tuple[Layout, tuple[LeftOut, ...]]:
+    """Take the lines that are ties out of what a drawing leaves out.
+
+    Parameters
+    ----------
+    sketch : Layout
+        Read with the layers ignored.
+    layers : sequence of str
+        Or patterns of them.
+    source : Path
+        The case file, for messages.
+
+    Returns
+    -------
+    sketch : Layout
+        With one note on its ties instead of those on lines left out.
+    lines : tuple of LeftOut
+
+    Raises
+    ------
+    ValueError
+        Where a layer has no line, or has something else.
+    """
+    if not layers:
+        return sketch, ()
+    lines = tuple(item for item in sketch.left_out if matches([item.layer], layers))
+    for layer in layers:
+        if not any(matches([item.layer], [layer]) for item in lines):
+            known = sorted({item.layer for item in sketch.left_out} | set(sketch.groups))
+            listed = ", ".join(f"'{name}'" for name in known if name)
+            raise ValueError(
+                f"{source}: [geometry] ties: no line lies on the layer '{layer}'{nearest(layer, known)}; the drawing "
+                f"has {listed or 'no layers'}"
+            )
+    closed = next((item for item in lines if item.closed), None)
+    if closed is not None:
+        x, y = closed.place
+        raise ValueError(
+            f"{source}: [geometry] ties: '{closed.name}' on layer '{closed.layer}' at ({x:.6g}, {y:.6g}) is an "
+            "outline, no line; move it to another layer"
+        )
+    said = in_words(lines)
+    words = [
+        f"ties: {sum(item.layer == layer for item in lines)} lines on layer '{layer}'"
+        for layer in dict.fromkeys(item.layer for item in lines)
+    ]
+    notes = (*(note for note in sketch.notes if note not in said), *words)
+    others = tuple(item for item in sketch.left_out if not matches([item.layer], layers))
+    return replace(sketch, left_out=others, notes=notes), lines
+
+
+def drawn_ties(entries: Sequence[TieCase], lines: Sequence[LeftOut]) -> list[TieCase]:
+    """List the ties of a case, those of layers with the ends of their lines.
+
+    Parameters
+    ----------
+    entries : sequence of TieCase
+    lines : sequence of LeftOut
+        As of :func:`without_tie_lines`.
+
+    Raises
+    ------
+    ValueError
+        For a line that is bent, and a name used twice.
+    """
+    found: list[TieCase] = []
+    for entry in entries:
+        if not entry.layer:
+            found.append(entry)
+            continue
+        for number, line in enumerate((line for line in lines if line.layer == entry.layer), start=1):
+            first, last = line.points[0], line.points[-1]
+            along, length = last - first, float(np.linalg.norm(last - first))
+            off = np.abs((line.points - first) @ np.array([-along[1], along[0]])) / (length or 1.0)
+            if off.max(initial=0.0) > STRAIGHT * length:
+                raise ValueError(
+                    f"{entry.where} layer '{entry.layer}': '{line.name}' from ({first[0]:.6g}, {first[1]:.6g}) to "
+                    f"({last[0]:.6g}, {last[1]:.6g}) is bent; draw each tie as a straight line"
+                )
+            ends = tuple(TieEnd(tuple(map(float, point))) for point in (first, last))
+            found.append(replace(entry, name=f"{entry.name} {number}", ends=ends, layer=""))
+    names = [one.name for one in found]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"{found[-1].where} name: two ties are called '{twice}'; give each its own name")
+    return found
+
+
+def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[Tie, ...]:
+    """Find the blocks that hold the ends of ties.
+
+    Parameters
+    ----------
+    entries : sequence of TieCase
+        As of :func:`drawn_ties`.
+    assembly : solver.Assembly
+
+    Returns
+    -------
+    tuple of solver.ties.Tie
+
+    Raises
+    ------
+    ValueError
+        For an end in no block, both in one, a tie without length; names the tie and the remedy.
+    """
+    return tuple(_in_blocks(entry, assembly) for entry in entries)
+
+
+def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> Tie:
+    where = f"{entry.where} '{entry.name}'"
+    points = tuple(_place(end.point, assembly, where) for end in entry.ends)
+    length = float(np.linalg.norm(np.subtract(points[1], points[0])))
+    if not length > 0.0:
+        raise ValueError(
+            f"{where}: a {entry.kind} has no length: both ends are at {_written(points[0])}; give two places"
+        )
+    blocks = tuple(
+        _holding(end, points[k], np.subtract(points[k], points[1 - k]), assembly, f"{where} {('from', 'to')[k]}")
+        for k, end in enumerate(entry.ends)
+    )
+    if blocks[0] == blocks[1]:
+        held = "the ground" if blocks[0] is None else f"the block '{assembly.names[blocks[0]]}'"
+        raise ValueError(f"{where}: both ends are in {held}, where a {entry.kind} carries nothing; join two blocks")
+    stiffness = entry.stiffness or (entry.area or 0.0) * (entry.modulus or 0.0) / length
+    return Tie(
+        name=entry.name,
+        blocks=(blocks[0], blocks[1]),
+        points=(points[0], points[1]),
+        stiffness=stiffness,
+        kind=entry.kind,
+        strength=entry.strength,
+        brittle=entry.brittle,
+        prestress=entry.prestress,
+        phase=entry.phase,
+    )
+
+
+def _place(point: tuple[float, ...], assembly: solver.Assembly, where: str) -> tuple[float, ...]:
+    """Give a point as many coordinates as the blocks have: a drawing in the plane stands upright in space."""
+    if len(point) == assembly.dimension:
+        return point
+    if len(point) == 2:
+        return (point[0], 0.0, point[1])
+    raise ValueError(f"{where}: {_written(point)} has three coordinates, and the blocks lie in the plane; give [x, y]")
+
+
+def _holding(
+    end: TieEnd, point: tuple[float, ...], away: np.ndarray, assembly: solver.Assembly, where: str
+) -> int | None:
+    """Find the block that holds an end; None for the ground."""
+    if end.fixed:
+        return None
+    if end.block:
+        if end.block not in assembly.names:
+            near = nearest(end.block, assembly.names)
+            raise ValueError(
+                f"{where}: no block is called '{end.block}'{near}; the layout has {', '.join(assembly.names[:12])}"
+            )
+        return assembly.index(end.block)
+    every = np.arange(assembly.n_blocks)
+    apart = distances_to(assembly, point)
+    if apart.min() > ON_EDGE * assembly.block_size:
+        near = assembly.names[int(apart.argmin())]
+        raise ValueError(
+            f"{where} {_written(point)} m lies in no block; the nearest is '{near}', {apart.min():.3g} m away"
+            f"{_in_metres(point, assembly)}; move it there, or hold it by the ground, {{ fixed = [x, y] }}"
+        )
+    # Where several blocks meet, it is the one behind the anchor.
+    return block_at(assembly, point, every, away.tolist(), where)
+
+
+def _in_metres(point: tuple[float, ...], assembly: solver.Assembly) -> str:
+    """Say that a point lies in a block if it is in another unit of length."""
+    for unit, factor in UNITS.items():
+        scaled = tuple(factor * x for x in point)
+        if distances_to(assembly, scaled).min() <= ON_EDGE * assembly.block_size:
+            return f" (if it is in {unit}, write {_written(scaled)}: coordinates of a case are in m)"
+    return ""
+
+
+def _written(point: Sequence[float]) -> str:
+    return f"({', '.join(f'{x:g}' for x in point)})"
+
+
+def tie_words(tie: Tie, assembly: solver.Assembly) -> str:
+    """Say in a line what a tie is and what holds it."""
+    ends = [
+        f"{'ground' if block is None else repr(assembly.names[block])} {_written(point)}"
+        for block, point in zip(tie.blocks, tie.points, strict=True)
+    ]
+    more: list[Any] = [f"{tie.stiffness:.4g} N/m"]
+    if np.isfinite(tie.strength):
+        more.append(f"{'breaks' if tie.brittle else 'yields'} at {tie.strength:.4g} N")
+    if tie.prestress:
+        more.append(f"prestress {tie.prestress:.4g} N")
+    if tie.phase > 1:
+        more.append(f"from settlement {tie.phase} on")
+    return f"{tie.kind} '{tie.name}' from {ends[0]} to {ends[1]}, {', '.join(more)}"

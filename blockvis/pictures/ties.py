@@ -1,0 +1,161 @@
+"""Ties, props and bars in pictures: lines from end to end, coloured by what they do, named with their force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+import solver
+from blockvis.results.ties import STATE_WORDS, known_ties
+from blockvis.text import force_text
+from solver.ties import ABSENT, BROKEN, ELASTIC, PROP, SLACK, YIELDING, tie_ends
+
+from . import palette
+from .frame import Key
+
+#: States that are drawn, back to front.
+DRAWN = (SLACK, ELASTIC, YIELDING, BROKEN)
+
+#: Colours by state.
+COLOURS = {SLACK: palette.FAINT, ELASTIC: palette.TIE, YIELDING: palette.YIELDING, BROKEN: palette.WARNING}
+
+#: Widths of lines by state, and how much wider those of props are, in pixels of a picture 1080 high.
+WIDTHS, PROPS = {SLACK: 2.5, ELASTIC: 6.0, YIELDING: 8.0, BROKEN: 5.0}, 1.8
+
+#: A slack line has a dash in so many pixels of a picture 1080 high; of a broken one this part is left at either end.
+DASH, STUB = 22.0, 0.42
+
+#: Most ties that are named in a picture: those with the largest forces.
+MOST_NAMED = 6
+
+
+@dataclass(frozen=True)
+class Strands:
+    """Lines of one state and width.
+
+    Attributes
+    ----------
+    layer : str
+        "tie" and the state in words.
+    ends : (n, 2, d) array [m]
+        Of lines, dashes or stubs.
+    anchors : (m, d) array [m]
+        Ends of the members.
+    colour : (int, int, int)
+    width : float
+        In pixels of a picture 1080 high.
+    """
+
+    layer: str
+    ends: np.ndarray
+    anchors: np.ndarray
+    colour: tuple[int, int, int]
+    width: float
+
+
+class DrawnTies:
+    """The ties of a response as its pictures show them.
+
+    Parameters
+    ----------
+    response : solver.Response
+
+    Attributes
+    ----------
+    seen : set of int
+        States that were found so far by :meth:`survey`.
+    """
+
+    def __init__(self, response: solver.Response) -> None:
+        self._assembly, self._ties = response.assembly, known_ties(response)
+        self._props = np.array([tie.kind == PROP for tie in self._ties], dtype=bool)
+        self.seen: set[int] = set()
+
+    def survey(self, increment: solver.Increment) -> None:
+        """Take note of what ties do at an increment, for the legend."""
+        if self._ties:
+            self.seen |= set(self._states(increment).tolist()) - {ABSENT}
+
+    def ends(self, poses: Sequence[solver.Pose]) -> np.ndarray:
+        """(n, d) array [m]: where the ends are at poses."""
+        found = [tie_ends(self._ties, self._assembly, pose).reshape(-1, self._assembly.dimension) for pose in poses]
+        return np.concatenate([np.zeros((0, self._assembly.dimension)), *found])
+
+    def strands(self, increment: solver.Increment, shown: solver.Pose, dash: float) -> list[Strands]:
+        """List what is drawn of an increment, back to front; nothing in a fall, where they are not followed.
+
+        Parameters
+        ----------
+        increment : solver.Increment
+        shown : solver.Pose
+            Where the blocks are drawn.
+        dash : float [m]
+            Length of a dash and a gap.
+        """
+        states, ends = self._states(increment), tie_ends(self._ties, self._assembly, shown)
+        found = []
+        for state in DRAWN:
+            for wide in (False, True):
+                here = ends[(states == state) & (self._props == wide)]
+                lines = dashed(here, dash) if state == SLACK else _stubs(here) if state == BROKEN else here
+                width = WIDTHS[state] * (PROPS if wide else 1.0)
+                layer = f"tie {STATE_WORDS[state]}{'/wide' * wide}"
+                anchors = here.reshape(-1, self._assembly.dimension)
+                found.append(Strands(layer, lines, anchors, COLOURS[state], width))
+        return found
+
+    def labels(
+        self, increment: solver.Increment, shown: solver.Pose
+    ) -> tuple[np.ndarray, list[str], list[tuple[int, int, int]]]:
+        """Give middles (n, d) [m], words and colours of the labels of an increment, the largest force first."""
+        states = self._states(increment)
+        middles = tie_ends(self._ties, self._assembly, shown).mean(axis=1)
+        sizes = np.abs(increment.ties.forces) if len(increment.ties.forces) else np.zeros(len(states))
+        order = [k for k in np.argsort(-sizes, kind="stable").tolist() if states[k] != ABSENT][:MOST_NAMED]
+        words = [self._words(k, float(sizes[k]), int(states[k])) for k in order]
+        return middles[order], words, [COLOURS[int(states[k])] for k in order]
+
+    def keys(self) -> list[Key]:
+        """Return the legend."""
+        kinds = list(dict.fromkeys(tie.kind for tie in self._ties))
+        what = " or ".join(kinds)
+        return [
+            Key(
+                "dash" if state == SLACK else "line",
+                what if state == ELASTIC else f"{STATE_WORDS[state]} {what}",
+                COLOURS[state],
+                layers=(f"tie {STATE_WORDS[state]}",),
+            )
+            for state in DRAWN
+            if state in self.seen
+        ]
+
+    def _words(self, k: int, size: float, state: int) -> str:
+        name = self._ties[k].name
+        return f"{name} {force_text(size)}" if state in (ELASTIC, YIELDING) else f"{name} {STATE_WORDS[state]}"
+
+    def _states(self, increment: solver.Increment) -> np.ndarray:
+        states = increment.ties.states
+        if increment.status == solver.Status.FALLING or len(states) != len(self._ties):
+            return np.full(len(self._ties), ABSENT)
+        return states
+
+
+def dashed(ends: np.ndarray, length: float) -> np.ndarray:
+    """(m, 2, d) array [m]: dashes, with gaps as long, along lines (n, 2, d); a dash and a gap are ``length`` [m]."""
+    along = ends[:, 1] - ends[:, 0]
+    counts = np.maximum(1, np.round(np.linalg.norm(along, axis=1) / length)).astype(int)
+    line = np.repeat(np.arange(len(ends)), counts)
+    place = np.arange(len(line)) - np.repeat(np.cumsum(counts) - counts, counts)
+    # Half a gap at either end.
+    shares = (place[:, None] + np.array([0.25, 0.75])) / counts[line][:, None]
+    return np.asarray(ends[line, :1] + shares[:, :, None] * along[line][:, None])
+
+
+def _stubs(ends: np.ndarray) -> np.ndarray:
+    """(2 n, 2, d) array [m]: what is left of broken lines (n, 2, d)."""
+    along = STUB * (ends[:, 1] - ends[:, 0])
+    first = np.stack([ends[:, 0], ends[:, 0] + along], axis=1)
+    return np.concatenate([first, np.stack([ends[:, 1] - along, ends[:, 1]], axis=1)])

@@ -1,0 +1,237 @@
+"""Ties, props and bars in a results folder: which there are, their table, and what the summary says of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.system.atomic_files import write_atomic
+from blockvis.text import force_text
+from solver.ties import BROKEN, YIELDING, TieForces, tie_ends
+
+from .increments import folder_of
+from .npz import packed, unpacked
+
+#: File of the ties of a results folder, which is there where it has any.
+TIES = "ties.npz"
+
+#: Words of the states, in the order of :data:`solver.ties.STATES`.
+STATE_WORDS = ("absent", "slack", "elastic", "yielding", "broken")
+
+#: Columns of ties.csv.
+COLUMNS = ("increment", "phase", "settlement", "name", "kind", "force", "elongation", "state")
+
+
+@dataclass(frozen=True)
+class _Members:
+    """The ties of a structure, as they are stored."""
+
+    ties: tuple[solver.Tie, ...]
+
+
+def write_ties(folder: Path, ties: Sequence[solver.Tie]) -> None:
+    """Write the ties of a results folder; none takes the file away."""
+    if ties:
+        write_atomic(folder / TIES, packed(_Members(tuple(ties))))
+    else:
+        (folder / TIES).unlink(missing_ok=True)
+
+
+def stored_ties(folder: Path) -> tuple[solver.Tie, ...]:
+    """Read the ties of a results folder; none where it has none.
+
+    Raises
+    ------
+    ValueError
+        For a file that no run has written.
+    """
+    if not (folder / TIES).is_file():
+        return ()
+    try:
+        return unpacked((folder / TIES).read_bytes(), _Members)[0].ties
+    except ValueError as error:
+        raise ValueError(f"'{folder / TIES}' cannot be read ({error}); run the case again") from None
+
+
+def known_ties(response: solver.Response) -> tuple[solver.Tie, ...]:
+    """Find the ties of a response: those it knows, or those of the folder that its increments are read from."""
+    own: tuple[solver.Tie, ...] = getattr(response, "ties", ())
+    if own or not response.increments:
+        return own
+    folder = folder_of(response.increments[0])
+    return () if folder is None else stored_ties(folder)
+
+
+def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment) -> TieForces:
+    """Give what ties do at an increment; in frames of a fall, where that is not known, where their ends are.
+
+    Parameters
+    ----------
+    ties : sequence of solver.Tie
+    assembly : solver.Assembly
+    increment : solver.Increment
+    """
+    found = increment.ties
+    if len(found.forces) == len(ties):
+        return found
+    n = len(ties)
+    return TieForces(np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.int64), tie_ends(ties, assembly, increment.pose))
+
+
+def tie_rows(ties: Sequence[solver.Tie], number: int, increment: solver.Increment) -> list[tuple[Any, ...]]:
+    """Make the rows of ties.csv for an increment, in the order of :data:`COLUMNS`; none outside of equilibrium.
+
+    Parameters
+    ----------
+    ties : sequence of solver.Tie
+    number : int
+        Of the increment.
+    increment : solver.Increment
+    """
+    if increment.status != solver.Status.EQUILIBRIUM:
+        return []
+    found = increment.ties
+    place = number, increment.phase, repr(float(increment.parameter))
+    return [
+        (*place, tie.name, tie.kind, repr(float(force)), repr(float(elongation)), STATE_WORDS[state])
+        for tie, force, elongation, state in zip(ties, found.forces, found.elongations, found.states, strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class TieCourse:
+    """What a tie does along a path.
+
+    Attributes
+    ----------
+    name, kind : str
+    force : float [N]
+        The largest, tension positive.
+    at : float [m or rad]
+        Settlement there.
+    phase : int
+        Of it, from 1.
+    yields_at, breaks_at : float or None [m or rad]
+        First settlement at which it does.
+    last : float [N]
+        Force at the last equilibrium.
+    state : str
+        There.
+    """
+
+    name: str
+    kind: str
+    force: float
+    at: float
+    phase: int
+    yields_at: float | None
+    breaks_at: float | None
+    last: float
+    state: str
+
+    def values(self) -> dict[str, Any]:
+        """Give what summary.json says of it."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "largest_force": self.force,
+            "largest_force_at": self.at,
+            "phase": self.phase,
+            "yields_at": self.yields_at,
+            "breaks_at": self.breaks_at,
+            "last_force": self.last,
+            "last_state": self.state,
+        }
+
+
+class TieCourses:
+    """The courses of ties over the increments in equilibrium so far.
+
+    Parameters
+    ----------
+    ties : sequence of solver.Tie
+    """
+
+    def __init__(self, ties: Sequence[solver.Tie]) -> None:
+        self.ties = tuple(ties)
+        self._found: list[TieCourse] = []
+
+    def add(self, increment: solver.Increment) -> None:
+        """Take an increment into account."""
+        if not self.ties or increment.status != solver.Status.EQUILIBRIUM:
+            return
+        found, at = increment.ties, float(increment.parameter)
+        if not self._found:
+            self._found = [
+                TieCourse(t.name, t.kind, 0.0, at, increment.phase + 1, None, None, 0.0, "") for t in self.ties
+            ]
+        for k, (before, force, state) in enumerate(zip(self._found, found.forces, found.states, strict=True)):
+            larger = abs(force) > abs(before.force)
+            self._found[k] = TieCourse(
+                before.name,
+                before.kind,
+                float(force) if larger else before.force,
+                at if larger else before.at,
+                increment.phase + 1 if larger else before.phase,
+                at if before.yields_at is None and state == YIELDING else before.yields_at,
+                at if before.breaks_at is None and state == BROKEN else before.breaks_at,
+                float(force),
+                STATE_WORDS[state],
+            )
+
+    @property
+    def courses(self) -> tuple[TieCourse, ...]:
+        """One per tie; empty before the first increment."""
+        return tuple(self._found)
+
+
+def tie_courses(response: solver.Response) -> tuple[TieCourse, ...]:
+    """Work out what each tie of a response does along its path; its increments are gone through once."""
+    courses = TieCourses(known_ties(response))
+    for increment in response.path if courses.ties else ():
+        courses.add(increment)
+    return courses.courses
+
+
+def tie_texts(course: TieCourse, unit: str = "m") -> tuple[str, str, str]:
+    """Say what a tie is, its largest force and where, and what became of it.
+
+    Parameters
+    ----------
+    course : TieCourse
+    unit : str
+        Of settlements.
+    """
+    sense = "" if course.force == 0.0 else " tension" if course.force > 0.0 else " compression"
+    largest = f"{force_text(abs(course.force))}{sense}"
+    if sense:
+        largest += f" at {course.at:.4g} {unit}"
+    fate = [
+        f"{word} at {at:.4g} {unit}"
+        for word, at in (("yields", course.yields_at), ("breaks", course.breaks_at))
+        if at is not None
+    ]
+    # What yields and breaks was told.
+    said = {"yielding": course.yields_at, "broken": course.breaks_at}.get(course.state)
+    if said is None:
+        fate.append(
+            f"{course.state} at the end, {force_text(abs(course.last))}"
+            if course.last
+            else f"{course.state} at the end"
+        )
+    return (
+        f"{course.name} ({course.kind})" if course.kind not in course.name.split() else course.name,
+        largest,
+        ", ".join(fate),
+    )
+
+
+def tie_forces(response: solver.Response) -> np.ndarray:
+    """(n_increments, n_ties) array [N]: forces of ties along the path, tension positive."""
+    ties = known_ties(response)
+    return np.array([increment.ties.forces for increment in response.path]).reshape(len(response.path), len(ties))

@@ -1,0 +1,171 @@
+"""Ties, props and bars of a case: what it may say of them, and what is told of them."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blockvis.case_files.read import case_of
+from blockvis.cases.build import case_assembly, case_ties
+from blockvis.runs.plan import planned
+
+#: Two piers of a block each, 0.5 m wide and 2 m high, 2 m apart, on a ground; the right one stands on what moves.
+PIERS = {
+    "geometry": {"file": "piers.json"},
+    "settlement": [{"direction": [1, 0], "limit": 0.01}],
+}
+BLOCKS = """{"blocks": [
+  {"name": "left", "outline": [[0, 0], [0.5, 0], [0.5, 2], [0, 2]]},
+  {"name": "right", "outline": [[2.5, 0], [3, 0], [3, 2], [2.5, 2]]},
+  {"name": "ground", "role": "fixed", "outline": [[-1, -0.3], [1, -0.3], [1, 0], [-1, 0]]},
+  {"name": "footing", "role": "moving", "outline": [[2, -0.3], [4, -0.3], [4, 0], [2, 0]]}
+]}"""
+TIE = {"name": "iron", "from": [0.25, 1.5], "to": [2.75, 1.5], "stiffness": 1e7}
+
+
+def case_with(folder: Path, *ties, **tables):
+    (folder / "piers.json").write_text(BLOCKS, encoding="utf-8")
+    return case_of(PIERS | {"ties": list(ties)} | tables, folder / "case.toml")
+
+
+def ties_of(folder, *ties, **tables):
+    case = case_with(folder, *ties, **tables)
+    return case_ties(case, case_assembly(case))
+
+
+def plan(folder, *ties, **tables):
+    case = case_with(folder, *ties, **tables)
+    return planned(case, case_assembly(case))
+
+
+def refused(folder, *ties, **tables) -> str:
+    with pytest.raises(ValueError) as error:
+        plan(folder, *ties, **tables)
+    message = str(error.value)
+    assert "\n" not in message
+    assert str(folder / "case.toml") in message
+    return message
+
+
+def test_ends_are_held_by_the_blocks_at_their_points_by_named_ones_and_by_the_ground(tmp_path):
+    ground = {"name": "stay", "from": {"block": "right", "point": [2.75, 2.4]}, "to": {"fixed": [5.0, 0.0]}}
+    iron, stay = ties_of(tmp_path, TIE, ground | {"stiffness": 2e6, "kind": "bar", "phase": 1, "prestress": 10.0})
+    assert (iron.blocks, iron.points) == ((0, 1), ((0.25, 1.5), (2.75, 1.5)))
+    assert (iron.kind, iron.stiffness, iron.strength, iron.phase) == ("tie", 1e7, np.inf, 1)
+    assert (stay.blocks, stay.kind, stay.prestress) == ((1, None), "bar", 10.0)
+
+
+def test_area_and_modulus_give_the_stiffness(tmp_path):
+    section = {key: value for key, value in TIE.items() if key != "stiffness"} | {"area": 5e-4, "modulus": 2.1e11}
+    assert ties_of(tmp_path, section)[0].stiffness == pytest.approx(2.1e11 * 5e-4 / 2.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"to": [1.5, 1.5]}, "to (1.5, 1.5) m lies in no block; the nearest is 'left', 1 m away"),
+        ({"to": [2750, 1500]}, "(if it is in mm, write (2.75, 1.5): coordinates of a case are in m)"),
+        ({"to": [0.25, 0.5]}, "both ends are in the block 'left'"),
+        ({"to": {"block": "rihgt", "point": [0, 0]}}, "no block is called 'rihgt'"),
+        ({"from": {"fixed": [0, 1]}, "to": {"fixed": [1, 1]}}, "both ends are in the ground"),
+        ({"strength": -5.0}, "strength is -5; give a positive number"),
+        ({"kind": "prop", "to": [0.25, 1.5]}, "a prop has no length: both ends are at (0.25, 1.5)"),
+        ({"kind": "chain"}, "choose from tie, prop, bar"),
+        ({"area": 1e-4}, "stiffness and area or modulus are both given"),
+        ({"stiffness": None, "area": 1e-4}, "modulus is missing; give stiffness [N/m], or area [m²] and modulus [Pa]"),
+        ({"stiffness": None}, "stiffness is missing"),
+        ({"phase": 2}, "phase is 2, and there is one settlement"),
+        ({"prestress": 10.0, "strength": 5.0}, "prestress is 10 N, not below the strength of 5 N"),
+        ({"brittle": True}, "brittle is true, and no strength says"),
+        ({"to": None}, "to of 'iron' is missing; give a point [x, y]"),
+        ({"name": None}, "name is missing"),
+        ({"to": {"block": "right"}}, 'give [x, y], { block = "name", point = [x, y] } or { fixed = [x, y] }'),
+        ({"to": [2.75, 1.0, 1.5]}, "has three coordinates, and the blocks lie in the plane"),
+        ({"layer": "TIES", "from": None, "to": None}, "layer is 'TIES', which is not in [geometry] ties"),
+    ],
+)
+def test_what_cannot_be_a_tie_is_refused_in_a_line(tmp_path, change, words):
+    tie = {key: value for key, value in (TIE | change).items() if value is not None}
+    assert words in refused(tmp_path, tie)
+
+
+def test_a_name_used_twice_is_refused(tmp_path):
+    assert "[ties 2] name 'iron' is there twice" in refused(tmp_path, TIE, TIE)
+
+
+def test_analyses_that_know_no_ties_refuse_them(tmp_path):
+    live = {"kind": "live", "weight_fraction": [1.0, 0.0]}
+    said = refused(tmp_path, TIE, analysis={"kind": "limit load"}, loads=[live])
+    assert "ties are followed along a settlement" in said
+    assert 'increments = "linear program" knows none' in refused(
+        tmp_path, TIE, analysis={"increments": "linear program"}
+    )
+
+
+DXF = {"geometry": {"file": "piers.dxf", "ties": ["TIES"]}, "roles": {"GROUND": "fixed", "FOOTING": "moving"}}
+
+
+def drawing(folder, lines=(((0.25, 1.5), (2.75, 1.5)), ((0.5, 1.0), (2.5, 1.0)))):
+    """The piers as a drawing, with lines on the layer TIES, which reach over the outlines."""
+    ezdxf = pytest.importorskip("ezdxf")
+    document = ezdxf.new(setup=False)
+    document.header["$INSUNITS"] = 6
+    space = document.modelspace()
+    corners = re.findall(r"\[\[.*?\]\]", BLOCKS)
+    for outline, layer in zip(corners, ("STONE", "STONE", "GROUND", "FOOTING"), strict=True):
+        space.add_lwpolyline([tuple(p) for p in eval(outline)], close=True, dxfattribs={"layer": layer})
+    for points in lines:
+        if len(points) == 2:
+            space.add_line(*points, dxfattribs={"layer": "TIES"})
+        else:
+            space.add_lwpolyline(points, dxfattribs={"layer": "TIES"})
+    document.saveas(folder / "piers.dxf")
+
+
+OF_LAYER = {"layer": "TIES", "stiffness": 1e7, "strength": 1e4}
+
+
+def test_lines_on_a_layer_of_a_drawing_are_ties_and_no_joints(tmp_path):
+    drawing(tmp_path)
+    case = case_with(tmp_path, OF_LAYER, **DXF)
+    assembly = case_assembly(case)
+    assert assembly.n_blocks == 4
+    ties = case_ties(case, assembly)
+    assert [tie.name for tie in ties] == ["TIES 1", "TIES 2"]
+    assert [tie.points for tie in ties] == [((0.25, 1.5), (2.75, 1.5)), ((0.5, 1.0), (2.5, 1.0))]
+    assert {tie.strength for tie in ties} == {1e4}
+
+
+def test_lines_of_an_svg_are_ties(tmp_path):
+    paths = "".join(
+        f'<path d="M {" L ".join(f"{x},{-y}" for x, y in eval(outline))} Z"/>'
+        for outline in re.findall(r"\[\[.*?\]\]", BLOCKS)
+    )
+    (tmp_path / "piers.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" '
+        f'viewBox="-1 -3 6 4" data-blockvis-unit="m"><g inkscape:groupmode="layer" inkscape:label="STONE">{paths}</g>'
+        '<g inkscape:groupmode="layer" inkscape:label="TIES"><line x1="0.25" y1="-1.5" x2="2.75" y2="-1.5"/></g></svg>',
+        encoding="utf-8",
+    )
+    below = {"below": {"y": 0.0, "role": "moving"}}
+    case = case_with(tmp_path, OF_LAYER, geometry={"file": "piers.svg", "ties": "TIES"}, roles=below)
+    assembly = case_assembly(case)
+    (tie,) = case_ties(case, assembly)
+    assert assembly.n_blocks == 4
+    np.testing.assert_allclose(tie.points, [[0.25, 1.5], [2.75, 1.5]])
+
+
+@pytest.mark.parametrize(
+    ("lines", "geometry", "ties", "words"),
+    [
+        ([((0.25, 1.5), (1.5, 1.7), (2.75, 1.5))], {}, [OF_LAYER], "is bent; draw each tie as a straight line"),
+        ([((0.25, 1.5), (1.5, 1.5))], {}, [OF_LAYER], "'TIES 1' to (1.5, 1.5) m lies in no block; the nearest is"),
+        ([], {}, [OF_LAYER], "no line lies on the layer 'TIES'"),
+        ([], {}, [TIE], "names the layer 'TIES', and no [[ties]] says what its lines are"),
+        ([], {"file": "piers.json"}, [OF_LAYER], "ties are lines of a .dxf or .svg, and 'piers.json' has none"),
+    ],
+)
+def test_lines_that_cannot_be_ties_are_refused_in_a_line(tmp_path, lines, geometry, ties, words):
+    drawing(tmp_path, lines)
+    assert words in refused(tmp_path, *ties, **DXF | {"geometry": DXF["geometry"] | geometry})
