@@ -30,7 +30,10 @@ from solver.tolerances import CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLIN
 REACH = 0.25
 
 #: Non-associative flow: part of the new normal forces in the next program, and programs at most.
-RELAXATION, PROGRAMS = 0.9, 100
+RELAXATION, PROGRAMS = 0.9, 300
+
+#: Non-associative flow: programs after which the next one follows of so many changes, and part of the new forces then.
+PLAIN_PROGRAMS, REMEMBERED, ACCELERATED = 40, 15, 0.5
 
 #: Non-associative flow has converged when the multiplier changes by less than the first and shear forces exceed
 #: friction by less than the second, relative to the multiplier and to the largest normal force; the third in space,
@@ -96,7 +99,7 @@ def find_limit_load(
     the power of the loads is what friction takes: a complete solution for friction without dilatancy, never above the
     associative value. It is not proved to be the least: such a structure may have several limit loads, depending on how
     it was loaded, and may fall below this one. Its two values agree where it has converged, but are no bounds.
-    Convergence is not proved either; "not converged" says so and gives the last program.
+    Convergence is not proved either; "not converged" says so and gives the program that came nearest.
     """
     if flow not in ("associative", "non-associative"):
         raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
@@ -288,22 +291,29 @@ class _Problem:
         # Of equal ways to carry, those that press where nothing pressed come last.
         idle = normal <= CARRYING_FRACTION * normal.max(initial=0.0)
         change_cost = (CHANGE_COST if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
-        programs = 1
+        programs, normals, residuals = 1, [], []
+        nearest, least = None, np.inf
         for _ in range(PROGRAMS):
             state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
-            excess = _lengths(state.forces[:, 1:]) - self.friction * state.forces[:, 0] - self.cohesion
+            beyond = _lengths(state.forces[:, 1:]) - self.friction * state.forces[:, 0] - self.cohesion
+            excess = float(beyond.max(initial=0.0)) / largest
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
-            settled = float(excess.max(initial=0.0)) <= most_excess * largest and change <= MULTIPLIER_CHANGE
-            if settled and not state.falls:
-                status = found
+            error = np.inf if state.falls else max(excess, change)
+            settled = excess <= most_excess and change <= MULTIPLIER_CHANGE and not state.falls
+            if nearest is None or settled or error < least:
+                nearest, least, used = state, error, normal
+            if settled:
                 break
-            normal = (1.0 - RELAXATION) * normal + RELAXATION * state.forces[:, 0]
-            before = state
+            normals = [*normals[-REMEMBERED:], normal]
+            residuals = [*residuals[-REMEMBERED:], state.forces[:, 0] - normal]
+            normal, before = _next_normal(normals, residuals, programs), state
+        if least <= FRICTION_EXCESS:
+            status = found
         if status is found and not plane:
-            last = self._sliding(normal, balanced.unbalanced, 0.0 * change_cost)
-            state, programs = replace(state, velocity=last.velocity, gap=last.gap), programs + 1
-        return self.result(state, status, "non-associative", programs)
+            last = self._sliding(used, balanced.unbalanced, 0.0 * change_cost)
+            nearest, programs = replace(nearest, velocity=last.velocity, gap=last.gap), programs + 1
+        return self.result(nearest, status, "non-associative", programs)
 
     def _sliding(self, normal: np.ndarray, unbalanced: np.ndarray, change_cost: np.ndarray) -> _State:
         """One program of the sequence."""
@@ -375,6 +385,20 @@ class _Problem:
             torsion=POINTS if self.faces is None else UNIFORM,
             held=limit_state(self.pose, self.contacts, forces * self.force, self.friction, mechanism),
         )
+
+
+def _next_normal(normals: list[np.ndarray], residuals: list[np.ndarray], programs: int) -> np.ndarray:
+    """(n,) array: normal forces to try next, after so many programs by Anderson acceleration.
+
+    Anderson (1965), https://doi.org/10.1145/321296.321305: what the last changes did to the residuals says which
+    changes would take the present one away. It ends the cycles of vaults, which no constant relaxation does.
+    """
+    if programs <= PLAIN_PROGRAMS:
+        return np.asarray(normals[-1] + RELAXATION * residuals[-1])
+    changes, of_residuals = np.diff(normals, axis=0).T, np.diff(residuals, axis=0).T
+    parts = np.linalg.lstsq(of_residuals, residuals[-1], rcond=1e-10)[0]
+    moved = normals[-1] + ACCELERATED * residuals[-1] - (changes + ACCELERATED * of_residuals) @ parts
+    return np.asarray(np.maximum(moved, 0.0))
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:
