@@ -291,8 +291,9 @@ class _Problem:
         # Of equal ways to carry, those that press where nothing pressed come last.
         idle = normal <= CARRYING_FRACTION * normal.max(initial=0.0)
         change_cost = (CHANGE_COST if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
-        programs, normals, residuals = 1, [], []
-        nearest, least = None, np.inf
+        normals: list[np.ndarray] = []
+        residuals: list[np.ndarray] = []
+        nearest, least, used, programs = balanced, np.inf, normal, 1
         for _ in range(PROGRAMS):
             state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
@@ -301,7 +302,7 @@ class _Problem:
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
             error = np.inf if state.falls else max(excess, change)
             settled = excess <= most_excess and change <= MULTIPLIER_CHANGE and not state.falls
-            if nearest is None or settled or error < least:
+            if nearest is balanced or settled or error < least:
                 nearest, least, used = state, error, normal
             if settled:
                 break
