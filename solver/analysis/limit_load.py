@@ -292,7 +292,7 @@ class _Problem:
         idle = normal <= CARRYING_FRACTION * normal.max(initial=0.0)
         change_cost = (CHANGE_COST if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
         normals: list[np.ndarray] = []
-        residuals: list[np.ndarray] = []
+        answers: list[np.ndarray] = []
         nearest, least, used, programs = balanced, np.inf, normal, 1
         for _ in range(PROGRAMS):
             state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
@@ -307,8 +307,8 @@ class _Problem:
             if settled:
                 break
             normals = [*normals[-REMEMBERED:], normal]
-            residuals = [*residuals[-REMEMBERED:], state.forces[:, 0] - normal]
-            normal, before = _next_normal(normals, residuals, programs), state
+            answers = [*answers[-REMEMBERED:], state.forces[:, 0]]
+            normal, before = _next_normal(normals, answers, programs), state
         if least <= FRICTION_EXCESS:
             status = found
         if status is found and not plane:
@@ -388,17 +388,18 @@ class _Problem:
         )
 
 
-def _next_normal(normals: list[np.ndarray], residuals: list[np.ndarray], programs: int) -> np.ndarray:
-    """(n,) array: normal forces to try next, after so many programs by Anderson acceleration.
+def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs: int) -> np.ndarray:
+    """(n,) array: normal forces to try after those of the last programs and what these answered.
 
-    Anderson (1965), https://doi.org/10.1145/321296.321305: what the last changes did to the residuals says which
-    changes would take the present one away. It ends the cycles of vaults, which no constant relaxation does.
+    Anderson (1965), https://doi.org/10.1145/321296.321305, once a constant relaxation has not converged, as in vaults,
+    whose programs go in circles: what changes of the forces did to their error says which would take it away.
     """
     if programs <= PLAIN_PROGRAMS:
-        return np.asarray(normals[-1] + RELAXATION * residuals[-1])
-    changes, of_residuals = np.diff(normals, axis=0).T, np.diff(residuals, axis=0).T
-    parts = np.linalg.lstsq(of_residuals, residuals[-1], rcond=1e-10)[0]
-    moved = normals[-1] + ACCELERATED * residuals[-1] - (changes + ACCELERATED * of_residuals) @ parts
+        return np.asarray((1.0 - RELAXATION) * normals[-1] + RELAXATION * answers[-1])
+    errors = np.subtract(answers, normals)
+    changes, of_errors = np.diff(normals, axis=0).T, np.diff(errors, axis=0).T
+    parts = np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
+    moved = normals[-1] + ACCELERATED * errors[-1] - (changes + ACCELERATED * of_errors) @ parts
     return np.asarray(np.maximum(moved, 0.0))
 
 
