@@ -318,26 +318,12 @@ class _Problem:
 
     def _sliding(self, normal: np.ndarray, unbalanced: np.ndarray, change_cost: np.ndarray) -> _State:
         """One program of the sequence."""
-        found = solve_without_dilatancy(
-            self.matrix,
-            self.dead,
-            self.live,
-            unbalanced,
-            self.cohesion + self.friction * normal,
-            self.crushing,
-            self.price,
-            normal,
-            change_cost,
+        bound, loads = self.cohesion + self.friction * normal, (self.dead, self.live, unbalanced)
+        forces, multiplier, left, solution = solve_without_dilatancy(
+            self.matrix, *loads, bound, self.crushing, self.price, normal, change_cost
         )
-        return _State(
-            found.forces,
-            found.multiplier,
-            -found.solution.row_dual[: len(self.dead)],
-            unbalanced,
-            found.solution.gap,
-            found.unbalanced > FALLING_FRACTION * float(np.abs(self.dead).sum()),
-            self.cohesion + self.friction * normal,
-        )
+        velocity, falls = -solution.row_dual[: len(self.dead)], left > FALLING_FRACTION * float(np.abs(self.dead).sum())
+        return _State(forces, multiplier, velocity, unbalanced, solution.gap, falls, bound)
 
     def result(self, state: _State, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
         """The state in metres and newtons, its bounds and its certificate recomputed from it."""
