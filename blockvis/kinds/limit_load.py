@@ -41,7 +41,8 @@ TORSIONS = ("points", "uniform")
 
 #: What a limit load that has not converged is worth.
 UNPROVED = (
-    ': the value is that of the last program and no limit load; flow = "associative" gives a proved upper bound of it'
+    ": the value is that of the program that came nearest and no limit load; "
+    'flow = "associative" gives a proved upper bound of it'
 )
 
 #: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the

@@ -1,4 +1,4 @@
-"""How exact a run is: the same path with half the error that its steps aim for."""
+"""How exact a run is: the same path with half the error that its steps aim for, where they part with a quarter, too."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ LOOK, WORTH_A_WORD = 0.2, 2.0
 
 @dataclass(frozen=True)
 class StepCheck:
-    """How far a run and another with half the step tolerance are apart.
+    """How far a run and others with half and a quarter of the step tolerance are apart.
 
     Attributes
     ----------
@@ -51,11 +51,11 @@ class StepCheck:
     unit : str
         Of the parameter.
     collapse : float
-        Difference of the displacements at collapse, as a fraction; nan unless both collapse.
+        Largest difference of the displacements at collapse, as a fraction; nan unless all collapse.
     position : float [m]
         Largest distance between the two places of a block at the same parameter.
     stop, stop_of_check : str
-        How both ended.
+        How the run ended, and the first of the others that ended otherwise.
     """
 
     what: str
@@ -94,6 +94,11 @@ class StepCheck:
         return f"error of the steps: {', '.join(parts)}"
 
     @property
+    def parts(self) -> bool:
+        """Whether two runs that collapse took different ways: that they do so together may be chance."""
+        return self.error > NOTABLE and not np.isnan(self.collapse)
+
+    @property
     def warning(self) -> str:
         """What there is to say where the difference matters; nothing where it does not."""
         if self.error <= NOTABLE and self.stop == self.stop_of_check:
@@ -117,7 +122,8 @@ class StepChecking:
     """
 
     def __init__(self, case: Case, folder: Path | None = None) -> None:
-        self._other = OnceMore(_finer(case), folder)
+        self._case, self._folder = case, folder
+        self._other = OnceMore(_finer(case, 0.5), folder)
 
     def compared(
         self,
@@ -142,18 +148,32 @@ class StepChecking:
         ------
         TimeoutError
         """
-        began, reported = time.monotonic(), False
+        began = time.monotonic()
+        half = self._found(began, patience, waiting)
+        if half is None:
+            return None
+        check = compared(response, half)
+        if check.parts:
+            self.close()
+            self._other = OnceMore(_finer(self._case, 0.25), self._folder)
+            quarter = None
+            with contextlib.suppress(TimeoutError):
+                quarter = self._found(began, patience, lambda: None)
+            check = replace(check, collapse=np.nan) if quarter is None else compared(response, half, quarter)
+        return _written(Path(folder), check)
+
+    def _found(self, began: float, patience: float | None, waiting: Callable[[], None]) -> Traced | None:
+        """Wait for the path that the process follows."""
+        reported = False
         while True:
             with contextlib.suppress(TimeoutError):
-                other = self._other.found(LOOK)
-                break
+                return self._other.found(LOOK)
             waited = time.monotonic() - began
             if patience is not None and waited > patience:
                 raise TimeoutError(f"the same path in shorter steps takes longer than {patience:.0f} s more")
             if waited > WORTH_A_WORD and not reported:
                 waiting()
                 reported = True
-        return None if other is None else _written(Path(folder), compared(response, other))
 
     def close(self) -> None:
         """End the process."""
@@ -175,7 +195,7 @@ def stored_case(folder: Path) -> Case:
 
 
 def check_steps(folder: str | Path) -> StepCheck:
-    """Follow the run of a results folder again with half the step tolerance, compare, and write what comes out.
+    """Follow the run of a results folder again in shorter steps, compare, and write what comes out.
 
     ``step_check.json`` has the differences, ``step_error`` in ``summary.json`` the errors that follow of them.
 
@@ -197,7 +217,11 @@ def check_steps(folder: str | Path) -> StepCheck:
             f"'{folder}' has no path whose steps could be checked ({response.analysis}, {len(response.path)} "
             f"increments{by}); it takes a settlement or a pushover"
         )
-    return _written(folder, compared(response, followed(_finer(case), response.assembly)))
+    half = followed(_finer(case, 0.5), response.assembly)
+    check = compared(response, half)
+    if check.parts:
+        check = compared(response, half, followed(_finer(case, 0.25), response.assembly))
+    return _written(folder, check)
 
 
 def stored_check(folder: Path) -> StepCheck | None:
@@ -209,9 +233,9 @@ def stored_check(folder: Path) -> StepCheck | None:
     return StepCheck(**{**known, "collapse": np.nan if known["collapse"] is None else known["collapse"]})
 
 
-def _finer(case: Case) -> Case:
-    """Make the same case with half the error that its steps aim for."""
-    return replace(case, controls=replace(case.controls, step_tolerance=0.5 * case.controls.step_tolerance))
+def _finer(case: Case, part: float) -> Case:
+    """Make the same case with a part of the error that its steps aim for."""
+    return replace(case, controls=replace(case.controls, step_tolerance=part * case.controls.step_tolerance))
 
 
 def _percent(part: float | None) -> str:
@@ -233,33 +257,35 @@ def _written(folder: Path, check: StepCheck) -> StepCheck:
     return check
 
 
-def compared(response: solver.Response, other: Traced) -> StepCheck:
-    """Compare a run with another of shorter steps.
+def compared(response: solver.Response, *others: Traced) -> StepCheck:
+    """Compare a run with others of shorter steps.
 
     Parameters
     ----------
     response : solver.Response
-    other : Traced
+    others : Traced
         Of the same case.
     """
     ours = traced(response)
-    mine, others = ours.same_places(other)
-    a, b = ours.measured[mine], other.measured[others]
     first = LEAST_REACTION * np.abs(ours.measured[:1]).max(initial=0.0)
-    apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), first), np.finfo(float).tiny)
-    worst = int(np.argmax(apart)) if len(apart) else None
-    moved = np.linalg.norm(ours.positions[mine] - other.positions[others], axis=2)
-    collapse = np.nan
-    if ours.collapse is not None and other.collapse is not None and ours.collapse > 0.0:
-        collapse = abs(other.collapse - ours.collapse) / ours.collapse
+    difference = at = position = 0.0
+    for other in others:
+        mine, theirs = ours.same_places(other)
+        a, b = ours.measured[mine], other.measured[theirs]
+        apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), first), np.finfo(float).tiny)
+        if apart.max(initial=0.0) > difference:
+            difference, at = float(apart.max()), float(ours.parameters[mine[np.argmax(apart)]])
+        moved = np.linalg.norm(ours.positions[mine] - other.positions[theirs], axis=2)
+        position = max(position, float(moved.max(initial=0.0)))
+    ends = np.array([np.nan if path.collapse is None else path.collapse for path in (ours, *others)])
     driver = response.settlements[-1] if response.control is None and response.settlements else None
     return StepCheck(
         what=response.measured.name,
-        difference=0.0 if worst is None else float(apart[worst]),
-        at=0.0 if worst is None else float(ours.parameters[mine[worst]]),
+        difference=difference,
+        at=at,
         unit=response.parameter.unit if driver is None else driver.unit,
-        collapse=collapse,
-        position=float(moved.max(initial=0.0)),
+        collapse=float(np.max(ends) - np.min(ends)) / float(ends[0]) if ends[0] > 0.0 else np.nan,
+        position=position,
         stop=ours.stop,
-        stop_of_check=other.stop,
+        stop_of_check=next((path.stop for path in others if path.stop != ours.stop), ours.stop),
     )

@@ -43,7 +43,10 @@ from solver.tolerances import CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLIN
 REACH = 0.25
 
 #: Non-associative flow: part of the new normal forces in the next program, and programs at most.
-RELAXATION, PROGRAMS = 0.9, 100
+RELAXATION, PROGRAMS = 0.9, 300
+
+#: Non-associative flow: programs after which the next one follows of so many changes, and part of the new forces then.
+PLAIN_PROGRAMS, REMEMBERED, ACCELERATED = 40, 15, 0.5
 
 #: Non-associative flow has converged when the multiplier changes by less than the first and shear forces exceed
 #: friction by less than the second, relative to the multiplier and to the largest normal force; the third in space,
@@ -111,7 +114,7 @@ def find_limit_load(
     the power of the loads is what friction takes: a complete solution for friction without dilatancy, never above the
     associative value. It is not proved to be the least: such a structure may have several limit loads, depending on how
     it was loaded, and may fall below this one. Its two values agree where it has converged, but are no bounds.
-    Convergence is not proved either; "not converged" says so and gives the last program.
+    Convergence is not proved either; "not converged" says so and gives the program that came nearest.
     """
     if flow not in ("associative", "non-associative"):
         raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
@@ -321,45 +324,39 @@ class _Problem:
         # Of equal ways to carry, those that press where nothing pressed come last.
         idle = normal <= CARRYING_FRACTION * normal.max(initial=0.0)
         change_cost = (CHANGE_COST if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
-        programs = 1
+        normals: list[np.ndarray] = []
+        answers: list[np.ndarray] = []
+        nearest, least, used, programs = balanced, np.inf, normal, 1
         for _ in range(PROGRAMS):
             state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
-            excess = _lengths(state.forces[:, 1:]) - self.friction * state.forces[:, 0] - self.cohesion
+            beyond = _lengths(state.forces[:, 1:]) - self.friction * state.forces[:, 0] - self.cohesion
+            excess = float(beyond.max(initial=0.0)) / largest
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
-            settled = float(excess.max(initial=0.0)) <= most_excess * largest and change <= MULTIPLIER_CHANGE
-            if settled and not state.falls:
-                status = found
+            error = np.inf if state.falls else max(excess, change)
+            settled = excess <= most_excess and change <= MULTIPLIER_CHANGE and not state.falls
+            if nearest is balanced or settled or error < least:
+                nearest, least, used = state, error, normal
+            if settled:
                 break
-            normal = (1.0 - RELAXATION) * normal + RELAXATION * state.forces[:, 0]
-            before = state
+            normals = [*normals[-REMEMBERED:], normal]
+            answers = [*answers[-REMEMBERED:], state.forces[:, 0]]
+            normal, before = _next_normal(normals, answers, programs), state
+        if least <= FRICTION_EXCESS:
+            status = found
         if status is found and not plane:
-            last = self._sliding(normal, balanced.unbalanced, 0.0 * change_cost)
-            state, programs = replace(state, velocity=last.velocity, gap=last.gap), programs + 1
-        return self.result(state, status, "non-associative", programs)
+            last = self._sliding(used, balanced.unbalanced, 0.0 * change_cost)
+            nearest, programs = replace(nearest, velocity=last.velocity, gap=last.gap), programs + 1
+        return self.result(nearest, status, "non-associative", programs)
 
     def _sliding(self, normal: np.ndarray, unbalanced: np.ndarray, change_cost: np.ndarray) -> _State:
         """One program of the sequence."""
-        found = solve_without_dilatancy(
-            self.matrix,
-            self.dead,
-            self.live,
-            unbalanced,
-            self.cohesion + self.friction * normal,
-            self.crushing,
-            self.price,
-            normal,
-            change_cost,
+        bound, loads = self.cohesion + self.friction * normal, (self.dead, self.live, unbalanced)
+        forces, multiplier, left, solution = solve_without_dilatancy(
+            self.matrix, *loads, bound, self.crushing, self.price, normal, change_cost
         )
-        return _State(
-            found.forces,
-            found.multiplier,
-            -found.solution.row_dual[: len(self.dead)],
-            unbalanced,
-            found.solution.gap,
-            found.unbalanced > FALLING_FRACTION * float(np.abs(self.dead).sum()),
-            self.cohesion + self.friction * normal,
-        )
+        velocity, falls = -solution.row_dual[: len(self.dead)], left > FALLING_FRACTION * float(np.abs(self.dead).sum())
+        return _State(forces, multiplier, velocity, unbalanced, solution.gap, falls, bound)
 
     def result(self, state: _State, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
         """The state in metres and newtons, its bounds and its certificate recomputed from it."""
@@ -414,6 +411,21 @@ class _Problem:
         between = ~is_member(self.contacts)
         state = limit_state(self.pose, self.contacts[between], forces[between], self.friction[between], mechanism)
         return replace(state, ties=plastic_forces(self.ties, self.assembly, self.pose, self.contacts, forces))
+
+
+def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs: int) -> np.ndarray:
+    """(n,) array: normal forces to try after those of the last programs and what these answered.
+
+    Anderson (1965), https://doi.org/10.1145/321296.321305, once a constant relaxation has not converged, as in vaults,
+    whose programs go in circles: what changes of the forces did to their error says which would take it away.
+    """
+    if programs <= PLAIN_PROGRAMS:
+        return np.asarray((1.0 - RELAXATION) * normals[-1] + RELAXATION * answers[-1])
+    errors = np.subtract(answers, normals)
+    changes, of_errors = np.diff(normals, axis=0).T, np.diff(errors, axis=0).T
+    parts = np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
+    moved = normals[-1] + ACCELERATED * errors[-1] - (changes + ACCELERATED * of_errors) @ parts
+    return np.asarray(np.maximum(moved, 0.0))
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:

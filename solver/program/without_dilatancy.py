@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -12,25 +10,6 @@ from solver.programs.solve import solve_between
 
 #: Cost of unbalanced force, in multipliers, above that of any mechanism.
 UNBALANCED_COST = 1e3
-
-
-@dataclass(frozen=True)
-class FlowSolution:
-    """Solution of the program, in its units.
-
-    Attributes
-    ----------
-    forces : (n, d) array
-    multiplier : float
-    unbalanced : float
-        Largest unbalanced force.
-    solution : Solution
-    """
-
-    forces: np.ndarray
-    multiplier: float
-    unbalanced: float
-    solution: Solution
 
 
 def solve_without_dilatancy(
@@ -43,7 +22,7 @@ def solve_without_dilatancy(
     normal_cost: np.ndarray,
     normal: np.ndarray,
     change_cost: np.ndarray,
-) -> FlowSolution:
+) -> tuple[np.ndarray, float, float, Solution]:
     """Maximise α with |T| ≤ B; where changes cost, take of equal α the normal forces nearest to N⁰.
 
     Parameters
@@ -58,6 +37,13 @@ def solve_without_dilatancy(
         N⁰.
     change_cost : (n,) array
         Cost of a change of each normal force, in multipliers.
+
+    Returns
+    -------
+    forces : (n, d) array
+    multiplier, unbalanced : float
+        α, and the largest unbalanced force.
+    solution : Solution
 
     Notes
     -----
@@ -104,4 +90,4 @@ def solve_without_dilatancy(
     forces = np.column_stack([x[first : first + n], forces[:, int(size > 2) :]])
     multiplier = first + 3 * n
     unbalanced = x[multiplier + 1 : multiplier + 1 + 2 * rows]
-    return FlowSolution(forces, float(x[multiplier]), float(unbalanced.max(initial=0.0)), solution)
+    return forces, float(x[multiplier]), float(unbalanced.max(initial=0.0)), solution

@@ -197,6 +197,39 @@ def test_where_the_reaction_is_next_to_nothing_it_is_compared_with_a_part_of_the
     assert (check.difference, check.at) == (pytest.approx(0.02), pytest.approx(0.2))
 
 
+class OneAfterAnother:
+    """Other paths, each at once."""
+
+    paths = ()
+
+    def __init__(self, *_):
+        self.path, OneAfterAnother.paths = OneAfterAnother.paths[0], OneAfterAnother.paths[1:]
+
+    def found(self, seconds):
+        if self.path is None:
+            raise TimeoutError
+        return self.path
+
+    def close(self):
+        pass
+
+
+@pytest.mark.parametrize(("reaction", "third", "told"), [(1.3, 0.27, 0.2), (1.3, None, None), (1.001, None, 0.0)])
+def test_where_two_runs_part_a_third_says_by_how_much_collapses_differ(
+    tmp_path, monkeypatch, settled, reaction, third, told
+):
+    fallen = replace(settled, collapse=SimpleNamespace(displacement=0.3))
+    half = traced(fallen)
+    half.measured[1] *= reaction
+    quarter = None if third is None else replace(traced(fallen), collapse=third)
+    monkeypatch.setattr(step_check, "OnceMore", OneAfterAnother)
+    OneAfterAnother.paths = (half, quarter)
+    (tmp_path / "summary.json").write_text("{}", encoding="utf-8")
+    check = StepChecking(case_from(SHORT, tmp_path)).compared(tmp_path, fallen, 0.0)
+    assert check.step_error["collapse"] == (None if told is None else pytest.approx(told))
+    assert check.step_error["reaction"] == pytest.approx(2.0 * (reaction - 1.0))
+
+
 class Late:
     """Another path that does not come."""
 

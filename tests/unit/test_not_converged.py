@@ -1,7 +1,10 @@
 """A limit load that has not converged says what to do."""
 
+import numpy as np
 import pytest
 
+import solver
+from blockvis import generators
 from blockvis.cli import main
 
 CASE = """
@@ -26,3 +29,19 @@ def test_the_upper_bound_is_named(tmp_path, monkeypatch, capsys):
     (said,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("status"))
     assert "not converged" in said
     assert 'flow = "associative" gives a proved upper bound' in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("friction", "direction"), [(0.7, (1.0, 0.0, 0.0)), (0.45, (0.7, 0.7, 0.0))])
+def test_a_cross_vault_whose_programs_go_in_circles_is_accelerated_to_a_limit_load(friction, direction):
+    """A complete solution: in equilibrium, within friction, and the power of the loads is what friction takes."""
+    vault = generators.cross_vault(span=4.0, rise=1.5, thickness=0.3, voussoirs=5, stone=3.0)
+    live = solver.weight_fraction(vault, direction, np.flatnonzero(vault.free))
+    loads = solver.Loads(solver.self_weight(vault).dead, live)
+    associative = solver.limit_load(vault, loads=loads, friction_coefficient=friction)
+    limit = solver.limit_load(vault, loads=loads, friction_coefficient=friction, flow="non-associative")
+    assert limit.status is solver.LimitStatus.FOUND
+    assert 0.5 * associative.multiplier < limit.multiplier < associative.multiplier
+    assert abs(limit.gap) < 1e-5
+    assert limit.certificate.friction_excess < 1e-7
+    assert limit.certificate.equilibrium_residual < 1e-9
