@@ -13,27 +13,35 @@ import numpy as np
 ITERATIONS = 60
 
 
+def inner(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(n,) array: inner products of columns; row by row, as numpy's sum along the first axis is four times as slow."""
+    out = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        out += x * y
+    return np.asarray(out)
+
+
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(d, n) array: the product of the algebra, (a·b, a₀ b + b₀ a)."""
-    return np.concatenate([(a * b).sum(axis=0)[None], a[0] * b[1:] + b[0] * a[1:]])
+    return np.concatenate([inner(a, b)[None], a[0] * b[1:] + b[0] * a[1:]])
 
 
 def quotient(c: np.ndarray, a: np.ndarray) -> np.ndarray:
     """(d, n) array: what a has to be multiplied by to give c."""
-    first = (a[0] * c[0] - (a[1:] * c[1:]).sum(axis=0)) / determinant(a)
+    first = (a[0] * c[0] - inner(a[1:], c[1:])) / determinant(a)
     return np.concatenate([first[None], (c[1:] - first * a[1:]) / a[0]])
 
 
 def determinant(a: np.ndarray) -> np.ndarray:
     """(n,) array: a₀² - |a|², written so that little cancels, and not zero, so that the scaling stays finite."""
-    size = np.sqrt((a[1:] ** 2).sum(axis=0))
+    size = np.sqrt(inner(a[1:], a[1:]))
     return np.maximum((a[0] - size) * (a[0] + size), 1e-26 * a[0] ** 2)
 
 
 def longest_step(a: np.ndarray, change: np.ndarray) -> float:
     """Largest part of a change that stays inside the cones, infinite where none leaves them."""
-    square = change[0] ** 2 - (change[1:] ** 2).sum(axis=0)
-    half_slope = a[0] * change[0] - (a[1:] * change[1:]).sum(axis=0)
+    square = change[0] ** 2 - inner(change[1:], change[1:])
+    half_slope = a[0] * change[0] - inner(a[1:], change[1:])
     constant = determinant(a)
     root = np.sqrt(np.maximum(half_slope**2 - square * constant, 0.0))
     # The smallest positive root of square t² + 2 half t + room, where there is one.
@@ -61,7 +69,7 @@ class Scaling:
     def __init__(self, u: np.ndarray, z: np.ndarray) -> None:
         size_u, size_z = np.sqrt(determinant(u)), np.sqrt(determinant(z))
         a, b = u / size_u, z / size_z
-        half_slope = np.sqrt(0.5 * (1.0 + (a * b).sum(axis=0)))
+        half_slope = np.sqrt(0.5 * (1.0 + inner(a, b)))
         self.w = np.concatenate([(b[0] + a[0])[None], b[1:] - a[1:]]) / (2.0 * half_slope)
         self.square = size_z / size_u
         self.size = np.sqrt(self.square)
@@ -76,7 +84,7 @@ class Scaling:
         return self._transformed(z, -1.0) / self.size
 
     def _transformed(self, a: np.ndarray, sign: float) -> np.ndarray:
-        along = (self.w[1:] * a[1:]).sum(axis=0)
+        along = inner(self.w[1:], a[1:])
         rest = a[1:] + (sign * a[0] + along / (1.0 + self.w[0])) * self.w[1:]
         return np.concatenate([(self.w[0] * a[0] + sign * along)[None], rest])
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .cones import ITERATIONS, Scaling, longest_step, product, quotient
+from .cones import ITERATIONS, Scaling, inner, longest_step, product, quotient
 from .problem import ContactProblem, NotSolved, StepSolution
 
 #: Mean product and residual of the geometry, as parts of the movement, and force out of balance, in block weights, at
@@ -109,7 +109,7 @@ class _Iterate:
         # (isotropic I + 2 η² w wᵀ)⁻¹ = (I - reduction w wᵀ) / isotropic
         axis, curvature = self.scaling.w[1:].T, 2.0 * self.scaling.square
         isotropic = p.compliance[self.rough, 1] + self.scaling.square
-        reduction = curvature / (isotropic + curvature * (axis**2).sum(axis=1))
+        reduction = curvature / (isotropic + curvature * inner(axis.T, axis.T))
         self.shear_stiffness = np.eye(d - 1) - reduction[:, None, None] * axis[:, :, None] * axis[:, None, :]
         self.shear_stiffness /= isotropic[:, None, None]
         stiffness = np.zeros((len(p.gap), d, d))
@@ -143,7 +143,7 @@ class _Iterate:
         opening = relative[:, 0] + p.compliance[:, 0] * normal - self.gap_error
         opening[limited] += yielding
         shear[1:] = shear_of(slip_target - relative[self.rough, 1:].T)
-        first = target[0] - 2.0 * scaling.square * scaling.w[0] * (scaling.w[1:] * shear[1:]).sum(axis=0)
+        first = target[0] - 2.0 * scaling.square * scaling.w[0] * inner(scaling.w[1:], shear[1:])
         slide = relative[self.rough, 1:].T + p.compliance[self.rough, 1] * shear[1:] - self.slip_error
         return _Change(motion, multiplier, normal, opening, yielding, shear, np.concatenate([first[None], slide]))
 

@@ -28,6 +28,9 @@ from .stepping import StepError, Stepper
 #: First, longest and shortest step, as movements of the supports in block sizes; the first is accepted at any error.
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-5, 0.02, 1e-11
 
+#: Error of a step, in errors aimed for, below which nothing but hinges turn, and the longest step there.
+CALM, CALM_STEP = 0.1, 0.05
+
 #: Changes in a step, per relative error of the reaction: of friction bounds, in weights of the structure, and of
 #: movements, in block sizes, as measured on sliding walls.
 LAG_PER_ERROR, TURN_PER_ERROR = 20.0, 2.0
@@ -358,7 +361,8 @@ class Path:
         if grow <= 1.0:
             return max(grow * length, min(length, FIRST_STEP * unit))
         # A step that was cut at its target does not shorten the next.
-        return min(LONGEST_STEP * unit, max(step if length < 0.99 * step else 0.0, grow * length))
+        longest = CALM_STEP if measure < CALM else LONGEST_STEP
+        return min(longest * unit, max(step if length < 0.99 * step else 0.0, grow * length))
 
     def _is_on_path(self, new: Place, error: StepError, length: float, refining: bool) -> bool:
         """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""

@@ -196,17 +196,19 @@ class Stepper:
         vanished = np.flatnonzero(~kept & carried)
         is_new = ~same
         if len(vanished):
-            apart = np.linalg.norm(before.points[vanished][:, None] - contacts.points[None], axis=2)
+            n_blocks = self.model.assembly.n_blocks
             one, other = (
-                np.sort(np.stack([c.block_a[k], c.block_b[k]], axis=1), axis=1)
+                np.minimum(c.block_a[k], c.block_b[k]) * n_blocks + np.maximum(c.block_a[k], c.block_b[k])
                 for c, k in ((before, vanished), (contacts, slice(None)))
             )
-            apart = np.where((one[:, None] == other[None]).all(axis=2), apart, np.inf)
-            least = apart.min(axis=1)
-            near = (apart <= least[:, None] + 1e-6 * self.model.length) & (apart < 1e-2 * self.model.length)
+            row, successor = np.nonzero(one[:, None] == other[None])
+            apart = np.linalg.norm(before.points[vanished[row]] - contacts.points[successor], axis=1)
+            least = np.full(len(vanished), np.inf)
+            np.minimum.at(least, row, apart)
+            near = (apart <= least[row] + 1e-6 * self.model.length) & (apart < 1e-2 * self.model.length)
             # Equally near ones share them, so that their order does not matter.
-            row, successor = np.nonzero(near)
-            part, vanished = 1.0 / near.sum(axis=1)[row], vanished[row]
+            row, successor = row[near], successor[near]
+            part, vanished = 1.0 / np.bincount(row, minlength=1)[row], vanished[row]
             sense = np.where(before.block_a[vanished] == contacts.block_a[successor], 1.0, -1.0)
             vectors = np.einsum("nji,nj->ni", before.frames[vanished], place.forces[vanished]) * sense[:, None]
             passed = np.einsum("nij,nj->ni", contacts.frames[successor], vectors)

@@ -43,6 +43,8 @@ LOOSER = dict.fromkeys(
     # Friction bounds that follow carry rounding on: 5e-9 between the kernels, 3e-8 between two versions.
     "arch_pushed_after_settlement": 1e-6,
     "arch_friction": 1e-6,
+    # Hinges have no memory, but blocks are retarded by what they moved in the step before: 2e-7 by longer calm steps.
+    "semicircular_arch": 1e-6,
     # In space: 1e-3 between the kernels.
     "corner_of_walls": 5e-3,
     "cross_vault_corner": 2e-3,

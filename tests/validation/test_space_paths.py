@@ -7,6 +7,7 @@ plane. The dome's values are those of its lune, which is an arch: 8 lunes of 6 s
 
 import math
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -102,6 +103,17 @@ def test_extruded_arches_are_those_of_the_plane(voussoirs, direction, expected):
     for s in shared:
         one, other = (next(i for i in r.path if i.parameter == s) for r in (flat, solid))
         assert other.reaction / per_metre == pytest.approx(one.reaction, rel=5e-6)
+
+
+def test_sparse_factors_give_what_those_of_a_band_give(monkeypatch):
+    spreads = solver.Settlement(direction=(1, 0, 0), increment=0.01, limit=0.01)
+    by_band = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
+    # The wrapped function keeps no pattern.
+    unkept = import_module("solver.contact_step.stiffness")._pattern.__wrapped__
+    monkeypatch.setattr("solver.contact_step.stiffness._pattern", unkept)
+    monkeypatch.setattr("solver.contact_step.stiffness.WIDE", 0.0)
+    sparse = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
+    assert sparse.path[-1].reaction == pytest.approx(by_band.path[-1].reaction, rel=1e-9)
 
 
 @pytest.mark.slow
