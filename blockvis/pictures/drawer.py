@@ -19,6 +19,7 @@ from blockvis.text import force_text, rounded_length, width_text
 from solver import mechanics
 
 from . import palette
+from .backfill import fill_bodies
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, matters
 from .flat_scene import FlatScene
 from .frame import ColourBar, Frame, Key, Sheet, framed, write_labels
@@ -205,7 +206,8 @@ class Drawer:
             self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         self._arrow = ARROW_IN_SPACE * float(frame.size.max())
-        ends = np.concatenate([self.live.tails, *self._arrow_tips(extra)])
+        heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
+        ends = np.concatenate([self.live.tails, heads, *self._arrow_tips(extra)])
         if self._plane is not None:
             ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
         frame = frame.holding(self._projected(ends))
@@ -342,6 +344,8 @@ class Drawer:
         """
         increment = self._shown(increment)
         shown = self._drawn_at or magnified(self.assembly, increment.pose, self.look.magnification)
+        if self.response.changes:
+            self.scene.hide(increment.removed)
         self.scene.pose(shown, self._block_colours(increment.pose, increment))
         dots = np.zeros((0, self.assembly.dimension))
         if blocks_only:
@@ -352,6 +356,8 @@ class Drawer:
             self._draw_bearings(shown)
             self._draw_settlement(increment, shown)
             self._draw_live_load(increment, shown)
+            if self.response.loads.fills:
+                self.scene.backfill(fill_bodies(self.response, shown, increment.fallen))
         falling = increment.status == solver.Status.FALLING
         failed = self.response.stop == solver.Status.SOLVER_FAILED
         head, detail = caption_of(self.response, increment, self.look.magnification)
@@ -426,6 +432,11 @@ class Drawer:
             keys = self._keys_of_tints() + self._keys_of_joints() + self._keys_of_forces()
             if not self._flat and self.response.settlements and self.assembly.moving.any():
                 keys.append(Key("area", "moving support", palette.MOVING))
+            if self.response.loads.fills:
+                kind = "area" if self._flat else "line"
+                keys.append(
+                    Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",))
+                )
             if self.live.largest > 0.0:
                 keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
             if self._drawn_at is not None:

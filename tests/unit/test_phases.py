@@ -143,7 +143,10 @@ def test_a_run_goes_on_across_a_removal_bit_for_bit() -> None:
     ],
 )
 def test_a_change_that_cannot_be_is_refused_in_one_line(more: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match=words) as error:
+    def run() -> None:
         case = case_of(CASE | more, Path("case.toml"))
         planned(case, case_assembly(case))
+
+    with pytest.raises(ValueError, match=words) as error:
+        run()
     assert "\n" not in str(error.value)
