@@ -81,12 +81,6 @@ def backfills(entries: Sequence[BackfillCase], assembly: solver.Assembly, source
     return tuple(_fill(entry, assembly, f"{source}: [{entry.where}]") for entry in entries)
 
 
-def fill_weight(fills: Sequence[solver.Backfill], assembly: solver.Assembly) -> float:
-    """Sum the weight of the columns of fill over the blocks as drawn [N]."""
-    drawn = solver.Pose.initial(assembly)
-    return float(sum(-fill.load(assembly, drawn)[:, assembly.dimension - 1].sum() for fill in fills))
-
-
 def _fill(entry: BackfillCase, assembly: solver.Assembly, where: str) -> solver.Backfill:
     pieces, block = extrados(assembly, _chosen(entry, assembly, where), entry.surface)
     if not len(pieces):

@@ -12,6 +12,9 @@ import solver
 #: Distance of hatch lines, in extents of the fill.
 SPACING = 0.02
 
+#: Width of a joint that parts no body in space, in extents of the fill.
+GAPING = 0.02
+
 #: Pieces this near to each other in plan, in extents of the fill, are one body.
 SAME_BODY = 1e-6
 
@@ -66,9 +69,13 @@ class FillBodies:
             feet = self.feet[self.tops == top]
             plans = shapely.polygons(feet[:, :, :2])
             whole = shapely.union_all(plans[shapely.area(plans) > 0.0], grid_size=SAME_BODY * self._extent)
+            # Over a joint that gapes the fill is one body.
+            reach = GAPING * self._extent
+            whole = shapely.buffer(whole, reach, join_style="mitre")
+            whole = shapely.buffer(whole, -reach, join_style="mitre").simplify(0.1 * reach)
             for polygon in shapely.get_parts(whole):
                 for ring in (polygon.exterior, *polygon.interiors):
-                    plan = np.array(ring.simplify(SAME_BODY * self._extent).coords)
+                    plan = np.array(ring.coords)
                     level = np.column_stack([plan, np.full(len(plan), top)])
                     lines.append(np.stack([level[:-1], level[1:]], axis=1))
                     lines.append(self._uprights(level[:-1], feet.reshape(-1, 3)))
