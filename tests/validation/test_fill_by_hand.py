@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import solver
-from blockvis.case_files.read import read_case
-from blockvis.cases.backfill import BackfillCase, backfills
-from blockvis.cases.build import case_assembly
-from blockvis.runs.plan import planned
+from blockvis import generators, lay_backfill
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 DENSITY, UNIT_WEIGHT, SURFACE, COEFFICIENT = 2000.0, 18000.0, 2.5, 0.2
 #: Places, half the weight each, at which a quadratic is summed exactly.
 GAUSS = 0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0)
@@ -36,16 +30,19 @@ def prism(outline: np.ndarray) -> tuple[np.ndarray, list[list[int]]]:
 
 def two_block_arch(dimension: int) -> solver.Assembly:
     outlines = [HALF, mirrored(HALF), GROUND, mirrored(GROUND)]
-    labels = {"names": ["left", "right", "ground", "moving"], "roles": ["free", "free", "fixed", "moving"]}
+    labels = {"names": ["left half", "right half", "ground", "moving"], "roles": ["free", "free", "fixed", "moving"]}
     if dimension == 2:
         return solver.Assembly.from_outlines(outlines, density=DENSITY, **labels)
     return solver.Assembly.from_solids([prism(outline) for outline in outlines], density=DENSITY, **labels)
 
 
-def with_fill(assembly: solver.Assembly) -> solver.Structure:
-    fill = BackfillCase(("left", "right"), SURFACE, UNIT_WEIGHT, COEFFICIENT)
+def under(assembly: solver.Assembly, fill: solver.Backfill) -> solver.Loads:
     weight = solver.self_weight(assembly)
-    loads = solver.Loads(weight.dead, weight.live, backfills([fill], assembly, "case.toml"))
+    return solver.Loads(weight.dead, weight.live, (fill,))
+
+
+def with_fill(assembly: solver.Assembly) -> solver.Structure:
+    loads = under(assembly, lay_backfill(assembly, "* half", SURFACE, UNIT_WEIGHT, COEFFICIENT))
     return solver.Structure(assembly, loads=loads, friction_coefficient=3.0)
 
 
@@ -83,15 +80,16 @@ def test_thrust_of_a_filled_arch_of_two_blocks_is_that_of_three_hinges(dimension
 
 
 def test_the_supports_of_a_voussoir_arch_carry_its_weight_and_that_of_its_fill() -> None:
-    case = read_case(EXAMPLES / "arch_with_fill.toml")
-    assembly = case_assembly(case)
-    run = planned(case, assembly)
-    first = next(run.steps)
-    n = case.parameters["voussoirs"]
-    radius = 2.5 + 0.3
+    n, radius = 15, 2.5 + 0.3
+    roles = {"right springer": "moving"}
+    arch = generators.segmental_arch(span=4.0, rise=1.0, thickness=0.3, voussoirs=n)
+    assembly = arch.with_roles([roles.get(name, role) for name, role in zip(arch.names, arch.roles, strict=True)])
+    loads = under(assembly, lay_backfill(assembly, "voussoir *", 1.6, UNIT_WEIGHT, 0.3))
+    structure = solver.Structure(assembly, loads=loads, friction_coefficient=0.7)
+    first = structure.settle(solver.Settlement([1.0, 0.0], increment=1e-4, limit=1e-4)).path[0]
     angles = np.pi / 2.0 + np.arcsin(2.0 / 2.5) * np.linspace(-1.0, 1.0, n + 1)
     x, y = radius * np.cos(angles), radius * np.sin(angles) - 1.5
-    columns = 18000.0 * np.sum((1.6 - (y[1:] + y[:-1]) / 2.0) * (x[:-1] - x[1:]))
+    columns = UNIT_WEIGHT * float(assembly.thickness[0]) * np.sum((1.6 - (y[1:] + y[:-1]) / 2.0) * (x[:-1] - x[1:]))
     weights = assembly.masses[assembly.free].sum() * solver.GRAVITY + columns
     assert -first.support_forces[:, 1].sum() == pytest.approx(weights, rel=1e-9)
 
@@ -103,10 +101,9 @@ CORNER, OWN = np.array([1.0, 0.0]), 4000.0 * solver.GRAVITY
 def filled_block() -> solver.Structure:
     block, ground = [[0, 0], [1, 0], [1, 2], [0, 2]], [[-1, -1], [2, -1], [2, 0], [-1, 0]]
     assembly = solver.Assembly.from_outlines([block, ground], names=["block", "ground"], roles=["free", "fixed"])
-    dead = solver.self_weight(assembly).dead
-    fills = backfills([BackfillCase(("block",), 3.0, UNIT_WEIGHT)], assembly, "case.toml")
-    live = solver.weight_fraction(assembly, [1.0, 0.0])
-    return solver.Structure(assembly, loads=solver.Loads(dead, live, fills), friction_coefficient=5.0)
+    loads = under(assembly, lay_backfill(assembly, "block", 3.0, UNIT_WEIGHT))
+    structure = solver.Structure(assembly, loads=loads, friction_coefficient=5.0)
+    return structure.with_live(acceleration=[1.0, 0.0])
 
 
 def turned_by(lean: float, point: list[float]) -> np.ndarray:
