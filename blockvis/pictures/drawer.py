@@ -345,7 +345,8 @@ class Drawer:
         increment = self._shown(increment)
         shown = self._drawn_at or magnified(self.assembly, increment.pose, self.look.magnification)
         if self.response.changes:
-            self.scene.hide(increment.removed)
+            # A mechanism is that of what the last change has left.
+            self.scene.hide((self.response.increments[-1] if self._drawn_at is not None else increment).removed)
         self.scene.pose(shown, self._block_colours(increment.pose, increment))
         dots = np.zeros((0, self.assembly.dimension))
         if blocks_only:
