@@ -345,8 +345,10 @@ class Drawer:
         increment = self._shown(increment)
         shown = self._drawn_at or magnified(self.assembly, increment.pose, self.look.magnification)
         if self.response.changes:
-            # A mechanism is that of what the last change has left.
-            self.scene.hide((self.response.increments[-1] if self._drawn_at is not None else increment).removed)
+            if self._drawn_at is not None:
+                # A mechanism is that of what the last change has left.
+                increment = without_removed(increment, self.response.increments[-1].state.fell_at)
+            self.scene.hide(increment.removed)
         self.scene.pose(shown, self._block_colours(increment.pose, increment))
         dots = np.zeros((0, self.assembly.dimension))
         if blocks_only:
@@ -625,6 +627,20 @@ def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float
         return pose
     start = assembly.centroids
     return solver.Pose(start + magnification * (pose.positions - start), magnification * pose.rotations)
+
+
+def without_removed(increment: solver.Increment, fell_at: np.ndarray) -> solver.Increment:
+    """Leave out blocks that have been taken away since, by ``fell_at`` (n_blocks,) of a later increment."""
+    gone = np.isneginf(fell_at) if len(fell_at) else increment.removed
+    contacts = increment.contacts
+    kept = ~(gone[contacts.block_a] | gone[contacts.block_b])
+    return increment.with_arrays(
+        fell_at=fell_at,
+        contacts=contacts[kept],
+        forces=increment.forces[kept],
+        displacements=increment.displacements[kept],
+        friction=increment.friction[kept],
+    )
 
 
 def alike(frames: list[Frame]) -> list[Frame]:
