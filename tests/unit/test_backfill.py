@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from structures import assembly_of, box, case_from, rectangle
+from structures import alike, assembly_of, box, case_from, pixels, rectangle
 
 import solver
-from blockvis import lay_backfill
+from blockvis import draw_still, lay_backfill
 
 WEIGHT = 10.0
 
@@ -106,3 +108,18 @@ def test_a_linear_program_per_increment_has_no_fill() -> None:
     structure = solver.Structure(assembly, loads=loads, friction_coefficient=0.7)
     with pytest.raises(ValueError, match="under loads that stay as they are"):
         structure.settle([1.0, 0.0], controls=solver.Controls(increments="linear program"))
+
+
+def test_fill_is_drawn_up_to_its_surface(tmp_path: Path) -> None:
+    blocks = [rectangle(0.0, 0.0, 1.0, 1.0), rectangle(-1.0, -1.0, 2.0, 0.0)]
+    assembly = solver.Assembly.from_outlines(blocks, names=["block", "ground"], roles=["free", "moving"])
+    weight = solver.self_weight(assembly)
+    shown = {}
+    for name, fills in (("bare", ()), ("filled", (lay(assembly, "block", 3.0),))):
+        loads = solver.Loads(weight.dead, weight.live, fills)
+        structure = solver.Structure(assembly, loads=loads, friction_coefficient=0.7)
+        response = structure.settle(solver.Settlement([0.0, -1.0], increment=0.1, limit=0.1))
+        drawn = draw_still(response, -1, tmp_path / f"{name}.png", size=(640, 360))
+        shown[name] = alike(pixels(drawn), (150, 128, 92), 30).sum()
+    # The line of its surface is as long as the block is wide.
+    assert shown["filled"] > shown["bare"] + 40
