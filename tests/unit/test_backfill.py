@@ -110,6 +110,7 @@ def test_a_linear_program_per_increment_has_no_fill() -> None:
         structure.settle([1.0, 0.0], controls=solver.Controls(increments="linear program"))
 
 
+@pytest.mark.slow
 def test_fill_is_drawn_up_to_its_surface(tmp_path: Path) -> None:
     blocks = [rectangle(0.0, 0.0, 1.0, 1.0), rectangle(-1.0, -1.0, 2.0, 0.0)]
     assembly = solver.Assembly.from_outlines(blocks, names=["block", "ground"], roles=["free", "moving"])

@@ -71,6 +71,7 @@ def test_a_structure_that_stands_no_more_collapses_before_the_settlement() -> No
     assert {increment.phase for increment in response.path} == {0}
 
 
+@pytest.mark.slow
 def test_what_falls_at_once_is_told_as_a_loss() -> None:
     structure = beam_on_a_prop()
     # Without the beam its load falls; another block stands.
