@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .case_files.read import read_case as read_case
+    from .cases.backfill import lay_backfill as lay_backfill
     from .cases.contents import Case as Case
     from .explanation.explain import explain as explain
     from .formats.read import from_compas as from_compas
@@ -45,6 +46,7 @@ _HOMES = {
     "explain": "explanation.explain",
     "from_compas": "formats.read",
     "inspect": "formats.read",
+    "lay_backfill": "cases.backfill",
     "open_results": "runs.reopen",
     "read": "formats.read",
     "read_case": "case_files.read",

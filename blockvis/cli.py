@@ -1088,6 +1088,7 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         f"{assembly.n_blocks} blocks{' in space' if deep else ''} ({int(assembly.free.sum())} free), "
         f"{size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high, weight {weight:.6g} N, "
         f"largest block {across:.3g} m across",
+        *(f"fill up to {fill.surface:g} m, weight {fill.weight(assembly):.6g} N" for fill in response.loads.fills),
         f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} "
         f"programs, {sum(i.seconds for i in response.increments):.2f} s of solver time",
     ]

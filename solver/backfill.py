@@ -73,6 +73,10 @@ class Backfill:
             np.add.at(load, self.block, np.hstack([force, np.einsum("nrd,nd->nr", arms, force)]))
         return load
 
+    def weight(self, assembly: Assembly) -> float:
+        """Weight of the columns over the blocks as drawn [N]."""
+        return -float(self.load(assembly, Pose.initial(assembly))[:, assembly.dimension - 1].sum())
+
     def without(self, gone: np.ndarray) -> Backfill:
         """Return the fill over the other blocks once some, (n_blocks,) bool array, have left with theirs."""
         kept = ~gone[self.block]

@@ -78,36 +78,76 @@ def backfills(entries: Sequence[BackfillCase], assembly: solver.Assembly, source
     ValueError
         For a name that no free block has, a surface below the extrados of a block, blocks of which none sees it.
     """
-    return tuple(_fill(entry, assembly, f"{source}: [{entry.where}]") for entry in entries)
-
-
-def fill_weight(fills: Sequence[solver.Backfill], assembly: solver.Assembly) -> float:
-    """Sum the weight of the columns of fill over the blocks as drawn [N]."""
-    drawn = solver.Pose.initial(assembly)
-    return float(sum(-fill.load(assembly, drawn)[:, assembly.dimension - 1].sum() for fill in fills))
-
-
-def _fill(entry: BackfillCase, assembly: solver.Assembly, where: str) -> solver.Backfill:
-    pieces, block = extrados(assembly, _chosen(entry, assembly, where), entry.surface)
-    if not len(pieces):
-        raise ValueError(
-            f"{where} over: none of {_listed(entry.over)} looks up to the surface; name the topmost blocks"
+    return tuple(
+        lay_backfill(
+            assembly,
+            entry.over,
+            entry.surface,
+            entry.unit_weight,
+            entry.pressure_coefficient,
+            where=f"{source}: [{entry.where}]",
         )
+        for entry in entries
+    )
+
+
+def lay_backfill(
+    assembly: solver.Assembly,
+    over: str | Sequence[str],
+    surface: float,
+    unit_weight: float,
+    pressure_coefficient: float = 0.0,
+    *,
+    where: str = "backfill",
+) -> solver.Backfill:
+    """Lay loose fill over blocks, on what of them looks upwards and sees its level surface.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    over : str or sequence of str
+        Names or materials of the blocks under it, or patterns; supports among them carry none.
+    surface : float [m]
+        Height of its top.
+    unit_weight : float [N/m³]
+    pressure_coefficient : float
+        Horizontal pressure as a part of the vertical one.
+    where : str
+        What messages begin with.
+
+    Returns
+    -------
+    solver.Backfill
+        For ``solver.Loads(dead, live, fills=(...,))``.
+
+    Raises
+    ------
+    ValueError
+        For a name that no free block has, a surface below the extrados of a block, blocks of which none sees it, a
+        unit weight that is not positive, a negative coefficient.
+    """
+    names = (over,) if isinstance(over, str) else tuple(over)
+    for key, value, least in (("unit_weight", unit_weight, 1e-300), ("pressure_coefficient", pressure_coefficient, 0)):
+        if not least <= value < np.inf:
+            raise ValueError(f"{where} {key} is {value:g}; give a number {'of at least' if least == 0 else 'above'} 0")
+    pieces, block = extrados(assembly, _chosen(names, assembly, where), surface)
+    if not len(pieces):
+        raise ValueError(f"{where} over: none of {_listed(names)} looks up to the surface; name the topmost blocks")
     heights = pieces[:, :, -1].max(axis=1)
     highest = int(heights.argmax())
-    if heights[highest] > entry.surface + SLIVER * assembly.block_size:
+    if heights[highest] > surface + SLIVER * assembly.block_size:
         raise ValueError(
-            f"{where} surface is {entry.surface:g} m, below the extrados of block '{assembly.names[block[highest]]}', "
-            f"which reaches {heights[highest]:.6g} m; raise it, or leave the block out of over"
+            f"{where} surface is {surface:g} m, below the extrados of block '{assembly.names[block[highest]]}', which "
+            f"reaches {heights[highest]:.6g} m; raise it, or leave the block out of over"
         )
     thickness = assembly.thickness[block] if assembly.dimension == 2 else None
-    return solver.Backfill(pieces, block, entry.surface, entry.unit_weight, entry.pressure_coefficient, thickness)
+    return solver.Backfill(pieces, block, surface, unit_weight, pressure_coefficient, thickness)
 
 
-def _chosen(entry: BackfillCase, assembly: solver.Assembly, where: str) -> np.ndarray:
-    """(n_blocks,) bool array: the free blocks that the entry names."""
+def _chosen(over: Sequence[str], assembly: solver.Assembly, where: str) -> np.ndarray:
+    """(n_blocks,) bool array: the free blocks of these names or materials."""
     names, chosen = assembly.names, np.zeros(assembly.n_blocks, dtype=bool)
-    for pattern in entry.over:
+    for pattern in over:
         meant = [
             fnmatchcase(name, pattern) or (material != "" and fnmatchcase(material, pattern))
             for name, material in zip(names, assembly.materials, strict=True)
@@ -120,7 +160,7 @@ def _chosen(entry: BackfillCase, assembly: solver.Assembly, where: str) -> np.nd
             )
         chosen |= meant
     if not (chosen & assembly.free).any():
-        raise ValueError(f"{where} over: {_listed(entry.over)} are supports only; fill loads free blocks: name one")
+        raise ValueError(f"{where} over: {_listed(over)} are supports only; fill loads free blocks: name one")
     return chosen & assembly.free
 
 

@@ -185,6 +185,7 @@ def falling_increment(response: solver.Response, pose: solver.Pose) -> solver.In
         friction=np.zeros(0),
         velocity=np.zeros_like(last.velocity),
         support_forces=np.zeros_like(last.support_forces),
+        fell_at=response.increments[-1].state.fell_at,
     )
 
 
@@ -213,7 +214,9 @@ class _Engine:
     def __init__(self, response: solver.Response, push: float) -> None:
         import pymunk
 
-        assembly, last = response.assembly, response.path[-1]
+        last, self._gone = response.path[-1], response.increments[-1].removed
+        # Blocks that were taken away stay behind, and nothing meets them.
+        assembly = response.assembly.with_roles(np.where(self._gone, mechanics.FIXED, response.assembly.roles))
         self.assembly, self.pose = assembly, last.pose
         self.scale = SIZE / assembly.block_size
         self.origin = np.array([self.pose.positions[assembly.free, 0].mean(), _ground(assembly, self.pose)])
@@ -237,7 +240,7 @@ class _Engine:
         # Loads beside gravity act on as they did.
         own = solver.self_weight(assembly).dead
         per_force = self.scale / assembly.masses[assembly.free].mean()
-        extra = (response.loads.dead_at(assembly, response.path[-1].pose) - own) * assembly.free[:, None] * per_force
+        extra = (response.dead_at(response.increments[-1], self.pose) - own) * assembly.free[:, None] * per_force
         extra[np.abs(extra) < 1e-9 * np.abs(own).max()] = 0.0
         self.loaded = [(self.bodies[k], tuple(map(float, extra[k]))) for k in np.flatnonzero(extra.any(axis=1))]
 
@@ -281,7 +284,7 @@ class _Engine:
         for part in parts:
             part.elasticity = 0.0
             part.collision_type = block + 1
-        self.space.add(body, *parts)
+        self.space.add(body, *([] if self._gone[block] else parts))
         return body
 
     def _lay_ground(self, engine: pymunk) -> None:

@@ -36,14 +36,17 @@ class Engine:
     """
 
     def __init__(self, response: solver.Response, ground: float, velocity: np.ndarray) -> None:
-        last, drawn = response.path[-1].pose, response.assembly
+        last, gone = response.path[-1].pose, response.increments[-1].removed
+        drawn = response.assembly.with_roles(np.where(gone, mechanics.FIXED, response.assembly.roles))
         self.n_blocks = drawn.n_blocks
         assembly = _on_ground(drawn, last, ground)
         dead = np.zeros((assembly.n_blocks, 6))
-        dead[: self.n_blocks] = response.loads.dead_at(drawn, last)
+        dead[: self.n_blocks] = response.dead_at(response.increments[-1], last)
         controls = solver.Controls()
         law = replace(response.interfaces, scatter=None)
         model = mechanics.model_of(assembly, solver.Loads(dead, np.zeros_like(dead)), law, controls)
+        if gone.any():
+            model = model.without(np.append(gone, False))
         pose = solver.Pose(
             np.vstack([last.positions, assembly.centroids[self.n_blocks :]]),
             np.vstack([last.rotations, np.zeros((assembly.n_blocks - self.n_blocks, 3))]),

@@ -121,7 +121,7 @@ class SettlementKind(AnalysisKind):
             loss = loss_of(response)
             lines += [] if loss is None else [str(loss)]
             if response.changes and high == 0.0:
-                lines.append(f"once changed before settlement {response.increments[-1].phase + 1}: {response.message}")
+                lines.append(f"at once: {response.message.partition('; ')[0]}")
         elif len(path) > 1:
             last = path[-1]
             lines.append(f"last reaction        {reaction(last.reaction, last)}")

@@ -116,6 +116,9 @@ def _drawn_in_plane(
     fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
     frame = framed(assembly, [solver.Pose.initial(assembly)])
     scene = FlatScene(assembly, frame, sheet.inside_size, fill, outline=palette.PALE_OUTLINE)
+    if response.changes:
+        scene.hide(increment.removed)
+        scene.pose(solver.Pose.initial(assembly))
     others = [crack for crack in cracks if id(crack) not in {id(one) for one in main}]
     layers = [*zip(main, palette.SURVEYED, strict=False), *((crack, palette.FAINT) for crack in others)]
     height = float(scene.frame.size[1])

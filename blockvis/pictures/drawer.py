@@ -19,6 +19,7 @@ from blockvis.text import force_text, rounded_length, width_text
 from solver import mechanics
 
 from . import palette
+from .backfill import fill_bodies
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, matters
 from .flat_scene import FlatScene
 from .frame import ColourBar, Frame, Key, Sheet, framed, write_labels
@@ -211,7 +212,8 @@ class Drawer:
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         self._arrow = ARROW_IN_SPACE * float(frame.size.max())
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
-        ends = np.concatenate([self.live.tails, *self._arrow_tips(extra), tied])
+        heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
+        ends = np.concatenate([self.live.tails, heads, *self._arrow_tips(extra), tied])
         if self._plane is not None:
             ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
         frame = frame.holding(self._projected(ends))
@@ -351,6 +353,11 @@ class Drawer:
         """
         increment = self._shown(increment)
         shown = self._drawn_at or magnified(self.assembly, increment.pose, self.look.magnification)
+        if self.response.changes:
+            if self._drawn_at is not None:
+                # A mechanism is that of what the last change has left.
+                increment = without_removed(increment, self.response.increments[-1].state.fell_at)
+            self.scene.hide(increment.removed)
         self.scene.pose(shown, self._block_colours(increment.pose, increment))
         dots = np.zeros((0, self.assembly.dimension))
         if blocks_only:
@@ -361,6 +368,8 @@ class Drawer:
             self._draw_bearings(shown)
             self._draw_settlement(increment, shown)
             self._draw_live_load(increment, shown)
+            if self.response.loads.fills:
+                self.scene.backfill(fill_bodies(self.response, shown, increment.fallen))
         self.scene.ties(self.ties.strands(increment, shown, DASH * self.sheet.size[1] / 1080.0 * self.scene.pixel))
         falling = increment.status == solver.Status.FALLING
         failed = self.response.stop == solver.Status.SOLVER_FAILED
@@ -441,6 +450,11 @@ class Drawer:
             keys = [*self._keys_of_tints(), *self._keys_of_joints(), *self._keys_of_forces(), *self.ties.keys()]
             if not self._flat and self.response.settlements and self.assembly.moving.any():
                 keys.append(Key("area", "moving support", palette.MOVING))
+            if self.response.loads.fills:
+                kind = "area" if self._flat else "line"
+                keys.append(
+                    Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",))
+                )
             if self.live.largest > 0.0:
                 keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
             if self._drawn_at is not None:
@@ -646,6 +660,20 @@ def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float
         return pose
     start = assembly.centroids
     return solver.Pose(start + magnification * (pose.positions - start), magnification * pose.rotations)
+
+
+def without_removed(increment: solver.Increment, fell_at: np.ndarray) -> solver.Increment:
+    """Leave out blocks that have been taken away since, by ``fell_at`` (n_blocks,) of a later increment."""
+    gone = np.isneginf(fell_at) if len(fell_at) else increment.removed
+    contacts = increment.contacts
+    kept = ~(gone[contacts.block_a] | gone[contacts.block_b])
+    return increment.with_arrays(
+        fell_at=fell_at,
+        contacts=contacts[kept],
+        forces=increment.forces[kept],
+        displacements=increment.displacements[kept],
+        friction=increment.friction[kept],
+    )
 
 
 def alike(frames: list[Frame]) -> list[Frame]:

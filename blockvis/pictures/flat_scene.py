@@ -15,6 +15,7 @@ import solver
 from solver import mechanics
 
 from . import palette
+from .backfill import FillBodies
 from .frame import Frame
 from .hatching import hatch_lines
 from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes, part_outlines
@@ -24,7 +25,7 @@ from .underlay import COVER, CarriedPhotograph, Underlay
 
 #: The layers, back to front.
 ORDER = (
-    "earth", "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding", "motion outline",
+    "earth", "backfill", "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding", "motion outline",
     "force line", "force", "tie rim", "tie slack", "tie elastic", "tie yielding", "tie broken", "tie end",
     "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top",
     "arrow rim", "arrow top",
@@ -78,6 +79,7 @@ class FlatScene:
             None if underlay is None else CarriedPhotograph(underlay, assembly, self.frame.low, self.pixel, size)
         )
         self._under: np.ndarray | None = None
+        self._gone = np.zeros(assembly.n_blocks, dtype=bool)
         self._layers: dict[str, _Layer] = {}
         self._fills: list[_Layer] = []
         self._renderer: RendererAgg | None = None
@@ -109,11 +111,25 @@ class FlatScene:
             self._paint(block_fill)
         self._shown = shown
         corners = mechanics.moved_vertices(self.assembly, shown)
+        # Out of the picture.
+        corners[self._gone[self.assembly.block_of_vertex]] = self.frame.low - self.frame.size
         for layer in (*self._fills, self._layers["outline"]):
             layer.move(corners)
         if "hatch" in self._layers:
             points, blocks = self._hatched
-            self._layers["hatch"].move(mechanics.carried(points, blocks, solver.Pose.initial(self.assembly), shown))
+            moved = mechanics.carried(points, blocks, solver.Pose.initial(self.assembly), shown)
+            moved[self._gone[blocks]] = self.frame.low - self.frame.size
+            self._layers["hatch"].move(moved)
+
+    def hide(self, gone: np.ndarray) -> None:
+        """Leave blocks, (n_blocks,) bool array, out from the next pose on."""
+        self._gone = gone
+
+    def backfill(self, bodies: FillBodies) -> None:
+        """Fill and hatch what lies between extrados and surface, behind the blocks."""
+        self.polygons("backfill", bodies.columns, palette.FILL)
+        self.lines("backfill/hatch", bodies.hatch(), palette.FILL_HATCH, max(0.8, self.size[1] / 1000.0))
+        self.lines("backfill/rim", bodies.rims(), palette.FILL_RIM, max(1.2, self.size[1] / 500.0))
 
     def polygons(self, layer: str, corners: np.ndarray, colour: Colour) -> None:
         """Fill polygons, (n, k, 2) [m], in one layer, instead of those before."""

@@ -75,9 +75,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     if not (standing and finite):
         nowhere = np.zeros((0, assembly.dimension))
         return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), _of(np.zeros(0, dtype=int), pose))
-    live = -(
-        mechanics.block_forces(increment.contacts, pose, increment.forces) + response.loads.dead_at(assembly, pose)
-    )
+    live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + response.dead_at(increment))
     live[~assembly.free] = 0.0
     forces = live[:, : assembly.dimension]
     size = np.linalg.norm(forces, axis=1)

@@ -10,6 +10,7 @@ from PIL import Image
 import solver
 
 from . import palette
+from .backfill import FillBodies
 from .frame import write_words
 from .marks import Marks
 from .solid_scene import SolidScene
@@ -39,6 +40,16 @@ class PairedScenes:
         """Put the blocks where they are drawn."""
         for scene in self._scenes:
             scene.pose(shown, block_fill)
+
+    def hide(self, gone: np.ndarray) -> None:
+        """Leave blocks, (n_blocks,) bool array, out from the next pose on."""
+        for scene in self._scenes:
+            scene.hide(gone)
+
+    def backfill(self, bodies: FillBodies) -> None:
+        """Draw loose fill."""
+        for scene in self._scenes:
+            scene.backfill(bodies)
 
     def cracks(self, found: Marks, magnification: float, widest: float) -> None:
         """Draw open joints."""

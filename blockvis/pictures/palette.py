@@ -25,6 +25,8 @@ MOVING = (127, 187, 180)
 LIVE = (190, 24, 118)
 #: Ties that carry, and those that yield.
 TIE, YIELDING = (30, 130, 50), (222, 148, 0)
+#: Loose fill over arches and vaults, its hatch and its rim.
+FILL, FILL_HATCH, FILL_RIM = (245, 239, 226), (196, 180, 150), (150, 128, 92)
 WARNING = (190, 30, 30)
 #: Blocks as drawn, before any analysis: all, drawn twice, refused, not standing; and what was left out.
 DRAWN = (239, 230, 212)

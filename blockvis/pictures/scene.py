@@ -10,6 +10,7 @@ from PIL import Image
 
 import solver
 
+from .backfill import FillBodies
 from .frame import Frame
 from .marks import Marks
 from .swing import Swing
@@ -18,7 +19,7 @@ from .ties import Strands
 #: Layers that hold what statics knows: a fall in time has none of them.
 OF_STATICS = (
     *("crack", "crack edge", "sliding", "exposed", "hinge", "hinge rim", "hinge top", "hidden hinge"),
-    *("force", "force line", "ground"),
+    *("force", "force line", "ground", "backfill"),
     *("arrow rim", "arrow top", "live rim", "live top"),
 )
 
@@ -42,6 +43,12 @@ class Scene(Protocol):
 
     def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
         """Put the blocks where they are drawn, in new colours (n_blocks, 3) uint8 where these are given."""
+
+    def hide(self, gone: np.ndarray) -> None:
+        """Leave blocks, (n_blocks,) bool array, out from the next pose on."""
+
+    def backfill(self, bodies: FillBodies) -> None:
+        """Draw loose fill over the blocks."""
 
     def cracks(self, found: Marks, magnification: float, widest: float) -> None:
         """Draw open joints, all in one colour, in pictures whose widest is ``widest`` [m]."""

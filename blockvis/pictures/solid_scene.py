@@ -20,6 +20,7 @@ import solver
 from solver import mechanics
 
 from . import palette
+from .backfill import FillBodies
 from .frame import Frame, framed, room_in
 from .marks import Marks, arrow_shapes
 from .solid_view import ABOVE, AROUND, View, showing_faces
@@ -120,6 +121,7 @@ class SolidScene:
         #: Diagonal of the largest support [m].
         self._support = _largest_support(assembly)
         self._layers: dict[str, Any] = {}
+        self._gone = np.zeros(assembly.n_blocks, dtype=bool)
         self._overlays: dict[str, _Arrows] = {}
         self._look_at()
         self._cut = cut
@@ -151,6 +153,10 @@ class SolidScene:
             New colours.
         """
         corners = mechanics.moved_vertices(self.assembly, shown)
+        if self._gone.any():
+            # What is a point has no faces to draw.
+            owner = self.assembly.block_of_vertex
+            corners = np.where(self._gone[owner][:, None], shown.positions[owner], corners)
         self._surface.points = corners
         self._edges.points = corners
         if self._shadow is not None:
@@ -170,6 +176,14 @@ class SolidScene:
             edges = [np.stack([face, np.roll(face, -1, axis=0)], axis=1) for face in faces]
             ends = np.concatenate([np.zeros((0, 2, 3)), *edges])
             self.lines("section edge", ends, palette.INK, max(2.0 * self._thin, 1.2), forward=2.0)
+
+    def hide(self, gone: np.ndarray) -> None:
+        """Leave blocks, (n_blocks,) bool array, out from the next pose on."""
+        self._gone = gone
+
+    def backfill(self, bodies: FillBodies) -> None:
+        """Draw the edges of the bodies of fill."""
+        self.lines("backfill", bodies.rims(), palette.FILL_RIM, max(2.0 * self._thin, 1.2))
 
     def show_ground(self, height: float) -> None:
         """Draw the ground of a fall, with the shadows of the blocks under a light from above.

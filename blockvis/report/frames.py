@@ -24,6 +24,9 @@ from solver import mechanics
 
 from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, rounded
 
+#: How far down blocks go that are taken away, in extents of the structure.
+AWAY = 4.0
+
 
 def surveyed(
     assembly: solver.Assembly, joints: InitialJoints, shown: list[solver.Increment]
@@ -156,6 +159,8 @@ class FrameTables:
             if not falling:
                 far = float(np.linalg.norm(moved[assembly.free, :d], axis=1).max(initial=0.0))
                 self.largest_displacement = max(self.largest_displacement, far)
+            # What was taken away goes out of the picture.
+            moved[increment.removed, d - 1] -= AWAY * unit / FINENESS
             self._travel.append(rounded(moved[:, :d], unit))
             self._turn.append(rounded(moved[:, d:], TURN_UNIT))
             points, forces, pairs = resultants(increment)

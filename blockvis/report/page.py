@@ -419,6 +419,7 @@ def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tu
     follows = f", {apart} {'of pseudo-motion' if response.swings else 'falling'}" if apart and fall is None else ""
     rows += [
         ("weight W", force_text(response.total_weight)),
+        *((f"fill up to {fill.surface:g} m", force_text(fill.weight(assembly))) for fill in response.loads.fills),
         ("blocks", f"{assembly.n_blocks} ({int(assembly.free.sum())} free)"),
         *([("contact points", str(len(response.increments[0].contacts.points)))] if response.increments else []),
         ("increments", f"{len(path)} in equilibrium{follows}"),

@@ -75,12 +75,14 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         **_joint_counts(response),
         **_loss(response),
         "losses": [asdict(loss) for loss in response.losses],
+        "removed": _removed(response),
         "analysis": response.analysis,
         "parameter": response.parameter.name,
         **own,
         "last_settlement": path[-1].parameter if path else None,
         "last_reaction": path[-1].reaction if path else None,
         "total_weight": response.total_weight,
+        "fill_weight": sum(fill.weight(response.assembly) for fill in response.loads.fills),
         "n_blocks": response.assembly.n_blocks,
         "n_contacts": len(path[-1].contacts) if path else None,
         "n_increments": len(path),
@@ -101,6 +103,20 @@ def _initial_reaction(response: solver.Response) -> float | None:
         return None
     first = response.path[0]
     return least_reaction(first) if response.measured.is_force else first.reaction
+
+
+def _removed(response: solver.Response) -> list[dict[str, Any]]:
+    """Blocks that are taken away before each settlement, its number from 1, and their weight."""
+    names, weights = response.assembly.names, response.assembly.masses * solver.GRAVITY
+    return [
+        {
+            "phase": change.phase + 1,
+            "blocks": [names[k] for k in np.flatnonzero(change.removed)],
+            "weight": float(weights[change.removed].sum()),
+        }
+        for change in response.changes
+        if change.removed is not None
+    ]
 
 
 def _joint_counts(response: solver.Response) -> dict[str, int | None]:

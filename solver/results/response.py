@@ -15,7 +15,7 @@ from solver.geometry.contacts import Contacts
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose, relative_velocities
 from solver.loads import GRAVITY, Loads, Settlement
-from solver.phases import PhaseChange
+from solver.phases import PhaseChange, loads_in
 from solver.views import Shown, views
 
 from .certificate import Certificate
@@ -169,6 +169,11 @@ class Response(Shown):
             names = tuple(self.assembly.names[k] for k in fallen)
             losses.append(LocalLoss(float(value), names, weight, weight / self.total_weight))
         return tuple(losses)
+
+    def dead_at(self, increment: Increment, pose: Pose | None = None) -> np.ndarray:
+        """(n_blocks, n_dof) array [N, N·m]: in the phase of an increment, at its pose or at another."""
+        loads = loads_in(self.loads, self.changes, increment.phase)
+        return loads.dead_at(self.assembly, increment.pose if pose is None else pose)
 
     @property
     def parameters(self) -> np.ndarray:

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import solver
-from blockvis.case_files.read import read_case
-from blockvis.cases.backfill import BackfillCase, backfills
-from blockvis.cases.build import case_assembly
-from blockvis.runs.plan import planned
+from blockvis import generators, lay_backfill
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 DENSITY, UNIT_WEIGHT, SURFACE, COEFFICIENT = 2000.0, 18000.0, 2.5, 0.2
 #: Places, half the weight each, at which a quadratic is summed exactly.
 GAUSS = 0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0)
@@ -36,16 +30,19 @@ def prism(outline: np.ndarray) -> tuple[np.ndarray, list[list[int]]]:
 
 def two_block_arch(dimension: int) -> solver.Assembly:
     outlines = [HALF, mirrored(HALF), GROUND, mirrored(GROUND)]
-    labels = {"names": ["left", "right", "ground", "moving"], "roles": ["free", "free", "fixed", "moving"]}
+    labels = {"names": ["left half", "right half", "ground", "moving"], "roles": ["free", "free", "fixed", "moving"]}
     if dimension == 2:
         return solver.Assembly.from_outlines(outlines, density=DENSITY, **labels)
     return solver.Assembly.from_solids([prism(outline) for outline in outlines], density=DENSITY, **labels)
 
 
-def with_fill(assembly: solver.Assembly) -> solver.Structure:
-    fill = BackfillCase(("left", "right"), SURFACE, UNIT_WEIGHT, COEFFICIENT)
+def under(assembly: solver.Assembly, fill: solver.Backfill) -> solver.Loads:
     weight = solver.self_weight(assembly)
-    loads = solver.Loads(weight.dead, weight.live, backfills([fill], assembly, "case.toml"))
+    return solver.Loads(weight.dead, weight.live, (fill,))
+
+
+def with_fill(assembly: solver.Assembly) -> solver.Structure:
+    loads = under(assembly, lay_backfill(assembly, "* half", SURFACE, UNIT_WEIGHT, COEFFICIENT))
     return solver.Structure(assembly, loads=loads, friction_coefficient=3.0)
 
 
@@ -72,57 +69,71 @@ def thrust_by_hand(spread: float) -> float:
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_thrust_of_a_filled_arch_of_two_blocks_is_that_of_three_hinges(dimension: int) -> None:
-    settlement = solver.Settlement(np.eye(dimension)[0], increment=0.05, limit=0.1)
+    settlement = solver.Settlement(np.eye(dimension)[0], increment=0.1, limit=0.1)
     response = with_fill(two_block_arch(dimension)).settle(settlement)
+    # Over each half a trapezoid of fill, 0.5 and 2.5 m high and 2 m wide.
+    weights = 2.0 * (0.72 * DENSITY * solver.GRAVITY + 3.0 * UNIT_WEIGHT)
+    assert -response.path[0].support_forces[:, dimension - 1].sum() == pytest.approx(weights, rel=1e-9)
     assert response.path[0].least == pytest.approx(thrust_by_hand(0.0), rel=1e-7)
     for increment in response.path[1:]:
         assert increment.reaction == pytest.approx(thrust_by_hand(increment.parameter), rel=1e-5)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_supports_carry_the_weight_of_arch_and_fill(dimension: int) -> None:
-    assembly = two_block_arch(dimension)
-    response = with_fill(assembly).settle(solver.Settlement(np.eye(dimension)[0], increment=1e-3, limit=1e-3))
-    # Over each half a trapezoid of fill, 0.5 and 2.5 m high and 2 m wide.
-    weights = 2.0 * (0.72 * DENSITY * solver.GRAVITY + 3.0 * UNIT_WEIGHT)
-    assert -response.path[0].support_forces[:, dimension - 1].sum() == pytest.approx(weights, rel=1e-9)
-
-
 def test_the_supports_of_a_voussoir_arch_carry_its_weight_and_that_of_its_fill() -> None:
-    case = read_case(EXAMPLES / "arch_with_fill.toml")
-    assembly = case_assembly(case)
-    run = planned(case, assembly)
-    first = next(run.steps)
-    n = case.parameters["voussoirs"]
-    radius = 2.5 + 0.3
+    n, radius = 15, 2.5 + 0.3
+    roles = {"right springer": "moving"}
+    arch = generators.segmental_arch(span=4.0, rise=1.0, thickness=0.3, voussoirs=n)
+    assembly = arch.with_roles([roles.get(name, role) for name, role in zip(arch.names, arch.roles, strict=True)])
+    loads = under(assembly, lay_backfill(assembly, "voussoir *", 1.6, UNIT_WEIGHT, 0.3))
+    structure = solver.Structure(assembly, loads=loads, friction_coefficient=0.7)
+    first = structure.settle(solver.Settlement([1.0, 0.0], increment=1e-4, limit=1e-4)).path[0]
     angles = np.pi / 2.0 + np.arcsin(2.0 / 2.5) * np.linspace(-1.0, 1.0, n + 1)
     x, y = radius * np.cos(angles), radius * np.sin(angles) - 1.5
-    columns = 18000.0 * np.sum((1.6 - (y[1:] + y[:-1]) / 2.0) * (x[:-1] - x[1:]))
+    columns = UNIT_WEIGHT * float(assembly.thickness[0]) * np.sum((1.6 - (y[1:] + y[:-1]) / 2.0) * (x[:-1] - x[1:]))
     weights = assembly.masses[assembly.free].sum() * solver.GRAVITY + columns
     assert -first.support_forces[:, 1].sum() == pytest.approx(weights, rel=1e-9)
 
 
-def test_a_limit_load_under_fill_is_that_of_a_block_by_hand() -> None:
+#: A block 1 m wide and 2 m high under 1 m of fill, that overturns about its right lower corner.
+CORNER, OWN = np.array([1.0, 0.0]), 4000.0 * solver.GRAVITY
+
+
+def filled_block() -> solver.Structure:
     block, ground = [[0, 0], [1, 0], [1, 2], [0, 2]], [[-1, -1], [2, -1], [2, 0], [-1, 0]]
     assembly = solver.Assembly.from_outlines([block, ground], names=["block", "ground"], roles=["free", "fixed"])
-    weight = solver.self_weight(assembly)
-    fills = backfills([BackfillCase(("block",), 3.0, UNIT_WEIGHT)], assembly, "case.toml")
-    own, over = 4000.0 * solver.GRAVITY, UNIT_WEIGHT
-    structure = solver.Structure(
-        assembly, loads=solver.Loads(weight.dead, weight.live, fills), friction_coefficient=5.0
-    )
-    # It overturns: half the width against half the height.
-    found = structure.limit_load(acceleration=[1.0, 0.0])
-    assert found.multiplier == pytest.approx((own + over) * 0.5 / own, rel=1e-9)
-    # Leaning by 0.1, its top is where the fill is less deep over the higher corner.
-    lean = solver.Pose(np.array([[1.0, 0.0], [0.5, -0.5]]), np.array([[-0.1], [0.0]]))
-    corner = np.array([0.5, -1.0])
-    turn = np.array([[np.cos(0.1), np.sin(0.1)], [-np.sin(0.1), np.cos(0.1)]])
-    lean.positions[0] = np.array([1.0, 0.0]) - turn @ corner
-    a, b = (turn @ (np.array(p) - [1.0, 0.0]) for p in ([0.0, 2.0], [1.0, 2.0]))
-    moment = own * -(lean.positions[0] - [1.0, 0.0])[0]
+    loads = under(assembly, lay_backfill(assembly, "block", 3.0, UNIT_WEIGHT))
+    structure = solver.Structure(assembly, loads=loads, friction_coefficient=5.0)
+    return structure.with_live(acceleration=[1.0, 0.0])
+
+
+def turned_by(lean: float, point: list[float]) -> np.ndarray:
+    """From the corner to a point of the block once it leans to the right."""
+    turn = np.array([[np.cos(lean), np.sin(lean)], [-np.sin(lean), np.cos(lean)]])
+    return turn @ (np.array(point) - CORNER)
+
+
+def multiplier_by_hand(lean: float) -> float:
+    """Of the weight, pushing at the centroid: its fill is deeper over the lower end of its top."""
+    a, b, centroid = (turned_by(lean, point) for point in ([0.0, 2.0], [1.0, 2.0], [0.5, 1.0]))
+    moment = -OWN * centroid[0]
     for share in GAUSS:
         place = a + share * (b - a)
         moment -= UNIT_WEIGHT * (3.0 - place[1]) * (b - a)[0] * place[0] / 2.0
-    leaning = structure.limit_load(acceleration=[1.0, 0.0], pose=lean)
-    assert leaning.multiplier == pytest.approx(moment / (own * lean.positions[0][1]), rel=1e-7)
+    return float(moment / (OWN * centroid[1]))
+
+
+def test_limit_loads_under_fill_are_those_of_a_block_by_hand() -> None:
+    structure = filled_block()
+    assert structure.limit_load().multiplier == pytest.approx((OWN + UNIT_WEIGHT) * 0.5 / OWN, rel=1e-9)
+    lean = solver.Pose(np.array([CORNER + turned_by(0.1, [0.5, 1.0]), [0.5, -0.5]]), np.array([[-0.1], [0.0]]))
+    assert structure.limit_load(pose=lean).multiplier == pytest.approx(multiplier_by_hand(0.1), rel=1e-7)
+
+
+def test_a_pushover_under_fill_is_that_of_a_block_by_hand() -> None:
+    control = solver.ControlDisplacement("block", point=(0.5, 1.0), increment=0.2, limit=0.2)
+    response = filled_block().pushover(control)
+    assert len(response.path) == 2
+    for increment in response.path:
+        lean = -float(increment.pose.rotations[0, 0])
+        assert turned_by(lean, [0.5, 1.0])[0] + 0.5 == pytest.approx(increment.parameter, abs=1e-5)
+        assert increment.measured == pytest.approx(multiplier_by_hand(lean), abs=1e-6)

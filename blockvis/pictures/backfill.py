@@ -1,0 +1,112 @@
+"""Fill over arches and vaults in pictures: between the extrados, where it is drawn, and its surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+import solver
+
+#: Distance of hatch lines, in extents of the fill.
+SPACING = 0.02
+
+#: Width of a joint that parts no body in space, in extents of the fill.
+GAPING = 0.02
+
+#: Pieces this near to each other in plan, in extents of the fill, are one body.
+SAME_BODY = 1e-6
+
+
+@dataclass(frozen=True)
+class FillBodies:
+    """Columns of fill over pieces of the blocks.
+
+    Attributes
+    ----------
+    feet : (n, d, d) array [m]
+        Corners of each piece where it is drawn.
+    tops : (n,) array [m]
+        Height of the surface over each.
+    """
+
+    feet: np.ndarray
+    tops: np.ndarray
+
+    @property
+    def heads(self) -> np.ndarray:
+        """(n, d, d) array [m]: corners of the columns in the surface."""
+        heads = self.feet.copy()
+        heads[:, :, -1] = self.tops[:, None]
+        return heads
+
+    @property
+    def columns(self) -> np.ndarray:
+        """(n, 4, 2) array [m]: in the plane, the outline of each column."""
+        return np.concatenate([self.feet, self.heads[:, ::-1]], axis=1)
+
+    def hatch(self) -> np.ndarray:
+        """(m, 2, 2) array [m]: in the plane, lines that fall to the right across the fill."""
+        areas = shapely.polygons(self.columns)
+        whole = shapely.union_all(areas, grid_size=SAME_BODY * self._extent)
+        if whole.is_empty:
+            return np.zeros((0, 2, 2))
+        x0, y0, x1, y1 = whole.bounds
+        step = SPACING * np.sqrt(2.0) * self._extent
+        levels = np.arange(np.ceil((x0 + y0) / step), np.floor((x1 + y1) / step) + 1) * step
+        ends = np.stack([np.stack([levels - y, np.full(len(levels), y)], axis=1) for y in (y0, y1)], axis=1)
+        parts = shapely.get_parts(shapely.intersection(shapely.linestrings(ends), whole))
+        parts = parts[(shapely.get_type_id(parts) == 1) & (shapely.get_num_points(parts) == 2)]
+        return np.asarray(shapely.get_coordinates(parts)).reshape(-1, 2, 2)
+
+    def rims(self) -> np.ndarray:
+        """(m, 2, d) array [m]: edges of the bodies, in the surface and in space up to it from the extrados."""
+        if self.feet.shape[2] == 2:
+            return self.heads
+        lines = [np.zeros((0, 2, 3))]
+        for top in np.unique(self.tops):
+            feet = self.feet[self.tops == top]
+            plans = shapely.polygons(feet[:, :, :2])
+            whole = shapely.union_all(plans[shapely.area(plans) > 0.0], grid_size=SAME_BODY * self._extent)
+            # Over a joint that gapes the fill is one body.
+            reach = GAPING * self._extent
+            whole = shapely.buffer(whole, reach, join_style="mitre")
+            whole = shapely.buffer(whole, -reach, join_style="mitre").simplify(0.1 * reach)
+            for polygon in shapely.get_parts(whole):
+                for ring in (polygon.exterior, *polygon.interiors):
+                    plan = np.array(ring.coords)
+                    level = np.column_stack([plan, np.full(len(plan), top)])
+                    lines.append(np.stack([level[:-1], level[1:]], axis=1))
+                    lines.append(self._uprights(level[:-1], feet.reshape(-1, 3)))
+        return np.concatenate(lines)
+
+    def _uprights(self, heads: np.ndarray, feet: np.ndarray) -> np.ndarray:
+        apart = np.linalg.norm(heads[:, None, :2] - feet[None, :, :2], axis=2)
+        below = np.where(apart <= 1e-3 * self._extent, feet[None, :, 2], -np.inf).max(axis=1)
+        low = heads.copy()
+        low[:, 2] = below
+        return np.stack([heads, low], axis=1)[np.isfinite(below)]
+
+    @property
+    def _extent(self) -> float:
+        return float(np.ptp(self.feet.reshape(-1, self.feet.shape[2]), axis=0).max(initial=1e-9))
+
+
+def fill_bodies(response: solver.Response, shown: solver.Pose, gone: np.ndarray | None = None) -> FillBodies:
+    """Find the columns of fill over the blocks where they are drawn.
+
+    Parameters
+    ----------
+    response : solver.Response
+    shown : solver.Pose
+    gone : (n_blocks,) bool array, optional
+        Blocks that have left, with the fill over them.
+    """
+    d = response.assembly.dimension
+    feet, tops = [np.zeros((0, d, d))], [np.zeros(0)]
+    for fill in response.loads.fills:
+        kept = fill if gone is None else fill.without(gone)
+        feet.append(kept.corners(response.assembly, shown))
+        tops.append(np.full(len(kept.block), kept.surface))
+    return FillBodies(np.concatenate(feet), np.concatenate(tops))

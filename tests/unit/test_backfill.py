@@ -1,0 +1,126 @@
+"""Fill over blocks: which of their edges and faces carry it, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from structures import alike, assembly_of, box, case_from, pixels, rectangle
+
+import solver
+from blockvis import draw_still, lay_backfill
+
+WEIGHT = 10.0
+
+
+def lay(assembly: solver.Assembly, over: str, surface: float, coefficient: float = 0.0) -> solver.Backfill:
+    return lay_backfill(assembly, over, surface, WEIGHT, coefficient)
+
+
+def down(assembly: solver.Assembly, over: str, surface: float) -> np.ndarray:
+    """Vertical load of the fill on each block."""
+    fill = lay(assembly, over, surface)
+    return -fill.load(assembly, solver.Pose.initial(assembly))[:, assembly.dimension - 1]
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_only_what_sees_the_surface_carries_fill(dimension: int) -> None:
+    """A slab under a pier that goes through the surface, and under a beam above it, which hides nothing."""
+    boxes = {"slab": (0.0, 0.0, 4.0, 1.0), "pier": (1.0, 1.0, 2.0, 3.0), "beam": (1.0, 3.0, 4.0, 3.5)}
+    if dimension == 2:
+        assembly = solver.Assembly.from_outlines([rectangle(*one) for one in boxes.values()], names=list(boxes))
+    else:
+        solids = [box([x0, 0.0, y0], [x1, 1.0, y1]) for x0, y0, x1, y1 in boxes.values()]
+        assembly = solver.Assembly.from_solids(solids, names=list(boxes))
+    assert down(assembly, "slab", 2.0) == pytest.approx([3.0 * WEIGHT, 0.0, 0.0])
+
+
+def test_a_pier_on_a_slab_in_space_leaves_a_ring() -> None:
+    solids = [box([0, 0, 0], [4, 4, 1]), box([1, 1, 1], [2, 3, 3])]
+    assembly = solver.Assembly.from_solids(solids, names=["slab", "pier"])
+    fill = lay(assembly, "slab", 2.0)
+    load = fill.load(assembly, solver.Pose.initial(assembly))[0]
+    # What is missing is 2 m² at x = 1.5, y = 2 m, 0.5 m to the left of the middle.
+    assert load == pytest.approx([0.0, 0.0, -14.0 * WEIGHT, 0.0, 0.5 * 2.0 * WEIGHT, 0.0], abs=1e-9)
+
+
+def test_fill_presses_sideways_on_the_projected_height() -> None:
+    ramp = solver.Assembly.from_outlines([[[0, 0], [2, 0], [2, 1]]], thickness=0.5)
+    fill = lay(ramp, "*", 2.0, 0.4)
+    force = fill.load(ramp, solver.Pose.initial(ramp))[0, :2]
+    # Depth 2 m at the left end, 1 m at the right one.
+    assert force == pytest.approx([0.4 * WEIGHT * 1.5 * 1.0 * 0.5, -WEIGHT * 1.5 * 2.0 * 0.5])
+
+
+def test_the_load_is_the_column_over_the_place_where_the_block_is() -> None:
+    block = solver.Assembly.from_outlines([rectangle(0.0, 0.0, 1.0, 1.0)])
+    fill = lay(block, "*", 3.0)
+    sunk = solver.Pose(block.centroids - [0.3, 0.5], np.zeros((1, 1)))
+    assert fill.load(block, sunk)[0] == pytest.approx([0.0, -2.5 * WEIGHT, 0.0])
+    upside_down = solver.Pose(block.centroids, np.full((1, 1), np.pi))
+    assert fill.load(block, upside_down)[0] == pytest.approx([0.0, 0.0, 0.0])
+    risen = solver.Pose(block.centroids - [0.0, -2.5], np.zeros((1, 1)))
+    assert fill.load(block, risen)[0] == pytest.approx([0.0, 0.0, 0.0])
+
+
+CASE = """
+[geometry]
+layout = "segmental arch"
+parameters = { span = 4.0, rise = 1.0, voussoirs = 5 }
+[roles]
+"right springer" = "moving"
+[settlement]
+direction = [1, 0]
+"""
+FILL = {"over": '"voussoir *"', "surface": "2.0", "unit_weight": "18000.0"}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"over": '"vousoir 3"'}, r"\[backfill\] over: no block and no material is named 'vousoir 3' \(did you mean"),
+        ({"over": "[]"}, r"\[backfill\] over is empty"),
+        ({"over": '"left springer"'}, "'left springer' are supports only; fill loads free blocks"),
+        ({"surface": "1.0"}, r"surface is 1 m, below the extrados of block 'voussoir 2', which reaches 1.20"),
+        ({"unit_weight": "-18000.0"}, r"\[backfill\] unit_weight is -18000"),
+        ({"pressure_coefficient": "-0.1"}, r"\[backfill\] pressure_coefficient is -0.1"),
+    ],
+)
+def test_fill_that_cannot_be_is_refused_in_one_line(change: dict[str, str], words: str) -> None:
+    keys = "\n".join(f"{key} = {value}" for key, value in (FILL | change).items())
+    with pytest.raises(ValueError, match=words) as error:
+        assembly_of(case_from(f"{CASE}[[backfill]]\n{keys}\n"))
+    assert "\n" not in str(error.value)
+
+
+def test_fill_over_covered_blocks_is_refused() -> None:
+    boxes = [rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2)]
+    assembly = solver.Assembly.from_outlines(boxes, names=["below", "above"])
+    with pytest.raises(ValueError, match="none of 'below' looks up to the surface"):
+        down(assembly, "below", 3.0)
+
+
+def test_a_linear_program_per_increment_has_no_fill() -> None:
+    assembly = assembly_of(case_from(CASE))
+    weight = solver.self_weight(assembly)
+    loads = solver.Loads(weight.dead, weight.live, (lay(assembly, "voussoir *", 2.0),))
+    structure = solver.Structure(assembly, loads=loads, friction_coefficient=0.7)
+    with pytest.raises(ValueError, match="under loads that stay as they are"):
+        structure.settle([1.0, 0.0], controls=solver.Controls(increments="linear program"))
+
+
+@pytest.mark.slow
+def test_fill_is_drawn_up_to_its_surface(tmp_path: Path) -> None:
+    blocks = [rectangle(0.0, 0.0, 1.0, 1.0), rectangle(-1.0, -1.0, 2.0, 0.0)]
+    assembly = solver.Assembly.from_outlines(blocks, names=["block", "ground"], roles=["free", "moving"])
+    weight = solver.self_weight(assembly)
+    shown = {}
+    for name, fills in (("bare", ()), ("filled", (lay(assembly, "block", 3.0),))):
+        loads = solver.Loads(weight.dead, weight.live, fills)
+        structure = solver.Structure(assembly, loads=loads, friction_coefficient=0.7)
+        response = structure.settle(solver.Settlement([0.0, -1.0], increment=0.1, limit=0.1))
+        drawn = draw_still(response, -1, tmp_path / f"{name}.png", size=(640, 360))
+        shown[name] = alike(pixels(drawn), (150, 128, 92), 30).sum()
+    # The line of its surface is as long as the block is wide.
+    assert shown["filled"] > shown["bare"] + 40
