@@ -44,7 +44,7 @@ WHITE_BOX = {
     "unit/test_extras.py": 4,
     "unit/test_fall.py": 6,
     "unit/test_fall_in_space.py": 3,
-    "unit/test_films.py": 6,
+    "unit/test_films.py": 7,
     "unit/test_import_graph.py": 1,
     "unit/test_kinds.py": 7,
     "unit/test_labels.py": 13,
