@@ -116,7 +116,7 @@ def _drawn_in_plane(
     fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
     frame = framed(assembly, [solver.Pose.initial(assembly)])
     scene = FlatScene(assembly, frame, sheet.inside_size, fill, outline=palette.PALE_OUTLINE)
-    if response.changes:
+    if increment.removed.any():
         scene.hide(increment.removed)
         scene.pose(solver.Pose.initial(assembly))
     others = [crack for crack in cracks if id(crack) not in {id(one) for one in main}]

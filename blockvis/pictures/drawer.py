@@ -60,7 +60,7 @@ ARROW, ARROW_IN_SPACE = 0.055, 0.09
 CELL, CELL_IN_SPACE = 0.07, 0.09
 
 #: Arrows of a mechanism shorter than this fraction of the picture are specks, and left out.
-SPECK = 0.02
+SPECK = 0.01
 
 #: Supports in space are shown whole where the picture is no larger for it than this many times the blocks: part of a
 #: slab that ends just outside looks like a mistake.
@@ -542,11 +542,11 @@ class Drawer:
         if swing is None or self._drawn_at is not None or increment.status == solver.Status.FALLING:
             return True
         place = increment.phase, increment.parameter
+        if not self.response.parameter.is_path and len(self.response.path) > 1 and len(self.increments) > 1:
+            # Of states that stand by themselves one would flash in a film.
+            return False
         if place not in self._acting:
-            # Of states that stand by themselves some move in the same parts, here and there.
-            same = self.response.parameter.is_path and np.array_equal(
-                mechanics.rigid_parts(self.assembly, increment), swing.parts
-            )
+            same = np.array_equal(mechanics.rigid_parts(self.assembly, increment), swing.parts)
             self._acting[place] = same or place == (swing.increment.phase, swing.increment.parameter)
         return self._acting[place]
 

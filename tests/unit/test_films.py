@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import box, dropped_brick, posed
+from structures import box, case_from, dropped_brick, posed
 
 import solver
 from blockvis import animate
@@ -12,8 +12,17 @@ from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of, state_at
 from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.solid_view import chosen_view
+from blockvis.runs.outputs import Drawing
 
 SIZE = (320, 180)
+
+LIMIT_LOAD = """
+[analysis]
+kind = "limit load"
+[[loads]]
+kind = "live"
+weight_fraction = [1.0, 0.0]
+"""
 
 
 def sideways_block(steps=3):
@@ -68,3 +77,14 @@ def test_what_falls_is_not_hidden_by_what_stands():
     alone = solver.Assembly.from_solids([box((0.8, 0.4, 0), (1.2, 0.8, 0.4))])
     alone = replace(posed(alone, solver.Pose.initial(alone)), increments=())
     assert chosen_view(alone, motion[1:]).axes[2, 1] < 0.0
+
+
+@pytest.mark.parametrize("settles", [True, False])
+def test_a_run_is_drawn_whole_with_its_cracks_where_there_may_be_any(tmp_path, settles):
+    ending = "[settlement]\ndirection = [0, -1]\nincrement = 0.1\nlimit = 0.1\n" if settles else LIMIT_LOAD
+    case = case_from('[geometry]\nlayout = "arch"\n[material]\nfriction_coefficient = 0.6\n' + ending)
+    for name in ("report.html", "mechanism.png", "collapse.mp4"):
+        (tmp_path / name).touch()
+    assert Drawing().is_written(case, tmp_path) is not settles
+    (tmp_path / "cracks.png").touch()
+    assert Drawing().is_written(case, tmp_path)
