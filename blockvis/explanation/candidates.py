@@ -173,12 +173,11 @@ def _touching(assembly: solver.Assembly) -> mechanics.Contacts:
     return mechanics.find_contacts(assembly, assembly.vertices, TOUCHING * assembly.block_size)
 
 
-def _bearing(assembly: solver.Assembly, names: Sequence[str]) -> list[int]:
-    """Find the supports of these names on which free blocks stand, with a face, not a corner alone."""
+def _bearing(assembly: solver.Assembly, names: Sequence[str] | None = None) -> list[int]:
+    """Find the supports, of these names or all, on which free blocks stand, with a face, not a corner alone."""
     contacts = _touching(assembly)
     found = []
-    for name in names:
-        block = assembly.index(name)
+    for block in np.flatnonzero(~assembly.free).tolist() if names is None else map(assembly.index, names):
         points = contacts.points[(contacts.block_a == block) | (contacts.block_b == block)]
         if len(points) and np.ptp(points, axis=0).max() > SHORTEST_FOOT * assembly.block_size:
             found.append(block)
@@ -333,7 +332,7 @@ def _troughs(ground: Ground, settings: ExplainSettings) -> list[Candidate]:
 
 def _extent(ground: Ground) -> tuple[float, float]:
     """Find the x between which the structure stands on its supports [m]."""
-    bearing = _bearing(ground.assembly, [piece for pieces in ground.pieces.values() for piece in pieces])
+    bearing = _bearing(ground.assembly)
     x = np.concatenate([ground.assembly.outline(i)[:, 0] for i in bearing])
     return float(x.min()), float(x.max())
 
@@ -432,8 +431,7 @@ def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list
     list of Twin
         One per candidate; of itself where it has its own run.
     """
-    supports = np.flatnonzero(~assembly.free)
-    bearing = _bearing(assembly, [assembly.names[i] for i in supports])
+    bearing = _bearing(assembly)
     size, d = float(np.ptp(assembly.vertices, axis=0).max()), assembly.dimension
     shapes: list[tuple[np.ndarray, float, np.ndarray]] = []
     found: list[Twin] = []
@@ -457,8 +455,7 @@ def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list
 
 def opens_cracks(assembly: solver.Assembly, candidate: Candidate) -> bool:
     """Whether supports move against each other or turn."""
-    bearing = _bearing(assembly, [assembly.names[i] for i in np.flatnonzero(~assembly.free)])
-    motion, d = _table(assembly, bearing, candidate.motions), assembly.dimension
+    motion, d = _table(assembly, _bearing(assembly), candidate.motions), assembly.dimension
     return bool(np.ptp(motion[:, :d], axis=0).max() > 1e-12 or np.abs(motion[:, d:]).max() > 1e-12)
 
 
@@ -483,8 +480,7 @@ def per_amount(assembly: solver.Assembly, candidate: Candidate) -> tuple[float, 
 
 def differential(assembly: solver.Assembly, motions: Motions) -> float:
     """Difference [m] between the lowest and the highest of the supports on which something stands, moved by these."""
-    bearing = _bearing(assembly, [assembly.names[i] for i in np.flatnonzero(~assembly.free)])
-    return float(np.ptp(_table(assembly, bearing, motions)[:, assembly.dimension - 1]))
+    return float(np.ptp(_table(assembly, _bearing(assembly), motions)[:, assembly.dimension - 1]))
 
 
 def scaled_motions(candidate: Candidate) -> Motions:
