@@ -18,7 +18,7 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import outlines_of_cells, rectangle, spread_of
 from blockvis.layout.refusal import Refused
 from blockvis.layout.selection import MORTAR
-from blockvis.layout.solids import volume, width_of
+from blockvis.layout.solids import fans, volume, width_of
 from blockvis.layout.views import VIEWS, axis_across, view_along
 from solver import mechanics
 
@@ -85,12 +85,6 @@ def body_of_polygons(name: str, points: np.ndarray, faces: Sequence[Sequence[int
     """
     used, triangles = np.unique(fans(faces), return_inverse=True)
     return Body(name, points[used], triangles.reshape(-1, 3))
-
-
-def fans(faces: Sequence[Sequence[int]]) -> np.ndarray:
-    """(m, 3) int array: polygons cut into triangles from their first corner, which keeps the edges around each."""
-    triangles = [(ring[0], ring[k], ring[k + 1]) for ring in faces for k in range(1, len(ring) - 1)]
-    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,10 @@ from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import Note
 from blockvis.layout.outlines import FLAT, spread_of
+from blockvis.layout.solids import fans
 from solver import mechanics
 
-from .bodies import Bodies, fans
+from .bodies import Bodies
 from .cells import layout_of_cells
 from .closed_surfaces import enclosed, without_volume
 from .reading import Reading

@@ -17,10 +17,11 @@ import numpy as np
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
+from blockvis.layout.solids import fans
 from solver import mechanics
 
 from . import meshio_files
-from .bodies import Bodies, Body, fans
+from .bodies import Bodies, Body
 from .closed_surfaces import closed_bodies
 from .reading import Reading
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from .left_out import LeftOut
 from .notes import LEFT_OUT, Note
+from .outlines import share_in
 
 if TYPE_CHECKING:
     from .layout import Layout
@@ -66,7 +67,7 @@ def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
     told, walls = np.zeros(layout.n_blocks, bool), list[Any]()
     for wall, label, holes, black in sorted(around, key=lambda one: float(one[0].area)):
         # Around a wall there may be a hatch of it, or the frame of the sheet.
-        if not wall.is_valid or wall.area == 0.0 or any(_share(one, wall) > 0.99 for one in walls):
+        if not wall.is_valid or wall.area == 0.0 or any(share_in(one, wall) > 0.99 for one in walls):
             continue
         inside = [i for i in np.flatnonzero(~told).tolist() if _lies_in(blocks[i], wall)]
         if not _are_openings(wall, [blocks[i] for i in inside], holes):
@@ -85,12 +86,7 @@ def _may_be_wall(item: LeftOut) -> bool:
 
 
 def _lies_in(shape: Any, wall: Any) -> bool:
-    return bool(0.0 < shape.area < 0.9 * wall.area and _share(shape, wall) > 0.99)
-
-
-def _share(inner: Any, outer: Any) -> float:
-    """Fraction of the area of one shape that lies in another."""
-    return float(inner.intersection(outer).area / inner.area) if inner.intersects(outer) else 0.0
+    return bool(0.0 < shape.area < 0.9 * wall.area and share_in(shape, wall) > 0.99)
 
 
 def _are_openings(wall: Any, shapes: list[Any], holes: Iterable[Any]) -> bool:

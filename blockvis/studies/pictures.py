@@ -18,7 +18,7 @@ from blockvis.pictures import palette
 from blockvis.results.about import LOCAL
 from blockvis.system.atomic_files import atomic_file
 
-from .fragility import Fragility, fragility_of
+from .fragility import CONFIDENCE, Fragility, fragility_of
 from .sensitivity import first_order, outcome, swings
 from .study_file import Study
 from .study_folder import NO_RESULT, StudyFolder
@@ -93,7 +93,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
         low, high = np.append(curve.lower, curve.lower[-1]), np.append(curve.upper, curve.upper[-1])
         axes.fill_between(
             ends, low, high, step="post", color=colour, alpha=0.18, linewidth=0,
-            label=f"{100 * curve.confidence:g} % confidence, point by point",
+            label=f"{100 * CONFIDENCE:g} % confidence, point by point",
         )  # fmt: skip
     axes.step(x, level, where="post", color=colour, linewidth=2.2, label=curve_name(study))
     for share, words in ((0.05, "5 %"), (0.5, "half")):
