@@ -368,35 +368,37 @@ def refined(ground: Ground, best: Sequence[Candidate], known: Sequence[Candidate
         names = [way for way in (*WAYS, "outward") if any(way in one.ways for one in known)]
     for one in best:
         if one.is_trough:
-            others = sorted({other.centre for other in troughs})
-            step = min(np.diff(others), default=one.inflection) / 2.0
-            for centre in (one.centre - step, one.centre, one.centre + step):
-                for inflection in (one.inflection / 2.0**0.5, one.inflection, one.inflection * 2.0**0.5):
-                    if (centre, inflection) != (one.centre, one.inflection):
-                        found.append(trough(ground, float(centre), float(inflection), one.detail))
-            continue
-        d = ground.assembly.dimension
+            found += _other_troughs(ground, one, troughs)
         # Of supports that turn, or that go two ways already, there are no others between.
-        if len(one.ways) != 1 or len(set(one.motions.values())) != 1 or one.ways[0] not in names:
-            continue
-        way = one.ways[0]
-        head = one.cause.removesuffix(f" {said(way)}")
-        for other in names:
-            motions = translation(ground, list(one.motions), other)
-            across = all(abs(np.dot(own[:d], motions[piece][:d])) < 0.5 for piece, own in one.motions.items())
-            # A support goes outward from where it stands: across that there is nothing but down.
-            radial = bool({way, other} & set(RADIAL)) and "down" not in (way, other)
-            if motions and across and other != "up" and not radial:
-                words = sorted((way, other), key=names.index)
-                both = {k: tuple(a + b for a, b in zip(own, motions[k], strict=True)) for k, own in one.motions.items()}
-                cause = f"{head} {said(words[0])} and {said(words[1])}"
-                found.append(Candidate(cause, both, OBLIQUE, ways=tuple(words)))
+        elif len(one.ways) == len(set(one.motions.values())) == 1 and one.ways[0] in names:
+            found += _oblique(ground, one, names)
+    new = {one.cause + one.detail: one for one in reversed(found)}
     taken = {one.cause + one.detail for one in known}
-    return [
-        one
-        for k, one in enumerate(found)
-        if one.cause + one.detail not in taken | {o.cause + o.detail for o in found[:k]}
-    ]
+    return [one for one in found if new[one.cause + one.detail] is one and one.cause + one.detail not in taken]
+
+
+def _other_troughs(ground: Ground, one: Candidate, troughs: Sequence[Candidate]) -> Iterator[Candidate]:
+    """Yield the troughs beside one: half way to the next, and wider and narrower."""
+    step = min(np.diff(sorted({other.centre for other in troughs})), default=one.inflection) / 2.0
+    for centre in (one.centre - step, one.centre, one.centre + step):
+        for inflection in (one.inflection / 2.0**0.5, one.inflection, one.inflection * 2.0**0.5):
+            if (centre, inflection) != (one.centre, one.inflection):
+                yield trough(ground, float(centre), float(inflection), one.detail)
+
+
+def _oblique(ground: Ground, one: Candidate, names: Sequence[str]) -> Iterator[Candidate]:
+    """Yield the movements between the one direction of a candidate and those across it."""
+    d, (way,) = ground.assembly.dimension, one.ways
+    head = one.cause.removesuffix(f" {said(way)}")
+    for other in names:
+        motions = translation(ground, list(one.motions), other)
+        across = all(abs(np.dot(own[:d], motions[piece][:d])) < 0.5 for piece, own in one.motions.items())
+        # A support goes outward from where it stands: across that there is nothing but down.
+        radial = bool({way, other} & set(RADIAL)) and "down" not in (way, other)
+        if motions and across and other != "up" and not radial:
+            words = sorted((way, other), key=names.index)
+            both = {k: tuple(a + b for a, b in zip(own, motions[k], strict=True)) for k, own in one.motions.items()}
+            yield Candidate(f"{head} {said(words[0])} and {said(words[1])}", both, OBLIQUE, ways=tuple(words))
 
 
 @dataclass(frozen=True)

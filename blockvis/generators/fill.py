@@ -231,19 +231,7 @@ def filled(
     area = rest.area
     bearing = length / 2.0 if pattern.bearing is None else pattern.bearing
     units = Units(length=length, height=height, bearing=bearing, base=0.0, grid=grid)
-    stones: list[tuple[str, shapely.Polygon]] = []
-    hanging: list[np.ndarray] = []
-    for number, hole in enumerate(holes, start=1):
-        if pattern.heads == "none" or not _has_wall_over(hole, rest, OVER * height):
-            continue
-        head = head_of(hole, pattern.heads, rest, _nearest(hole, holes), units)
-        if head is None:
-            hanging.append(np.array(hole.centroid.coords[0]) + corner)
-            continue
-        word, parts = head
-        several = len(parts) > 1
-        stones += [(f"{word} {number}-{i}" if several else f"{word} {number}", part) for i, part in enumerate(parts, 1)]
-        rest = shapely.difference(rest, shapely.union_all(parts, grid_size=grid), grid_size=grid)
+    stones, rest, hanging = _heads(holes, rest, pattern, units)
     quoins = _quoins(solid, rest, pattern, grid)
     stones += [(f"quoin {k}", shape) for k, shape in enumerate(quoins, start=1)]
     if quoins:
@@ -258,7 +246,7 @@ def filled(
         stones = _with_mortar(stones, pattern.joint)
     notes = []
     if hanging:
-        x, y = hanging[0]
+        x, y = np.array(hanging[0].centroid.coords[0]) + corner
         notes.append(Note(CHANGED, f"bond: {len(hanging)} openings have no room for a head, the first around "
                      f"({x:.6g}, {y:.6g}): what lies over them may hang; give a smaller bearing or brick"))  # fmt: skip
     return Layout(
@@ -355,6 +343,26 @@ def _quoins(solid: shapely.Polygon, rest: shapely.Geometry, pattern: Pattern, gr
     return found
 
 
+def _heads(
+    holes: Sequence[shapely.Polygon], rest: shapely.Geometry, pattern: Pattern, units: Units
+) -> tuple[list[tuple[str, shapely.Polygon]], shapely.Geometry, list[shapely.Polygon]]:
+    """Lay heads over openings; give their stones, what is left of the wall, and the openings without room for one."""
+    stones: list[tuple[str, shapely.Polygon]] = []
+    hanging = []
+    for number, hole in enumerate(holes, start=1):
+        if pattern.heads == "none" or not _has_wall_over(hole, rest, OVER * units.height):
+            continue
+        head = head_of(hole, pattern.heads, rest, _nearest(hole, holes), units)
+        if head is None:
+            hanging.append(hole)
+            continue
+        word, parts = head
+        several = len(parts) > 1
+        stones += [(f"{word} {number}-{i}" if several else f"{word} {number}", part) for i, part in enumerate(parts, 1)]
+        rest = shapely.difference(rest, shapely.union_all(parts, grid_size=units.grid), grid_size=units.grid)
+    return stones, rest, hanging
+
+
 def _laid(
     rest: shapely.Geometry, box: tuple[float, ...], pattern: Pattern, grid: float
 ) -> list[tuple[str, shapely.Polygon]]:
@@ -379,9 +387,14 @@ def _laid(
     def too_small(shape: shapely.Polygon, piece: int) -> bool:
         return not is_complete[piece] and _is_sliver(shape, length, height)
 
-    joined = [shape for shape, _ in without_slivers(pieces, too_small, height, grid)]
+    return _numbered([shape for shape, _ in without_slivers(pieces, too_small, height, grid)], pattern)
+
+
+def _numbered(joined: Sequence[shapely.Polygon], pattern: Pattern) -> list[tuple[str, shapely.Polygon]]:
+    """Name stones by their course and their place in it, those of rubble in rows."""
+    height = pattern.module[1]
     middles = shapely.get_coordinates(shapely.centroid(joined))
-    if random:
+    if pattern.bond == "rubble":
         order = np.lexsort((middles[:, 0], np.round(middles[:, 1] / height)))
         return [(f"stone {k}", joined[i]) for k, i in enumerate(order.tolist(), start=1)]
     courses = np.floor(np.array([shape.bounds[1] for shape in joined]) / height + 1e-6).astype(int)
