@@ -143,21 +143,17 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
         raise ValueError(f'{source}: no block is a support; give some the role "fixed" under [roles] or [[supports]]')
     fixed = assembly.with_roles(np.where(assembly.free, mechanics.FREE, mechanics.FIXED))
     whole = {assembly.names[i]: (assembly.names[i],) for i in supports}
-    if assembly.dimension == 3:
-        given = next((key for key in ("trough", "centres", "inflections") if getattr(settings, key)), None)
-        if given is not None:
-            raise ValueError(
-                f"{source}: [explain] {given} is of structures in the plane, this one is in space; leave it out"
-            )
+    given = [key for key in ("trough", "centres", "inflections") if getattr(settings, key)]
+    if assembly.dimension == 3 and given:
+        raise ValueError(
+            f"{source}: [explain] {given[0]} is of structures in the plane, this one is in space; leave it out"
+        )
     if settings.trough is False or assembly.dimension == 3:
         return Ground(fixed, whole, troughs=False)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         cut = cut_ground(fixed, (), chosen=supports)
-    new = [name for name in cut.names if name not in assembly.names]
-    pieces = {
-        name: own if (own := tuple(p for p in new if p.rpartition(" ")[0] == name)) else (name,) for name in whole
-    }
+    pieces = {name: _pieces(name, cut, assembly) for name in whole}
     feet = sum(len(_bearing(cut, names)) for names in pieces.values())
     if feet < FEWEST_FEET and settings.trough is None:
         return Ground(fixed, whole, troughs=False)
@@ -166,6 +162,12 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
             f"{source}: [explain] trough: the structure stands on one place, which cannot bend; leave it out"
         )
     return Ground(cut, pieces, troughs=True, notes=tuple(str(warning.message) for warning in caught))
+
+
+def _pieces(name: str, cut: solver.Assembly, drawn: solver.Assembly) -> tuple[str, ...]:
+    """Name the pieces of a support, or itself where it was not cut."""
+    new = tuple(one for one in cut.names if one not in drawn.names and one.rpartition(" ")[0] == name)
+    return new or (name,)
 
 
 def _touching(assembly: solver.Assembly) -> mechanics.Contacts:
@@ -463,8 +465,8 @@ def opens_cracks(assembly: solver.Assembly, candidate: Candidate) -> bool:
 
 def _table(assembly: solver.Assembly, blocks: Sequence[int], motions: Motions) -> np.ndarray:
     """(n, n_dof) array [m and rad]: motions of blocks, 0 of those that stand still."""
-    still = (0.0,) * (3 if assembly.dimension == 2 else 6)
-    return np.array([motions.get(assembly.names[i], still) for i in blocks])
+    at_rest = (0.0,) * (3 if assembly.dimension == 2 else 6)
+    return np.array([motions.get(assembly.names[i], at_rest) for i in blocks])
 
 
 def per_amount(assembly: solver.Assembly, candidate: Candidate) -> tuple[float, str]:

@@ -240,7 +240,7 @@ def _mortar_rows(proposal: Proposal, rounding: float) -> tuple[Row, ...]:
     for k in np.flatnonzero(counts):
         rows.append(("", f"{edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {counts[k]:6d} stretches  {metres[k]:9.3f} m"))
     rows.append(("proposed", f'joint_thickness = {proposal.thickness:g}   (m, or "auto")'))
-    if proposal.way == "voronoi":
+    if proposal.method == "voronoi":
         rows.append(("", 'closing = "voronoi": faces are not straight, mortar goes to the nearest stone'))
     return (*rows, ("", proposal.note)) if proposal.note else tuple(rows)
 

@@ -25,8 +25,8 @@ INSIDE, OUTSIDE = 0.5, 1e-6
 #: Outlines are the same if what only one of them covers is below this fraction of its area.
 SAME = 1e-4
 
-#: What of an opening lies outside of its wall is told from this fraction of its area on.
-TOLD = 0.01
+#: What of an opening lies outside of its wall is reported from this fraction of its area on.
+REPORTED = 0.01
 
 #: Kinds of what a reader leaves out that may be outlines of walls.
 _OUTLINES = ("hole", "background", "across")
@@ -271,7 +271,7 @@ def _reaching_out(every: Sequence[tuple[Region, int]]) -> list[str]:
     for region, _ in every:
         for opening in region.openings:
             out = 1.0 - share_in(opening, region.wall)
-            if out > TOLD:
+            if out > REPORTED:
                 x, y = opening.centroid.coords[0]
                 found.append(
                     f"bond: {out:.0%} of the opening around ({x:.6g}, {y:.6g}) lies outside of its wall on layer "
