@@ -143,21 +143,17 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
         raise ValueError(f'{source}: no block is a support; give some the role "fixed" under [roles] or [[supports]]')
     fixed = assembly.with_roles(np.where(assembly.free, mechanics.FREE, mechanics.FIXED))
     whole = {assembly.names[i]: (assembly.names[i],) for i in supports}
-    if assembly.dimension == 3:
-        given = next((key for key in ("trough", "centres", "inflections") if getattr(settings, key)), None)
-        if given is not None:
-            raise ValueError(
-                f"{source}: [explain] {given} is of structures in the plane, this one is in space; leave it out"
-            )
+    given = [key for key in ("trough", "centres", "inflections") if getattr(settings, key)]
+    if assembly.dimension == 3 and given:
+        raise ValueError(
+            f"{source}: [explain] {given[0]} is of structures in the plane, this one is in space; leave it out"
+        )
     if settings.trough is False or assembly.dimension == 3:
         return Ground(fixed, whole, troughs=False)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         cut = cut_ground(fixed, (), chosen=supports)
-    new = [name for name in cut.names if name not in assembly.names]
-    pieces = {
-        name: own if (own := tuple(p for p in new if p.rpartition(" ")[0] == name)) else (name,) for name in whole
-    }
+    pieces = {name: _pieces(name, cut, assembly) for name in whole}
     feet = sum(len(_bearing(cut, names)) for names in pieces.values())
     if feet < FEWEST_FEET and settings.trough is None:
         return Ground(fixed, whole, troughs=False)
@@ -168,17 +164,22 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
     return Ground(cut, pieces, troughs=True, notes=tuple(str(warning.message) for warning in caught))
 
 
+def _pieces(name: str, cut: solver.Assembly, drawn: solver.Assembly) -> tuple[str, ...]:
+    """Name the pieces of a support, or itself where it was not cut."""
+    new = tuple(one for one in cut.names if one not in drawn.names and one.rpartition(" ")[0] == name)
+    return new or (name,)
+
+
 def _touching(assembly: solver.Assembly) -> mechanics.Contacts:
     """Find the contact points of the layout."""
     return mechanics.find_contacts(assembly, assembly.vertices, TOUCHING * assembly.block_size)
 
 
-def _bearing(assembly: solver.Assembly, names: Sequence[str]) -> list[int]:
-    """Find the supports of these names on which free blocks stand, with a face, not a corner alone."""
+def _bearing(assembly: solver.Assembly, names: Sequence[str] | None = None) -> list[int]:
+    """Find the supports, of these names or all, on which free blocks stand, with a face, not a corner alone."""
     contacts = _touching(assembly)
     found = []
-    for name in names:
-        block = assembly.index(name)
+    for block in np.flatnonzero(~assembly.free).tolist() if names is None else map(assembly.index, names):
         points = contacts.points[(contacts.block_a == block) | (contacts.block_b == block)]
         if len(points) and np.ptp(points, axis=0).max() > SHORTEST_FOOT * assembly.block_size:
             found.append(block)
@@ -333,7 +334,7 @@ def _troughs(ground: Ground, settings: ExplainSettings) -> list[Candidate]:
 
 def _extent(ground: Ground) -> tuple[float, float]:
     """Find the x between which the structure stands on its supports [m]."""
-    bearing = _bearing(ground.assembly, [piece for pieces in ground.pieces.values() for piece in pieces])
+    bearing = _bearing(ground.assembly)
     x = np.concatenate([ground.assembly.outline(i)[:, 0] for i in bearing])
     return float(x.min()), float(x.max())
 
@@ -369,35 +370,37 @@ def refined(ground: Ground, best: Sequence[Candidate], known: Sequence[Candidate
         names = [way for way in (*WAYS, "outward") if any(way in one.ways for one in known)]
     for one in best:
         if one.is_trough:
-            others = sorted({other.centre for other in troughs})
-            step = min(np.diff(others), default=one.inflection) / 2.0
-            for centre in (one.centre - step, one.centre, one.centre + step):
-                for inflection in (one.inflection / 2.0**0.5, one.inflection, one.inflection * 2.0**0.5):
-                    if (centre, inflection) != (one.centre, one.inflection):
-                        found.append(trough(ground, float(centre), float(inflection), one.detail))
-            continue
-        d = ground.assembly.dimension
+            found += _other_troughs(ground, one, troughs)
         # Of supports that turn, or that go two ways already, there are no others between.
-        if len(one.ways) != 1 or len(set(one.motions.values())) != 1 or one.ways[0] not in names:
-            continue
-        way = one.ways[0]
-        head = one.cause.removesuffix(f" {said(way)}")
-        for other in names:
-            motions = translation(ground, list(one.motions), other)
-            across = all(abs(np.dot(own[:d], motions[piece][:d])) < 0.5 for piece, own in one.motions.items())
-            # A support goes outward from where it stands: across that there is nothing but down.
-            radial = bool({way, other} & set(RADIAL)) and "down" not in (way, other)
-            if motions and across and other != "up" and not radial:
-                words = sorted((way, other), key=names.index)
-                both = {k: tuple(a + b for a, b in zip(own, motions[k], strict=True)) for k, own in one.motions.items()}
-                cause = f"{head} {said(words[0])} and {said(words[1])}"
-                found.append(Candidate(cause, both, OBLIQUE, ways=tuple(words)))
+        elif len(one.ways) == len(set(one.motions.values())) == 1 and one.ways[0] in names:
+            found += _oblique(ground, one, names)
+    new = {one.cause + one.detail: one for one in reversed(found)}
     taken = {one.cause + one.detail for one in known}
-    return [
-        one
-        for k, one in enumerate(found)
-        if one.cause + one.detail not in taken | {o.cause + o.detail for o in found[:k]}
-    ]
+    return [one for one in found if new[one.cause + one.detail] is one and one.cause + one.detail not in taken]
+
+
+def _other_troughs(ground: Ground, one: Candidate, troughs: Sequence[Candidate]) -> Iterator[Candidate]:
+    """Yield the troughs beside one: half way to the next, and wider and narrower."""
+    step = min(np.diff(sorted({other.centre for other in troughs})), default=one.inflection) / 2.0
+    for centre in (one.centre - step, one.centre, one.centre + step):
+        for inflection in (one.inflection / 2.0**0.5, one.inflection, one.inflection * 2.0**0.5):
+            if (centre, inflection) != (one.centre, one.inflection):
+                yield trough(ground, float(centre), float(inflection), one.detail)
+
+
+def _oblique(ground: Ground, one: Candidate, names: Sequence[str]) -> Iterator[Candidate]:
+    """Yield the movements between the one direction of a candidate and those across it."""
+    d, (way,) = ground.assembly.dimension, one.ways
+    head = one.cause.removesuffix(f" {said(way)}")
+    for other in names:
+        motions = translation(ground, list(one.motions), other)
+        across = all(abs(np.dot(own[:d], motions[piece][:d])) < 0.5 for piece, own in one.motions.items())
+        # A support goes outward from where it stands: across that there is nothing but down.
+        radial = bool({way, other} & set(RADIAL)) and "down" not in (way, other)
+        if motions and across and other != "up" and not radial:
+            words = sorted((way, other), key=names.index)
+            both = {k: tuple(a + b for a, b in zip(own, motions[k], strict=True)) for k, own in one.motions.items()}
+            yield Candidate(f"{head} {said(words[0])} and {said(words[1])}", both, OBLIQUE, ways=tuple(words))
 
 
 @dataclass(frozen=True)
@@ -432,8 +435,7 @@ def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list
     list of Twin
         One per candidate; of itself where it has its own run.
     """
-    supports = np.flatnonzero(~assembly.free)
-    bearing = _bearing(assembly, [assembly.names[i] for i in supports])
+    bearing = _bearing(assembly)
     size, d = float(np.ptp(assembly.vertices, axis=0).max()), assembly.dimension
     shapes: list[tuple[np.ndarray, float, np.ndarray]] = []
     found: list[Twin] = []
@@ -457,15 +459,14 @@ def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list
 
 def opens_cracks(assembly: solver.Assembly, candidate: Candidate) -> bool:
     """Whether supports move against each other or turn."""
-    bearing = _bearing(assembly, [assembly.names[i] for i in np.flatnonzero(~assembly.free)])
-    motion, d = _table(assembly, bearing, candidate.motions), assembly.dimension
+    motion, d = _table(assembly, _bearing(assembly), candidate.motions), assembly.dimension
     return bool(np.ptp(motion[:, :d], axis=0).max() > 1e-12 or np.abs(motion[:, d:]).max() > 1e-12)
 
 
 def _table(assembly: solver.Assembly, blocks: Sequence[int], motions: Motions) -> np.ndarray:
     """(n, n_dof) array [m and rad]: motions of blocks, 0 of those that stand still."""
-    still = (0.0,) * (3 if assembly.dimension == 2 else 6)
-    return np.array([motions.get(assembly.names[i], still) for i in blocks])
+    at_rest = (0.0,) * (3 if assembly.dimension == 2 else 6)
+    return np.array([motions.get(assembly.names[i], at_rest) for i in blocks])
 
 
 def per_amount(assembly: solver.Assembly, candidate: Candidate) -> tuple[float, str]:
@@ -483,8 +484,7 @@ def per_amount(assembly: solver.Assembly, candidate: Candidate) -> tuple[float, 
 
 def differential(assembly: solver.Assembly, motions: Motions) -> float:
     """Difference [m] between the lowest and the highest of the supports on which something stands, moved by these."""
-    bearing = _bearing(assembly, [assembly.names[i] for i in np.flatnonzero(~assembly.free)])
-    return float(np.ptp(_table(assembly, bearing, motions)[:, assembly.dimension - 1]))
+    return float(np.ptp(_table(assembly, _bearing(assembly), motions)[:, assembly.dimension - 1]))
 
 
 def scaled_motions(candidate: Candidate) -> Motions:

@@ -119,11 +119,7 @@ def explain(
         first = [one for one in first if opens_cracks(ground.assembly, one)]
     about = 3 * len(first)
     with workers_for(about, workers, scheduler) as processes:
-        search.follow([pair for one in first for pair in search.usual(one)], processes, progress)
-        worth = [c for c in search.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
-        around = refined(ground, [cause.best.candidate for cause in worth], first)
-        search.follow([pair for one in around for pair in search.usual(one)], processes, progress)
-        search.follow([pair for one in _likeliest(search.ranked()) for pair in search.others(one)], processes, progress)
+        search.carry_out(first, processes, progress)
     causes = search.ranked()
     by_best = by_any = observations.widths > 0.0
     if causes:
@@ -224,6 +220,14 @@ class _Search:
         heavier_sides = (-1, 1) if trial.candidate.bends else (trial.variant.heavier_side,) * 2
         frictions = (self.frictions[0], self.frictions[2])
         return [(trial.candidate, Variant(*both)) for both in zip(frictions, heavier_sides, strict=True)]
+
+    def carry_out(self, first: Sequence[Candidate], processes: Executor | None, progress: bool) -> None:
+        """Follow candidates, others around the best of them, and the likeliest with other coefficients of friction."""
+        self.follow([pair for one in first for pair in self.usual(one)], processes, progress)
+        worth = [c for c in self.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
+        around = refined(self.ground, [cause.best.candidate for cause in worth], first)
+        self.follow([pair for one in around for pair in self.usual(one)], processes, progress)
+        self.follow([pair for one in _likeliest(self.ranked()) for pair in self.others(one)], processes, progress)
 
     def follow(self, pairs: Sequence[tuple[Candidate, Variant]], processes: Executor | None, progress: bool) -> None:
         """Follow candidates in some variants, and compare them with the observations."""

@@ -98,15 +98,12 @@ class Run:
         Of the increments in equilibrium, from 0; empty where there is none.
     moved : (n, n_blocks, n_dof) array [m and rad]
         Displacement and rotation of each block.
-    collapsed : bool
-        Whether the structure falls beyond the last amount.
     message : str
         Why it ended.
     """
 
     amounts: np.ndarray
     moved: np.ndarray
-    collapsed: bool
     message: str
 
     def at(self, amounts: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -214,7 +211,7 @@ def followed(order: Order) -> Run:
     joints = initial_joints(assembly)
     amounts, moved = [], []
     steps = FOLLOWED.start(order.given, None, ()).steps
-    collapsed, message = False, ""
+    message = ""
     try:
         for increment in steps:
             if increment.status != solver.Status.EQUILIBRIUM:
@@ -225,12 +222,11 @@ def followed(order: Order) -> Run:
                 steps.close()
                 break
         else:
-            collapsed = steps.ending.stop in (solver.Status.COLLAPSED, solver.Status.NO_INITIAL_EQUILIBRIUM)
             message = steps.ending.message
     except solver.SolveError as error:
         message = str(error)
     shape = solver.Pose.initial(assembly).displacements(assembly).shape
-    return Run(np.array(amounts), np.array(moved).reshape(-1, *shape), collapsed, message)
+    return Run(np.array(amounts), np.array(moved).reshape(-1, *shape), message)
 
 
 @contextmanager

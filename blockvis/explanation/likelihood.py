@@ -156,7 +156,7 @@ class Comparison:
         sigma, spread = self.deviations
         if len(self.seen):
             terms = _log_normal(widths - given.widths[self.seen], sigma[self.seen]) + self.log_chance
-            fits = _log_sums(terms, self.first) + np.log1p(-self.trust.outliers)
+            fits = np.logaddexp.reduceat(terms, self.first, axis=1) + np.log1p(-self.trust.outliers)
             total += np.logaddexp(fits, strays).sum(axis=1)
         if len(given.points):
             fits = _log_normal(displacements - given.displacements, spread) + np.log1p(-self.trust.outliers)
@@ -219,14 +219,6 @@ def _error_scales(observed: np.ndarray) -> np.ndarray:
 def _log_normal(gap: np.ndarray, sigma: np.ndarray) -> np.ndarray:
     """Logarithm of the normal density [1/m] at gaps [m]."""
     return np.asarray(-0.5 * (gap / sigma) ** 2 - np.log(sigma * np.sqrt(2.0 * np.pi)))
-
-
-def _log_sums(terms: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Logarithms of the sums of exp(terms), (n, n_pairs), over runs of pairs that begin at `first`, (m,): (n, m)."""
-    top = np.maximum.reduceat(terms, first, axis=1)
-    lengths = np.diff([*first, terms.shape[1]])
-    sums = np.add.reduceat(np.exp(terms - np.repeat(top, lengths, axis=1)), first, axis=1)
-    return np.asarray(top + np.log(sums))
 
 
 @dataclass(frozen=True)

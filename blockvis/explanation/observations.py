@@ -327,6 +327,22 @@ def _check_width(width: float, cells: _Cells, assembly: solver.Assembly) -> None
         )
 
 
+def _between(
+    names: Sequence[str], keys: Sequence[str], cells: _Cells, assembly: solver.Assembly, joints: InitialJoints
+) -> np.ndarray:
+    """(n_joints,) bool array: the joints between two blocks, which must touch."""
+    pair = [_block(name, key, cells, assembly) for name, key in zip(names, keys, strict=True)]
+    first_a, first_b = joints.block_a == pair[0], joints.block_b == pair[0]
+    between = (first_a & (joints.block_b == pair[1])) | (first_b & (joints.block_a == pair[1]))
+    if not between.any():
+        beside = np.unique(np.concatenate([joints.block_b[first_a], joints.block_a[first_b]]))
+        others = ", ".join(f"'{assembly.names[k]}'" for k in beside) or "no block"
+        raise cells.error(
+            keys[1], f"names '{names[0]}' and '{names[1]}', which do not touch; '{names[0]}' touches {others}"
+        )
+    return between
+
+
 def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> tuple[np.ndarray, bool, bool, str]:
     """Find where a width was measured: somewhere in the joint between two blocks, or at its coordinates.
 
@@ -348,18 +364,7 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
     else:
         names, keys = [cells.text("block_a"), cells.text("block_b")], ["block_a", "block_b"]
     if names[0] or names[1]:
-        pair = [_block(name, key, cells, assembly) for name, key in zip(names, keys, strict=True)]
-        between = ((joints.block_a == pair[0]) & (joints.block_b == pair[1])) | (
-            (joints.block_a == pair[1]) & (joints.block_b == pair[0])
-        )
-        if not between.any():
-            beside = np.concatenate(
-                [joints.block_b[joints.block_a == pair[0]], joints.block_a[joints.block_b == pair[0]]]
-            )
-            others = ", ".join(f"'{assembly.names[k]}'" for k in np.unique(beside)) or "no block"
-            raise cells.error(
-                keys[1], f"names '{names[0]}' and '{names[1]}', which do not touch; '{names[0]}' touches {others}"
-            )
+        between = _between(names, keys, cells, assembly, joints)
         label = f"{names[0]} | {names[1]}"
         if all(cells.number(axis) is not None for axis in axes):
             place = np.array([cells.number(axis) for axis in axes], dtype=float)

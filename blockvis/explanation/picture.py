@@ -17,7 +17,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import solver
 from blockvis.pictures import palette
-from blockvis.pictures.drawer import WHOLE
+from blockvis.pictures.drawer import WHOLE, magnified
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.cracks import SMALLEST_OPENING
@@ -73,7 +73,7 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     extent = float(np.ptp(assembly.vertices[free[assembly.block_of_vertex]], axis=0).max())
     # Each cause by its own: what one makes by going far, another may make by going a little.
     factors = [max(1.0, rounded_length(SHOWN * extent / most)) if most > 0.0 else 1.0 for most in largest]
-    shown = [_magnified(assembly, pose, factor) for pose, factor in zip(poses, factors, strict=True)]
+    shown = [magnified(assembly, pose, factor) for pose, factor in zip(poses, factors, strict=True)]
     view = None if assembly.dimension == 2 else _view_of(found)
     if view is None:
         frame = framed(assembly, [drawn, *shown])
@@ -102,11 +102,6 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     with atomic_file(path) as partial:
         figure.savefig(partial, dpi=DPI, facecolor="white")
     return path
-
-
-def _magnified(assembly: solver.Assembly, pose: solver.Pose, factor: float) -> solver.Pose:
-    start = assembly.centroids
-    return solver.Pose(start + factor * (pose.positions - start), factor * pose.rotations)
 
 
 def _view_of(found: Explanation) -> View:
@@ -144,7 +139,10 @@ class _Canvas:
 
     def blocks(self, pose: solver.Pose, lines: Sequence[np.ndarray], thick: Sequence[float], filled: Any) -> None:
         """Draw the blocks, and open joints as lines (n, 2, d) [m] so thick [points], or as polygons (n, 4, d) [m]."""
-        colour, fill = _rgb(palette.OPEN), palette.block_colours(self.assembly.materials, self.assembly.free)
+        colour, fill = (
+            palette.hexadecimal(palette.OPEN),
+            palette.block_colours(self.assembly.materials, self.assembly.free),
+        )
         if self.view is not None:
             self._solid_blocks(pose, lines, thick, filled)
             return
@@ -153,7 +151,7 @@ class _Canvas:
             PolyCollection(
                 np.split(corners, self.assembly.offsets[1:-1]),
                 facecolors=[tuple(one) for one in (fill / 255.0).tolist()],
-                edgecolors=_rgb(palette.OUTLINE),
+                edgecolors=palette.hexadecimal(palette.OUTLINE),
                 linewidths=0.6,
                 zorder=2,
             )
@@ -171,10 +169,12 @@ class _Canvas:
         arms = 0.07 * across * self.view.projected(np.eye(3)[:2])
         centre = corner + np.array([0.1 * across, 0.0]) + 0.05 * high
         for word, arm in zip(("right", "back"), arms, strict=True):
-            arrow = {"arrowstyle": "-|>", "color": _rgb(palette.FAINT)}
+            arrow = {"arrowstyle": "-|>", "color": palette.hexadecimal(palette.FAINT)}
             self.panel.annotate("", centre + arm, xytext=centre, arrowprops=arrow)
             x, y = centre + 1.35 * arm
-            self.panel.text(x, y, word, ha="center", va="center", fontsize=TEXT - 3, color=_rgb(palette.FAINT))
+            self.panel.text(
+                x, y, word, ha="center", va="center", fontsize=TEXT - 3, color=palette.hexadecimal(palette.FAINT)
+            )
 
     def _solid_blocks(
         self, pose: solver.Pose, lines: Sequence[np.ndarray], thick: Sequence[float], filled: Any
@@ -211,17 +211,21 @@ def _observed(canvas: _Canvas, found: Explanation) -> None:
     canvas.blocks(solver.Pose.initial(assembly), lines, thick, [])
     canvas.compass()
     places = canvas.placed(given.places)
-    panel.plot(*places[~opened].T, "o", ms=4.5, mfc="white", mec=_rgb(palette.FAINT), zorder=4)
+    panel.plot(*places[~opened].T, "o", ms=4.5, mfc="white", mec=palette.hexadecimal(palette.FAINT), zorder=4)
     _labels(panel, places, given.widths, found, sizes=given.widths)
     strange = places[list(found.unexplained)]
-    panel.plot(*strange.T, "o", ms=17, mfc="none", mec=_rgb(palette.WARNING), mew=1.6, zorder=6)
+    panel.plot(*strange.T, "o", ms=17, mfc="none", mec=palette.hexadecimal(palette.WARNING), mew=1.6, zorder=6)
     if len(given.points):
         _arrows(panel, canvas.placed(given.points), canvas.placed(given.displacements), assembly)
     what = "Observed" + (": open joints [mm], ○ closed" if len(given.widths) else ": displaced points")
-    panel.set_title(what, loc="left", fontsize=TEXT + 1, color=_rgb(palette.INK))
+    panel.set_title(what, loc="left", fontsize=TEXT + 1, color=palette.hexadecimal(palette.INK))
     if len(strange):
         panel.annotate(
-            "○ unexplained", (0.0, 0.0), xycoords="axes fraction", fontsize=TEXT, color=_rgb(palette.WARNING)
+            "○ unexplained",
+            (0.0, 0.0),
+            xycoords="axes fraction",
+            fontsize=TEXT,
+            color=palette.hexadecimal(palette.WARNING),
         )
 
 
@@ -253,14 +257,14 @@ def _computed(
     measurement = found.next_measurement
     if measurement is not None:
         x, y = canvas.placed(between.middles()[[measurement.joint]])[0]
-        panel.plot(x, y, "D", ms=8, mfc="white", mec=_rgb(palette.FORCE), mew=1.8, zorder=7)
+        panel.plot(x, y, "D", ms=8, mfc="white", mec=palette.hexadecimal(palette.FORCE), mew=1.8, zorder=7)
         panel.annotate(
             f"measure here: {width_text(float(opening[measurement.joint]))}",
             (x, y),
             xytext=(7, 7),
             textcoords="offset points",
             fontsize=TEXT - 1,
-            color=_rgb(palette.FORCE),
+            color=palette.hexadecimal(palette.FORCE),
             # In space the blocks below are of many shades, and widths stand close.
             bbox=None if canvas.view is None else {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none"},
             zorder=8,
@@ -275,7 +279,7 @@ def _computed(
         f"best fit: {amount}; widths [mm]; displacements × {factor:g}",
         loc="left",
         fontsize=TEXT + 1,
-        color=_rgb(palette.INK),
+        color=palette.hexadecimal(palette.INK),
     )
 
 
@@ -299,7 +303,7 @@ def _arrows(panel: Axes, tails: np.ndarray, moved: np.ndarray, assembly: solver.
                 "",
                 tail + vector,
                 xytext=tail,
-                arrowprops={"arrowstyle": "-|>", "color": _rgb(palette.SETTLEMENT), "lw": 2.0},
+                arrowprops={"arrowstyle": "-|>", "color": palette.hexadecimal(palette.SETTLEMENT), "lw": 2.0},
                 zorder=7,
             )
 
@@ -331,11 +335,7 @@ def _labels(
             ha="center",
             va="center",
             fontsize=TEXT - 1,
-            color=_rgb(palette.INK),
-            bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": _rgb(palette.OPEN), "lw": 0.7},
+            color=palette.hexadecimal(palette.INK),
+            bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": palette.hexadecimal(palette.OPEN), "lw": 0.7},
             zorder=5,
         )
-
-
-def _rgb(colour: tuple[int, int, int]) -> tuple[float, float, float]:
-    return colour[0] / 255.0, colour[1] / 255.0, colour[2] / 255.0

@@ -155,24 +155,16 @@ def ranked(trials: Sequence[Trial], *, apart: bool) -> list[Cause]:
 
 def _weights(own: Sequence[Trial]) -> np.ndarray:
     """(n,) array: prior weights of the trials of a cause, with sum 1."""
-    parents: dict[str, list[Trial]] = {}
-    for trial in own:
-        parents.setdefault(trial.candidate.refines or trial.candidate.detail, []).append(trial)
-    weights = np.zeros(len(own))
-    for members in parents.values():
-        for trial in members:
-            weights[next(k for k, one in enumerate(own) if one is trial)] = 1.0 / (len(parents) * len(members))
-    return weights
+    parents = [trial.candidate.refines or trial.candidate.detail for trial in own]
+    _, parent, members = np.unique(parents, return_inverse=True, return_counts=True)
+    return np.asarray(1.0 / (len(members) * members[parent]))
 
 
 def _range_of(own: Sequence[Trial], share: np.ndarray) -> tuple[float, float, float]:
     """Quantiles of the amount over the trials of a cause."""
-    amounts = np.concatenate([trial.amounts for trial in own])
-    mass = np.concatenate(
-        [s * np.exp(t.log_mass - logsumexp(t.log_mass)) for s, t in zip(share, own, strict=True) if s > 0.0]
-        or [np.ones(1)]
-    )
-    amounts = np.concatenate([t.amounts for s, t in zip(share, own, strict=True) if s > 0.0] or [amounts[:1]])
+    likely = [(s, trial) for s, trial in zip(share, own, strict=True) if s > 0.0]
+    amounts = np.concatenate([trial.amounts for _, trial in likely])
+    mass = np.concatenate([s * np.exp(trial.log_mass - logsumexp(trial.log_mass)) for s, trial in likely])
     order = np.argsort(amounts)
     below = np.cumsum(mass[order])
     places = np.searchsorted(below, np.array(TAILS) * below[-1])

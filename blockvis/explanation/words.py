@@ -135,8 +135,6 @@ def _capital(text: str) -> str:
 def values_of(found: Explanation) -> dict[str, Any]:
     """Make what explain.json holds: lengths in m, angles in rad, widths in mm where the key says so."""
     given = found.observations
-    best = found.causes[:2]
-    computed = [cause.best.widths[cause.at] for cause in best]
     settings = found.case.explain
     return {
         "verdict": verdict(found),
@@ -151,31 +149,7 @@ def values_of(found: Explanation) -> dict[str, Any]:
             for k in found.unexplained
         ],
         "next_measurement": _measurement_values(found.next_measurement),
-        "observations": {
-            "source": given.source,
-            "widths": [
-                {
-                    "place": given.labels[k],
-                    **_coordinates(given.places[k]),
-                    "width_mm": _mm(given.widths[k]),
-                    "uncertainty_mm": _mm(given.uncertainties[k]),
-                    "computed_mm": [_mm(widths[k]) for widths in computed],
-                }
-                for k in range(len(given.widths))
-            ],
-            "points": [
-                {
-                    "block": given.blocks[k],
-                    **_coordinates(given.points[k]),
-                    "displacement_mm": [_mm(value) for value in given.displacements[k]],
-                    "computed_mm": [
-                        [_mm(value) for value in found.comparison.displacements(c.best.moved(c.at)[None])[0, k]]
-                        for c in best
-                    ],
-                }
-                for k in range(len(given.points))
-            ],
-        },
+        "observations": {"source": given.source, "widths": _width_values(found), "points": _point_values(found)},
         "assumed": {
             "prior": "causes alike, amounts evenly up to the largest looked at, frictions and places of troughs alike, "
             "stones heavier towards the left or right alike",
@@ -188,6 +162,35 @@ def values_of(found: Explanation) -> dict[str, Any]:
         "notes": list(found.notes),
         "case": found.case.text,
     }
+
+
+def _width_values(found: Explanation) -> list[dict[str, Any]]:
+    given = found.observations
+    computed = [cause.best.widths[cause.at] for cause in found.causes[:2]]
+    return [
+        {
+            "place": given.labels[k],
+            **_coordinates(given.places[k]),
+            "width_mm": _mm(given.widths[k]),
+            "uncertainty_mm": _mm(given.uncertainties[k]),
+            "computed_mm": [_mm(widths[k]) for widths in computed],
+        }
+        for k in range(len(given.widths))
+    ]
+
+
+def _point_values(found: Explanation) -> list[dict[str, Any]]:
+    given = found.observations
+    computed = [found.comparison.displacements(c.best.moved(c.at)[None])[0] for c in found.causes[:2]]
+    return [
+        {
+            "block": given.blocks[k],
+            **_coordinates(given.points[k]),
+            "displacement_mm": list(map(_mm, given.displacements[k])),
+            "computed_mm": [list(map(_mm, moved[k])) for moved in computed],
+        }
+        for k in range(len(given.points))
+    ]
 
 
 def _cause_values(cause: Cause) -> dict[str, Any]:

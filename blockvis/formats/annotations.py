@@ -105,7 +105,11 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     if not found.shapes:
         kinds = ", ".join(f"{n} {kind}" for kind, n in found.dropped.items()) or "nothing"
         raise ValueError(f"'{path}' outlines no stone, it has {kinds}; annotate each stone by a polygon or a mask")
-    placement = placement_in(path, found, reading)
+    return _layout_of(found, placement_in(path, found, reading), reading)
+
+
+def _layout_of(found: _Annotated, placement: Placement, reading: Reading) -> Layout:
+    """Make a block of each piece of what is annotated."""
     smallest, tolerance = (reading.image.get(key) for key in ("smallest", "outline_tolerance"))
     stairs = STAIRS if tolerance is None else tolerance / placement.pixel
     speck = None if smallest is None else smallest / placement.pixel

@@ -18,7 +18,7 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import outlines_of_cells, rectangle, spread_of
 from blockvis.layout.refusal import Refused
 from blockvis.layout.selection import MORTAR
-from blockvis.layout.solids import volume, width_of
+from blockvis.layout.solids import fans, volume, width_of
 from blockvis.layout.views import VIEWS, axis_across, view_along
 from solver import mechanics
 
@@ -85,12 +85,6 @@ def body_of_polygons(name: str, points: np.ndarray, faces: Sequence[Sequence[int
     """
     used, triangles = np.unique(fans(faces), return_inverse=True)
     return Body(name, points[used], triangles.reshape(-1, 3))
-
-
-def fans(faces: Sequence[Sequence[int]]) -> np.ndarray:
-    """(m, 3) int array: polygons cut into triangles from their first corner, which keeps the edges around each."""
-    triangles = [(ring[0], ring[k], ring[k + 1]) for ring in faces for k in range(1, len(ring) - 1)]
-    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
 @dataclass(frozen=True)
@@ -253,20 +247,7 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
         drawn = abs(volume(body.points, body.faces))
         changed.append((volume(points, faces) / drawn - 1.0, body.name))
         solids.append((points[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if lying else points, faces))
-    said = []
-    if warped:
-        most, name, place = max(warped, key=lambda one: one[0])
-        said.append(
-            f"planes were fitted to warped faces of {len(warped)} of {len(solids)} blocks: up to {most:.3g} in the "
-            f"file's unit, of '{name}' at ({', '.join(f'{x:.6g}' for x in place)})"
-        )
-    coarser = [one for one in changed if abs(one[0]) > NOTED_VOLUME]
-    if coarser:
-        most, name = max(coarser, key=lambda one: abs(one[0]))
-        said.append(
-            f"faces were joined to fewer plane ones: the volume of {len(coarser)} of {len(solids)} blocks is off by up "
-            f"to {100.0 * most:+.2g} %, of '{name}'; draw round stones with fewer sides"
-        )
+    said = _plane_faces_said(warped, changed)
     if lying and view is None:
         said.append(f'{found.up_says}: its (x, y, z) were read as (x, -z, y); give view = "xz" if z is up')
     layout = Layout(
@@ -281,6 +262,27 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
         ),
     )
     return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", reading.ignore))
+
+
+def _plane_faces_said(
+    warped: Sequence[tuple[float, str, np.ndarray]], changed: Sequence[tuple[float, str]]
+) -> list[str]:
+    """Say how far warped faces were moved, and how volumes changed: of every body, as a part of it."""
+    said = []
+    if warped:
+        most, name, place = max(warped, key=lambda one: one[0])
+        said.append(
+            f"planes were fitted to warped faces of {len(warped)} of {len(changed)} blocks: up to {most:.3g} in the "
+            f"file's unit, of '{name}' at ({', '.join(f'{x:.6g}' for x in place)})"
+        )
+    coarser = [one for one in changed if abs(one[0]) > NOTED_VOLUME]
+    if coarser:
+        most, name = max(coarser, key=lambda one: abs(one[0]))
+        said.append(
+            f"faces were joined to fewer plane ones: the volume of {len(coarser)} of {len(changed)} blocks is off by "
+            f"up to {100.0 * most:+.2g} %, of '{name}'; draw round stones with fewer sides"
+        )
+    return said
 
 
 def in_dimension(found: Bodies, path: Path | str, reading: Reading) -> Layout:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.layout.block_table import with_rows
+from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import UPRIGHT, kind_of
@@ -198,34 +198,24 @@ def _merged_bodies(parts: Sequence[tuple[Bodies, str]]) -> Bodies:
 
 
 def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> Layout:
-    upright = {note for part, _ in parts for note in part.notes if kind_of(note) == UPRIGHT}
-    lying = any(not any(kind_of(note) == UPRIGHT for note in part.notes) for part, _ in parts)
-    if len(upright) + lying > 1:
+    if len({tuple(note for note in part.notes if kind_of(note) == UPRIGHT) for part, _ in parts}) > 1:
         raise ValueError(f"'{path}' has flat parts that lie in different planes; draw them in one")
     named = [replace(part, names=_own_names(part.names, label)) for part, label in parts]
 
     def joined(key: str) -> tuple[Any, ...]:
         return tuple(value for layout in named for value in getattr(layout, key))
 
-    def numbers(key: str) -> np.ndarray | None:
-        if all(getattr(layout, key) is None for layout in named):
-            return None
-        parts = (getattr(d, key) if getattr(d, key) is not None else np.full(d.n_blocks, np.nan) for d in named)
-        return np.concatenate(list(parts))
-
-    return Layout(
+    layout = Layout(
         blocks=joined("blocks"),
         names=joined("names"),
-        groups=tuple(group or label for d, (_, label) in zip(named, parts, strict=True) for group in d.groups),
-        roles=joined("roles"),
-        materials=joined("materials"),
-        thickness=numbers("thickness"),
-        density=numbers("density"),
         unit=named[0].unit,
         notes=tuple(dict.fromkeys(joined("notes"))),
         left_out=joined("left_out"),
         looks=joined("looks"),
     )
+    groups = [{"group": label} if label else {} for part, label in parts for _ in range(part.n_blocks)]
+    rows = [row for part in named for row in rows_of(part)]
+    return with_rows(layout, [group | row for group, row in zip(groups, rows, strict=True)])
 
 
 def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path | str) -> Layout | Bodies:

@@ -12,10 +12,10 @@ from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import FLAT
 from blockvis.layout.refusal import Refused, carrying
-from blockvis.layout.solids import area_vectors
+from blockvis.layout.solids import area_vectors, fans
 from blockvis.layout.surfaces import same_points, turned_faces
 
-from .bodies import Bodies, Body, as_drawn, fans
+from .bodies import Bodies, Body, as_drawn
 from .reading import Reading
 
 #: Points closer than this fraction of the size of the drawing are one: single precision is accurate to 6e-8.

@@ -19,9 +19,10 @@ from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import Note
 from blockvis.layout.outlines import FLAT, spread_of
+from blockvis.layout.solids import fans
 from solver import mechanics
 
-from .bodies import Bodies, fans
+from .bodies import Bodies
 from .cells import layout_of_cells
 from .closed_surfaces import enclosed, without_volume
 from .reading import Reading
@@ -78,8 +79,11 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies 
         ) from None
     except ValueError as error:
         raise ValueError(f"'{path}': {error}") from None
-    if not meshes:
-        return None
+    return _layout_of(meshes, path, reading) if meshes else None
+
+
+def _layout_of(meshes: list[_Mesh], path: Path, reading: Reading) -> Layout | Bodies:
+    """Make outlines of meshes in a plane, and of others the bodies that they enclose."""
     every = np.concatenate([mesh.points for mesh in meshes])
     spread = spread_of(every, f"'{path}'")
     names = [str(mesh.row["name"]) for mesh in meshes]
@@ -266,6 +270,11 @@ def _shape(data: dict[str, Any]) -> tuple[np.ndarray, list[list[int]]] | None:
         # Some files hold each face twice.
         once = {frozenset(face): face for face in faces if len(face) > 2}
         return np.array(points).reshape(-1, 3), list(once.values())
+    return _shape_of_lists(data)
+
+
+def _shape_of_lists(data: dict[str, Any]) -> tuple[np.ndarray, list[list[int]]] | None:
+    """Give points and faces of a polyhedron, a box or a polygon; None for anything else."""
     if data.get("vertices") and data.get("faces") and isinstance(data["vertices"], list):
         corners = np.array([_unwrapped(point)[0] for point in data["vertices"]], dtype=float).reshape(-1, 3)
         return corners, [[int(k) for k in face] for face in data["faces"]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +23,13 @@ UP = {"X_UP": ([1, 2, 0], "z"), "Y_UP": ([0, 1, 2], "y"), "Z_UP": ([0, 1, 2], "z
 
 @dataclass(frozen=True)
 class Drawn:
-    """Meshes of a file: name, (n, 3) points in place and (m, 3) faces of each; unit, and the axis that points up."""
+    """Meshes of a file: name, (n, 3) points in place and (m, 3) faces of each; unit, axis that points up, rows."""
 
     parts: list[tuple[str, np.ndarray, np.ndarray]]
     unit: str
     up: str
     up_says: str
+    rows: list[dict[str, Any]] = field(default_factory=list)
 
 
 def drawn_in(path: Path) -> Drawn:

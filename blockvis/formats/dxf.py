@@ -76,6 +76,14 @@ class _Outlines:
         self.rows.append(_own_data(entity))
         self.looks.append(_looks(entity))
 
+    def append(self, ring: np.ndarray, level: float, layer: str, name: str, looks: tuple[str, ...]) -> None:
+        """Add an outline (n, 2) that lines make, at a level."""
+        self.rings.append(np.column_stack([ring, np.full(len(ring), level)]))
+        self.layers.append(layer)
+        self.names.append(name)
+        self.rows.append({})
+        self.looks.append(looks)
+
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a .dxf drawing; its unit is that of the header variable $INSUNITS."""
@@ -110,28 +118,11 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     frozen = {layer.dxf.name for layer in document.layers if layer.is_frozen()}
     shut = frozen | {layer.dxf.name for layer in document.layers if layer.is_off()}
     found = _Outlines()
-    # A small file can insert any number of copies: more entities than a quarter of its bytes are refused.
-    size = path.stat().st_size
-    most = budget = max(size // 4, 1000)
-    for entity, handle in _flat(document.modelspace(), 0, path, frozen):
-        budget -= 1
-        if budget < 0:
-            raise ValueError(
-                f"'{path}' inserts more than {most} entities, though it has {size} bytes only; "
-                "explode its block references"
-            )
+    for entity, handle in _bounded(document.modelspace(), path, frozen):
         if entity.dxf.layer in shut:
             found.hidden[entity.dxf.layer] += 1
-        elif entity.dxf.layer == NEVER_DRAWN:
-            found.skipped[f"{entity.dxftype()} on {NEVER_DRAWN}"] += 1
-        elif entity.dxftype() in ("HATCH", "MPOLYGON"):
-            _add_hatch(entity, handle, found, tolerance)
-        elif is_mesh(entity):
-            found.meshes.append(drawn_mesh(entity, handle))
-        elif entity.dxftype() in _CURVES:
-            _add_curve(entity, handle, found, tolerance)
         else:
-            found.skipped[entity.dxftype()] += 1
+            _add(entity, handle, found, tolerance)
     meshes = _chosen_meshes(found, reading)
     if meshes:
         return layout_of_meshes(meshes, path, reading, stated, _faults(audit) + _skipped(found))
@@ -230,6 +221,19 @@ def _turned(found: _Outlines, view: str | None, path: Path) -> list[str]:
     return [upright_note(chosen)]
 
 
+def _bounded(entities: Any, path: Path, frozen: Set[str]) -> Iterator[tuple[Any, str]]:
+    """Yield entities and their handles; of a small file that inserts any number of copies no more than it may have."""
+    size = path.stat().st_size
+    most = max(size // 4, 1000)
+    for number, found in enumerate(_flat(entities, 0, path, frozen)):
+        if number >= most:
+            raise ValueError(
+                f"'{path}' inserts more than {most} entities, though it has {size} bytes only; "
+                "explode its block references"
+            )
+        yield found
+
+
 def _flat(
     entities: Any,
     depth: int,
@@ -283,6 +287,20 @@ def _points(curve: Any, tolerance: float | None) -> np.ndarray:
         return box
     distance = max(1e-3 * size if tolerance is None else tolerance, 1e-6 * size)
     return np.array([(p.x, p.y, p.z) for p in curve.flattening(distance, segments=2)])
+
+
+def _add(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
+    kind = entity.dxftype()
+    if entity.dxf.layer == NEVER_DRAWN:
+        found.skipped[f"{kind} on {NEVER_DRAWN}"] += 1
+    elif kind in ("HATCH", "MPOLYGON"):
+        _add_hatch(entity, handle, found, tolerance)
+    elif is_mesh(entity):
+        found.meshes.append(drawn_mesh(entity, handle))
+    elif kind in _CURVES:
+        _add_curve(entity, handle, found, tolerance)
+    else:
+        found.skipped[kind] += 1
 
 
 def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
@@ -434,6 +452,27 @@ def _drawn_already(ring: np.ndarray, found: _Outlines) -> bool:
 
 def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     """Add the faces between loose lines, and cut outlines along the lines within them."""
+    unwanted, wanted = _chosen_lines(found, reading)
+    # Outlines that will be left out are not cut.
+    able = [i for i, layer in enumerate(found.layers) if not unwanted.takes([layer], found.looks[i])]
+    faces = faces_of_lines(wanted, [found.rings[i][:, :2] for i in able])
+    found.left_out += faces.left_out
+    for k, pieces in sorted(faces.pieces.items(), reverse=True):
+        i = able[k]
+        level = float(found.rings[i][0, 2])
+        for number, piece in enumerate(pieces):
+            found.append(piece, level, found.layers[i], f"{found.names[i]}.{number}", found.looks[i])
+        for values in (found.rings, found.layers, found.names, found.rows, found.looks):
+            del values[i]
+    for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
+        found.append(ring, 0.0, layer, f"face {number}", ("face",))
+    if faces.rings:
+        faces.notes.append(faces_note(faces, wanted))
+    return faces
+
+
+def _chosen_lines(found: _Outlines, reading: Reading) -> tuple[Choice, list[Line]]:
+    """Leave out loose lines that are not wanted; give what is unwanted, and the others."""
     wanted = []
     layers = {*found.layers, *(line.layer for line in found.loose)}
     names = {*layers, *found.names, *(f"line {line.handle}" for line in found.loose)}
@@ -449,30 +488,7 @@ def _with_loose(found: _Outlines, reading: Reading) -> Faces:
             found.left_out.append(left)
         else:
             wanted.append(line)
-    # Outlines that will be left out are not cut.
-    able = [i for i, layer in enumerate(found.layers) if not unwanted.takes([layer], found.looks[i])]
-    faces = faces_of_lines(wanted, [found.rings[i][:, :2] for i in able])
-    found.left_out += faces.left_out
-    for k, pieces in sorted(faces.pieces.items(), reverse=True):
-        i = able[k]
-        level = float(found.rings[i][0, 2])
-        for number, piece in enumerate(pieces):
-            found.rings.append(np.column_stack([piece, np.full(len(piece), level)]))
-            found.layers.append(found.layers[i])
-            found.names.append(f"{found.names[i]}.{number}")
-            found.rows.append({})
-            found.looks.append(found.looks[i])
-        for values in (found.rings, found.layers, found.names, found.rows, found.looks):
-            del values[i]
-    for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
-        found.rings.append(np.column_stack([ring, np.zeros(len(ring))]))
-        found.layers.append(layer)
-        found.names.append(f"face {number}")
-        found.rows.append({})
-        found.looks.append(("face",))
-    if faces.rings:
-        faces.notes.append(faces_note(faces, wanted))
-    return faces
+    return unwanted, wanted
 
 
 def _size(found: _Outlines) -> float:

@@ -11,8 +11,9 @@ import numpy as np
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import FLAT, spread_of
+from blockvis.layout.solids import fans
 
-from .bodies import Bodies, Body, fans
+from .bodies import Bodies, Body
 from .cells import layout_of_cells
 from .closed_surfaces import closed_bodies
 from .reading import Reading

@@ -41,16 +41,21 @@ def files_of(path: Path) -> list[Path]:
         found = [entry for entry in path.iterdir() if entry.is_file() and _readable(entry)]
         if not found:
             raise ValueError(f"'{path}' is a folder without a layout file; give a file, or a folder of one per stone")
-    elif path.exists() or not glob.has_magic(str(path)):
-        if not path.exists():
-            near = files_like(path)
-            hint = f"; did you mean {' or '.join(near)}?" if near else "; check the path"
-            raise MissingFile(f"there is no file '{path}'{hint}")
+    elif path.exists():
         return [path]
+    elif not glob.has_magic(str(path)):
+        near = files_like(path)
+        hint = f"; did you mean {' or '.join(near)}?" if near else "; check the path"
+        raise MissingFile(f"there is no file '{path}'{hint}")
     else:
         found = [Path(name) for name in glob.glob(str(path), recursive=True) if Path(name).is_file()]
         if not found:
             raise MissingFile(f"no file fits '{path}'; check the folder and the pattern")
+    return _of_one_format(found, path)
+
+
+def _of_one_format(found: list[Path], path: Path) -> list[Path]:
+    """Order the files that a name stands for; refuse those of several formats, and too many."""
     suffixes = sorted({entry.suffix.lower() for entry in found})
     if len(suffixes) > 1:
         counts = ", ".join(f"{sum(e.suffix.lower() == suffix for e in found)} {suffix}" for suffix in suffixes[:8])

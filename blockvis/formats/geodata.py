@@ -27,7 +27,7 @@ from blockvis.layout.views import VIEWS, axis_across, upright_note
 from blockvis.system.extras import require
 from solver import mechanics
 
-from .loose_lines import Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
+from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
 #: Attributes that name a block and its group, the first that a file has; in small letters.
@@ -289,31 +289,21 @@ def layout_of_features(
     _check_degrees(outlines, path, reading, degrees, notes, far=far)
     if listed:
         notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
-    kinds, left_out = _parts(rows, found.of), []
-    for holed, k in found.holed:
-        outer, *holes = (ring[:, order] for ring in holed)
-        x, y = holes[0].mean(axis=0)
-        name, layer = rows[k]["name"], rows[k].get("group", "")
-        message = f"'{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
-        left_out.append(LeftOut("hole", outer, message, layer, name, holes=tuple(holes)))
-    lines = []
-    for points, k in found.lines:
-        name, layer = rows[k]["name"], rows[k].get("group", "")
-        line = Line(points[:, order], layer, name, must_close=len(points) > 2)
-        if reading.wants([layer, name]):
-            lines.append(line)
-        else:
-            left_out.append(LeftOut("asked line", line.points, "", layer, name, closed=False))
-    faces = faces_of_lines(lines, rings)
-    for i, pieces in sorted(faces.pieces.items(), reverse=True):
-        rings[i : i + 1] = pieces
-        kinds[i : i + 1] = [{**kinds[i], "name": f"{kinds[i]['name']} {n + 1}"} for n in range(len(pieces))]
-    rings += faces.rings
-    kinds += [_row(f"face {n}", layer, {}) for n, layer in enumerate(faces.layers)]
+    kinds = _parts(rows, found.of)
+    left_out = [_hole(*(ring[:, order] for ring in holed), row=rows[k]) for holed, k in found.holed]
+    lines = _lines(found, rows, order)
+    wanted = [line for line in lines if reading.wants([line.layer, line.handle])]
+    left_out += [
+        LeftOut("asked line", line.points, "", line.layer, line.handle, closed=False)
+        for line in lines
+        if not reading.wants([line.layer, line.handle])
+    ]
+    faces = faces_of_lines(wanted, rings)
+    _replace_cut(rings, kinds, faces)
     left_out += faces.left_out
     if not rings and all(item.kind == "open" for item in left_out):
         raise ValueError(f"'{path}' has no polygon: {nothing_closed(faces)}; draw each block as one polygon")
-    notes += [faces_note(faces, lines)] if faces.rings else []
+    notes += [faces_note(faces, wanted)] if faces.rings else []
     notes += faces.notes + joined_note(found.misses, float(np.ptp(np.concatenate(every), axis=0).max()))
     layout = Layout(
         blocks=tuple(rings),
@@ -323,6 +313,31 @@ def layout_of_features(
         left_out=tuple(left_out),
     )
     return with_rows(layout, kinds)
+
+
+def _lines(found: _Found, rows: Sequence[Mapping[str, Any]], order: list[int]) -> list[Line]:
+    """Name the open lines after the features that have them."""
+    return [
+        Line(points[:, order], rows[k].get("group", ""), rows[k]["name"], must_close=len(points) > 2)
+        for points, k in found.lines
+    ]
+
+
+def _replace_cut(rings: list[np.ndarray], rows: list[dict[str, Any]], faces: Faces) -> None:
+    """Put the pieces of outlines that lines cut in their place, and the faces between lines at the end."""
+    for i, pieces in sorted(faces.pieces.items(), reverse=True):
+        rings[i : i + 1] = pieces
+        rows[i : i + 1] = [{**rows[i], "name": f"{rows[i]['name']} {n + 1}"} for n in range(len(pieces))]
+    rings += faces.rings
+    rows += [_row(f"face {n}", layer, {}) for n, layer in enumerate(faces.layers)]
+
+
+def _hole(outer: np.ndarray, *holes: np.ndarray, row: Mapping[str, Any]) -> LeftOut:
+    """Leave out a polygon with holes."""
+    x, y = holes[0].mean(axis=0)
+    name = row["name"]
+    message = f"'{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
+    return LeftOut("hole", outer, message, row.get("group", ""), name, holes=holes)
 
 
 def _add(geometry: Any, number: int, found: _Found) -> None:

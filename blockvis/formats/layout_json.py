@@ -63,8 +63,12 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     version = content.get("version", 1)
     if version != 1:
         raise ValueError(f"'{path}' is a layout of version {version!r}; version 1 is read: update blockvis")
-    if any(isinstance(block, dict) and "points" in block for block in content["blocks"]):
-        return _read_solids(content, path)
+    in_space = any(isinstance(block, dict) and "points" in block for block in content["blocks"])
+    return (_read_solids if in_space else _read_outlines)(content, path)
+
+
+def _read_outlines(content: dict[str, Any], path: Path) -> Layout:
+    """Read blocks in the plane."""
     outlines, names = [], []
     for k, block in enumerate(content["blocks"]):
         name = str(block.get("name", f"block {k}")) if isinstance(block, dict) else f"block {k}"

@@ -142,6 +142,16 @@ class _Announced:
         self.binary: dict[str, str] | None = None
         self.content: list[str] = []
 
+    def _counts(self, attributes: dict[str, str]) -> dict[str, str]:
+        """Numbers of items that an element announces, none of them more than the file can hold."""
+        counts = {key: value for key, value in attributes.items() if key.startswith("NumberOf")}
+        for key, value in counts.items():
+            if not re.fullmatch(r"\s*\d{1,15}\s*", value) or int(value) > MOST_PER_BYTE * self.size:
+                raise ValueError(
+                    f"'{self.path}' announces {value[:20]} items in {self.size} bytes ({key}); export it again"
+                )
+        return counts
+
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         """Check the counts of an element when it begins."""
         self.depth += 1
@@ -149,12 +159,7 @@ class _Announced:
             raise ValueError(
                 f"'{self.path}' nests elements more than {DEEPEST} deep; no VTK file does: export it again"
             )
-        counts = {key: value for key, value in attributes.items() if key.startswith("NumberOf")}
-        for key, value in counts.items():
-            if not re.fullmatch(r"\s*\d{1,15}\s*", value) or int(value) > MOST_PER_BYTE * self.size:
-                raise ValueError(
-                    f"'{self.path}' announces {value[:20]} items in {self.size} bytes ({key}); export it again"
-                )
+        counts = self._counts(attributes)
         for key in ("WholeExtent", "Extent"):
             ends = [int(end[:15]) for end in re.findall(r"-?\d+", attributes.get(key, ""))]
             if ends:

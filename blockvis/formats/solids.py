@@ -31,11 +31,25 @@ LARGEST_HEADER = 64 * 2**20
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read bodies or a flat mesh; .glb is in metres, .dae states its unit, the other formats state none."""
+    suffix = path.suffix.lower()
+    drawn = _dae(path) if suffix == ".dae" else _scene(path, suffix)
+    size = _checked_size(drawn.parts, path)
+    if _are_flat(drawn.parts, size):
+        return replace(_flat(drawn.parts, path, drawn.rows, reading.view), unit=drawn.unit)
+    closed = enclosed(drawn.parts, size, path, reading)
+    bodies, rows = closed.bodies, drawn.rows
+    if suffix == ".obj":
+        # The reader returns the objects in an order of its own: rows are matched to them by name.
+        by_name = {row.get("name"): row for row in rows}
+        rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
+    known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
+    return Bodies(tuple(bodies), tuple(known), drawn.unit, tuple(closed.notes), up=drawn.up, up_says=drawn.up_says)
+
+
+def _scene(path: Path, suffix: str) -> dae.Drawn:
+    """Read the meshes of a file by trimesh."""
     import trimesh
 
-    suffix = path.suffix.lower()
-    if suffix == ".dae":
-        return _read_dae(path, reading)
     # What it would print of a missing texture is no fault of a stone.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL + 1)
     try:
@@ -55,28 +69,15 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         # trimesh passes on the errors of whatever parser it uses.
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
         raise ValueError(f"'{path}' cannot be read as {suffix} ({reason}); export it again") from None
-    size = _checked_size(parts, path)
-    unit = "m" if suffix == ".glb" else ""
-    rows = _own_rows(path)
-    if _are_flat(parts, size):
-        return replace(_flat(parts, path, rows, reading.view), unit=unit)
-    closed = enclosed(parts, size, path, reading)
-    bodies = closed.bodies
-    if suffix == ".obj":
-        # The reader returns the objects in an order of its own: rows are matched to them by name.
-        by_name = {row.get("name"): row for row in rows}
-        rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
-    if suffix == ".glb":
-        found = [mesh.metadata.get("blockvis") for _, mesh in _placed(scene, path) if len(mesh.faces)]
-        rows = found if len(found) == len(bodies) and all(isinstance(row, dict) for row in found) else []
-    known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
-    up, says = _up(path) if suffix == ".glb" else ("z", "")
-    return Bodies(tuple(bodies), tuple(known), unit, tuple(closed.notes), up=up, up_says=says)
+    if suffix != ".glb":
+        return dae.Drawn(parts, "", "z", "", _own_rows(path))
+    rows = [mesh.metadata.get("blockvis") for _, mesh in _placed(scene, path) if len(mesh.faces)]
+    return dae.Drawn(parts, "m", *_up(path), rows if all(isinstance(row, dict) for row in rows) else [])
 
 
-def _read_dae(path: Path, reading: Reading) -> Layout | Bodies:
+def _dae(path: Path) -> dae.Drawn:
     try:
-        drawn = dae.drawn_in(path)
+        return dae.drawn_in(path)
     except MissingExtra:
         raise
     except Exception as error:  # noqa: BLE001
@@ -84,14 +85,6 @@ def _read_dae(path: Path, reading: Reading) -> Layout | Bodies:
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__} "
         reason = " ".join(f"{kind}{error}".split())[:200]
         raise ValueError(f"'{path}' cannot be read as .dae ({reason}); export it again") from None
-    size = _checked_size(drawn.parts, path)
-    if _are_flat(drawn.parts, size):
-        return replace(_flat(drawn.parts, path, [], reading.view), unit=drawn.unit)
-    closed = enclosed(drawn.parts, size, path, reading)
-    rows = [{"name": body.name} for body in closed.bodies]
-    return Bodies(
-        tuple(closed.bodies), tuple(rows), drawn.unit, tuple(closed.notes), up=drawn.up, up_says=drawn.up_says
-    )
 
 
 def _checked_size(parts: list[tuple[str, np.ndarray, np.ndarray]], path: Path) -> float:

@@ -88,17 +88,7 @@ def read(path: Path, reading: Reading) -> Layout:
     """Read a .svg drawing; its unit follows from its width and its viewBox."""
     if reading.view not in (None, "xy"):
         raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
-    text = path.read_bytes()
-    if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise ValueError(f"'{path}' is not in UTF-8; save it as plain SVG")
-    if re.search(rb"<!\s*(DOCTYPE|ENTITY)[^>]*(\[|ENTITY)", text, re.IGNORECASE):
-        raise ValueError(f"'{path}' defines XML entities; save it as plain SVG without a document type")
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
-        raise ValueError(f"'{path}' is not an SVG file: {error}; save it as plain SVG") from None
-    if _tag(root) != "svg":
-        raise ValueError(f"'{path}' is XML with the root <{_tag(root)}>, not <svg>; save it as plain SVG")
+    root = _root(path)
     stated = root.get("data-blockvis-unit") or _unit(root)
     tolerance = None
     if reading.chord_tolerance is not None:
@@ -121,6 +111,22 @@ def read(path: Path, reading: Reading) -> Layout:
     looks = tuple(found.looks)
     layout = Layout(blocks=turned, names=names, unit=stated, notes=notes, left_out=left_out, looks=looks)
     return with_rows(layout, found.rows)
+
+
+def _root(path: Path) -> ElementTree.Element:
+    """Parse a file without entities."""
+    text = path.read_bytes()
+    if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise ValueError(f"'{path}' is not in UTF-8; save it as plain SVG")
+    if re.search(rb"<!\s*(DOCTYPE|ENTITY)[^>]*(\[|ENTITY)", text, re.IGNORECASE):
+        raise ValueError(f"'{path}' defines XML entities; save it as plain SVG without a document type")
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
+        raise ValueError(f"'{path}' is not an SVG file: {error}; save it as plain SVG") from None
+    if _tag(root) != "svg":
+        raise ValueError(f"'{path}' is XML with the root <{_tag(root)}>, not <svg>; save it as plain SVG")
+    return root
 
 
 def _with_loose(found: _Outlines, reading: Reading) -> Faces:

@@ -17,10 +17,11 @@ import numpy as np
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
+from blockvis.layout.solids import fans
 from solver import mechanics
 
 from . import meshio_files
-from .bodies import Bodies, Body, fans
+from .bodies import Bodies, Body
 from .closed_surfaces import closed_bodies
 from .reading import Reading
 
@@ -189,7 +190,7 @@ def _follow(line: int, words: list[str], model: _Model) -> None:
 
 def _made(line: int, words: list[str], path: Path) -> _Block:
     """Make the block that a command describes."""
-    shape, lists, about = "", list[tuple[str, list[float]]](), dict[str, str]()
+    lists, about = list[tuple[str, list[float]]](), dict[str, str]()
     for word in words:
         number = _number(word)
         if number is not None and lists:
@@ -204,20 +205,24 @@ def _made(line: int, words: list[str], path: Path) -> _Block:
         if word in ABOUT and len(numbers) == 1:
             about[REGION.get(word, word)] = f"{numbers[0]:g}"
     shapes = [(word, numbers) for word, numbers in lists if word in SHAPES]
-    shape = shapes[0][0] if shapes else (lists[0][0] if lists else "")
-    if shape == "brick":
-        points, faces = _brick(shapes[0][1], line, path)
-    elif shape == "prism" and len(shapes) == 3:
-        points, faces = _prism(shapes[1][1], shapes[2][1], line, path)
-    elif shape == "face":
-        points, faces = _polyhedron([numbers for _, numbers in shapes], line, path)
-    else:
-        raise ValueError(
-            f"'{path}': line {line} makes a block by '{shape}', which is not read; write it as brick, prism or faces"
-        )
+    points, faces = _shape(shapes or lists[:1], line, path)
     if not np.isfinite(points).all():
         raise ValueError(f"'{path}': line {line} has a corner that is not finite; repair it")
     return _Block(line, points, faces, about)
+
+
+def _shape(shapes: list[tuple[str, list[float]]], line: int, path: Path) -> tuple[np.ndarray, list[list[int]]]:
+    """Corners and faces of a block by the words of its shape, each with the numbers after it."""
+    word = shapes[0][0] if shapes else ""
+    if word == "brick":
+        return _brick(shapes[0][1], line, path)
+    if word == "prism" and len(shapes) == 3:
+        return _prism(shapes[1][1], shapes[2][1], line, path)
+    if word == "face":
+        return _polyhedron([numbers for _, numbers in shapes], line, path)
+    raise ValueError(
+        f"'{path}': line {line} makes a block by '{word}', which is not read; write it as brick, prism or faces"
+    )
 
 
 def _brick(numbers: list[float], line: int, path: Path) -> tuple[np.ndarray, list[list[int]]]:

@@ -215,39 +215,25 @@ def filled(
     corner = np.array(wall.bounds[:2])
     wall, *holes = [_shifted(shape, -corner) for shape in (wall, *openings)]
     _check_size(wall, pattern)
-    for number, hole in enumerate(holes, start=1):
-        if hole.intersection(wall).area <= DUST * hole.area:
-            x, y = np.array(hole.centroid.coords[0]) + corner
-            raise ValueError(
-                f"opening {number} around ({x:.6g}, {y:.6g}) lies outside its wall; move it, or leave it out"
-            )
+    outside = next((k for k, hole in enumerate(holes) if hole.intersection(wall).area <= DUST * hole.area), None)
+    if outside is not None:
+        x, y = openings[outside].centroid.coords[0]
+        raise ValueError(
+            f"opening {outside + 1} around ({x:.6g}, {y:.6g}) lies outside its wall; move it, or leave it out"
+        )
     length, height = pattern.module
     grid = GRID * max(*wall.bounds[2:], length)
     solid = shapely.Polygon(wall.exterior)
     holes = _apart([*holes, *map(shapely.Polygon, wall.interiors), *_notches(solid, grid)])
     rest = wall if taken is None else shapely.difference(wall, _shifted(taken, -corner), grid_size=grid)
-    if holes:
-        rest = shapely.difference(rest, shapely.union_all(holes, grid_size=grid), grid_size=grid)
+    rest = _without(rest, holes, grid)
     area = rest.area
     bearing = length / 2.0 if pattern.bearing is None else pattern.bearing
     units = Units(length=length, height=height, bearing=bearing, base=0.0, grid=grid)
-    stones: list[tuple[str, shapely.Polygon]] = []
-    hanging: list[np.ndarray] = []
-    for number, hole in enumerate(holes, start=1):
-        if pattern.heads == "none" or not _has_wall_over(hole, rest, OVER * height):
-            continue
-        head = head_of(hole, pattern.heads, rest, _nearest(hole, holes), units)
-        if head is None:
-            hanging.append(np.array(hole.centroid.coords[0]) + corner)
-            continue
-        word, parts = head
-        several = len(parts) > 1
-        stones += [(f"{word} {number}-{i}" if several else f"{word} {number}", part) for i, part in enumerate(parts, 1)]
-        rest = shapely.difference(rest, shapely.union_all(parts, grid_size=grid), grid_size=grid)
+    stones, rest, hanging = _heads(holes, rest, pattern, units)
     quoins = _quoins(solid, rest, pattern, grid)
     stones += [(f"quoin {k}", shape) for k, shape in enumerate(quoins, start=1)]
-    if quoins:
-        rest = shapely.difference(rest, shapely.union_all(quoins, grid_size=grid), grid_size=grid)
+    rest = _without(rest, quoins, grid)
     stones = _with_crumbs(_laid(rest, wall.bounds, pattern, grid), stones, pattern, grid)
     kept = sum(shape.area for _, shape in stones)
     if abs(kept - area) > KEPT * area:
@@ -256,16 +242,12 @@ def filled(
         )
     if pattern.joint and mortar:
         stones = _with_mortar(stones, pattern.joint)
-    notes = []
-    if hanging:
-        x, y = hanging[0]
-        notes.append(Note(CHANGED, f"bond: {len(hanging)} openings have no room for a head, the first around "
-                     f"({x:.6g}, {y:.6g}): what lies over them may hang; give a smaller bearing or brick"))  # fmt: skip
+    notes = _hanging_note(hanging, corner)
     return Layout(
         blocks=tuple(without_collinear(np.array(shape.exterior.coords)[:-1], 1e-9) + corner for _, shape in stones),
         names=tuple(name for name, _ in stones),
         materials=tuple("brick" if name.startswith("brick") else "stone" for name, _ in stones),
-        notes=tuple(notes),
+        notes=notes,
     )
 
 
@@ -355,6 +337,39 @@ def _quoins(solid: shapely.Polygon, rest: shapely.Geometry, pattern: Pattern, gr
     return found
 
 
+def _without(wall: shapely.Geometry, parts: Sequence[shapely.Polygon], grid: float) -> shapely.Geometry:
+    """Take parts out of a wall."""
+    return shapely.difference(wall, shapely.union_all(parts, grid_size=grid), grid_size=grid) if parts else wall
+
+
+def _hanging_note(hanging: Sequence[shapely.Polygon], corner: np.ndarray) -> tuple[Note, ...]:
+    if not hanging:
+        return ()
+    x, y = np.array(hanging[0].centroid.coords[0]) + corner
+    said = f"bond: {len(hanging)} openings have no room for a head, the first around ({x:.6g}, {y:.6g})"
+    return (Note(CHANGED, f"{said}: what lies over them may hang; give a smaller bearing or brick"),)
+
+
+def _heads(
+    holes: Sequence[shapely.Polygon], rest: shapely.Geometry, pattern: Pattern, units: Units
+) -> tuple[list[tuple[str, shapely.Polygon]], shapely.Geometry, list[shapely.Polygon]]:
+    """Lay heads over openings; give their stones, what is left of the wall, and the openings without room for one."""
+    stones: list[tuple[str, shapely.Polygon]] = []
+    hanging = []
+    for number, hole in enumerate(holes, start=1):
+        if pattern.heads == "none" or not _has_wall_over(hole, rest, OVER * units.height):
+            continue
+        head = head_of(hole, pattern.heads, rest, _nearest(hole, holes), units)
+        if head is None:
+            hanging.append(hole)
+            continue
+        word, parts = head
+        several = len(parts) > 1
+        stones += [(f"{word} {number}-{i}" if several else f"{word} {number}", part) for i, part in enumerate(parts, 1)]
+        rest = _without(rest, parts, units.grid)
+    return stones, rest, hanging
+
+
 def _laid(
     rest: shapely.Geometry, box: tuple[float, ...], pattern: Pattern, grid: float
 ) -> list[tuple[str, shapely.Polygon]]:
@@ -379,9 +394,14 @@ def _laid(
     def too_small(shape: shapely.Polygon, piece: int) -> bool:
         return not is_complete[piece] and _is_sliver(shape, length, height)
 
-    joined = [shape for shape, _ in without_slivers(pieces, too_small, height, grid)]
+    return _numbered([shape for shape, _ in without_slivers(pieces, too_small, height, grid)], pattern)
+
+
+def _numbered(joined: Sequence[shapely.Polygon], pattern: Pattern) -> list[tuple[str, shapely.Polygon]]:
+    """Name stones by their course and their place in it, those of rubble in rows."""
+    height = pattern.module[1]
     middles = shapely.get_coordinates(shapely.centroid(joined))
-    if random:
+    if pattern.bond == "rubble":
         order = np.lexsort((middles[:, 0], np.round(middles[:, 1] / height)))
         return [(f"stone {k}", joined[i]) for k, i in enumerate(order.tolist(), start=1)]
     courses = np.floor(np.array([shape.bounds[1] for shape in joined]) / height + 1e-6).astype(int)

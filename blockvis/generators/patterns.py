@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -148,26 +149,28 @@ def bedded(stones: list[shapely.Polygon], wall: shapely.Geometry) -> list[shapel
     wall : shapely geometry [m]
     """
     kept = [np.array(stone.exterior.coords)[:-1] for stone in stones]
-    at: dict[tuple[float, float], list[int]] = {}
-    for i, ring in enumerate(kept):
-        for x, y in ring.tolist():
-            at.setdefault((round(x, 9), round(y, 9)), []).append(i)
-    corners = np.array(list(at))
-    rim = shapely.dwithin(shapely.points(corners), _upright(wall), 1e-8)
-    own = np.round(shapely.get_coordinates(wall), 9)
-    taken = set(map(tuple, own.tolist()))
-    for key in (key for key, on in zip(at, rim.tolist(), strict=True) if on and key not in taken):
-        if len(at[key]) != 2:
-            continue
-        moved = [found for found in (_levelled(kept[i], key) for i in at[key]) if found is not None]
+    for key, pair in _joints_at_rim(kept, wall).items():
+        moved = [found for found in (_levelled(kept[i], key) for i in pair) if found is not None]
         if len(moved) < 2 or abs(moved[0][0] - moved[1][0]) > 1e-8:
             continue
-        before = sum(shapely.Polygon(kept[i]).area for i in at[key])
+        before = sum(shapely.Polygon(kept[i]).area for i in pair)
         after = [shapely.Polygon(ring) for _, ring in moved]
         if all(shape.is_valid for shape in after) and abs(sum(s.area for s in after) - before) < 1e-12 * before:
-            for i, (_, ring) in zip(at[key], moved, strict=True):
+            for i, (_, ring) in zip(pair, moved, strict=True):
                 kept[i] = ring
     return [shapely.Polygon(ring) for ring in kept]
+
+
+def _joints_at_rim(rings: Sequence[np.ndarray], wall: shapely.Geometry) -> dict[tuple[float, float], list[int]]:
+    """Find where two stones alone meet on an upright rim of the wall, and which; corners of the wall are none."""
+    at: dict[tuple[float, float], list[int]] = {}
+    for i, ring in enumerate(rings):
+        for x, y in ring.tolist():
+            at.setdefault((round(x, 9), round(y, 9)), []).append(i)
+    rim = shapely.dwithin(shapely.points(np.array(list(at))), _upright(wall), 1e-8)
+    taken = set(map(tuple, np.round(shapely.get_coordinates(wall), 9).tolist()))
+    met = zip(at.items(), rim.tolist(), strict=True)
+    return {key: pair for (key, pair), on in met if on and key not in taken and len(pair) == 2}
 
 
 def _levelled(ring: np.ndarray, corner: tuple[float, float]) -> tuple[float, np.ndarray] | None:

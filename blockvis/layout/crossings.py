@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -46,23 +47,8 @@ def uncrossed(layout: Layout) -> Layout:
         piece = max(pieces, key=lambda part: part.area)
         largest = shapely.Polygon(piece.exterior)
         share = min(largest.area, area) / max(largest.area, area)
-        x, y = _crossing(shapes[i])
-        if share < WHOLE and largest.area > area:
-            # An outline that goes in along a line, around a hole and back.
-            holes = tuple(np.array(inner.coords)[:-1] for inner in piece.interiors)
-            x, y = holes[0].mean(axis=0)
-            message = (
-                f"block '{layout.names[i]}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the "
-                "hole with a block"
-            )
-            reasons[i] = LeftOut("hole", np.array(piece.exterior.coords)[:-1], message, holes=holes)
-            continue
         if share < WHOLE:
-            message = (
-                f"block '{layout.names[i]}' crosses itself at ({x:.6g}, {y:.6g}), and its largest piece has only "
-                f"{100.0 * share:.3g} % of its area; redraw it as one outline, or as several"
-            )
-            reasons[i] = LeftOut("crossing", layout.outlines[i], message)
+            reasons[i] = _refusal(layout.names[i], layout.outlines[i], piece if largest.area > area else None, share)
             continue
         reduced[i] = without_collinear(np.array(shapely.orient_polygons(largest).exterior.coords)[:-1])
         lost = max(lost, 1.0 - share)
@@ -77,6 +63,34 @@ def uncrossed(layout: Layout) -> Layout:
         blocks = tuple(reduced.get(i, ring) for i, ring in enumerate(layout.outlines))
         layout = replace(layout, blocks=blocks, notes=(*layout.notes, Note(CHANGED, said)))
     return layout.leaving_out(reasons)
+
+
+def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:
+    """Say why an outline cannot be reduced to its largest piece, which is ``around`` a hole, or has too small a share.
+
+    Parameters
+    ----------
+    name : str
+    ring : (n, 2) array [m]
+    around : shapely.Polygon or None
+        Of an outline that goes in along a line, around a hole and back.
+    share : float
+    """
+    import shapely
+
+    if around is None:
+        x, y = _crossing(shapely.Polygon(ring))
+        message = (
+            f"block '{name}' crosses itself at ({x:.6g}, {y:.6g}), and its largest piece has only "
+            f"{100.0 * share:.3g} % of its area; redraw it as one outline, or as several"
+        )
+        return LeftOut("crossing", ring, message)
+    holes = tuple(np.array(inner.coords)[:-1] for inner in around.interiors)
+    x, y = holes[0].mean(axis=0)
+    message = (
+        f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
+    )
+    return LeftOut("hole", np.array(around.exterior.coords)[:-1], message, holes=holes)
 
 
 def _crossing(shape: object) -> np.ndarray:

@@ -266,6 +266,16 @@ def _rings_of(triangles: np.ndarray) -> list[list[int]]:
 
 def _without_straight(points: np.ndarray, faces: list[list[int]], near: float) -> tuple[np.ndarray, list[list[int]]]:
     """Drop the corners at which only two faces meet, which lie on the edge between them, and points of no face."""
+    drop = _straight_corners(points, faces, near)
+    rings = [[corner for corner in ring if corner not in drop] for ring in faces]
+    rings = [ring for ring in rings if len(ring) > 2]
+    used = np.unique(np.concatenate([np.array(ring) for ring in rings]))
+    place = {int(old): new for new, old in enumerate(used)}
+    return points[used], [[place[corner] for corner in ring] for ring in rings]
+
+
+def _straight_corners(points: np.ndarray, faces: list[list[int]], near: float) -> set[int]:
+    """Find the corners of two faces alone that lie on the line between the next corners of three or more."""
     met: dict[int, set[int]] = {}
     for number, ring in enumerate(faces):
         for corner in ring:
@@ -283,11 +293,7 @@ def _without_straight(points: np.ndarray, faces: list[list[int]], near: float) -
                 after = min((j for j in kept if j > k), default=kept[0])
                 if _beside(points[ring[k]], points[ring[before]], points[ring[after]]) > near:
                     drop.discard(ring[k])
-    rings = [[corner for corner in ring if corner not in drop] for ring in faces]
-    rings = [ring for ring in rings if len(ring) > 2]
-    used = np.unique(np.concatenate([np.array(ring) for ring in rings]))
-    place = {int(old): new for new, old in enumerate(used)}
-    return points[used], [[place[corner] for corner in ring] for ring in rings]
+    return drop
 
 
 def _beside(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:

@@ -382,6 +382,12 @@ def _from_lowest_left(ring: np.ndarray) -> np.ndarray:
     return np.roll(ring, -int(np.lexsort((ring[:, 0], ring[:, 1]))[0]), axis=0)
 
 
+def _bed(points: np.ndarray, level: float, least: float) -> np.ndarray | None:
+    """(n, 2) array: hull in plan of the corners of a block within ``level`` of its lowest; None of less area [m²]."""
+    face = shapely.MultiPoint(points[points[:, 2] <= points[:, 2].min() + level][:, :2]).convex_hull
+    return shapely.get_coordinates(face)[:-1] if face.area > least else None
+
+
 def _feet_in_space(found: Inspection) -> list[_Foot]:
     """Find the blocks of the lowest course in space, and the bottom faces they lie on in plan."""
     blocks = found.kept.tolist()
@@ -394,23 +400,17 @@ def _feet_in_space(found: Inspection) -> list[_Foot]:
     plans = [shapely.MultiPoint(points[:, :2]).convex_hull for points in corners]
     boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
     touching = _touching(boxes, 1e-3 * near + _opening(found))
-    feet = []
+    feet: list[_Foot] = []
     for k in course.tolist():
         lower = [j for j in touching[k] if low[j, 2] < low[k, 2] - 1e-6 * near]
         covered = plans[k].intersection(shapely.union_all([plans[j] for j in lower])).area if lower else 0.0
         if covered > (1.0 - EXPOSED) * plans[k].area:
             continue
-        points = corners[k]
-        bottom = points[points[:, 2] <= low[k, 2] + LEVEL * height[k]]
-        face = shapely.MultiPoint(bottom[:, :2]).convex_hull
-        if face.area > NARROW * plans[k].area:
-            bed = shapely.get_coordinates(face)[:-1]
-        elif any(low[j, 2] < low[k, 2] - 0.5 * near for j in lower) or not _can_be_named(found, blocks[k]):
-            # It rests on a springer.
-            continue
-        else:
-            bed = None
-        feet.append(_Foot(blocks[k], low[k, :2], high[k, :2], bed, float(low[k, 2])))
+        bed = _bed(corners[k], LEVEL * height[k], NARROW * plans[k].area)
+        rests = (low[lower, 2] < low[k, 2] - 0.5 * near).any()
+        # Without a bed it may rest on a springer.
+        if bed is not None or not (rests or not _can_be_named(found, blocks[k])):
+            feet.append(_Foot(blocks[k], low[k, :2], high[k, :2], bed, float(low[k, 2])))
     if 2 * sum(foot.bed is None for foot in feet) > len(feet):
         # Corner pieces of a vault end flat by chance.
         feet = [replace(foot, bed=None) if _can_be_named(found, foot.block) else foot for foot in feet]

@@ -18,7 +18,6 @@ from .facing import faced, facing_tolerance
 from .joints.close import Proposal, proposed
 from .joints.facing_edges import Facing
 from .layout import Layout
-from .notes import UNIT_CLASH, kind_of
 from .refusal import carrying
 from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
 from .roles import dropped_twins, roles_of
@@ -96,11 +95,6 @@ class Inspection:
     open_joints: tuple[tuple[int, int, float], ...] = ()
     refused: str = ""
     remedy: str = ""
-
-    @property
-    def unit_clash(self) -> str:
-        """The note on a unit that cannot be right, or ""."""
-        return next((note for note in self.layout.notes if kind_of(note) == UNIT_CLASH), "")
 
     def __str__(self) -> str:
         """Write the measurements as lines of a table."""
@@ -246,7 +240,7 @@ def _mortar_rows(proposal: Proposal, rounding: float) -> tuple[Row, ...]:
     for k in np.flatnonzero(counts):
         rows.append(("", f"{edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {counts[k]:6d} stretches  {metres[k]:9.3f} m"))
     rows.append(("proposed", f'joint_thickness = {proposal.thickness:g}   (m, or "auto")'))
-    if proposal.way == "voronoi":
+    if proposal.method == "voronoi":
         rows.append(("", 'closing = "voronoi": faces are not straight, mortar goes to the nearest stone'))
     return (*rows, ("", proposal.note)) if proposal.note else tuple(rows)
 

@@ -12,7 +12,7 @@ UNIT, UNIT_CLASH = "unit", "unit clash"
 UPRIGHT = "upright"
 
 #: Kinds that change what is analysed.
-TOLD = (LEFT_OUT, CHANGED, UNIT, UNIT_CLASH)
+REPORTED = (LEFT_OUT, CHANGED, UNIT, UNIT_CLASH)
 
 
 class Note(str):
@@ -45,7 +45,7 @@ class Note(str):
 
 def changes_analysis(note: str) -> bool:
     """Whether a note changes what is analysed."""
-    return kind_of(note) in TOLD
+    return kind_of(note) in REPORTED
 
 
 def kind_of(note: str) -> str:

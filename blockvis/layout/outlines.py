@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -84,6 +85,11 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
     chosen = view or flat[0]
     note = "" if chosen == "xy" else upright_note(chosen)
     return points[:, VIEWS[chosen]], note
+
+
+def share_in(inner: Any, outer: Any) -> float:
+    """Fraction of the area of one shape that lies in another."""
+    return float(inner.intersection(outer).area / inner.area) if inner.intersects(outer) else 0.0
 
 
 def spread_of(points: np.ndarray, where: str) -> np.ndarray:

@@ -15,6 +15,7 @@ from solver import mechanics
 from .layout import Layout
 from .left_out import LeftOut, matches
 from .notes import CHANGED, Note
+from .outlines import share_in
 from .roles import roles_of
 from .selection import ANNOTATIONS, labels_of
 
@@ -24,8 +25,8 @@ INSIDE, OUTSIDE = 0.5, 1e-6
 #: Outlines are the same if what only one of them covers is below this fraction of its area.
 SAME = 1e-4
 
-#: What of an opening lies outside of its wall is told from this fraction of its area on.
-TOLD = 0.01
+#: What of an opening lies outside of its wall is reported from this fraction of its area on.
+REPORTED = 0.01
 
 #: Kinds of what a reader leaves out that may be outlines of walls.
 _OUTLINES = ("hole", "background", "across")
@@ -114,7 +115,7 @@ def regions_of(
     for region, number in every:
         region.taken.extend(
             other.wall for other, n in every
-            if n != number and other.wall.area < region.wall.area and _share(other.wall, region.wall) > OUTSIDE
+            if n != number and other.wall.area < region.wall.area and share_in(other.wall, region.wall) > OUTSIDE
         )  # fmt: skip
     others = [k for k in free if k not in walls]
     opened = {k: _opened_by(drawn[k], every, choices, layout.source) for k in others}
@@ -122,7 +123,7 @@ def regions_of(
         for region in around:
             region.openings.append(drawn[k].shape)
     left = [k for k in others if not opened[k] and drawn[k].block >= 0]
-    notes = [*layout.notes, *_reaching_out(drawn, every), *_left_in(drawn, left, every)]
+    notes = [*layout.notes, *_reaching_out(every), *_left_in(drawn, left, every)]
     used = [drawn[k] for k in (*walls, *(k for k in others if opened[k]))]
     blocks, items = {one.block for one in used}, {one.item for one in used}
     rest = layout.chosen([i for i in range(layout.n_blocks) if i not in blocks])
@@ -163,7 +164,7 @@ def _opened_by(
         region for region, number in every
         if (number in asked or not choices[number].openings)
         and (asked or (one.shape.area < region.wall.area and not _is_beside(one)))
-        and _share(one.shape, region.wall) > (OUTSIDE if asked else INSIDE)
+        and share_in(one.shape, region.wall) > (OUTSIDE if asked else INSIDE)
     ]  # fmt: skip
     if asked and not opened:
         x, y = one.shape.centroid.coords[0]
@@ -204,11 +205,6 @@ def _polygon(ring: np.ndarray) -> Any:
     return shape if shape.geom_type == "Polygon" and shape.area > 0.0 else None
 
 
-def _share(inner: Any, outer: Any) -> float:
-    """Fraction of the area of one shape that lies in another."""
-    return float(inner.intersection(outer).area / inner.area) if inner.intersects(outer) else 0.0
-
-
 def _is_beside(one: _Drawn) -> bool:
     """Whether by its layer an outline explains the drawing."""
     return ANNOTATIONS.fullmatch(one.labels[0].strip()) is not None
@@ -227,9 +223,9 @@ def _nested(drawn: Sequence[_Drawn]) -> list[Region]:
     regions: list[Region] = []
     around: list[list[int]] = []
     for k, one in enumerate(unlike):
-        around.append([j for j in range(k) if _share(one.shape, unlike[j].shape) > 1.0 - SAME])
+        around.append([j for j in range(k) if share_in(one.shape, unlike[j].shape) > 1.0 - SAME])
         if len(around[k]) % 2:
-            parent = next(region for region in reversed(regions) if _share(one.shape, region.wall) > 1.0 - SAME)
+            parent = next(region for region in reversed(regions) if share_in(one.shape, region.wall) > 1.0 - SAME)
             parent.openings.append(one.shape)
         else:
             regions.append(Region(one.shape, one.labels[0], one.labels[-1], openings=list(one.holes)))
@@ -269,13 +265,13 @@ def _smallest_gap(lines: Sequence[LeftOut]) -> tuple[float, np.ndarray]:
     return float(apart[i, j]), ends[i] + 0.0
 
 
-def _reaching_out(drawn: Sequence[_Drawn], every: Sequence[tuple[Region, int]]) -> list[str]:
+def _reaching_out(every: Sequence[tuple[Region, int]]) -> list[str]:
     """Note openings that reach beyond their wall."""
     found = []
     for region, _ in every:
         for opening in region.openings:
-            out = 1.0 - _share(opening, region.wall)
-            if out > TOLD:
+            out = 1.0 - share_in(opening, region.wall)
+            if out > REPORTED:
                 x, y = opening.centroid.coords[0]
                 found.append(
                     f"bond: {out:.0%} of the opening around ({x:.6g}, {y:.6g}) lies outside of its wall on layer "
@@ -291,7 +287,7 @@ def _left_in(drawn: Sequence[_Drawn], others: Sequence[int], every: Sequence[tup
         for region, _ in every:
             if (
                 drawn[k].shape.area < region.wall.area
-                and _share(drawn[k].shape, region.wall) > INSIDE
+                and share_in(drawn[k].shape, region.wall) > INSIDE
                 and not _is_beside(drawn[k])
             ):
                 region.taken.append(drawn[k].shape)

@@ -94,13 +94,14 @@ def proposed_ignore(
 def _candidates(layout: Layout, pairs: Sequence[tuple[int, int]]) -> Iterator[tuple[tuple[str, ...], set[int]]]:
     """Names of sets of blocks, and their numbers: layers, materials, kinds and colours, names and how they begin."""
     concerned = sorted({block for pair in pairs for block in pair})
-    for values in (layout.groups, layout.materials):
-        for word in dict.fromkeys(values[i] for i in concerned):
-            if word:
-                yield (word,), {i for i, other in enumerate(values) if other == word}
-    for look in dict.fromkeys(look for i in concerned for look in layout.looks[i]):
-        yield (look,), {i for i, own in enumerate(layout.looks) if look in own}
-    cover = _cover(pairs)
+    for labels in ([(word,) for word in layout.groups], [(word,) for word in layout.materials], layout.looks):
+        for word in dict.fromkeys(word for i in concerned for word in labels[i] if word):
+            yield (word,), {i for i, own in enumerate(labels) if word in own}
+    yield from _by_name(layout, _cover(pairs))
+
+
+def _by_name(layout: Layout, cover: Sequence[int]) -> Iterator[tuple[tuple[str, ...], set[int]]]:
+    """How the names of some blocks begin, or these names themselves, and the numbers of all that have them."""
     names = [layout.names[i] for i in cover]
     # What the first and the last have in common, all between them have.
     same = [a == b for a, b in zip(min(names), max(names), strict=False)]

@@ -148,7 +148,7 @@ def repaired(
         return outlines, notes
     depth = min(tolerance, 1.01 * found[0][2]) if found else 0.0
     try:
-        closed = close_joints(outlines, thickness, overlap=depth, anchored=anchored, way=closing, mortar=mortar)
+        closed = close_joints(outlines, thickness, overlap=depth, anchored=anchored, method=closing, mortar=mortar)
     except FoldedOutline as error:
         raise ValueError(
             f"closing the joints of block {error.block} ('{assembly.names[error.block]}') face by face folds its "
@@ -168,7 +168,7 @@ def _thickness(
         found = proposed(outlines, closing)
         notes = [f'joint_thickness "auto" found {found.thickness:g} m' + (f": {found.note}" if found.note else "")]
         # Faces that turn out not to close edge by edge may still be closed in the other way.
-        return found.thickness, closing if found.way == "faces" else found.way, notes
+        return found.thickness, closing if found.method == "faces" else found.method, notes
     thickness = float(asked)
     if not (np.isfinite(thickness) and thickness >= 0):
         raise ValueError(f"joint_thickness is {thickness:g} m; it must be a length of at least 0")
@@ -194,7 +194,7 @@ def _notes(
             f"{len(found)} overlaps of up to {depth:.3g} m were cut away, the deepest between '{assembly.names[i]}' "
             f"and '{assembly.names[j]}'; redraw them, or lower overlap_tolerance to have them refused"
         )
-    if thickness and closing.way == "voronoi":
+    if thickness and closing.method == "voronoi":
         notes.append(
             f"joints of up to {thickness:g} m{', and the mortar as drawn,' if drawn else ''} were closed by giving the "
             "mortar to the nearest stone: faces are not straight, or corners blunt; "

@@ -126,16 +126,9 @@ def without_ignored(layout: Layout, ignore: Sequence[str], only: Sequence[str]) 
     beside = [(item.layer, item.name) for item in layout.left_out]
     every = [label for labels in (*known, *beside) for label in labels if label]
     looks = {look for own in (*layout.looks, *(item.looks for item in layout.left_out)) for look in own}
-    notes = list(layout.notes)
-    for pattern in (*only, *ignore):
-        if matches(every, [pattern]) or look_of(pattern) in looks or (pattern in ignore and look_of(pattern) in KINDS):
-            continue
-        listed = ", ".join(f"'{label}'" for label in by_similarity(pattern, list(dict.fromkeys(every))[:2000])[:12])
-        message = f"'{pattern}' matches no layer, group or name; the drawing has {listed or 'none'}"
-        message += f"; its kinds and colours are {', '.join(sorted(looks)[:12])}" if looks else ""
-        if pattern in only:
-            raise ValueError(f"{layout.source or 'the drawing'}: only: {message}; correct it")
-        notes.append(Note(LEFT_OUT, f"ignore: {message}"))
+    if only and (unmatched := _unmatched(only, every, looks)):
+        raise ValueError(f"{layout.source or 'the drawing'}: only: {unmatched[0]}; correct it")
+    unmatched = _unmatched([pattern for pattern in ignore if look_of(pattern) not in KINDS], every, looks)
     unwanted, wanted = Choice(ignore, (*every, "")), Choice(only, (*every, ""))
 
     def dropped(labels: tuple[str, ...], own: tuple[str, ...]) -> bool:
@@ -152,7 +145,19 @@ def without_ignored(layout: Layout, ignore: Sequence[str], only: Sequence[str]) 
         else item
         for item in layout.left_out
     )
-    return replace(layout, left_out=asked, notes=tuple(notes)).leaving_out(reasons)
+    notes = (*layout.notes, *(Note(LEFT_OUT, f"ignore: {message}") for message in unmatched))
+    return replace(layout, left_out=asked, notes=notes).leaving_out(reasons)
+
+
+def _unmatched(patterns: Sequence[str], labels: Sequence[str], looks: set[str]) -> list[str]:
+    """Say which patterns match nothing, and what the drawing has."""
+    found = []
+    for pattern in patterns:
+        if not matches(labels, [pattern]) and look_of(pattern) not in looks:
+            listed = ", ".join(f"'{one}'" for one in by_similarity(pattern, list(dict.fromkeys(labels))[:2000])[:12])
+            kinds = f"; its kinds and colours are {', '.join(sorted(looks)[:12])}" if looks else ""
+            found.append(f"'{pattern}' matches no layer, group or name; the drawing has {listed or 'none'}{kinds}")
+    return found
 
 
 def without_debris(layout: Layout) -> Layout:

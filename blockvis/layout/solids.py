@@ -22,29 +22,25 @@ def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return found
 
 
-def _fans(faces: Sequence[Sequence[int]] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cut faces into fans from their first corners: (m, 3) corners, and where the fan of each face begins."""
+def fans(faces: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
+    """(m, 3) int array: faces cut into triangles from their first corner, which keeps the edges around each."""
     if isinstance(faces, np.ndarray):
-        return faces, np.arange(len(faces))
-    rows: list[tuple[int, int, int]] = []
-    starts = []
-    for face in faces:
-        starts.append(len(rows))
-        rows += [(face[0], face[k], face[k + 1]) for k in range(1, len(face) - 1)]
-    return np.array(rows), np.array(starts)
+        return faces
+    triangles = [(face[0], face[k], face[k + 1]) for face in faces for k in range(1, len(face) - 1)]
+    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
 def volume(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> float:
     """Volume of a block; negative if its faces are seen clockwise from outside."""
-    a, b, c = (points - points.mean(axis=0))[_fans(faces)[0].T]
+    a, b, c = (points - points.mean(axis=0))[fans(faces).T]
     return float((cross(b, c) * a).sum()) / 6.0
 
 
 def area_vectors(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
     """(n_faces, 3) array: normals of faces that are seen counter-clockwise, as long as their areas are large."""
-    fan, starts = _fans(faces)
-    a, b, c = points[fan.T]
-    return np.asarray(np.add.reduceat(cross(b - a, c - a), starts, axis=0) / 2.0)
+    counts = [1] * len(faces) if isinstance(faces, np.ndarray) else [len(face) - 2 for face in faces]
+    a, b, c = points[fans(faces).T]
+    return np.asarray(np.add.reduceat(cross(b - a, c - a), np.cumsum([0, *counts[:-1]]), axis=0) / 2.0)
 
 
 def width_of(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> float:

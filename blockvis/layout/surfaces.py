@@ -41,15 +41,19 @@ def cleaned(points: np.ndarray, faces: list[list[int]]) -> Solid:
     if len(used) < len(points):
         place = {corner: k for k, corner in enumerate(used)}
         points, rings = points[used], [[place[corner] for corner in ring] for ring in rings]
-    if not is_closed(rings):
-        edges = _edges_of(rings)
-        face = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
-        low, high = np.sort(np.array(edges), axis=1).T
-        edge, counts = np.unique(low * np.int64(len(points)) + high, return_inverse=True, return_counts=True)[1:]
-        if (counts == 2).all():
-            turned = turned_faces(np.array(edges), edge.ravel(), face)
-            rings = [ring[::-1] if turned[k] else ring for k, ring in enumerate(rings)]
-    return outward(points, rings)
+    return outward(points, rings if is_closed(rings) else _turned_alike(rings, len(points)))
+
+
+def _turned_alike(rings: list[list[int]], n_points: int) -> list[list[int]]:
+    """Turn faces so that neighbours are seen from one side, where each edge is that of two."""
+    edges = np.array(_edges_of(rings))
+    face = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
+    low, high = np.sort(edges, axis=1).T
+    edge, counts = np.unique(low * np.int64(n_points) + high, return_inverse=True, return_counts=True)[1:]
+    if (counts != 2).any():
+        return rings
+    turned = turned_faces(edges, edge.ravel(), face)
+    return [ring[::-1] if turned[k] else ring for k, ring in enumerate(rings)]
 
 
 def is_closed(faces: list[list[int]]) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from .left_out import LeftOut
 from .notes import LEFT_OUT, Note
+from .outlines import share_in
 
 if TYPE_CHECKING:
     from .layout import Layout
@@ -55,25 +56,18 @@ def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
 
     blocks = [shapely.Polygon(ring) for ring in layout.outlines]
     blocks = [shape if shape.is_valid else shapely.Polygon() for shape in blocks]
-    around: list[tuple[Any, str, tuple[Any, ...], bool]] = [
-        (shapely.Polygon(item.points), item.layer or item.name, tuple(map(shapely.Polygon, item.holes)),
-         BLACK in item.looks)
-        for item in layout.left_out if _may_be_wall(item)
-    ]  # fmt: skip
-    labels = [layout.groups[i] or layout.names[i] for i in range(layout.n_blocks)]
-    around += [(blocks[i], label, (), BLACK in layout.looks[i]) for i, label in enumerate(labels)]
     found: dict[str, str] = {}
-    told, walls = np.zeros(layout.n_blocks, bool), list[Any]()
-    for wall, label, holes, black in sorted(around, key=lambda one: float(one[0].area)):
+    counted, walls = np.zeros(layout.n_blocks, bool), list[Any]()
+    for wall, label, holes, black in _possible_walls(layout, blocks):
         # Around a wall there may be a hatch of it, or the frame of the sheet.
-        if not wall.is_valid or wall.area == 0.0 or any(_share(one, wall) > 0.99 for one in walls):
+        if not wall.is_valid or wall.area == 0.0 or any(share_in(one, wall) > 0.99 for one in walls):
             continue
-        inside = [i for i in np.flatnonzero(~told).tolist() if _lies_in(blocks[i], wall)]
+        inside = [i for i in np.flatnonzero(~counted).tolist() if _lies_in(blocks[i], wall)]
         if not _are_openings(wall, [blocks[i] for i in inside], holes):
             continue
         if black and not pages and inside and all(WHITE in layout.looks[i] for i in inside):
             continue
-        told[inside] = True
+        counted[inside] = True
         walls.append(wall)
         openings = shapely.union_all([*(blocks[i] for i in inside), *holes])
         found.setdefault(label, _words(layout.source, label, wall, openings) + COUNTED * bool(inside))
@@ -84,13 +78,22 @@ def _may_be_wall(item: LeftOut) -> bool:
     return item.closed and item.kind in ("background", "hole") and len(item.points) > 2
 
 
+def _possible_walls(layout: Layout, blocks: list[Any]) -> list[tuple[Any, str, tuple[Any, ...], bool]]:
+    """List shape, layer or name, holes, and whether it is black, of whatever may be a wall, the smallest first."""
+    import shapely
+
+    around: list[tuple[Any, str, tuple[Any, ...], bool]] = [
+        (shapely.Polygon(item.points), item.layer or item.name, tuple(map(shapely.Polygon, item.holes)),
+         BLACK in item.looks)
+        for item in layout.left_out if _may_be_wall(item)
+    ]  # fmt: skip
+    labels = [group or name for group, name in zip(layout.groups, layout.names, strict=True)]
+    around += [(blocks[i], label, (), BLACK in layout.looks[i]) for i, label in enumerate(labels)]
+    return sorted(around, key=lambda one: float(one[0].area))
+
+
 def _lies_in(shape: Any, wall: Any) -> bool:
-    return bool(0.0 < shape.area < 0.9 * wall.area and _share(shape, wall) > 0.99)
-
-
-def _share(inner: Any, outer: Any) -> float:
-    """Fraction of the area of one shape that lies in another."""
-    return float(inner.intersection(outer).area / inner.area) if inner.intersects(outer) else 0.0
+    return bool(0.0 < shape.area < 0.9 * wall.area and share_in(shape, wall) > 0.99)
 
 
 def _are_openings(wall: Any, shapes: list[Any], holes: Iterable[Any]) -> bool:

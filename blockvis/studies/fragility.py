@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 #: Status of runs that did not collapse within their limit.
 STOOD = (str(solver.Status.LIMIT_REACHED), str(solver.Status.LOCKED))
 
+#: Probability that a value lies in its band.
+CONFIDENCE = 0.95
+
 
 @dataclass(frozen=True)
 class Fragility:
@@ -35,7 +38,6 @@ class Fragility:
         The curve is known up to the largest settlement of any run.
     n_runs, n_collapsed, n_stood : int
         All runs, those that collapsed, and those that did not collapse within their limit.
-    confidence : float
     """
 
     settlement: np.ndarray
@@ -46,7 +48,6 @@ class Fragility:
     n_runs: int
     n_collapsed: int
     n_stood: int
-    confidence: float
 
     def quantile(self, probability: float) -> float | None:
         """Find the settlement [m or rad] at which a probability of collapse is reached; None if it is not reached."""
@@ -74,12 +75,12 @@ def observations(table: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
     return settlement.astype(float), collapsed
 
 
-def fragility_of(table: pd.DataFrame, confidence: float = 0.95) -> Fragility:
+def fragility_of(table: pd.DataFrame) -> Fragility:
     """Estimate the fragility curve from the table of a study; runs without result are excluded: report their number."""
-    return fragility(*observations(table), confidence)
+    return fragility(*observations(table))
 
 
-def fragility(settlement: ArrayLike, collapsed: ArrayLike, confidence: float = 0.95) -> Fragility:
+def fragility(settlement: ArrayLike, collapsed: ArrayLike) -> Fragility:
     """Estimate the fragility curve from runs that collapsed and runs that did not collapse within their limit.
 
     Parameters
@@ -87,8 +88,6 @@ def fragility(settlement: ArrayLike, collapsed: ArrayLike, confidence: float = 0
     settlement : (n,) array [m or rad]
         Settlement at collapse, or the last one of a run that did not collapse.
     collapsed : (n,) bool array
-    confidence : float
-        Of the band, 0 to 1.
 
     Returns
     -------
@@ -117,7 +116,7 @@ def fragility(settlement: ArrayLike, collapsed: ArrayLike, confidence: float = 0
     for k in np.flatnonzero(last):
         # The variance is undefined when no run is left standing: take the number of runs of the step before.
         runs[k] = runs[k - 1] if k else at_risk[k]
-    lower, upper = wilson(1.0 - standing, runs, confidence)
+    lower, upper = wilson(1.0 - standing, runs)
     return Fragility(
         settlement=steps,
         probability=1.0 - standing,
@@ -127,11 +126,10 @@ def fragility(settlement: ArrayLike, collapsed: ArrayLike, confidence: float = 0
         n_runs=len(end),
         n_collapsed=int(event.sum()),
         n_stood=int((~event).sum()),
-        confidence=confidence,
     )
 
 
-def wilson(share: ArrayLike, number: ArrayLike, confidence: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
+def wilson(share: ArrayLike, number: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Compute Wilson's interval of a probability.
 
     Parameters
@@ -140,7 +138,6 @@ def wilson(share: ArrayLike, number: ArrayLike, confidence: float = 0.95) -> tup
         Fraction of the observations in which the event happened.
     number : (n,) array
         Number of observations; need not be whole.
-    confidence : float
 
     Returns
     -------
@@ -158,7 +155,7 @@ def wilson(share: ArrayLike, number: ArrayLike, confidence: float = 0.95) -> tup
     0.2366 0.7634
     """
     p, n = np.asarray(share, dtype=float), np.asarray(number, dtype=float)
-    z = float(ndtri(0.5 + confidence / 2.0))
+    z = float(ndtri(0.5 + CONFIDENCE / 2.0))
     centre = (p + z**2 / (2.0 * n)) / (1.0 + z**2 / n)
     half = z / (1.0 + z**2 / n) * np.sqrt(p * (1.0 - p) / n + z**2 / (4.0 * n**2))
     return np.clip(centre - half, 0.0, 1.0), np.clip(centre + half, 0.0, 1.0)

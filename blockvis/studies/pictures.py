@@ -18,8 +18,8 @@ from blockvis.pictures import palette
 from blockvis.results.about import LOCAL
 from blockvis.system.atomic_files import atomic_file
 
-from .fragility import Fragility, fragility_of
-from .sensitivity import first_order, outcome, swings
+from .fragility import CONFIDENCE, Fragility, fragility_of
+from .sensitivity import Swing, first_order, outcome, swings
 from .study_file import Study
 from .study_folder import NO_RESULT, StudyFolder
 from .summary import classes_of, curve_name, independent_rows
@@ -93,7 +93,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
         low, high = np.append(curve.lower, curve.lower[-1]), np.append(curve.upper, curve.upper[-1])
         axes.fill_between(
             ends, low, high, step="post", color=colour, alpha=0.18, linewidth=0,
-            label=f"{100 * curve.confidence:g} % confidence, point by point",
+            label=f"{100 * CONFIDENCE:g} % confidence, point by point",
         )  # fmt: skip
     axes.step(x, level, where="post", color=colour, linewidth=2.2, label=curve_name(study))
     for share, words in ((0.05, "5 %"), (0.5, "half")):
@@ -132,19 +132,7 @@ def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Pat
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.6, 1.0))
     centre = factor * float(np.nanmean(outcome(table)))
     for place, swing in enumerate(found):
-        ends = ((swing.low, swing.low_value, swing.low_error, "#9bc0e0"),
-                (swing.high, swing.high_value, swing.high_error, palette.hexadecimal(palette.FORCE)))  # fmt: skip
-        for mean, value, error, colour in ends:
-            left.barh(place, factor * mean - centre, left=centre, color=colour, height=0.52, zorder=2)
-            left.errorbar(
-                factor * mean, place, xerr=factor * error, color="#333333", linewidth=1.0, capsize=3, zorder=3
-            )
-            outwards = 1 if factor * mean >= centre else -1
-            edge = factor * (mean + outwards * (0.0 if np.isnan(error) else error))
-            left.annotate(
-                _short(value), (edge, place), xytext=(6 * outwards, 0), textcoords="offset points", va="center",
-                ha="left" if outwards > 0 else "right", fontsize=0.85 * TEXT,
-            )  # fmt: skip
+        _draw_swing(left, place, swing, centre, factor)
     left.axvline(centre, color="#333333", linewidth=1.0)
     left.margins(x=0.22)
     left.set_yticks(range(len(names)), [textwrap.shorten(name, 40) for name in names], fontsize=0.95 * TEXT)
@@ -169,6 +157,21 @@ def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Pat
         _plain_frame(axes)
         axes.grid(visible=False, axis="y")
     return _saved(figure, path)
+
+
+def _draw_swing(axes: Axes, place: int, swing: Swing, centre: float, factor: float) -> None:
+    """Draw the bar of a parameter to both sides of the mean of all runs, with its values at the ends."""
+    ends = ((swing.low, swing.low_value, swing.low_error, "#9bc0e0"),
+            (swing.high, swing.high_value, swing.high_error, palette.hexadecimal(palette.FORCE)))  # fmt: skip
+    for mean, value, error, colour in ends:
+        axes.barh(place, factor * mean - centre, left=centre, color=colour, height=0.52, zorder=2)
+        axes.errorbar(factor * mean, place, xerr=factor * error, color="#333333", linewidth=1.0, capsize=3, zorder=3)
+        outwards = 1 if factor * mean >= centre else -1
+        edge = factor * (mean + outwards * (0.0 if np.isnan(error) else error))
+        axes.annotate(
+            _short(value), (edge, place), xytext=(6 * outwards, 0), textcoords="offset points", va="center",
+            ha="left" if outwards > 0 else "right", fontsize=0.85 * TEXT,
+        )  # fmt: skip
 
 
 def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:

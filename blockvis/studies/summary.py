@@ -128,12 +128,16 @@ def in_words(summary: dict[str, Any]) -> str:
     for name, (share, error) in summary["first_order_indices"].items():
         if name not in listed:
             lines.append(f"{name}: {100 * share:.0f} ± {100 * error:.0f} % of the variance")
-    classes = summary["mechanism_classes"]
-    for number, (name, count) in enumerate(list(classes.items())[:MOST_MECHANISMS], 1):
-        lines.append(f"mechanism {number}, {count} time{'' if count == 1 else 's'}: {name}")
-    if len(classes) > MOST_MECHANISMS:
-        lines.append(f"and {len(classes) - MOST_MECHANISMS} more mechanisms")
-    return "\n".join(lines)
+    return "\n".join([*lines, *_mechanism_lines(summary["mechanism_classes"])])
+
+
+def _mechanism_lines(classes: dict[str, int]) -> list[str]:
+    lines = [
+        f"mechanism {number}, {count} time{'' if count == 1 else 's'}: {name}"
+        for number, (name, count) in enumerate(list(classes.items())[:MOST_MECHANISMS], 1)
+    ]
+    more = len(classes) - MOST_MECHANISMS
+    return [*lines, f"and {more} more mechanisms"] if more > 0 else lines
 
 
 def _value(value: float | str) -> str:

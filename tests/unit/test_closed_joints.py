@@ -348,7 +348,7 @@ def test_stones_end_where_an_uneven_ground_begins():
     top = np.column_stack([x, 0.012 * np.sin(25.0 * x) - 0.012])
     ground = [*top[::-1].tolist(), [x[0], -0.2], [x[-1], -0.2]]
     stones = rubble(0)
-    closed = close_joints([*stones, np.array(ground)], 0.05, anchored=np.arange(46) == 45, way="voronoi").outlines
+    closed = close_joints([*stones, np.array(ground)], 0.05, anchored=np.arange(46) == 45, method="voronoi").outlines
     shapes = np.array([shapely.Polygon(ring) for ring in closed])
     assert shapely.is_valid(shapes).all()
     assert shapely.area(shapes).sum() == pytest.approx(shapely.union_all(shapes).area, rel=1e-9)
@@ -440,9 +440,9 @@ def test_the_way_can_be_chosen():
     rings = bricks()
     with pytest.raises(ValueError, match="closing is 'glue'; choose from auto, faces, voronoi"):
         assemble(layout(rings), joint_thickness=0.01, closing="glue")
-    assert proposed(rings).way == "faces"
-    assert proposed(rubble(1)).way == "voronoi"
-    assert close_joints(rings[:4], 0.01, way="voronoi").way == "voronoi"
+    assert proposed(rings).method == "faces"
+    assert proposed(rubble(1)).method == "voronoi"
+    assert close_joints(rings[:4], 0.01, method="voronoi").method == "voronoi"
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")

@@ -23,7 +23,6 @@ FACES = {
 WHITE_BOX = {
     "formats/test_gmsh_cad.py": 1,
     "system/test_drawing.py": 6,
-    "system/test_explain.py": 3,
     "system/test_memory.py": 8,
     "system/test_path_range.py": 11,
     "system/test_report_use.py": 5,
@@ -44,7 +43,6 @@ WHITE_BOX = {
     "unit/test_kinds.py": 7,
     "unit/test_labels.py": 13,
     "unit/test_marks.py": 12,
-    "unit/test_moving_load_in_space.py": 1,
     "unit/test_observations.py": 1,
     "unit/test_programs.py": 18,
     "unit/test_refusal_pictures.py": 8,

@@ -54,7 +54,7 @@ class Proposal:
     ----------
     thickness : float [m]
         0 if there are no gaps.
-    way : str
+    method : str
         "faces" or "voronoi".
     reach : float [m]
         How far gaps were looked for.
@@ -63,7 +63,7 @@ class Proposal:
     """
 
     thickness: float
-    way: str
+    method: str
     reach: float
     stretches: Facing
 
@@ -80,7 +80,7 @@ class Proposal:
                 f"gaps were looked for up to {self.reach:.3g} m, and there are joints of that width: wider ones stay "
                 "open; give joint_thickness in m to close them"
             )
-        if self.way == "faces" and wider.any():
+        if self.method == "faces" and wider.any():
             return (
                 f"{self.stretches.lengths[wider].sum():.3g} of {self.stretches.lengths.sum():.3g} m of gaps are wider "
                 f"than joint_thickness {self.thickness:g} m, up to {self.stretches.gaps.max():.3g} m, and stay open"
@@ -88,26 +88,26 @@ class Proposal:
         return ""
 
 
-def proposed(outlines: Sequence[np.ndarray], way: str = "auto") -> Proposal:
+def proposed(outlines: Sequence[np.ndarray], method: str = "auto") -> Proposal:
     """Propose how the joints of a drawing are closed.
 
     Parameters
     ----------
     outlines : sequence of (n, 2) arrays [m]
         Counter-clockwise.
-    way : {"auto", "faces", "voronoi"}
+    method : {"auto", "faces", "voronoi"}
     """
     thickness, found = proposed_thickness(outlines)
-    if way == "auto":
-        way = chosen_method(outlines, found)
-    if way == "faces":
-        return Proposal(thickness, way, search_reach(outlines), found)
+    if method == "auto":
+        method = chosen_method(outlines, found)
+    if method == "faces":
+        return Proposal(thickness, method, search_reach(outlines), found)
     gap, reach = proposed_gap(outlines)
-    return Proposal(rounded_up(gap) if gap else 0.0, way, reach, found)
+    return Proposal(rounded_up(gap) if gap else 0.0, method, reach, found)
 
 
 def chosen_method(outlines: Sequence[np.ndarray], found: Facing) -> str:
-    """Choose the way of closing that fits the faces of a drawing."""
+    """Choose the method of closing that fits the faces of a drawing."""
     return "faces" if straight_share(outlines, found) >= STRAIGHT else "voronoi"
 
 
@@ -126,7 +126,7 @@ class Closing:
         Widest gap that was closed.
     residual : float [m]
         Widest remaining gap or overlap along them.
-    way : str
+    method : str
         "faces" or "voronoi".
     """
 
@@ -135,7 +135,7 @@ class Closing:
     n_cut: int
     largest_gap: float
     residual: float
-    way: str = "faces"
+    method: str = "faces"
 
 
 def close_joints(
@@ -144,7 +144,7 @@ def close_joints(
     *,
     overlap: float = 0.0,
     anchored: np.ndarray | None = None,
-    way: str = "faces",
+    method: str = "faces",
     mortar: Sequence[LeftOut] = (),
 ) -> Closing:
     """Move facing edges onto the line midway between them, or give the mortar to the nearest stone.
@@ -159,7 +159,7 @@ def close_joints(
         Deepest overlap that is resolved in the same way.
     anchored : (n_blocks,) bool array, optional
         Blocks that keep their outline; edges that face them move across the whole gap.
-    way : {"auto", "faces", "voronoi"}
+    method : {"auto", "faces", "voronoi"}
         Whether edges move to the midline between faces, or mortar goes to the nearest stone. "auto" takes the second
         where faces are not straight, where corners are so blunt that pockets would stay open between them, and where
         edges that move would fold an outline.
@@ -175,17 +175,18 @@ def close_joints(
     ValueError
         With the number of the outline, if "faces" would fold one.
     """
-    if way == "auto":
+    anchored = np.zeros(len(outlines), dtype=bool) if anchored is None else np.asarray(anchored, dtype=bool)
+    if method == "auto":
         # Judged as far as joints may reach: corners too blunt for this thickness count, too.
         reach = max(thickness, search_reach(outlines))
-        way = chosen_method(outlines, facing_edges(outlines, reach)) if thickness else "faces"
-        if way == "faces":
+        method = chosen_method(outlines, facing_edges(outlines, reach)) if thickness else "faces"
+        if method == "faces":
             closing = _between_faces(outlines, thickness, overlap, anchored)
             whole = _folded(outlines, closing.outlines) is None
             if not thickness or (whole and _pockets(outlines, closing.outlines, thickness) <= POCKETS):
                 return closing
-        way = "voronoi"
-    if way == "voronoi":
+        method = "voronoi"
+    if method == "voronoi":
         return _to_nearest_stone(outlines, thickness, overlap, anchored, mortar)
     closing = _between_faces(outlines, thickness, overlap, anchored)
     folded = _folded(outlines, closing.outlines)
@@ -233,41 +234,37 @@ def _to_nearest_stone(
     outlines: Sequence[np.ndarray],
     thickness: float,
     overlap: float,
-    anchored: np.ndarray | None,
+    anchored: np.ndarray,
     mortar: Sequence[LeftOut],
 ) -> Closing:
-    still = np.zeros(len(outlines), dtype=bool) if anchored is None else np.asarray(anchored, dtype=bool)
     found = facing_edges(outlines, thickness, overlap)
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
     n_open = int((np.abs(found.gaps).max(axis=1) > CLOSED * scale).sum()) if len(found) else 0
-    closed = share_out(outlines, thickness, still, mortar)
+    closed = share_out(outlines, thickness, anchored, mortar)
     return Closing(tuple(closed), n_open, 0, float(found.gaps.max(initial=0.0)), 0.0, "voronoi")
 
 
-def _between_faces(
-    outlines: Sequence[np.ndarray], thickness: float, overlap: float, anchored: np.ndarray | None
-) -> Closing:
+def _between_faces(outlines: Sequence[np.ndarray], thickness: float, overlap: float, anchored: np.ndarray) -> Closing:
     """Move facing edges onto the line midway between them."""
     origin = np.concatenate(outlines).mean(axis=0)
     rings = [ring - origin for ring in outlines]
-    still = np.zeros(len(rings), dtype=bool) if anchored is None else np.asarray(anchored, dtype=bool)
     edges = edges_of(rings)
     scale = float(np.ptp(edges.start, axis=0).max())
     found = facing_edges(rings, thickness, overlap)
-    found = found.chosen(~(still[edges.block[found.edge_a]] & still[edges.block[found.edge_b]]))
+    found = found.chosen(~(anchored[edges.block[found.edge_a]] & anchored[edges.block[found.edge_b]]))
     closed = CLOSED * scale
     n_open = int((np.abs(found.gaps).max(axis=1) > closed).sum()) if len(found) else 0
     if n_open == 0:
         return Closing(tuple(outlines), 0, 0, 0.0, 0.0)
-    lines, uncommon = common_lines(found, edges, still, closed)
+    lines, uncommon = common_lines(found, edges, anchored, closed)
     base = _without_repeats(moved_outlines(edges, lines, LONGEST_MITRE * max(thickness, overlap)), closed)
-    final = extended_to_lines(base, edges, found, uncommon, lines, still, max(thickness, overlap))
-    final = separated(_without_repeats(final, closed), still, max(thickness, overlap), 10.0 * closed)
+    final = extended_to_lines(base, edges, found, uncommon, lines, anchored, max(thickness, overlap))
+    final = separated(_without_repeats(final, closed), anchored, max(thickness, overlap), 10.0 * closed)
     final = _without_repeats(final, closed)
     remaining = facing_edges(final, thickness, max(overlap, closed))
     residual = float(np.abs(remaining.gaps).max()) if len(remaining) else 0.0
     return Closing(
-        outlines=tuple(outlines[i] if still[i] else ring + origin for i, ring in enumerate(final)),
+        outlines=tuple(outlines[i] if anchored[i] else ring + origin for i, ring in enumerate(final)),
         n_joints=n_open,
         n_cut=len(uncommon),
         largest_gap=float(found.gaps.max()),

@@ -36,14 +36,14 @@ class Line:
         return np.abs(points @ self.normal - self.level)
 
 
-def common_lines(found: Facing, edges: Edges, still: np.ndarray, closed: float) -> tuple[dict[int, Line], list[int]]:
+def common_lines(found: Facing, edges: Edges, anchored: np.ndarray, closed: float) -> tuple[dict[int, Line], list[int]]:
     """Find a line for every edge that moves, shared by as many facing edges as one line fits.
 
     Parameters
     ----------
     found : Facing
     edges : Edges
-    still : (n_blocks,) bool array
+    anchored : (n_blocks,) bool array
         Blocks that keep their outline.
     closed : float [m]
         Gap that is a rounding error.
@@ -59,7 +59,7 @@ def common_lines(found: Facing, edges: Edges, still: np.ndarray, closed: float) 
     Stretches are taken longest first; each joins the lines of its two edges into one if a straight fit through all
     their midlines stays within the fraction SHARED_LINE of every gap.
     """
-    fixed = np.stack([still[edges.block[found.edge_a]], still[edges.block[found.edge_b]]], axis=1)
+    fixed = np.stack([anchored[edges.block[found.edge_a]], anchored[edges.block[found.edge_b]]], axis=1)
     middle = _midlines_on_anchors(found, edges, fixed)
     gaps = np.abs(found.gaps)
     allowed = SHARED_LINE * gaps + 0.05 * gaps.max(axis=1, keepdims=True) + closed
@@ -83,11 +83,11 @@ def common_lines(found: Facing, edges: Edges, still: np.ndarray, closed: float) 
                 line_of[int(found.edge_a[s])] = line_of[int(found.edge_b[s])] = line
         else:
             uncommon.append(int(k))
-    line_of.update(_own_lines(found, edges, still, middle, uncommon, line_of, closed))
+    line_of.update(_own_lines(found, edges, anchored, middle, uncommon, line_of, closed))
     lines = {
         edge: line
         for edge, line in line_of.items()
-        if (gaps[line.stretches] > closed).any() and not still[edges.block[edge]]
+        if (gaps[line.stretches] > closed).any() and not anchored[edges.block[edge]]
     }
     return lines, uncommon
 
@@ -123,7 +123,7 @@ def _fitted(found: Facing, middle: np.ndarray, stretches: list[int], held: list[
 def _own_lines(
     found: Facing,
     edges: Edges,
-    still: np.ndarray,
+    anchored: np.ndarray,
     middle: np.ndarray,
     uncommon: list[int],
     line_of: dict[int, Line],
@@ -133,7 +133,7 @@ def _own_lines(
     alone: dict[int, list[int]] = {}
     for k in uncommon:
         for edge in (int(found.edge_a[k]), int(found.edge_b[k])):
-            if edge not in line_of and not still[edges.block[edge]]:
+            if edge not in line_of and not anchored[edges.block[edge]]:
                 alone.setdefault(edge, []).append(k)
     return {edge: _fitted(found, middle, stretches, [], closed) for edge, stretches in alone.items()}
 

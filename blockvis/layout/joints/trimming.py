@@ -25,7 +25,7 @@ def extended_to_lines(
     found: Facing,
     uncommon: list[int],
     lines: dict[int, Line],
-    still: np.ndarray,
+    anchored: np.ndarray,
     thickness: float,
 ) -> list[np.ndarray]:
     """Extend one edge of each stretch without a common line to the other one, and cut its block along it.
@@ -39,7 +39,7 @@ def extended_to_lines(
     uncommon : list of int
         Stretches without a common line.
     lines : {edge: line}
-    still : (n_blocks,) bool array
+    anchored : (n_blocks,) bool array
         Blocks that keep their outline.
     thickness : float [m]
         Of the joints.
@@ -50,20 +50,7 @@ def extended_to_lines(
     """
     import shapely
 
-    overshoot: dict[int, float] = {}
-    strips: dict[int, list[np.ndarray]] = {}
-    size = np.hypot(*(edges.end - edges.start).T)
-    for k in uncommon:
-        a, b = int(found.edge_a[k]), int(found.edge_b[k])
-        extended, straight = (a, b) if (still[edges.block[b]], size[b]) >= (still[edges.block[a]], size[a]) else (b, a)
-        if still[edges.block[extended]]:
-            extended, straight = straight, extended
-        normal, level = _outward_form(edges, lines, straight)
-        target = found.midline[k] + (level - found.midline[k] @ normal)[:, None] * normal
-        own_normal, own_level = _outward_form(edges, lines, extended)
-        needed = float((target @ own_normal - own_level).max()) + 0.1 * thickness
-        overshoot[extended] = max(overshoot.get(extended, 0.0), needed)
-        strips.setdefault(extended, []).append(found.midline[k])
+    overshoot, strips = _extended_edges(edges, found, uncommon, lines, anchored, thickness)
     if not overshoot:
         return base
     further = dict(lines)
@@ -84,24 +71,52 @@ def extended_to_lines(
         shape = shapely.union_all([shapes[block].buffer(0), shapely.intersection(wide, strip)])
         near = [int(j) for j in tree.query(shape) if j != block]
         cut = shapely.difference(shape, shapely.union_all([shapes[j].buffer(0) for j in near]))
-        pieces = [piece for piece in getattr(cut, "geoms", [cut]) if piece.geom_type == "Polygon"]
-        if pieces:
-            shapes[block] = shapely.Polygon(max(pieces, key=lambda piece: piece.area).exterior)
+        piece = max(shapely.get_parts(cut), key=shapely.area, default=None)
+        if piece is not None and piece.geom_type == "Polygon" and piece.area > 0.0:
+            shapes[block] = shapely.Polygon(piece.exterior)
             final[block] = np.array(shapely.orient_polygons(shapes[block]).exterior.coords)[:-1]
     involved = {int(edges.block[edge]) for k in uncommon for edge in (found.edge_a[k], found.edge_b[k])}
     return merge_close_corners(
-        final, sorted(involved), still, MERGED * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max())
+        final, sorted(involved), anchored, MERGED * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max())
     )
 
 
-def separated(rings: list[np.ndarray], still: np.ndarray, thickness: float, closed: float) -> list[np.ndarray]:
+def _extended_edges(
+    edges: Edges,
+    found: Facing,
+    uncommon: list[int],
+    lines: dict[int, Line],
+    anchored: np.ndarray,
+    thickness: float,
+) -> tuple[dict[int, float], dict[int, list[np.ndarray]]]:
+    """Choose the edges that are extended: by how much [m], and to which midlines, by the edge."""
+    overshoot: dict[int, float] = {}
+    strips: dict[int, list[np.ndarray]] = {}
+    size = np.hypot(*(edges.end - edges.start).T)
+    for k in uncommon:
+        a, b = int(found.edge_a[k]), int(found.edge_b[k])
+        extended, straight = (
+            (a, b) if (anchored[edges.block[b]], size[b]) >= (anchored[edges.block[a]], size[a]) else (b, a)
+        )
+        if anchored[edges.block[extended]]:
+            extended, straight = straight, extended
+        normal, level = _outward_form(edges, lines, straight)
+        target = found.midline[k] + (level - found.midline[k] @ normal)[:, None] * normal
+        own_normal, own_level = _outward_form(edges, lines, extended)
+        needed = float((target @ own_normal - own_level).max()) + 0.1 * thickness
+        overshoot[extended] = max(overshoot.get(extended, 0.0), needed)
+        strips.setdefault(extended, []).append(found.midline[k])
+    return overshoot, strips
+
+
+def separated(rings: list[np.ndarray], anchored: np.ndarray, thickness: float, closed: float) -> list[np.ndarray]:
     """Remove the overlaps that closing joints leaves at the junctions of several joints.
 
     Parameters
     ----------
     rings : list of (n, 2) arrays [m]
         Counter-clockwise.
-    still : (n_blocks,) bool array
+    anchored : (n_blocks,) bool array
         Blocks that keep their outline.
     thickness : float [m]
         Of the joints.
@@ -123,13 +138,13 @@ def separated(rings: list[np.ndarray], still: np.ndarray, thickness: float, clos
     if len(first) == 0:
         return rings
     rings = merge_close_corners(
-        rings, sorted({*map(int, first), *map(int, second)}), still, MERGED * thickness, closed / 10.0
+        rings, sorted({*map(int, first), *map(int, second)}), anchored, MERGED * thickness, closed / 10.0
     )
     result = list(rings)
     for i, j, _ in zip(*_overlaps(rings, closed), strict=True):
         shapes = {int(k): shapely.Polygon(result[k]).buffer(0) for k in (i, j)}
-        small, large = sorted(shapes, key=lambda k: (bool(still[k]), shapes[k].area))
-        if still[small]:
+        small, large = sorted(shapes, key=lambda k: (bool(anchored[k]), shapes[k].area))
+        if anchored[small]:
             continue
         cut = shapely.difference(shapes[small], shapes[large])
         pieces = [piece for piece in getattr(cut, "geoms", [cut]) if piece.geom_type == "Polygon"]
@@ -172,7 +187,7 @@ def _strip(edges: Edges, edge: int, stretch: np.ndarray, thickness: float, dista
 
 
 def merge_close_corners(
-    rings: list[np.ndarray], involved: list[int], still: np.ndarray, reach: float, closed: float
+    rings: list[np.ndarray], involved: list[int], anchored: np.ndarray, reach: float, closed: float
 ) -> list[np.ndarray]:
     """Merge corners that cutting leaves close together, in all blocks that share them.
 
@@ -181,7 +196,7 @@ def merge_close_corners(
     rings : list of (n, 2) arrays [m]
     involved : list of int
         Blocks whose corners may move.
-    still : (n_blocks,) bool array
+    anchored : (n_blocks,) bool array
         Blocks whose corners stay.
     reach : float [m]
         Corners closer than this are merged.
@@ -206,21 +221,21 @@ def merge_close_corners(
     points = np.concatenate([rings[i] for i in near])
     index = cKDTree(points)
     shared = {i: with_corners_on_edges(rings[i], points, index, max(10 * closed, 1e-7 * reach)) for i in near}
-    movable = np.concatenate([np.zeros((0, 2)), *(shared[i] for i in involved if not still[i] and i in shared)])
+    movable = np.concatenate([np.zeros((0, 2)), *(shared[i] for i in involved if not anchored[i] and i in shared)])
     movable = np.unique(np.round(movable, 12), axis=0)
     if len(movable) < 2:
         return rings
     group = fcluster(linkage(movable, "complete"), reach, "distance")
     count = np.bincount(group)
     centre = np.stack([np.bincount(group, movable[:, axis]) / np.maximum(count, 1) for axis in (0, 1)], axis=1)
-    anchors = [shared[i] for i in near if still[i]]
+    anchors = [shared[i] for i in near if anchored[i]]
     if anchors:
         distance, nearest = cKDTree(np.concatenate(anchors)).query(centre)
         centre = np.where((distance <= reach)[:, None], np.concatenate(anchors)[nearest], centre)
     lookup = cKDTree(movable)
     result = list(rings)
     for i in near:
-        if still[i]:
+        if anchored[i]:
             continue
         distance, nearest = lookup.query(shared[i])
         moved = np.where((distance <= max(10 * closed, 1e-7 * reach))[:, None], centre[group[nearest]], shared[i])
