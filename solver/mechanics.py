@@ -4,14 +4,26 @@ from .analysis.increments import Increments
 from .analysis.pushover import pushover_increments
 from .analysis.settlement import check_settlement, model_of, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, find_contacts, measure_contacts
-from .equilibrium import block_forces
-from .geometry.contacts import Contacts
+from .contact_step.minimise import minimise
+from .contact_step.problem import ContactProblem
+from .contact_step.stiffness import ContactRows
+from .equilibrium import block_forces, wrench_matrix
+from .geometry.contacts import Contacts, joined_contacts, matched_contacts
 from .geometry.outlines import overlap_depths
 from .geometry.planar_contacts import corners_and_edges, features_of
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
 from .geometry.shapes import Shapes
-from .kinematics import carried, carried_between, motion_size, moved_vertices, point_velocities, swung, turned
+from .kinematics import (
+    carried,
+    carried_between,
+    motion_size,
+    moved,
+    moved_vertices,
+    point_velocities,
+    swung,
+    turned,
+)
 from .path.controls import INCREMENTS, Ending
 from .path.state import PathState, Place
 from .path.stepping import NotSolved, Stepper
@@ -41,6 +53,8 @@ __all__ = [
     "REACTION",
     "ROLES",
     "SETTLEMENT",
+    "ContactProblem",
+    "ContactRows",
     "ContactState",
     "Contacts",
     "Control",
@@ -64,10 +78,14 @@ __all__ = [
     "corners_and_edges",
     "features_of",
     "find_contacts",
+    "joined_contacts",
+    "matched_contacts",
     "measure_contacts",
     "mechanism_of",
+    "minimise",
     "model_of",
     "motion_size",
+    "moved",
     "moved_vertices",
     "overlap_depths",
     "path_parameters",
@@ -82,4 +100,5 @@ __all__ = [
     "turned",
     "with_motion",
     "worst_of",
+    "wrench_matrix",
 ]

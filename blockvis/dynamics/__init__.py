@@ -1,1 +1,1 @@
-"""What follows the last equilibrium, by an engine that others keep; nothing static depends on it."""
+"""What follows the last equilibrium: rigid-body dynamics; nothing static depends on it."""

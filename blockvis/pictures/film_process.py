@@ -23,7 +23,7 @@ from .video import find_encoder
 PATIENCE = 5.0
 
 #: What drawing needs, loaded by the process while the first one solves.
-_LOADED = ("blockvis.pictures.render", "blockvis.pictures.curves", "pymunk")
+_LOADED = ("blockvis.pictures.render", "blockvis.pictures.curves")
 
 
 class FilmFailed(RuntimeError):

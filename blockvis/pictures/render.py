@@ -175,8 +175,8 @@ def animate(
     """Write the settlement and the fall as a film.
 
     The settlement grows evenly over ``seconds``, the last equilibrium holds for a moment, then the fall follows in
-    real time: rigid-body dynamics without restitution. Without pymunk, or with a magnification, the mechanism is
-    followed step by step instead, marked as pseudo-time.
+    real time: rigid-body dynamics without restitution. With a magnification the mechanism is followed step by step
+    instead, marked as pseudo-time.
 
     Parameters
     ----------

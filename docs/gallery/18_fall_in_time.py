@@ -2,7 +2,7 @@
 The fall in time
 ================
 
-Behind the last equilibrium statics has nothing to say; rigid-body dynamics without restitution, by pymunk,
+Behind the last equilibrium statics has nothing to say; rigid-body dynamics without restitution
 goes on from there.
 """
 

@@ -101,7 +101,6 @@ def test_extras_are_those_of_the_project_file():
         packages = {re.match(r"[\w-]+", line)[0] for line in project["optional-dependencies"][extra]}
         assert packages == {PACKAGES.get(name, name).replace("_", "-") for name in modules}
         assert not packages & core
-    assert "pymunk" in core, "a film whose fall lands needs no extra"
     assert "blockvis[studies]" in project["optional-dependencies"]["test"], "the README's test command tests studies"
 
 

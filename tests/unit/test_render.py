@@ -151,7 +151,7 @@ def test_mechanism_of_a_structure_that_never_stood(tmp_path):
 
 @pytest.mark.parametrize("suffix", ["mp4", "gif", "webp"])
 def test_films_have_their_frames(tmp_path, suffix, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pymunk", None)
+    monkeypatch.setattr("blockvis.pictures.render.fall_of", lambda response: None)
     response = parted(wall(6, 5), 4, 3)
     path = animate(response, tmp_path / f"film.{suffix}", size=(320, 180), fps=10, seconds=1.0)
     # 10 on the path, the last of them held for 5, 3 of the fall, held for 8.
@@ -228,8 +228,7 @@ def frames_of(response, **options):
     return frames, told
 
 
-def test_every_frame_of_the_path_is_new_and_nothing_stands_for_long(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pymunk", None)
+def test_every_frame_of_the_path_is_new_and_nothing_stands_for_long():
     frames, told = frames_of(parted(wall(6, 5), 4, 3, settlement=0.05))
     # Four seconds of path, half a second before three frames of the fall, and the end.
     assert len(frames) == 100 + 12 + 3 + 20

@@ -1,0 +1,335 @@
+"""Blocks that fall, in the plane and in space: the convex program of the path's step, with inertia for the viscosity.
+
+A step of time h minimises over the movement v of all blocks, with their movement u in free flight::
+
+    1/2 (v - u)ᵀ M/h² (v - u) + what contact points ask for (solver.contact_step.problem)
+
+It is implicit and without restitution. Rotations are counted about the principal axes of each block, in which its
+inertia is diagonal. A contact point is a point of one block before a plane that rides on the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+import solver
+from solver import mechanics
+
+from .spin import axes_at, free_spin, principal_inertia
+
+#: Longest and shortest step, in √(block size / g), and how far a corner moves in a step at most, in block sizes.
+LONGEST_STEP, SHORTEST_STEP, STRIDE = 0.1, 1e-3, 0.2
+
+#: Give of a contact point, normal and tangential: block sizes under the mean weight of a block.
+GIVE, SHEAR_GIVE = 1e-6, 5e-6
+
+#: Part of an overlap that a step pushes out: all of it at once would throw the blocks.
+PUSHED_OUT = 0.2
+
+#: Overlap that a step may add before it is repeated in two halves, in block sizes.
+DEEP = 2e-3
+
+#: Force from which on a contact point counts, in block weights.
+FORCE = 1e-3
+
+#: Kind of the contact points that a search before the step has not found.
+MISSED = 9
+
+#: Error of predicted gaps above which a step is linearised again, in block sizes, and linearisations at most.
+EXACT, LINEARISATIONS = 1e-4, 3
+
+
+class Engine:
+    """Blocks that move by inertia, loads and contact; supports stand still.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+        With the ground.
+    loads : (n_blocks, n_dof) array [N, N·m]
+    interfaces : solver.Interfaces
+    pose : solver.Pose
+    velocity : (n_blocks, n_dof) array [m/s, rad/s]
+        At the start.
+    removed : (n_blocks,) bool array, optional
+        Supports that nothing meets: blocks that were taken away before.
+
+    Attributes
+    ----------
+    pose : solver.Pose
+    velocity : (n_blocks, n_dof) array
+        In block sizes, radians and √(block size / g).
+    steps, programs : int
+        Taken and solved.
+    """
+
+    def __init__(
+        self,
+        assembly: solver.Assembly,
+        loads: np.ndarray,
+        interfaces: solver.Interfaces,
+        pose: solver.Pose,
+        velocity: np.ndarray,
+        removed: np.ndarray | None = None,
+    ) -> None:
+        self.removed = np.zeros(assembly.n_blocks, dtype=bool) if removed is None else removed
+        self.assembly, self.interfaces, self.pose = assembly, replace(interfaces, scatter=None), pose
+        self.d, self.free, self.length = assembly.dimension, assembly.free, assembly.block_size
+        self.mass = float(assembly.masses[self.free].mean())
+        self.unit = float(np.sqrt(self.length / solver.GRAVITY))
+        is_place = np.arange(loads.shape[1]) < self.d
+        self.scales = np.where(is_place, self.length, 1.0)
+        self.loads = loads / (self.mass * solver.GRAVITY * np.where(is_place, 1.0, self.length))
+        self.velocity = np.where(self.free[:, None], velocity * self.unit / self.scales, 0.0)
+        moments, self.drawn_axes = principal_inertia(assembly)
+        masses = np.repeat(assembly.masses[:, None], self.d, axis=1)
+        self.weights = np.concatenate([masses, moments / self.length**2], axis=1) / self.mass
+        arms = assembly.vertices - assembly.centroids[assembly.block_of_vertex]
+        self.radii = np.zeros(assembly.n_blocks)
+        np.maximum.at(self.radii, assembly.block_of_vertex, np.linalg.norm(arms, axis=1) / self.length)
+        self.contacts: mechanics.Contacts | None = None
+        self.forces = self.trial = np.zeros((0, self.d))
+        self.corners = mechanics.moved_vertices(assembly, pose)
+        self.deep = self._deep(self.corners)
+        self.flies = np.zeros(assembly.n_blocks, dtype=bool)
+        #: Length of the last step.
+        self.step_length = 0.2 * LONGEST_STEP
+        self.steps = self.programs = 0
+
+    @property
+    def speeds(self) -> np.ndarray:
+        """(n_blocks,) array: of the fastest corner at most, in √(g × block size)."""
+        forward, spin = self.velocity[:, : self.d], self.velocity[:, self.d :]
+        return np.linalg.norm(forward, axis=1) + self.radii * np.linalg.norm(spin, axis=1)
+
+    @property
+    def fastest(self) -> float:
+        """Speed of the fastest free block [m/s], turning included."""
+        return float(self.speeds[self.free].max()) * self.length / self.unit
+
+    @property
+    def energies(self) -> np.ndarray:
+        """(n_blocks,) array [J]: potential and kinetic energy of the free blocks."""
+        height = (self.loads[:, : self.d] * self.pose.positions).sum(axis=1) / self.length
+        kinetic = self._kinetic(self.velocity, axes_at(self.pose, self.drawn_axes))
+        return np.where(self.free, kinetic - height, 0.0) * self.mass * solver.GRAVITY * self.length
+
+    def advance(self, seconds: float) -> None:
+        """Follow the blocks for so many seconds.
+
+        Raises
+        ------
+        solver.mechanics.NotSolved
+        """
+        left = seconds / self.unit
+        while left > 1e-9:
+            fastest = float(self.speeds[self.free].max()) + 0.5 * LONGEST_STEP
+            h = left / np.ceil(left / min(LONGEST_STEP, STRIDE / fastest, 2.0 * self.step_length) - 1e-9)
+            while not self._step(h):
+                h /= 2.0
+            self.step_length, left = h, left - h
+
+    def _step(self, h: float, missed: mechanics.Contacts | None = None) -> bool:
+        """Take a step, with contact points beside those found; false where it has to be shorter."""
+        flight, velocity = self._flight(h)
+        contacts = self._near(h)
+        if missed is not None:
+            contacts = mechanics.joined_contacts([contacts, missed])
+        before, trial = self._transferred(contacts)
+        axes = axes_at(self.pose, self.drawn_axes)
+        forces, motion, predicted = before, flight, None
+        for _ in range(LINEARISATIONS):
+            pose = mechanics.moved(self.pose, motion * self.scales)
+            measured = self._carried(contacts, pose)
+            carries = forces[:, 0] > FORCE
+            if (
+                predicted is not None
+                and np.abs(measured.gaps - predicted)[carries].max(initial=0.0) < EXACT * self.length
+            ):
+                break
+            problem = self._problem(h, contacts, measured, before, pose, motion - flight, axes)
+            try:
+                solution = mechanics.minimise(problem, trial)
+            except mechanics.NotSolved:
+                if h < SHORTEST_STEP:
+                    raise
+                return False
+            self.programs += 1
+            forces, trial = solution.forces, solution.trial
+            predicted = measured.gaps + problem.rows.relative(solution.motion)[:, 0] * self.length
+            change = np.zeros_like(motion)
+            change[self.free] = solution.motion.reshape(-1, motion.shape[1])
+            motion = motion + self._along(change, axes)
+        pose = mechanics.moved(self.pose, motion * self.scales)
+        corners = mechanics.moved_vertices(self.assembly, pose)
+        deep = self._deep(corners)
+        new = [pair for pair in deep if deep[pair] > self.deep.get(pair, 0.0) + DEEP * self.length]
+        if new and h > SHORTEST_STEP:
+            added = self._missed(new, corners) if missed is None else None
+            return added is not None and self._step(h, added)
+        self.deep, energies = deep, self.energies
+        self.contacts, self.forces, self.trial = contacts, forces, trial
+        self.velocity = np.where(self.free[:, None], velocity + (motion - flight) / h, 0.0)
+        self.pose, self.corners = pose, corners
+        self.flies = self.free.copy()
+        carries = forces[:, 0] > FORCE
+        self.flies[contacts.block_a[carries]] = self.flies[contacts.block_b[carries]] = False
+        self._lose(energies)
+        self.steps += 1
+        return True
+
+    def _flight(self, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Movement and velocity after a step without loads and contact, (n_blocks, n_dof) arrays."""
+        motion, velocity = h * self.velocity, self.velocity.copy()
+        # Implicit steps fall too far by h² g / 2, which is taken back where nothing touches.
+        motion[:, : self.d] -= np.where(self.flies[:, None], 0.5 * h * h * self.loads / self.weights, 0.0)[:, : self.d]
+        spinning = np.flatnonzero((self.velocity[:, self.d :] != 0.0).any(axis=1))
+        if self.d == 3 and len(spinning):
+            axes = axes_at(self.pose, self.drawn_axes)[spinning]
+            spin = np.einsum("nji,nj->ni", axes, self.velocity[spinning, 3:])
+            turn, after = free_spin(self.weights[spinning, 3:], spin, h)
+            motion[spinning, 3:] = np.einsum("nij,nj->ni", axes, turn)
+            # The axes have turned, too.
+            velocity[spinning, 3:] = mechanics.turned(np.einsum("nij,nj->ni", axes, after), motion[spinning, 3:])
+        return motion, velocity
+
+    def _near(self, h: float) -> mechanics.Contacts:
+        """Contact points that may close within a step."""
+        way = self.speeds * h + np.where(self.free, 2.0 * h * h, 0.0)
+        reach = float(2.0 * way.max()) + 1e-3
+        found = mechanics.find_contacts(self.assembly, self.corners, reach * self.length)
+        met = ~(self.removed[found.block_a] | self.removed[found.block_b])
+        return found[met & (found.gaps <= (way[found.block_a] + way[found.block_b] + 1e-4) * self.length)]
+
+    def _carried(self, contacts: mechanics.Contacts, pose: solver.Pose) -> mechanics.Contacts:
+        """Measure the same contact points at another pose."""
+        a, b = contacts.block_a, contacts.block_b
+        on_plane = contacts.points - contacts.gaps[:, None] * contacts.frames[:, 0]
+        point = mechanics.carried(contacts.points, a, self.pose, pose)
+        turn = self.pose.movement_to(pose)[b, self.d :]
+        frames = np.stack([mechanics.turned(contacts.frames[:, k], turn) for k in range(self.d)], axis=1)
+        apart = np.einsum("nij,nj->ni", frames, point - mechanics.carried(on_plane, b, self.pose, pose))
+        return replace(contacts, points=point, frames=frames, gaps=apart[:, 0], slip=apart[:, 1:])
+
+    def _transferred(self, contacts: mechanics.Contacts) -> tuple[np.ndarray, np.ndarray]:
+        """Hand on forces and trial forces of the step before to these contact points, (n, d) arrays."""
+        forces, trial = np.zeros((len(contacts), self.d)), np.tile(-np.eye(self.d)[0], (len(contacts), 1))
+        if self.contacts is not None and len(self.contacts) and len(contacts):
+            number, same = mechanics.matched_contacts(contacts, self.contacts)
+            forces[same], trial[same] = self.forces[number[same]], self.trial[number[same]]
+        return forces, trial
+
+    def _problem(
+        self,
+        h: float,
+        start: mechanics.Contacts,
+        measured: mechanics.Contacts,
+        before: np.ndarray,
+        pose: solver.Pose,
+        beside_flight: np.ndarray,
+        axes: np.ndarray,
+    ) -> mechanics.ContactProblem:
+        """State the program of a step, linearised where contact points are measured."""
+        rows = mechanics.ContactRows(mechanics.wrench_matrix(measured, pose, self.length), self.free)
+        loads = self.loads
+        if self.d == 3:
+            for block, first in ((start.block_a, 3), (start.block_b, 9)):
+                rows.blocks[:, :, first : first + 3] = rows.blocks[:, :, first : first + 3] @ axes[block]
+            loads, beside_flight = (self._along(of, axes.transpose(0, 2, 1)) for of in (loads, beside_flight))
+        # What has come into another block is pushed out over some steps.
+        gaps = measured.gaps - (1.0 - PUSHED_OUT) * np.minimum(start.gaps, 0.0)
+        friction = self.interfaces.friction(self.assembly, start.block_a, start.block_b)
+        return mechanics.ContactProblem(
+            rows=rows,
+            gap=gaps / self.length,
+            slip=measured.slip / self.length,
+            # Gaps are absolute, slip counts from the start of the step.
+            forces=np.column_stack([np.zeros(len(start)), before[:, 1:]]),
+            bound=friction * before[:, 0],
+            compliance=np.tile([GIVE] + [SHEAR_GIVE] * (self.d - 1), (len(start), 1)),
+            most=np.full(len(start), np.inf),
+            load=loads[self.free].ravel(),
+            viscosity=(self.weights / h**2)[self.free].ravel(),
+            motion_so_far=beside_flight[self.free].ravel(),
+            size=1.0,
+        )
+
+    def _along(self, motion: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """(n_blocks, n_dof) array: in space rotations times axes."""
+        if self.d == 2:
+            return motion
+        return np.concatenate([motion[:, :3], np.einsum("nij,nj->ni", axes, motion[:, 3:])], axis=1)
+
+    def _deep(self, corners: np.ndarray) -> dict[tuple[int, int], float]:
+        """Pairs of blocks, one of them free, that overlap by more than is let pass, and how deep they do [m]."""
+        i, j, depth = self.assembly.shapes.overlaps(corners, DEEP * self.length)
+        return {(a, b): d for a, b, d in zip(i.tolist(), j.tolist(), depth.tolist(), strict=True) if self._moves(a, b)}
+
+    def _moves(self, a: int, b: int) -> bool:
+        return bool((self.free[a] or self.free[b]) and not (self.removed[a] or self.removed[b]))
+
+    def _missed(self, pairs: list[tuple[int, int]], corners: np.ndarray) -> mechanics.Contacts | None:
+        """Contact points, where they were before a step, of pairs that the step has put into each other.
+
+        A face that was between the two, and the corner that came through it farthest.
+        """
+        rows = []
+        normals, middles, block_of_face = self._faces(self.corners)
+        for pair in pairs:
+            best = (-DEEP * self.length, -1, -1)
+            for a, b in (pair, pair[::-1]):
+                faces, own = np.flatnonzero(block_of_face == b), np.flatnonzero(self.assembly.block_of_vertex == a)
+                heights = ((self.corners[own][None] - middles[faces][:, None]) * normals[faces][:, None]).sum(axis=2)
+                face = int(heights.min(axis=1).argmax())
+                came = ((corners[own] - self.corners[own]) * normals[faces[face]]).sum(axis=1) + heights[face]
+                best = max(best, (float(heights.min(axis=1)[face]), int(faces[face]), int(own[came.argmin()])))
+            if best[1] >= 0:
+                rows.append(best[1:])
+        if not rows:
+            return None
+        face, vertex = np.array(rows).T
+        normal, point, n = normals[face], self.corners[vertex], len(face)
+        frames = np.linalg.qr(np.concatenate([normal[:, :, None], np.tile(np.eye(self.d), (n, 1, 1))], axis=2))[0]
+        frames = frames.transpose(0, 2, 1)
+        frames[:, 0] = normal
+        return mechanics.Contacts(
+            features=np.stack([np.full(n, MISSED), vertex, face, np.full(n, -1)], axis=1),
+            block_a=self.assembly.block_of_vertex[vertex],
+            block_b=block_of_face[face],
+            points=point,
+            frames=frames,
+            gaps=((point - middles[face]) * normal).sum(axis=1),
+            slip=np.zeros((n, self.d - 1)),
+            areas=np.zeros(n),
+        )
+
+    def _faces(self, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Give normals and points of all faces, in the plane edges, (n, d) arrays, and the block of each."""
+        if self.d == 3:
+            solids = self.assembly.polyhedra
+            faces = solids.faces(corners)
+            return faces.normals, faces.middles, solids.block_of_face
+        along = corners[self.assembly.next_vertex] - corners
+        normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / self.assembly.edge_lengths[:, None]
+        return normals, corners, self.assembly.block_of_vertex
+
+    def _kinetic(self, velocity: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        turned = self._along(velocity, axes.transpose(0, 2, 1))
+        return np.asarray(0.5 * (self.weights * turned**2).sum(axis=1))
+
+    def _lose(self, before: np.ndarray) -> None:
+        """Slow the blocks that touch each other where their energy has grown: by rotations within the step."""
+        assert self.contacts is not None
+        n, carries = len(self.free), self.forces[:, 0] > FORCE
+        a, b = self.contacts.block_a[carries], self.contacts.block_b[carries]
+        both = self.free[a] & self.free[b]
+        links = sp.coo_array((np.ones(int(both.sum())), (a[both], b[both])), shape=(n, n))
+        count, group = connected_components(links, directed=False)
+        grown = np.bincount(group, (self.energies - before), count) / (self.mass * solver.GRAVITY * self.length)
+        kinetic = np.bincount(group, self._kinetic(self.velocity, axes_at(self.pose, self.drawn_axes)), count)
+        part = np.clip(1.0 - np.maximum(grown, 0.0) / np.maximum(kinetic, 1e-300), 0.0, 1.0)
+        self.velocity = self.velocity * np.sqrt(part)[group][:, None]
