@@ -26,9 +26,9 @@ from .underlay import COVER, CarriedPhotograph, Underlay
 #: The layers, back to front.
 ORDER = (
     "earth", "backfill", "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding",
-    "motion outline", "force line", "force", "tie rim", "tie slack", "tie elastic", "tie yielding", "tie broken", "tie end",
-    "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top",
-    "arrow rim", "arrow top",
+    "motion outline", "force line", "force",
+    "tie rim", "tie slack", "tie elastic", "tie yielding", "tie broken", "tie end",
+    "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top", "arrow rim", "arrow top",
 )  # fmt: skip
 
 #: A picture is drawn in bands of at most so many pixels, so that its size does not decide how much memory that takes.
