@@ -225,6 +225,7 @@ def settlement_steps(
         interfaces=given.interfaces,
         loads=given.loads,
         controls=replace(case.controls, local_loss=0.0) if whole else case.controls,
+        ties=given.ties,
         resume=resume,
         on_step=given.step,
     )
