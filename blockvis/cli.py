@@ -1076,6 +1076,7 @@ def _parameter(given: str) -> tuple[str, Any]:
 def _in_words(response: solver.Response, folder: Path) -> str:
     """Sum up a run in words."""
     from .kinds.kinds import KINDS
+    from .results.ties import tie_courses, tie_texts
 
     kind = KINDS[response.analysis]
     assembly, weight = response.assembly, response.total_weight
@@ -1095,6 +1096,8 @@ def _in_words(response: solver.Response, folder: Path) -> str:
     if response.message and not kind.covers_message(response):
         lines.append(response.message)
     lines += kind.lines(response)
+    unit = response.settlements[-1].unit if response.settlements else response.parameter.unit
+    lines += [": ".join(filter(None, tie_texts(course, unit))) for course in tie_courses(response)]
     worst = mechanics.worst_of(i.certificate for i in response.path)
     if worst is not None:
         measures = {

@@ -228,6 +228,7 @@ def settlement_steps(
         loads=given.loads,
         controls=replace(case.controls, local_loss=0.0) if whole else case.controls,
         changes=given.changes,
+        ties=given.ties,
         resume=resume,
         on_step=given.step,
     )

@@ -40,6 +40,7 @@ from blockvis.results.about import about, counts_text, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
+from blockvis.results.ties import tie_courses, tie_texts
 from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text
 from solver import mechanics
@@ -175,7 +176,7 @@ def report_html(
         script=_script(response.assembly.dimension),
         turning=TURNING if response.assembly.dimension == 3 else "Shift with the arrows moves the picture",
         summary=html_rows(summary_rows(response, fall)),
-        cracks=_cracks(response),
+        cracks=_cracks(response) + _ties(response),
         certificate=html_rows(certificate_rows(response)),
         error=_error(error) + html_rows(range_rows(band)),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
@@ -211,6 +212,19 @@ def _cracks(response: solver.Response) -> str:
     last = response.path[-1]
     rows = crack_rows(cracks_of(response.assembly, last.pose, fallen=last.fallen), LISTED_CRACKS)
     return f'<h2>Cracks at the last equilibrium</h2><table id="crack-lines">{html_rows(rows)}</table>' if rows else ""
+
+
+def _ties(response: solver.Response) -> str:
+    """List the ties with their largest forces and what became of them."""
+    rows = tie_rows(response)
+    listed = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    return f'<h2>Ties and props</h2><table id="ties">{listed}</table>' if rows else ""
+
+
+def tie_rows(response: solver.Response) -> list[tuple[str, str, str]]:
+    """List name and kind of ties, their largest forces and where, and what became of them."""
+    unit = response.settlements[-1].unit if response.settlements else response.parameter.unit
+    return [tie_texts(course, unit) for course in tie_courses(response)]
 
 
 def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> list[_Frame]:

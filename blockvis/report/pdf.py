@@ -27,7 +27,7 @@ from blockvis.results.reaction_range import ReactionRange
 from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text, width_text
 
-from .page import certificate_rows, headline_of, range_rows, summary_rows
+from .page import certificate_rows, headline_of, range_rows, summary_rows, tie_rows
 
 #: Width of the text, margin and height of a line [mm]; size of the text [points].
 WIDTH, MARGIN, LINE, TEXT = 174.0, 18.0, 5.2, 9.5
@@ -105,6 +105,9 @@ def write_pdf(
                 paper.heading("Cracks", 12.0, PICTURE)
                 paper.picture(draw_cracks(response, -1, Path(folder) / "cracks.png"))
                 paper.tabulate("Cracks at the last equilibrium", *_crack_table(cracks))
+    ties = tie_rows(response)
+    if ties:
+        paper.tabulate("Ties and props", ("", "largest force", "what became of it"), ties, (44.0, 58.0, 72.0))
     certificate = certificate_rows(response)
     if certificate:
         paper.tabulate("Certificate", ("", ""), certificate, (112.0, 62.0))

@@ -80,7 +80,8 @@ def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: so
     if len(found.forces) == len(ties):
         return found
     n = len(ties)
-    return TieForces(np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.int64), tie_ends(ties, assembly, increment.pose))
+    ends = tie_ends(ties, assembly, increment.pose)
+    return TieForces(np.zeros(n), np.zeros(n), np.full(n, np.nan), np.zeros(n, dtype=np.int64), ends)
 
 
 def tie_rows(ties: Sequence[solver.Tie], number: int, increment: solver.Increment) -> list[tuple[Any, ...]]:
@@ -229,9 +230,3 @@ def tie_texts(course: TieCourse, unit: str = "m") -> tuple[str, str, str]:
         largest,
         ", ".join(fate),
     )
-
-
-def tie_forces(response: solver.Response) -> np.ndarray:
-    """(n_increments, n_ties) array [N]: forces of ties along the path, tension positive."""
-    ties = known_ties(response)
-    return np.array([increment.ties.forces for increment in response.path]).reshape(len(response.path), len(ties))

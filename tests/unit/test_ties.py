@@ -1,13 +1,19 @@
 """Ties, props and bars of a case: what it may say of them, and what is told of them."""
 
+import csv
+import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
+import blockvis
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly, case_ties
+from blockvis.cli import main
 from blockvis.runs.plan import planned
 
 #: Two piers of a block each, 0.5 m wide and 2 m high, 2 m apart, on a ground; the right one stands on what moves.
@@ -169,3 +175,77 @@ def test_lines_of_an_svg_are_ties(tmp_path):
 def test_lines_that_cannot_be_ties_are_refused_in_a_line(tmp_path, lines, geometry, ties, words):
     drawing(tmp_path, lines)
     assert words in refused(tmp_path, *ties, **DXF | {"geometry": DXF["geometry"] | geometry})
+
+
+ARCH = """[geometry]
+layout = "arch on piers"
+[geometry.parameters]
+voussoirs = 5
+pier_blocks = 1
+pier_width = 0.5
+[settlement]
+direction = [1, 0]
+increment = 0.005
+limit = 0.02
+[output]
+animation = false
+[[ties]]
+name = "iron"
+from = [-1.3, 1.95]
+to = [1.3, 1.95]
+stiffness = 1e7
+strength = 3000
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tied")
+    (folder / "case.toml").write_text(ARCH, encoding="utf-8")
+    return blockvis.run_case(folder / "case.toml", folder / "out", outputs=())
+
+
+def test_the_table_and_the_summary_say_what_a_tie_does(run):
+    with (run.folder / "ties.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["state"] for row in rows][-1] == "yielding"
+    assert list(rows[0]) == ["increment", "phase", "settlement", "name", "kind", "force", "elongation", "state"]
+    forces = [float(row["force"]) for row in rows]
+    np.testing.assert_array_equal(forces, [increment.ties.forces[0] for increment in run.response.path])
+    (told,) = run.summary["ties"]
+    assert (told["name"], told["kind"]) == ("iron", "tie")
+    assert told["largest_force"] == pytest.approx(3000.0)
+    first = next(float(row["settlement"]) for row in rows if row["state"] == "yielding")
+    assert (told["yields_at"], told["breaks_at"]) == (first, None)
+
+
+def test_a_folder_with_ties_opens_with_them_and_viewers_get_lines(run):
+    again = blockvis.open_results(run.folder)
+    for one, other in zip(run.response.path, again.path, strict=True):
+        np.testing.assert_array_equal(one.ties.forces, other.ties.forces)
+        np.testing.assert_array_equal(one.forces, other.forces)
+    pyvista = pytest.importorskip("pyvista")
+    assert "ties_00001.vtu" in (run.folder / "ties.pvd").read_text(encoding="utf-8")
+    lines = pyvista.read(run.folder / "increments" / "ties_00001.vtu")
+    assert lines.n_cells == 1
+    assert {"force", "elongation", "state", "name"} <= set(lines.cell_data)
+    assert lines.cell_data["force"][0] == again.path[1].ties.forces[0]
+
+
+def test_a_picture_draws_the_tie_in_the_colour_of_its_state(run, tmp_path):
+    from blockvis.pictures import palette
+
+    picture = Image.open(
+        blockvis.draw_still(run.response, run.response.path[-1], tmp_path / "last.png", size=(480, 360))
+    )
+    colours = {colour for _, colour in picture.convert("RGB").getcolors(picture.width * picture.height)}
+    assert palette.YIELDING in colours
+
+
+def test_a_run_that_was_stopped_goes_on_with_its_ties(run, tmp_path):
+    folder = tmp_path / "stopped"
+    shutil.copytree(run.folder, folder)
+    (folder / "summary.json").unlink()
+    assert main(["run", "--resume", str(folder), "--no-pictures"]) == 0
+    assert (folder / "ties.csv").read_bytes() == (run.folder / "ties.csv").read_bytes()
+    assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["ties"] == run.summary["ties"]
