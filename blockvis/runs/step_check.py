@@ -95,8 +95,8 @@ class StepCheck:
 
     @property
     def parts(self) -> bool:
-        """Whether two runs that collapse took different ways: that they do so together may be chance."""
-        return self.error > NOTABLE and not np.isnan(self.collapse)
+        """Whether two runs part before they collapse nearer to each other, which may be chance."""
+        return ERROR_OVER_DIFFERENCE * self.difference > NOTABLE and self.collapse < self.difference
 
     @property
     def warning(self) -> str:
