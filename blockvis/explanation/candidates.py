@@ -425,11 +425,6 @@ class Twin:
 def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list[Twin]:
     """Find candidates that differ by a translation of the whole structure, which opens no crack.
 
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    candidates : sequence of Candidate
-
     Returns
     -------
     list of Twin

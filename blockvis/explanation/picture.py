@@ -60,10 +60,6 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     found : Explanation
     path : path
         Ending in .png, .svg or .pdf.
-
-    Returns
-    -------
-    pathlib.Path
     """
     assembly, causes = found.assembly, found.causes[:2]
     drawn = solver.Pose.initial(assembly)

@@ -62,10 +62,6 @@ def write_explanation(found: Explanation, folder: str | Path, *, overwrite: bool
     folder : str or Path
     overwrite : bool
         Whether an explanation that is there already may be replaced.
-
-    Returns
-    -------
-    pathlib.Path
     """
     refuse_explanation(folder, overwrite)
     folder = Path(folder)

@@ -76,10 +76,6 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -
     outlines : sequence of (n, 2) arrays
         Closed outlines of the same drawing.
 
-    Returns
-    -------
-    Faces
-
     Notes
     -----
     Lines cut an outline if they lie within it and it has two or more pieces along its border then; a line that reaches

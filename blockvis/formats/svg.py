@@ -131,6 +131,27 @@ def _root(path: Path) -> ElementTree.Element:
 
 def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     """Leave out what is not wanted, add the faces between loose lines, cut outlines along the lines within them."""
+    wanted = _wanted_lines(found, reading)
+    faces = faces_of_lines(wanted, found.rings)
+    found.left_out += faces.left_out
+    for k, pieces in sorted(faces.pieces.items(), reverse=True):
+        row, looks = found.rows[k], found.looks[k]
+        del found.rings[k], found.rows[k], found.looks[k]
+        for number, piece in enumerate(pieces):
+            found.rings.append(piece)
+            found.rows.append({**row, "name": f"{row.get('name', 'block')} {number + 1}"})
+            found.looks.append(looks)
+    for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
+        found.rings.append(ring)
+        found.rows.append(_row(layer, f"face {number}"))
+        found.looks.append(("face",))
+    if faces.rings:
+        faces.notes.append(faces_note(faces, wanted))
+    return faces
+
+
+def _wanted_lines(found: _Outlines, reading: Reading) -> list[Line]:
+    """Leave out what is not wanted; give the loose lines that are."""
     every = [*zip(found.labels, found.looks, strict=True)]
     lines = [(labels, line.looks) for line, labels in zip(found.loose, found.loose_labels, strict=True)]
     names = {label for labels, _ in (*every, *lines) for label in labels}
@@ -152,22 +173,7 @@ def _with_loose(found: _Outlines, reading: Reading) -> Faces:
         else:
             left = LeftOut("asked line", line.points, "", line.layer, line.handle, closed=False, looks=line.looks)
             found.left_out.append(left)
-    faces = faces_of_lines(wanted, found.rings)
-    found.left_out += faces.left_out
-    for k, pieces in sorted(faces.pieces.items(), reverse=True):
-        row, looks = found.rows[k], found.looks[k]
-        del found.rings[k], found.rows[k], found.looks[k]
-        for number, piece in enumerate(pieces):
-            found.rings.append(piece)
-            found.rows.append({**row, "name": f"{row.get('name', 'block')} {number + 1}"})
-            found.looks.append(looks)
-    for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
-        found.rings.append(ring)
-        found.rows.append(_row(layer, f"face {number}"))
-        found.looks.append(("face",))
-    if faces.rings:
-        faces.notes.append(faces_note(faces, wanted))
-    return faces
+    return wanted
 
 
 def _unit(root: ElementTree.Element) -> str:

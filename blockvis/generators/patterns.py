@@ -153,9 +153,10 @@ def bedded(stones: list[shapely.Polygon], wall: shapely.Geometry) -> list[shapel
         moved = [found for found in (_levelled(kept[i], key) for i in pair) if found is not None]
         if len(moved) < 2 or abs(moved[0][0] - moved[1][0]) > 1e-8:
             continue
-        before = sum(shapely.Polygon(kept[i]).area for i in pair)
+        before = [shapely.Polygon(kept[i]) for i in pair]
         after = [shapely.Polygon(ring) for _, ring in moved]
-        if all(shape.is_valid for shape in after) and abs(sum(s.area for s in after) - before) < 1e-12 * before:
+        area = shapely.area(before).sum()
+        if shapely.is_valid(after).all() and abs(shapely.area(after).sum() - area) < 1e-12 * area:
             for i, (_, ring) in zip(pair, moved, strict=True):
                 kept[i] = ring
     return [shapely.Polygon(ring) for ring in kept]

@@ -71,10 +71,6 @@ def assemble(
         Corners within this distance of a simpler outline are dropped; by default a hundredth of the size of a block
         where outlines have more than 24 corners in the mean, else 0.
 
-    Returns
-    -------
-    solver.Assembly
-
     Raises
     ------
     ValueError
@@ -195,10 +191,6 @@ def supports_of(supports: Sequence[Mapping[str, Any]], dimension: int) -> Layout
         As of :func:`assemble`.
     dimension : {2, 3}
         Of the drawing.
-
-    Returns
-    -------
-    Layout
 
     Raises
     ------

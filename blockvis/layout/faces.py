@@ -56,10 +56,6 @@ def with_plane_faces(points: np.ndarray, triangles: np.ndarray, tolerance: float
         All seen in the same sense from outside.
     tolerance : float
         Largest warp of a face, as a fraction of the width of the body; what is farther from a plane stays triangles.
-
-    Returns
-    -------
-    PlaneSolid
     """
     used, index = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], index.reshape(-1, 3)

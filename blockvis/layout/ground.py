@@ -110,10 +110,6 @@ def with_role(found: Inspection, role: str) -> list[int]:
 def ground_of(found: Inspection) -> Ground:
     """Say what stands and what settles, of what a drawing says and shows.
 
-    Parameters
-    ----------
-    found : Inspection
-
     Returns
     -------
     Ground

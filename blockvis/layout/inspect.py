@@ -166,10 +166,6 @@ def inspected(layout: Layout) -> Inspection:
     layout : Layout
         As read, duplicates included.
 
-    Returns
-    -------
-    Inspection
-
     Raises
     ------
     Refused

@@ -93,14 +93,6 @@ class LeftOut:
 def in_words(left_out: Sequence[LeftOut]) -> list[Note]:
     """Say what is left out: one line per kind and layer, with the number and the place of the first.
 
-    Parameters
-    ----------
-    left_out : sequence of LeftOut
-
-    Returns
-    -------
-    list of Note
-
     Examples
     --------
     >>> stroke = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.5]])

@@ -161,12 +161,7 @@ def _unmatched(patterns: Sequence[str], labels: Sequence[str], looks: set[str]) 
 
 
 def without_debris(layout: Layout) -> Layout:
-    """Leave out outlines without area, and slivers.
-
-    Parameters
-    ----------
-    layout : Layout
-    """
+    """Leave out outlines without area, and slivers."""
     reasons = {}
     perimeters = [float(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum()) for ring in layout.outlines]
     for i, ring in enumerate(layout.outlines):

@@ -74,10 +74,6 @@ _SECTION_REMEDY = 'give "x", "y" or "z", "y = 1.2" in m, or { point = [x, y, z],
 def read_sight(value: Any) -> Sight:
     """Read a view: a word of :data:`SIGHTS`, or azimuth and elevation [degrees].
 
-    Parameters
-    ----------
-    value : str, mapping or Sight
-
     Raises
     ------
     ValueError
@@ -107,10 +103,6 @@ def read_sight(value: Any) -> Sight:
 
 def read_cut(value: Any) -> Cut:
     """Read a section: an axis, a place on it, or a point [m] and a normal.
-
-    Parameters
-    ----------
-    value : str, mapping or Cut
 
     Raises
     ------

@@ -117,10 +117,6 @@ def run_study(
         As of :func:`study`.
     keep : sequence of int
         Runs whose results folder is written, besides those that the study names.
-
-    Returns
-    -------
-    StudyFolder
     """
     if "__mp_main__" in sys.modules and multiprocessing.parent_process() is not None:
         raise SystemExit('blockvis: in a script, call blockvis.study under: if __name__ == "__main__":')

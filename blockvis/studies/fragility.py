@@ -89,10 +89,6 @@ def fragility(settlement: ArrayLike, collapsed: ArrayLike) -> Fragility:
         Settlement at collapse, or the last one of a run that did not collapse.
     collapsed : (n,) bool array
 
-    Returns
-    -------
-    Fragility
-
     Notes
     -----
     E. L. Kaplan and P. Meier, Nonparametric estimation from incomplete observations, Journal of the American

@@ -48,11 +48,6 @@ HEADING: dict[str, Any] = {"fontsize": 0.95 * TEXT, "loc": "left", "color": "#4a
 def draw_study(records: StudyFolder, table: pd.DataFrame) -> list[Path]:
     """Draw the pictures of a study that its table has data for.
 
-    Parameters
-    ----------
-    records : StudyFolder
-    table : pandas.DataFrame
-
     Returns
     -------
     list of Path
@@ -116,14 +111,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
 
 
 def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draw the swing of the collapse displacement with every parameter, and Sobol' indices beside it.
-
-    Parameters
-    ----------
-    study : Study
-    table : pandas.DataFrame
-    path : path
-    """
+    """Draw the swing of the collapse displacement with every parameter, and Sobol' indices beside it."""
     found, indices = swings(study, table)[:12], first_order(study, table)
     factor, unit = _length(table)
     rest = [name for name in indices if name not in {s.name for s in found}]
@@ -175,14 +163,7 @@ def _draw_swing(axes: Axes, place: int, swing: Swing, centre: float, factor: flo
 
 
 def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draw the collapse displacement of every run against the parameters with the largest swings, by mechanism.
-
-    Parameters
-    ----------
-    study : Study
-    table : pandas.DataFrame
-    path : path
-    """
+    """Draw the collapse displacement of every run against the parameters with the largest swings, by mechanism."""
     factor, unit = _length(table)
     numeric = {p.name for p in study.parameters if p.numeric}
     names = [s.name for s in swings(study, table) if s.name in numeric][:PANELS] or ["run"]
@@ -219,14 +200,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
 
 
 def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draw one run of each mechanism found, the most frequent first.
-
-    Parameters
-    ----------
-    records : StudyFolder
-    table : pandas.DataFrame
-    path : path
-    """
+    """Draw one run of each mechanism found, the most frequent first."""
     classes = classes_of(table)
     factor, unit = _length(table)
     shown = [one for one in classes if records.shape_file(one).is_file()][:DRAWN]

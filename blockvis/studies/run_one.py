@@ -171,10 +171,6 @@ def _falling(response: solver.Response) -> solver.Increment | None:
 def mechanism_class(mechanism: mechanics.Mechanism) -> str:
     """Name the class of a mechanism by its hinges and sliding joints, or by their numbers if there are many.
 
-    Parameters
-    ----------
-    mechanism : solver.mechanics.Mechanism
-
     Returns
     -------
     str

@@ -56,10 +56,6 @@ def designed(method: str, runs: int, levels: Sequence[int], repeats: int, seed: 
     scattered : bool
         Whether there are imperfections.
 
-    Returns
-    -------
-    Design
-
     Raises
     ------
     ValueError

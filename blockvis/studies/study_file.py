@@ -186,10 +186,6 @@ def run_values(values: Mapping[str, Any], order: Mapping[str, Any], n_seeded: in
         Of :meth:`Study.order`.
     n_seeded : int
         Number of the first imperfections, those of the study, which get the run's seed.
-
-    Returns
-    -------
-    dict
     """
     case = copy.deepcopy(dict(values))
     for path, value in order["paths"].items():
@@ -206,10 +202,6 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
     ----------
     source : str, Path or mapping
         The file, or its content; the path of the case in the latter is relative to the working directory.
-
-    Returns
-    -------
-    Study
 
     Raises
     ------

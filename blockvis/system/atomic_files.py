@@ -68,18 +68,7 @@ def atomic_file(path: str | os.PathLike[str], *, last: bool = True, durable: boo
 def write_atomic(
     path: str | os.PathLike[str], content: str | bytes, *, last: bool = True, durable: bool = True
 ) -> Path:
-    """Write a text in UTF-8, or bytes, whole or not at all; see :func:`atomic_file`.
-
-    Parameters
-    ----------
-    path : path
-    content : str or bytes
-    last, durable : bool
-
-    Returns
-    -------
-    pathlib.Path
-    """
+    """Write a text in UTF-8, or bytes, whole or not at all; see :func:`atomic_file`."""
     with atomic_file(path, last=last, durable=durable) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)
     return Path(path)
@@ -118,12 +107,7 @@ def _move(partial: Path, path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder and its missing parents, and flush them to the disk.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Make a folder and its missing parents, and flush them to the disk."""
     missing = [folder for folder in (path, *path.parents) if not folder.exists()]
     path.mkdir(parents=True, exist_ok=True)
     for folder in missing:
@@ -131,12 +115,7 @@ def make_folder(path: Path) -> None:
 
 
 def flush(path: Path) -> None:
-    """Flush a file, or the list of names of a folder, to the disk.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Flush a file, or the list of names of a folder, to the disk."""
     folder = path.is_dir()
     if folder and WINDOWS:
         # Windows opens no folder, and keeps its list of names in a journal.

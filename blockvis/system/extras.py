@@ -27,10 +27,6 @@ def install_command(extra: str) -> str:
     ----------
     extra : str
         A key of :data:`EXTRAS`.
-
-    Returns
-    -------
-    str
     """
     return f"pip install 'blockvis[{extra}]'"
 

@@ -45,10 +45,6 @@ def write_vtu(
     last, durable : bool
         As of :func:`blockvis.system.atomic_files.atomic_file`.
 
-    Returns
-    -------
-    pathlib.Path
-
     Notes
     -----
     The format is inline binary with zlib and 64-bit headers, which ParaView from 5.11 on, pyvista and meshio read.
@@ -138,10 +134,6 @@ def write_pvd(
         Files as given, relative to the folder of ``path``.
     last, durable : bool
         As of :func:`blockvis.system.atomic_files.atomic_file`.
-
-    Returns
-    -------
-    pathlib.Path
     """
     lines = [
         '<?xml version="1.0"?>',

@@ -166,10 +166,6 @@ def close_joints(
     mortar : sequence of LeftOut
         Surfaces of mortar as drawn, with the stones as their holes; the nearest stone takes all of it, however wide.
 
-    Returns
-    -------
-    Closing
-
     Raises
     ------
     ValueError
