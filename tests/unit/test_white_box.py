@@ -48,7 +48,7 @@ WHITE_BOX = {
     "unit/test_refusal_pictures.py": 8,
     "unit/test_render.py": 11,
     "unit/test_studies.py": 16,
-    "unit/test_ties.py": 4,
+    "unit/test_ties.py": 5,
     "unit/test_tolerances.py": 1,
     "unit/test_video.py": 3,
     "unit/test_written_files.py": 10,
