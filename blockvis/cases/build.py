@@ -300,15 +300,8 @@ def case_changes(case: Case, assembly: solver.Assembly) -> tuple[solver.PhaseCha
     Raises
     ------
     ValueError
-        For a name that no block has, and for an analysis that is asked of one structure under one set of loads.
+        For a name that no block has.
     """
-    later = [load.phase for load in case.loads if load.phase > 1]
-    if case.analysis != "settlement" and (case.removals or later):
-        what = "[[remove]]" if case.removals else f"[[loads]] phase = {later[0]}"
-        raise ValueError(
-            f'{case.source}: {what} belongs to [analysis] kind = "settlement"; a {case.analysis} has the blocks and '
-            "loads of the drawing: leave it out"
-        )
     changes = [solver.PhaseChange(one.phase - 1, removed_blocks(one, assembly)) for one in case.removals]
     for phase in sorted({load.phase for load in case.loads} - {1}):
         added = loads_of(case.loads, assembly, case.source, phase)

@@ -46,6 +46,13 @@ def planned(
         controls=case_controls(case, assembly),
     )
     changes = case_changes(case, assembly)
+    if changes and not kind.has_phases:
+        what = "[[remove]]" if case.removals else "[[loads]] phase"
+        which = " or ".join(f'"{name}"' for name, other in KINDS.items() if other.has_phases)
+        raise ValueError(
+            f"{case.source}: {what} belongs to [analysis] kind = {which}; a {case.analysis} has the blocks and loads "
+            "of the drawing: leave it out"
+        )
     given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly), changes)
     if case.settlements:
         mechanics.check_settlement(assembly, case.settlements, case.controls, changes)
