@@ -29,7 +29,7 @@ from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
 from .profiles import cut_ground, with_profiles
-from .removals import removed_blocks
+from .removals import removed_blocks, removed_ties
 from .role_places import with_roles_by_place
 from .ties import drawn_ties, ties_of, without_tie_lines
 
@@ -301,22 +301,20 @@ def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
     return replace(loads, fills=backfills(case.backfills, assembly, case.source))
 
 
-def case_changes(case: Case, assembly: solver.Assembly) -> tuple[solver.PhaseChange, ...]:
-    """Find what changes between the settlements of a case: blocks that are taken away, loads that begin to act.
+def case_changes(
+    case: Case, assembly: solver.Assembly, ties: Sequence[solver.Tie] = ()
+) -> tuple[solver.PhaseChange, ...]:
+    """Find what changes between the settlements of a case: what is taken away, and loads that begin to act.
 
     Raises
     ------
     ValueError
-        For a name that no block has, and for an analysis that is asked of one structure under one set of loads.
+        For a name that no block or no tie has.
     """
-    later = [load.phase for load in case.loads if load.phase > 1]
-    if case.analysis != "settlement" and (case.removals or later):
-        what = "[[remove]]" if case.removals else f"[[loads]] phase = {later[0]}"
-        raise ValueError(
-            f'{case.source}: {what} belongs to [analysis] kind = "settlement"; a {case.analysis} has the blocks and '
-            "loads of the drawing: leave it out"
-        )
-    changes = [solver.PhaseChange(one.phase - 1, removed_blocks(one, assembly)) for one in case.removals]
+    changes = [
+        solver.PhaseChange(one.phase - 1, removed_blocks(one, assembly), ties=removed_ties(one, ties))
+        for one in case.removals
+    ]
     for phase in sorted({load.phase for load in case.loads} - {1}):
         added = loads_of(case.loads, assembly, case.source, phase)
         changes.append(solver.PhaseChange(phase - 1, dead=added.dead))

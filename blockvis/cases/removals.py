@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
@@ -70,13 +71,34 @@ def removed_blocks(removal: Removal, assembly: solver.Assembly) -> np.ndarray:
     ValueError
         For a name that no block has.
     """
-    chosen = np.zeros(assembly.n_blocks, dtype=bool)
-    for pattern in removal.blocks:
-        named = np.array([fnmatchcase(name, pattern) for name in assembly.names])
-        if not named.any():
-            raise ValueError(
-                f"{removal.where} blocks: no block is named '{pattern}'{nearest(pattern, assembly.names)}; the blocks "
-                f"are {', '.join(assembly.names[:12])}{' ...' if assembly.n_blocks > 12 else ''}"
-            )
-        chosen |= named
+    return np.isin(assembly.names, _matching(removal.blocks, assembly.names, f"{removal.where} blocks", "block"))
+
+
+def removed_ties(removal: Removal, ties: Sequence[solver.Tie]) -> tuple[str, ...]:
+    """Names of the ties that a table takes away.
+
+    Parameters
+    ----------
+    removal : Removal
+    ties : sequence of solver.Tie
+
+    Raises
+    ------
+    ValueError
+        For a name that no tie has.
+    """
+    names = [tie.name for tie in ties]
+    return tuple(_matching(removal.ties, names, f"{removal.where} ties", "tie"))
+
+
+def _matching(patterns: Sequence[str], names: Sequence[str], where: str, what: str) -> list[str]:
+    """Names that match patterns, each at least one."""
+    chosen = []
+    for pattern in patterns:
+        found = [name for name in names if fnmatchcase(name, pattern)]
+        if not found:
+            listed = f"the {what}s are {', '.join(names[:12])}" if names else f"the case has no {what}s"
+            more = " ..." if len(names) > 12 else ""
+            raise ValueError(f"{where}: no {what} is named '{pattern}'{nearest(pattern, names)}; {listed}{more}")
+        chosen += found
     return chosen

@@ -130,6 +130,8 @@ class AnalysisKind(ABC):
         Dataclass from which its increments go on; NoneType where they start again.
     in_studies : bool
         Whether studies repeat it.
+    has_phases : bool
+        Whether blocks and dead loads may change between its settlements.
     keys : tuple of Key
         That it reads from [analysis].
     sections : tuple of Section
@@ -141,6 +143,7 @@ class AnalysisKind(ABC):
     measured: mechanics.Quantity
     checkpoint: type[Any] = NoneType
     in_studies: bool = False
+    has_phases: bool = False
     keys: tuple[Key, ...] = ()
     sections: tuple[Section, ...] = ()
 

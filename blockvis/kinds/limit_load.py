@@ -452,11 +452,9 @@ def _limit_state(
     case, assembly = run.given.case, run.given.assembly
     started = time.perf_counter()
     try:
-        limit = solver.limit_load(
-            assembly,
-            loads=loads,
-            interfaces=run.given.interfaces,
+        limit = solver.Structure(assembly, run.given.interfaces, loads, ties=run.given.ties).limit_load(
             pose=pose,
+            ties_at=None if at is None else at.ties,
             flow=case.settings.flow,
             torsion=case.settings.torsion,
             displacement=_displacement(case, assembly),

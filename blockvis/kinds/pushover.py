@@ -178,13 +178,13 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
 
 def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechanics.PathState | None) -> Steps:
     case = given.case
-    pose = None
+    pose, ties_at = None, None
     # A pushover that has begun has its settlement behind it.
     steps = settlement_steps(given, whole=True) if resume is None else without_increments()
     for increment in steps:
         if increment.status == solver.Status.FALLING:
             yield replace(increment, parameter=0.0, measured=increment.load_multiplier, phase=0)
-        pose = increment.pose
+        pose, ties_at = increment.pose, increment.ties
     if steps.ending.stop is not solver.Status.LIMIT_REACHED:
         return not_reached(steps.ending, "nothing is left to push over")
     try:
@@ -195,6 +195,8 @@ def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechani
             interfaces=given.interfaces,
             controls=case.controls,
             pose=pose,
+            ties=given.ties,
+            ties_at=ties_at,
             resume=resume,
             on_step=given.step,
         )

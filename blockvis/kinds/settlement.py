@@ -34,6 +34,7 @@ class SettlementKind(AnalysisKind):
     measured = mechanics.REACTION
     checkpoint = mechanics.PathState
     in_studies = True
+    has_phases = True
     keys = (
         Key("range", TRUE_OR_FALSE, "Whether blockvis run follows a settlement again with friction, compliance of the "
             "joints and imperfection varied, and gives the range of collapse and reaction", True, default=False),

@@ -18,7 +18,6 @@ from blockvis.cases.build import (
 from blockvis.cases.contents import Case
 from blockvis.kinds.kind import AnalysisRun, RunInput
 from blockvis.kinds.kinds import KINDS
-from blockvis.kinds.settlement import SettlementKind
 from solver import mechanics
 
 
@@ -57,26 +56,32 @@ def planned(
         controls=case_controls(case, assembly),
     )
     refuse_ties(case)
-    changes = case_changes(case, assembly)
     members = case_ties(case, assembly) if ties is None else tuple(ties)
+    changes = case_changes(case, assembly, members)
+    if changes and not kind.has_phases:
+        what = "[[remove]]" if case.removals else "[[loads]] phase"
+        which = " or ".join(f'"{name}"' for name, other in KINDS.items() if other.has_phases)
+        raise ValueError(
+            f"{case.source}: {what} belongs to [analysis] kind = {which}; a {case.analysis} has the blocks and loads "
+            "of the drawing: leave it out"
+        )
     given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly), changes, members)
     if case.settlements:
-        mechanics.check_settlement(assembly, case.settlements, case.controls, changes)
+        mechanics.check_settlement(assembly, case.settlements, case.controls, changes, members)
     return kind.start(given, resume, found)
 
 
 def refuse_ties(case: Case) -> None:
-    """Raise ValueError for ties where no settlement follows them, or before one that there is not."""
-    by_program = case.controls.increments == mechanics.INCREMENTS[1]
+    """Raise ValueError for ties that an analysis does not know, or before a settlement that there is not."""
     for tie in case.ties:
         who = f"{tie.where} '{tie.name}'"
-        if case.analysis != SettlementKind.name or by_program:
-            what = f'increments = "{case.controls.increments}"' if by_program else f"a {case.analysis}"
+        if case.controls.increments == mechanics.INCREMENTS[1]:
             raise ValueError(
-                f"{who}: ties are followed along a settlement by increments = "
-                f'"{mechanics.INCREMENTS[0]}" only, and {what} knows none; leave [[ties]] out, or ask a settlement'
+                f'{who}: increments = "{case.controls.increments}" knows no ties; leave increments out, or [[ties]]'
             )
-        if tie.phase > len(case.settlements):
+        if case.settlements and any(load.positions for load in case.loads):
+            raise ValueError(f"{who}: positions after a settlement know no ties; leave [[ties]] or positions out")
+        if tie.phase > max(len(case.settlements), 1):
             raise ValueError(
                 f"{who}: phase is {tie.phase}, and there {_are(len(case.settlements))}; give the settlement, counted "
                 "from 1, before which it is installed"

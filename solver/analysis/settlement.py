@@ -186,8 +186,8 @@ def check_settlement(
     gone = np.zeros(assembly.n_blocks, dtype=bool)
     for number, phase in enumerate(phases):
         gone |= removed_before(changes, number, assembly.n_blocks)
-        if not (phase.taking_part(assembly) & ~gone).any():
+        if gone.any() and not (phase.taking_part(assembly) & ~gone).any():
             raise ValueError(f"settlement phase {number + 1} moves only supports that have been taken away; keep one")
-        if not (assembly.free & ~gone).any():
+        if gone.any() and not (assembly.free & ~gone).any():
             raise ValueError(f"before settlement phase {number + 1} all free blocks are taken away; keep one")
     check_blocks(assembly, controls.overlap_tolerance)
