@@ -105,6 +105,8 @@ def explain(
         if not isinstance(case, Case):
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
+        if case.ties:
+            raise ValueError(f"{case.ties[0].where}: blockvis explain knows no ties; leave [[ties]] out")
         drawn = case_assembly(case)
         needs_dry_joints(case)
         mechanics.check_settlement(*_any_settlement(drawn), case.controls)

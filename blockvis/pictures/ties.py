@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -116,6 +117,25 @@ class DrawnTies:
         order = [k for k in np.argsort(-sizes, kind="stable").tolist() if states[k] != ABSENT][:MOST_NAMED]
         words = [self._words(k, float(sizes[k]), int(states[k])) for k in order]
         return middles[order], words, [COLOURS[int(states[k])] for k in order]
+
+    def told(self, increment: solver.Increment) -> list[dict[str, Any]]:
+        """List what a page draws of an increment, as JSON has it: ends [m], words, colour, width [pixel], dashes."""
+        states, ends = self._states(increment), tie_ends(self._ties, self._assembly, increment.pose)
+        told = []
+        for k in np.flatnonzero(states != ABSENT).tolist():
+            state = int(states[k])
+            told.append(
+                {
+                    "ends": np.round(ends[k], 5).tolist(),
+                    "words": self._words(k, abs(float(increment.ties.forces[k])), state),
+                    "state": "" if state == ELASTIC else STATE_WORDS[state],
+                    "kind": self._ties[k].kind,
+                    "colour": palette.hexadecimal(COLOURS[state]),
+                    "width": 0.6 * WIDTHS[state] * (PROPS if self._props[k] else 1.0),
+                    "dash": [7, 6] if state == SLACK else [18, 6] if state == BROKEN else [],
+                }
+            )
+        return told
 
     def keys(self) -> list[Key]:
         """Return the legend."""

@@ -36,6 +36,7 @@ from blockvis.pictures.captions import (
 from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.marks import STEEPEST, WIDEST
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
+from blockvis.pictures.ties import DrawnTies
 from blockvis.results.about import about, counts_text, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
@@ -221,6 +222,12 @@ def _ties(response: solver.Response) -> str:
     return f'<h2>Ties and props</h2><table id="ties">{listed}</table>' if rows else ""
 
 
+def _drawn_ties(response: solver.Response, shown: list[solver.Increment]) -> list[list[dict[str, Any]]]:
+    """List what is drawn of the ties in each frame: ends [m], words, colour, width, dashes."""
+    drawn = DrawnTies(response)
+    return [drawn.told(increment) for increment in shown]
+
+
 def tie_rows(response: solver.Response) -> list[tuple[str, str, str]]:
     """List name and kind of ties, their largest forces and where, and what became of them."""
     unit = response.settlements[-1].unit if response.settlements else response.parameter.unit
@@ -283,6 +290,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
             )
         },
         "frames": _frames(response, frames),
+        "ties": _drawn_ties(response, shown),
         "times": _times(frames),
         # In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.
         "joints_of_fall": fall is None,

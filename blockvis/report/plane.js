@@ -156,6 +156,7 @@
       if (layers.hinges) drawHinges(pen, near);
       drawLive(pen, near);
     }
+    drawTies(pen, near, colours, ([x, y]) => [px(x), py(y)]);
     scaleBar(pen, w, h, colours);
   }
 

@@ -75,6 +75,20 @@
     pen.closePath(); pen.fill();
   }
 
+  // Ties, props and bars of a frame, from end to end, each with its force; onPage says where a point is on the canvas.
+  function drawTies(pen, k, colours, placed) {
+    if (state.magnify !== 1 || Math.abs(state.frame - k) >= 0.5) return;
+    for (const tie of model.ties[k]) {
+      const [[x0, y0], [x1, y1]] = tie.ends.map((p) => placed(p.map((v, i) => v - model.origin[i])));
+      pen.strokeStyle = pen.fillStyle = tie.colour; pen.lineWidth = tie.width; pen.lineCap = "butt"; pen.setLineDash(tie.dash);
+      pen.beginPath(); pen.moveTo(x0, y0); pen.lineTo(x1, y1); pen.stroke(); pen.setLineDash([]);
+      for (const [x, y] of [[x0, y0], [x1, y1]]) { pen.beginPath(); pen.arc(x, y, 1.2 * tie.width, 0, 2 * Math.PI); pen.fill(); }
+      const x = (x0 + x1) / 2, y = (y0 + y1) / 2 - 12, half = 4 * tie.words.length;
+      pen.fillStyle = colours.paper; pen.fillRect(x - half, y - 9, 2 * half, 18);
+      pen.fillStyle = colours.ink; pen.font = `13px ${FONT}`; pen.textAlign = "center"; pen.textBaseline = "middle"; pen.fillText(tie.words, x, y);
+    }
+  }
+
   const FONT = "system-ui, DejaVu Sans, sans-serif";
   function scaleBar(pen, w, h, colours) {
     const most = 0.25 * w / state.view.scale;
@@ -142,6 +156,7 @@
     if (layers.thrust && marked && !falling && thrustLine(k).length) add("line", "thrust line", model.colours.force);
     const was = `${model.space ? "thin" : "dashed"}: where the support was`;
     if (layers.start && model.arrows.length) add("line", falling ? was : `settlement; ${was}`, falling ? model.colours.hatch : model.colours.settlement);
+    if (marked) for (const told of new Set(model.ties[k].map((tie) => JSON.stringify([`${tie.state} ${tie.kind}`.trim(), tie.colour])))) add("line", ...JSON.parse(told));
     if (marked && model.live_words) add("line", model.live_words, model.colours.live);
     if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.moving]);
     if (state.colours === "displacement") add("ramp", `displacement, 0 to ${+(1000 * model.largest_displacement).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.ramp.join(",")})`);

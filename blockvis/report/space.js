@@ -296,6 +296,7 @@
       pen.drawImage(glass, 0, 0, w, h);
     }
     if (state.magnify === 1 && Math.abs(state.frame - near) < 0.5 && !falling) drawForces(pen, near);
+    drawTies(pen, near, colours, onPage);
     axesOfDrawing(pen, w, colours);
     scaleBar(pen, w, h, colours);
   }

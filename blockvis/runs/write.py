@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import solver
@@ -30,13 +31,14 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
     sources = {folder_of(increment) for increment in response.increments} - {None}
     if any(source is not None and source.resolve() == Path(folder).resolve() for source in sources):
         raise ValueError(f"the response is read from '{folder}' itself; write it to another folder")
-    results = ResultsFolder(
-        folder,
-        response.assembly,
-        overwrite=overwrite,
-        parameter=response.parameter,
-        ties=known_ties(response),
-    )
+    ties = known_ties(response)
+    if not ties and response.increments and len(response.increments[0].ties.forces):
+        warnings.warn(
+            f"'{folder}': the response has forces of ties and not their names: ties.csv and ties.pvd are not written; "
+            "run a case file with [[ties]] for them",
+            stacklevel=2,
+        )
+    results = ResultsFolder(folder, response.assembly, overwrite=overwrite, parameter=response.parameter, ties=ties)
     for increment in response.increments:
         results.add(increment)
     finish(results, response)
