@@ -71,12 +71,15 @@ class StepError:
         Movement of the fastest block, in block sizes.
     penetration : float
         Deepest penetration at a contact point that carries, in block sizes.
+    slides : bool
+        Whether a contact point that carries has used up its friction.
     """
 
     lag: float
     turn: float
     moved: float
     penetration: float
+    slides: bool
 
 
 def viscous_weights(model: Model) -> np.ndarray:
@@ -298,7 +301,8 @@ class Stepper:
         new = Place(s, pose, contacts, forces, trial, followed, multiplier / (live_size or 1.0), velocity)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
-        return new, motion / scales, StepError(lag, turn, movement_size, float(-gap[carries].min(initial=0.0)))
+        penetration = float(-gap[carries].min(initial=0.0))
+        return new, motion / scales, StepError(lag, turn, movement_size, penetration, bool(slides))
 
     def _resistance(
         self, place: Place, length: float, in_time: bool, viscosity: float
