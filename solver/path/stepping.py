@@ -79,12 +79,15 @@ class StepError:
         Movement of the fastest block, in block sizes.
     penetration : float
         Deepest penetration at a contact point that carries, in block sizes.
+    slides : bool
+        Whether a contact point that carries has used up its friction.
     """
 
     lag: float
     turn: float
     moved: float
     penetration: float
+    slides: bool
 
 
 def viscous_weights(model: Model) -> np.ndarray:
@@ -326,8 +329,21 @@ class Stepper:
         new = Place(s, pose, contacts, forces, trial, followed, multiplier, velocity, tie_lengths=lengths)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
-        deepest = float(contacts.gaps[(forces[:, 0] > CARRIES) & ~members].min(initial=0.0)) / model.length
-        return new, motion / scales, StepError(lag, turn, movement_size, -deepest)
+        touching = self._penetration(contacts, forces), self._slides(contacts, forces, bound)
+        return new, motion / scales, StepError(lag, turn, movement_size, *touching)
+
+    @staticmethod
+    def _touches(contacts: Contacts, forces: np.ndarray) -> np.ndarray:
+        """Which contact points between blocks carry, (n,) bool array."""
+        return (forces[:, 0] > CARRIES) & ~is_member(contacts)
+
+    def _penetration(self, contacts: Contacts, forces: np.ndarray) -> float:
+        """Deepest penetration where blocks carry, in block sizes."""
+        return -float(contacts.gaps[self._touches(contacts, forces)].min(initial=0.0)) / self.model.length
+
+    def _slides(self, contacts: Contacts, forces: np.ndarray, bound: np.ndarray) -> bool:
+        touches = self._touches(contacts, forces)
+        return bool((np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * bound)[touches].any())
 
     @staticmethod
     def _largest(values: np.ndarray) -> float:
@@ -338,9 +354,8 @@ class Stepper:
     ) -> float:
         """Errors of the gaps of contact points that carry, and of what was predicted of them, over what is accepted."""
         gap, carries = contacts.gaps / self.model.length, forces[:, 0] > CARRIES
-        touches = carries & ~is_member(contacts)
-        slides = (np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * bound)[touches].any()
-        exact = EXACT_SLIDING if slides else EXACT
+        touches = self._touches(contacts, forces)
+        exact = EXACT_SLIDING if self._slides(contacts, forces, bound) else EXACT
         return max(self._largest(gap[touches]) / closed, self._largest((gap - predicted)[carries]) / exact)
 
     def _load(self, pose: Pose, imperfection: float) -> np.ndarray:
