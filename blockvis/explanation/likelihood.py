@@ -63,12 +63,6 @@ class Comparison:
     where the drawing has other blocks than the structure its joints lie elsewhere. Each observation is compared with
     every joint near it, and what these comparisons say is averaged, the nearer ones counting more. Along a joint
     nothing is left open: on which side it gapes tells one hinge from another.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    observations : Observations
-    trust : Trust
     """
 
     def __init__(self, assembly: solver.Assembly, observations: Observations, trust: Trust) -> None:

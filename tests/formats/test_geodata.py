@@ -3,6 +3,7 @@
 import json
 import sqlite3
 import struct
+import sys
 from contextlib import closing
 
 import numpy as np
@@ -244,7 +245,7 @@ def test_shapefiles_in_degrees_and_damaged_ones_are_refused(tmp_path):
 
 
 def test_a_shapefile_without_its_package_names_the_command(tmp_path, monkeypatch):
-    monkeypatch.setattr("blockvis.system.extras.is_installed", lambda name: False)
+    monkeypatch.setitem(sys.modules, "shapefile", None)
     (tmp_path / "wall.shp").write_bytes(bytes(100))
     with pytest.raises(ImportError, match=r"need pyshp, which .*pip install 'blockvis\[geo\]'$"):
         blockvis.read_layout(tmp_path / "wall.shp")

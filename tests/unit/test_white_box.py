@@ -36,7 +36,7 @@ WHITE_BOX = {
     "unit/test_curves.py": 6,
     "unit/test_dimensions.py": 12,
     "unit/test_explanation.py": 21,
-    "unit/test_extras.py": 4,
+    "unit/test_extras.py": 2,
     "unit/test_fall.py": 8,
     "unit/test_fall_in_space.py": 4,
     "unit/test_films.py": 7,

@@ -192,12 +192,7 @@ def close_joints(
 
 
 class FoldedOutline(ValueError):
-    """Closing joints edge by edge folds an outline.
-
-    Parameters
-    ----------
-    block : int
-    """
+    """Closing joints edge by edge folds an outline."""
 
     def __init__(self, block: int) -> None:
         super().__init__(f"moving the edges of outline {block} to the midlines of its joints folds it")
