@@ -53,8 +53,6 @@ def read_removal(table: Table) -> Removal:
     values = REMOVE.read(table)
     if not values["blocks"] and not values["ties"]:
         raise table.error("blocks", 'is missing; name what is taken away: blocks = ["prop"]')
-    if values["ties"]:
-        raise table.error("ties", f"names '{values['ties'][0]}', but the case has no ties; name blocks")
     return Removal(**values, where=f"{table.source}: [{table.where}]")
 
 

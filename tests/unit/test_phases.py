@@ -127,7 +127,7 @@ def test_a_path_goes_on_across_a_removal_bit_for_bit() -> None:
         (REMOVED.replace("2", "3", 1), r"\[remove\] phase is 3; the case has 2 \[\[settlement\]\]"),
         (REMOVED.replace("brick", "brik"), r"\[remove\] blocks: no block is named 'brik 3-3'"),
         ("[[remove]]\nphase = 2\n", r"\[remove\] blocks is missing"),
-        ('[[remove]]\nphase = 2\nties = "tie"\n', r"\[remove\] ties names 'tie', but the case has no ties"),
+        ('[[remove]]\nphase = 2\nties = "tie"\n', r"\[remove\] ties: no tie is named 'tie'; the case has no ties"),
         (REMOVED.replace("brick 3-3", "ground*"), "phase 2 moves only supports that have been taken away"),
         ("[[loads]]\nforce = [0, -1]\nphase = 3\n", r"\[loads 1\] phase is 3; the case has 2 \[\[settlement\]\]"),
         ('[[loads]]\nkind = "live"\nforce = [0, -1]\nphase = 2\n', "a live load acts after all settlements"),
