@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 import blockvis
+import solver
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cli import main
@@ -101,12 +102,26 @@ def test_a_name_used_twice_is_refused(tmp_path):
 
 
 def test_analyses_that_know_no_ties_refuse_them(tmp_path):
+    moving = {"kind": "live", "force": [0.0, -1.0], "positions": [0.2, 0.3, 2]}
+    said = refused(tmp_path, TIE, analysis={"kind": "limit load"}, loads=[moving])
+    assert "positions after a settlement know no ties" in said
+    said = refused(tmp_path, TIE, analysis={"increments": "linear program"})
+    assert 'increments = "linear program" knows no ties' in said
+
+
+def test_a_tie_adds_to_the_acceleration_that_overturns_a_pier_and_to_what_is_left_of_it(tmp_path):
     live = {"kind": "live", "weight_fraction": [1.0, 0.0]}
-    said = refused(tmp_path, TIE, analysis={"kind": "limit load"}, loads=[live])
-    assert "ties are followed along a settlement" in said
-    assert 'increments = "linear program" knows none' in refused(
-        tmp_path, TIE, analysis={"increments": "linear program"}
-    )
+    stay = TIE | {"to": {"fixed": [-2.0, 1.5]}, "from": [0.25, 1.5], "strength": 500.0}
+    # The left pier weighs W: it turns about its right corner, W b/2 + S 1.5 m = α W h/2.
+    case = case_with(tmp_path, stay, analysis={"kind": "limit load", "capacity_at": [0.01]}, loads=[live])
+    weight = case_assembly(case).masses[0] * solver.GRAVITY
+    (limit,) = blockvis.run_case(case, tmp_path / "out", pictures=False, film=False).response.limits
+    assert limit.multiplier == pytest.approx(0.25, rel=1e-6), "the right pier is not tied and falls first"
+    both = [stay, stay | {"name": "other", "from": [2.75, 1.5], "to": {"fixed": [1.2, 1.5]}}]
+    case = case_with(tmp_path, *both, analysis={"kind": "limit load", "capacity_at": [0.0]}, loads=[live])
+    (limit,) = blockvis.run_case(case, tmp_path / "other", pictures=False, film=False).response.limits
+    assert limit.multiplier == pytest.approx(0.25 + 1.5 * 500.0 / weight, rel=1e-6)
+    assert limit.state.ties.forces == pytest.approx([500.0, 500.0], rel=1e-6)
 
 
 DXF = {"geometry": {"file": "piers.dxf", "ties": ["TIES"]}, "roles": {"GROUND": "fixed", "FOOTING": "moving"}}
