@@ -41,18 +41,28 @@ from .results.quantities import (
     settlement_in,
 )
 from .results.response import Control, path_parameters, total_weight
+from .ties import ABSENT, BROKEN, ELASTIC, PROP, SLACK, TIE, YIELDING, TieForces, tie_ends
+from .ties import KINDS as TIE_KINDS
 
 __all__ = [
+    "ABSENT",
+    "BROKEN",
     "CONTROL_DISPLACEMENT",
+    "ELASTIC",
     "FIXED",
     "FREE",
     "INCREMENTS",
     "LOAD_MULTIPLIER",
     "LOAD_POSITION",
     "MOVING",
+    "PROP",
     "REACTION",
     "ROLES",
     "SETTLEMENT",
+    "SLACK",
+    "TIE",
+    "TIE_KINDS",
+    "YIELDING",
     "ContactProblem",
     "ContactRows",
     "ContactState",
@@ -71,6 +81,7 @@ __all__ = [
     "State",
     "Stepper",
     "StoredState",
+    "TieForces",
     "block_forces",
     "carried",
     "carried_between",
@@ -96,6 +107,7 @@ __all__ = [
     "settlement_in",
     "settlement_increments",
     "swung",
+    "tie_ends",
     "total_weight",
     "turned",
     "with_motion",

@@ -32,7 +32,7 @@ from .loads import loads_of
 from .profiles import cut_ground, with_profiles
 from .removals import removed_blocks, removed_ties
 from .role_places import with_roles_by_place
-from .ties import drawn_ties, ties_of, without_tie_lines
+from .ties import check_layers, drawn_ties, ties_of, without_tie_lines
 
 #: The weight of a block lighter than this fraction of the whole may be lost in rounding errors of the other forces.
 LIGHTEST = 1e-14
@@ -326,6 +326,7 @@ def case_ties(case: Case, assembly: solver.Assembly) -> tuple[solver.Tie, ...]:
     """Find the ties of a case, those that its drawing has as lines included."""
     lines: tuple[LeftOut, ...] = ()
     if case.tie_layers:
+        check_layers(case.ties, case.tie_layers, case.source)
         lines = without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[1]
     return ties_of(drawn_ties(case.ties, lines), assembly)
 

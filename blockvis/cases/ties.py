@@ -13,7 +13,7 @@ import solver
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, in_words, matches
 from blockvis.text import nearest
-from solver.ties import KINDS, PROP, TIE, Tie
+from solver import mechanics
 
 from .block_at import ON_EDGE, block_at, distances_to
 from .key import NOT_NEGATIVE, POSITIVE, TEXT, TRUE_OR_FALSE, VECTOR, Key, Section, ValueKind, one_of, whole
@@ -130,8 +130,9 @@ TIES = Section(
         Key("to", _END, "Where it ends", {"fixed": [4.0, 2.0]}, "m", otherwise="layer is given instead"),
         Key("layer", TEXT, "Layer of the drawing, one of [geometry] ties, whose lines are ties with these properties",
             "TIES", otherwise="from and to are given instead"),
-        Key("kind", one_of(KINDS), "Whether it carries tension only, compression only (prop) or both (bar)", PROP,
-            default=TIE),
+        Key("kind", one_of(mechanics.TIE_KINDS),
+            "Whether it carries tension only, compression only (prop) or both (bar)", mechanics.PROP,
+            default=mechanics.TIE),
         Key("stiffness", POSITIVE, "Force per elongation of the whole member", 5e7, "N/m",
             otherwise="modulus times area over length"),
         Key("area", POSITIVE, "Area of its section, with a modulus", 5e-4, "m²",
@@ -160,7 +161,7 @@ def read_ties(tables: Sequence[Table], layers: Sequence[str]) -> tuple[TieCase, 
     Raises
     ------
     ValueError
-        For keys that do not go together, a name used twice, a layer without properties.
+        For keys that do not go together, or a name used twice.
     """
     found: list[TieCase] = []
     for table in tables:
@@ -170,14 +171,17 @@ def read_ties(tables: Sequence[Table], layers: Sequence[str]) -> tuple[TieCase, 
         if not one.layer and one.name in [other.name for other in found if not other.layer]:
             raise table.error("name", f"'{one.name}' is there twice; give each tie its own name")
         found.append(one)
-    missing = [layer for layer in layers if not any(matches([one.layer], [layer]) for one in found if one.layer)]
-    if missing:
-        where = f"{tables[0].source}: " if tables else ""
-        raise ValueError(
-            f"{where}[geometry] ties names the layer '{missing[0]}', and no [[ties]] says what its lines are; add "
-            f'[[ties]] with layer = "{missing[0]}" and stiffness'
-        )
     return tuple(found)
+
+
+def check_layers(entries: Sequence[TieCase], layers: Sequence[str], source: Path) -> None:
+    """Raise ValueError for a layer of ``[geometry] ties`` without properties."""
+    for layer in layers:
+        if not any(matches([one.layer], [layer]) for one in entries if one.layer):
+            raise ValueError(
+                f"{source}: [geometry] ties names the layer '{layer}', and no [[ties]] says what its lines are; add "
+                f'[[ties]] with layer = "{layer}" and stiffness'
+            )
 
 
 def _tie(table: Table) -> TieCase:
@@ -298,7 +302,7 @@ def drawn_ties(entries: Sequence[TieCase], lines: Sequence[LeftOut]) -> list[Tie
     return found
 
 
-def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[Tie, ...]:
+def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[solver.Tie, ...]:
     """Find the blocks that hold the ends of ties.
 
     Parameters
@@ -319,7 +323,7 @@ def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[Tie,
     return tuple(_in_blocks(entry, assembly) for entry in entries)
 
 
-def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> Tie:
+def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> solver.Tie:
     where = f"{entry.where} '{entry.name}'"
     points = tuple(_place(end.point, assembly, where) for end in entry.ends)
     length = float(np.linalg.norm(np.subtract(points[1], points[0])))
@@ -335,7 +339,7 @@ def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> Tie:
         held = "the ground" if blocks[0] is None else f"the block '{assembly.names[blocks[0]]}'"
         raise ValueError(f"{where}: both ends are in {held}, where a {entry.kind} carries nothing; join two blocks")
     stiffness = entry.stiffness or (entry.area or 0.0) * (entry.modulus or 0.0) / length
-    return Tie(
+    return solver.Tie(
         name=entry.name,
         blocks=(blocks[0], blocks[1]),
         points=(points[0], points[1]),
@@ -395,7 +399,7 @@ def _written(point: Sequence[float]) -> str:
     return f"({', '.join(f'{x:g}' for x in point)})"
 
 
-def tie_words(tie: Tie, assembly: solver.Assembly) -> str:
+def tie_words(tie: solver.Tie, assembly: solver.Assembly) -> str:
     """Say in a line what a tie is and what holds it."""
     ends = [
         f"{'ground' if block is None else repr(assembly.names[block])} {_written(point)}"

@@ -11,19 +11,24 @@ import numpy as np
 import solver
 from blockvis.results.ties import STATE_WORDS, known_ties
 from blockvis.text import force_text
-from solver.ties import ABSENT, BROKEN, ELASTIC, PROP, SLACK, YIELDING, tie_ends
+from solver import mechanics
 
 from . import palette
 from .frame import Key
 
 #: States that are drawn, back to front.
-DRAWN = (SLACK, ELASTIC, YIELDING, BROKEN)
+DRAWN = (mechanics.SLACK, mechanics.ELASTIC, mechanics.YIELDING, mechanics.BROKEN)
 
 #: Colours by state.
-COLOURS = {SLACK: palette.FAINT, ELASTIC: palette.TIE, YIELDING: palette.YIELDING, BROKEN: palette.WARNING}
+COLOURS = {
+    mechanics.SLACK: palette.FAINT,
+    mechanics.ELASTIC: palette.TIE,
+    mechanics.YIELDING: palette.YIELDING,
+    mechanics.BROKEN: palette.WARNING,
+}
 
 #: Widths of lines by state, and how much wider those of props are, in pixels of a picture 1080 high.
-WIDTHS, PROPS = {SLACK: 2.5, ELASTIC: 6.0, YIELDING: 8.0, BROKEN: 5.0}, 1.8
+WIDTHS, PROPS = {mechanics.SLACK: 2.5, mechanics.ELASTIC: 6.0, mechanics.YIELDING: 8.0, mechanics.BROKEN: 5.0}, 1.8
 
 #: A slack line has a dash in so many pixels of a picture 1080 high; of a broken one this part is left at either end.
 DASH, STUB = 22.0, 0.42
@@ -71,17 +76,19 @@ class DrawnTies:
 
     def __init__(self, response: solver.Response) -> None:
         self._assembly, self._ties = response.assembly, known_ties(response)
-        self._props = np.array([tie.kind == PROP for tie in self._ties], dtype=bool)
+        self._props = np.array([tie.kind == mechanics.PROP for tie in self._ties], dtype=bool)
         self.seen: set[int] = set()
 
     def survey(self, increment: solver.Increment) -> None:
         """Take note of what ties do at an increment, for the legend."""
         if self._ties:
-            self.seen |= set(self._states(increment).tolist()) - {ABSENT}
+            self.seen |= set(self._states(increment).tolist()) - {mechanics.ABSENT}
 
     def ends(self, poses: Sequence[solver.Pose]) -> np.ndarray:
         """(n, d) array [m]: where the ends are at poses."""
-        found = [tie_ends(self._ties, self._assembly, pose).reshape(-1, self._assembly.dimension) for pose in poses]
+        found = [
+            mechanics.tie_ends(self._ties, self._assembly, pose).reshape(-1, self._assembly.dimension) for pose in poses
+        ]
         return np.concatenate([np.zeros((0, self._assembly.dimension)), *found])
 
     def strands(self, increment: solver.Increment, shown: solver.Pose, dash: float) -> list[Strands]:
@@ -95,12 +102,16 @@ class DrawnTies:
         dash : float [m]
             Length of a dash and a gap.
         """
-        states, ends = self._states(increment), tie_ends(self._ties, self._assembly, shown)
+        states, ends = self._states(increment), mechanics.tie_ends(self._ties, self._assembly, shown)
         found = []
         for state in DRAWN:
             for wide in (False, True):
                 here = ends[(states == state) & (self._props == wide)]
-                lines = dashed(here, dash) if state == SLACK else _stubs(here) if state == BROKEN else here
+                lines = here
+                if state == mechanics.SLACK:
+                    lines = dashed(here, dash)
+                elif state == mechanics.BROKEN:
+                    lines = _stubs(here)
                 width = WIDTHS[state] * (PROPS if wide else 1.0)
                 layer = f"tie {STATE_WORDS[state]}{'/wide' * wide}"
                 anchors = here.reshape(-1, self._assembly.dimension)
@@ -112,27 +123,27 @@ class DrawnTies:
     ) -> tuple[np.ndarray, list[str], list[tuple[int, int, int]]]:
         """Give middles (n, d) [m], words and colours of the labels of an increment, the largest force first."""
         states = self._states(increment)
-        middles = tie_ends(self._ties, self._assembly, shown).mean(axis=1)
+        middles = mechanics.tie_ends(self._ties, self._assembly, shown).mean(axis=1)
         sizes = np.abs(increment.ties.forces) if len(increment.ties.forces) else np.zeros(len(states))
-        order = [k for k in np.argsort(-sizes, kind="stable").tolist() if states[k] != ABSENT][:MOST_NAMED]
+        order = [k for k in np.argsort(-sizes, kind="stable").tolist() if states[k] != mechanics.ABSENT][:MOST_NAMED]
         words = [self._words(k, float(sizes[k]), int(states[k])) for k in order]
         return middles[order], words, [COLOURS[int(states[k])] for k in order]
 
     def told(self, increment: solver.Increment) -> list[dict[str, Any]]:
         """List what a page draws of an increment, as JSON has it: ends [m], words, colour, width [pixel], dashes."""
-        states, ends = self._states(increment), tie_ends(self._ties, self._assembly, increment.pose)
+        states, ends = self._states(increment), mechanics.tie_ends(self._ties, self._assembly, increment.pose)
         told = []
-        for k in np.flatnonzero(states != ABSENT).tolist():
+        for k in np.flatnonzero(states != mechanics.ABSENT).tolist():
             state = int(states[k])
             told.append(
                 {
                     "ends": np.round(ends[k], 5).tolist(),
                     "words": self._words(k, abs(float(increment.ties.forces[k])), state),
-                    "state": "" if state == ELASTIC else STATE_WORDS[state],
+                    "state": "" if state == mechanics.ELASTIC else STATE_WORDS[state],
                     "kind": self._ties[k].kind,
                     "colour": palette.hexadecimal(COLOURS[state]),
                     "width": 0.6 * WIDTHS[state] * (PROPS if self._props[k] else 1.0),
-                    "dash": [7, 6] if state == SLACK else [18, 6] if state == BROKEN else [],
+                    "dash": [7, 6] if state == mechanics.SLACK else [18, 6] if state == mechanics.BROKEN else [],
                 }
             )
         return told
@@ -143,8 +154,8 @@ class DrawnTies:
         what = " or ".join(kinds)
         return [
             Key(
-                "dash" if state == SLACK else "line",
-                what if state == ELASTIC else f"{STATE_WORDS[state]} {what}",
+                "dash" if state == mechanics.SLACK else "line",
+                what if state == mechanics.ELASTIC else f"{STATE_WORDS[state]} {what}",
                 COLOURS[state],
                 layers=(f"tie {STATE_WORDS[state]}",),
             )
@@ -154,12 +165,13 @@ class DrawnTies:
 
     def _words(self, k: int, size: float, state: int) -> str:
         name = self._ties[k].name
-        return f"{name} {force_text(size)}" if state in (ELASTIC, YIELDING) else f"{name} {STATE_WORDS[state]}"
+        carries = state in (mechanics.ELASTIC, mechanics.YIELDING)
+        return f"{name} {force_text(size) if carries else STATE_WORDS[state]}"
 
     def _states(self, increment: solver.Increment) -> np.ndarray:
         states = increment.ties.states
         if increment.status == solver.Status.FALLING or len(states) != len(self._ties):
-            return np.full(len(self._ties), ABSENT)
+            return np.full(len(self._ties), mechanics.ABSENT)
         return states
 
 

@@ -16,7 +16,6 @@ import numpy as np
 
 import solver
 from solver import mechanics
-from solver.ties import TieForces
 
 from .npz import checked_arrays, compressed, flat, from_flat
 
@@ -180,11 +179,13 @@ def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
         named["features"] = mechanics.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
         named["slip"], named["rotations"] = arrays["along"][:, None], arrays["rotations"][:, None]
     ties = {name.removeprefix(_OF_TIES): array for name, array in arrays.items() if name.startswith(_OF_TIES)}
-    state = from_flat(named, mechanics.State, ties=from_flat(ties, TieForces) if ties else TieForces())
+    state = from_flat(
+        named, mechanics.State, ties=from_flat(ties, mechanics.TieForces) if ties else mechanics.TieForces()
+    )
     return from_flat(named, solver.Increment, held=state, checkpoint=None)
 
 
-def _tie_arrays(ties: TieForces) -> dict[str, np.ndarray]:
+def _tie_arrays(ties: mechanics.TieForces) -> dict[str, np.ndarray]:
     """Name the arrays of ties; none where there are none."""
     return {f"{_OF_TIES}{name}": array for name, array in flat(ties).items()} if len(ties.forces) else {}
 

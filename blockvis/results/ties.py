@@ -12,7 +12,7 @@ import numpy as np
 import solver
 from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text
-from solver.ties import BROKEN, YIELDING, TieForces, tie_ends
+from solver import mechanics
 
 from .increments import folder_of
 from .npz import packed, unpacked
@@ -67,7 +67,7 @@ def known_ties(response: solver.Response) -> tuple[solver.Tie, ...]:
     return () if folder is None else stored_ties(folder)
 
 
-def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment) -> TieForces:
+def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment) -> mechanics.TieForces:
     """Give what ties do at an increment; in frames of a fall, where that is not known, where their ends are.
 
     Parameters
@@ -80,8 +80,8 @@ def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: so
     if len(found.forces) == len(ties):
         return found
     n = len(ties)
-    ends = tie_ends(ties, assembly, increment.pose)
-    return TieForces(np.zeros(n), np.zeros(n), np.full(n, np.nan), np.zeros(n, dtype=np.int64), ends)
+    ends = mechanics.tie_ends(ties, assembly, increment.pose)
+    return mechanics.TieForces(np.zeros(n), np.zeros(n), np.full(n, np.nan), np.zeros(n, dtype=np.int64), ends)
 
 
 def tie_rows(ties: Sequence[solver.Tie], number: int, increment: solver.Increment) -> list[tuple[Any, ...]]:
@@ -179,8 +179,8 @@ class TieCourses:
                 float(force) if larger else before.force,
                 at if larger else before.at,
                 increment.phase + 1 if larger else before.phase,
-                at if before.yields_at is None and state == YIELDING else before.yields_at,
-                at if before.breaks_at is None and state == BROKEN else before.breaks_at,
+                at if before.yields_at is None and state == mechanics.YIELDING else before.yields_at,
+                at if before.breaks_at is None and state == mechanics.BROKEN else before.breaks_at,
                 float(force),
                 STATE_WORDS[state],
             )

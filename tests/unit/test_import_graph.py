@@ -49,6 +49,7 @@ ORDER = (
     "solver.phases",
     "solver.loads",
     "solver.backfill",
+    "solver.ties",
     "solver.equilibrium",
     "solver.kinematics",
     "solver.interfaces",
