@@ -20,7 +20,7 @@ from .npz import packed, unpacked
 #: File of the ties of a results folder, which is there where it has any.
 TIES = "ties.npz"
 
-#: Words of the states, in the order of :data:`solver.ties.STATES`.
+#: Words of the states, in the order of ``solver.mechanics.TieForces.states``.
 STATE_WORDS = ("absent", "slack", "elastic", "yielding", "broken")
 
 #: Columns of ties.csv.

@@ -109,8 +109,6 @@ class Stepper:
     model : Model
         Units, loads, interfaces.
     driver : Driver
-    damping : float
-        Of steps in time, in units of mass · √(g / block size).
 
     Attributes
     ----------
@@ -118,8 +116,8 @@ class Stepper:
         Solved since the last increment.
     """
 
-    def __init__(self, model: Model, driver: Driver, damping: float = DAMPING) -> None:
-        self.model, self.driver, self.damping, self.members = model, driver, damping, Members(model)
+    def __init__(self, model: Model, driver: Driver) -> None:
+        self.model, self.driver, self.members = model, driver, Members(model)
         self.free = model.assembly.free
         self.weights = viscous_weights(model)
         self.weight = float(np.linalg.norm(model.scaled_load[self.free, : model.dimension].sum(axis=0)))
@@ -369,7 +367,7 @@ class Stepper:
         weights, kept = self.weights[self.free].ravel(), 1.0
         resisting = VISCOSITY * viscosity * self.unit / length * weights
         if in_time:
-            resisting, kept = (1.0 / length**2 + self.damping / length) * weights, 1.0 / (1.0 + self.damping * length)
+            resisting, kept = (1.0 / length**2 + DAMPING / length) * weights, 1.0 / (1.0 + DAMPING * length)
         if place.velocity is None:
             return resisting, np.zeros_like(resisting)
         return resisting, kept * (place.velocity / self.model.lengths * length)[self.free].ravel()
