@@ -62,7 +62,7 @@ class TieCase:
     area, modulus : float, optional [m², Pa]
         Instead.
     kind, strength, brittle, prestress, phase
-        As of :class:`solver.ties.Tie`.
+        As of :class:`solver.Tie`.
     where : str
         File and table, for messages.
     """
@@ -313,7 +313,7 @@ def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[solv
 
     Returns
     -------
-    tuple of solver.ties.Tie
+    tuple of solver.Tie
 
     Raises
     ------

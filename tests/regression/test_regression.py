@@ -69,6 +69,8 @@ SLOW = {
 #: How each ends, and the first reaction over the weight of the free blocks, as measured; they guard against change.
 ENDS = {
     "arch_with_fill": (solver.Status.COLLAPSED, 0.628247),
+    "arch_with_tie": (solver.Status.COLLAPSED, 0.04383),
+    "panel_with_tie": (solver.Status.LIMIT_REACHED, 0.42029),
     "opening_cut": (solver.Status.LIMIT_REACHED, 0.221444),
     "vault_with_fill": (solver.Status.LIMIT_REACHED, 0.441382),
     "semicircular_arch": (solver.Status.COLLAPSED, 0.177115),
@@ -92,6 +94,8 @@ THOROUGH = {
     "arch_moving_load",
     "arch_pushed_after_settlement",
     "arch_with_fill",
+    "arch_with_tie",
+    "panel_with_tie",
     "opening_cut",
     "panel_with_opening",
     "portal_frame",
