@@ -279,7 +279,7 @@ def needs_live_load(case: Case) -> None:
 def needs_dry_joints(case: Case) -> None:
     """Raise ValueError where a joint of a case has cohesion or finite strength."""
     laws = [solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength)]
-    if not all(law.dry for law in [*laws, *case.interfaces.values()]):
+    if not all((not law.bonds and not law.crushes) for law in [*laws, *case.interfaces.values()]):
         raise ValueError(
             f"{case.source}: cohesion and compressive_strength are for limit loads without a settlement; settlements "
             "and pushovers follow dry joints"

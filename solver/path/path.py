@@ -117,12 +117,14 @@ class Path:
             self._remove_blocks(fell_at)
             place = self.stepper.members.installed(place, self.number)
         else:
-            place = self.stepper.members.installed(Place.unloaded(start), self.number)
+            place = self.stepper.unloaded(start, self.number)
             resting = self._at_rest(place)
             if resting is None:
                 # Joints that the drawing leaves open close.
                 closed = self.fall.relaxed(place, JUMP)
-                resting = None if closed is None else self._at_rest(replace(closed, contacts=None, velocity=None))
+                resting = None
+                if closed is not None:
+                    resting = self._at_rest(self.stepper.whole(replace(closed, contacts=None, velocity=None)))
             place = resting or place
         return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
 
@@ -141,7 +143,10 @@ class Path:
                     return None
                 forces, place = bounds.forces, replace(place, multiplier=bounds.high)
         contacts = self.stepper.contacts_at(place)
-        trial = np.where(forces[:, :1] > 0.0, forces, -np.eye(forces.shape[1])[0])
+        beyond = forces.copy()
+        beyond[:, 0] += self.stepper.mortar.points(place, contacts).tension
+        trial = np.where(beyond[:, :1] > 0.0, beyond, -np.eye(forces.shape[1])[0])
+        place = self.stepper.mortar.at_rest(place, contacts, forces)
         return replace(place, contacts=contacts, forces=forces, trial=trial, followed=forces[:, 0])
 
     # The loop ----------------------------------------------------------------------------------------------------
@@ -441,7 +446,7 @@ class Path:
         """Multiplier at the place beyond, at or below zero; None where equilibrium itself is lost, not the capacity."""
         if self.model.live is None:
             return None
-        unloaded = self.stepper.members.installed(Place.unloaded(state.start), self.number)
+        unloaded = self.stepper.unloaded(state.start, self.number)
         first, bounds = self.checks.bounds(unloaded), self.checks.bounds(beyond, CLOSING_GAP)
         vanishes = state.place.multiplier <= VANISHING * first.high
         return bounds.high if vanishes and bounds.in_equilibrium and bounds.high <= 0.0 else None

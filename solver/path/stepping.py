@@ -12,7 +12,7 @@ the limit of short steps exists.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,15 +21,17 @@ from solver.contact_step.minimise import minimise
 from solver.contact_step.problem import ContactProblem, NotSolved
 from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
-from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts
+from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts, successors
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.program.model import Model
+from solver.program.strength import ForceLimits
 from solver.ties import is_member
 from solver.tolerances import COMPLIANCE, FRICTION_MEMORY, IMPERFECTION, SHEAR_COMPLIANCE, VELOCITY_MEMORY, VISCOSITY
 
 from .drivers import Driver
 from .members import Members, with_members
-from .state import Place
+from .mortar import JointPoints, Mortar
+from .state import Bonds, Place
 
 #: Linearisations of a step at most.
 LINEARISATIONS = 6
@@ -95,6 +97,41 @@ def viscous_weights(model: Model) -> np.ndarray:
     return np.column_stack([weight] * d + [turning] * (len(model.lengths) - d))
 
 
+@dataclass(frozen=True)
+class _StepPoints:
+    """The n contact points of a step, in units of the program.
+
+    Attributes
+    ----------
+    start : Contacts
+        At the start of the step.
+    forces, trial : (n, d) arrays
+    followed : (n,) array
+    is_new : (n,) bool array
+    friction : (n,) array
+    compliance : (n, d) array
+    joints : JointPoints
+    bound : (n,) array
+        Largest shear forces.
+    kept : (n,) array
+        Part of the give under the normal force that the next linearisation takes back.
+    pulled : (n, d) array
+        The tension: the program is that of the normal forces beyond it.
+    """
+
+    start: Contacts
+    forces: np.ndarray
+    trial: np.ndarray
+    followed: np.ndarray
+    is_new: np.ndarray
+    friction: np.ndarray
+    compliance: np.ndarray
+    joints: JointPoints
+    bound: np.ndarray
+    kept: np.ndarray
+    pulled: np.ndarray
+
+
 class Stepper:
     """Steps from one place to another under a driver.
 
@@ -114,6 +151,7 @@ class Stepper:
 
     def __init__(self, model: Model, driver: Driver, damping: float = DAMPING) -> None:
         self.model, self.driver, self.damping, self.members = model, driver, damping, Members(model)
+        self.mortar = Mortar(model)
         self.free = model.assembly.free
         self.weights = viscous_weights(model)
         self.weight = float(np.linalg.norm(model.scaled_load[self.free, : model.dimension].sum(axis=0)))
@@ -128,6 +166,14 @@ class Stepper:
         if size > 0.0:
             imperfection = model.imperfection * IMPERFECTION
             self.imperfection[:, :d] = imperfection * self.weights[:, :1] * support_motion / size
+
+    def unloaded(self, pose: Pose, phase: int) -> Place:
+        """Return the place of a pose without forces, with the members of a phase, from 0, and all joints whole."""
+        return self.whole(self.members.installed(Place.unloaded(pose), phase))
+
+    def whole(self, place: Place) -> Place:
+        """Return the place with mortar in all closed joints."""
+        return self.mortar.cast(place, self.contacts(place.pose)) if self.mortar.present else place
 
     def contacts_at(self, place: Place) -> Contacts:
         """Return the contact points at a place, those of members last."""
@@ -156,11 +202,42 @@ class Stepper:
         friction = self.model.interfaces.friction(self.model.assembly, contacts.block_a, contacts.block_b)
         return np.where(is_member(contacts), 0.0, friction)
 
-    def compliance(self, contacts: Contacts) -> np.ndarray:
+    def compliance(self, contacts: Contacts, joints: JointPoints) -> np.ndarray:
         """(n, d) array: that of joints and members, in units of the program."""
-        compliance, members = self.joint_compliance(contacts, self.model.compliance), is_member(contacts)
+        members = is_member(contacts)
+        compliance = self.joint_compliance(contacts, self.model.compliance) + joints.give
         compliance[members, 0] = self.members.compliance[contacts.features[members, 1]]
         return compliance
+
+    def force_limits(self, place: Place, contacts: Contacts, gap: float) -> tuple[Contacts, ForceLimits]:
+        """Contact points with gaps beyond the give of their joints, and the limits of their forces.
+
+        Parameters
+        ----------
+        place : Place
+        contacts : Contacts
+            At its pose.
+        gap : float
+            Of contact points that may carry, in block sizes.
+        """
+        gaps, limits = self.joint_limits(place, contacts)
+        of_members, members = self.members.force_limits(contacts, gap), is_member(contacts)
+        least, most = (
+            np.where(members, m, j) for m, j in ((of_members.least, limits.least), (of_members.most, limits.most))
+        )
+        return replace(contacts, gaps=gaps), replace(limits, least=least, most=most)
+
+    def joint_limits(
+        self, place: Place, contacts: Contacts, forces: np.ndarray | None = None
+    ) -> tuple[np.ndarray, ForceLimits]:
+        """Gaps [m] beyond the give of joints under forces, or without, and the limits of the forces between blocks."""
+        limits = ForceLimits.dry(len(contacts))
+        if not self.mortar.present:
+            return contacts.gaps, limits
+        joints, friction = self.mortar.points(place, contacts), self.friction(contacts)
+        gaps = joints.beyond_give(contacts.gaps, 0.0 if forces is None else forces[:, 0])
+        cohesion = np.maximum(joints.cohesion - friction * joints.tension, 0.0)
+        return gaps, replace(limits, least=-joints.tension, cohesion=cohesion)
 
     @staticmethod
     def joint_compliance(contacts: Contacts, factor: float = 1.0) -> np.ndarray:
@@ -189,25 +266,19 @@ class Stepper:
         followed = np.where(same, place.followed[number], 0.0)
         trial = np.where(same[:, None], place.trial[number], -np.eye(d)[0])
         _, kept = matched_contacts(before, contacts)
-        carried = ~is_member(before) & ((place.forces[:, 0] > 0.0) | (place.followed > 0.0))
+        carried = ~is_member(before) & ((place.forces[:, 0] != 0.0) | (place.followed > 0.0))
         vanished = np.flatnonzero(~kept & carried)
         is_new = ~same
         if len(vanished):
-            apart = np.linalg.norm(before.points[vanished][:, None] - contacts.points[None], axis=2)
-            one, other = (
-                np.sort(np.stack([c.block_a[k], c.block_b[k]], axis=1), axis=1)
-                for c, k in ((before, vanished), (contacts, slice(None)))
-            )
-            apart = np.where((one[:, None] == other[None]).all(axis=2), apart, np.inf)
-            least = apart.min(axis=1)
-            near = (apart <= least[:, None] + 1e-6 * self.model.length) & (apart < 1e-2 * self.model.length)
+            length = self.model.length
+            row, successor = successors(before, vanished, contacts, 1e-6 * length, 1e-2 * length)
             # Equally near ones share them, so that their order does not matter.
-            row, successor = np.nonzero(near)
-            part, vanished = 1.0 / near.sum(axis=1)[row], vanished[row]
+            part, vanished = 1.0 / np.bincount(row)[row], vanished[row]
             sense = np.where(before.block_a[vanished] == contacts.block_a[successor], 1.0, -1.0)
             vectors = np.einsum("nji,nj->ni", before.frames[vanished], place.forces[vanished]) * sense[:, None]
             passed = np.einsum("nij,nj->ni", contacts.frames[successor], vectors)
-            passed[:, 0] = np.maximum(passed[:, 0], 0.0)
+            if not self.mortar.present:
+                passed[:, 0] = np.maximum(passed[:, 0], 0.0)
             np.add.at(forces, successor, part[:, None] * passed)
             trial[successor] = forces[successor]
             np.add.at(followed, successor, part * place.followed[vanished])
@@ -253,16 +324,15 @@ class Stepper:
         # A step in time is solved to a small part of such a movement.
         s, size = (place.s, 1e-3) if in_time else (place.s + length, length / self.unit)
         supports, start = driver.supports(s), self.contacts_at(place) if candidates is None else candidates
-        forces, trial, followed, is_new = self.transferred(place, start)
-        friction, compliance, members = self.friction(start), self.compliance(start), is_member(start)
-        bound = friction * followed
+        place = self.mortar.renamed(place, start)
+        points, members = self._points(place, start), is_member(start)
+        forces, trial, pulled, joints = points.forces, points.trial, points.pulled, points.joints
         resisting, before = self._resistance(place, length, in_time, viscosity)
         load = (model.scaled_load + (0.0 if in_time else viscosity) * self.imperfection)[free].ravel()
         closed = np.inf if in_time or viscosity == 1.0 else EXACT
         live, live_size = model.scaled_live
         multiplier = place.multiplier * live_size
-        # The give of members stays.
-        motion_so_far, normal, shear = np.zeros_like(load), np.where(members, 0.0, forces[:, 0]), forces[:, 1:]
+        motion_so_far, before_step = np.zeros_like(load), np.column_stack([points.kept * forces[:, 0], forces[:, 1:]])
         pose = self._with_supports(place.pose, supports)
         contacts = self.measured(start, pose, place.tie_lengths)
         for number in range(LINEARISATIONS):
@@ -270,14 +340,14 @@ class Stepper:
             control = driver.control(pose) if model.live is not None else None
             problem = ContactProblem(
                 rows=rows,
-                gap=contacts.gaps / model.length,
+                gap=joints.beyond_give(contacts.gaps) / model.length,
                 slip=(contacts.slip - start.slip) / model.length,
                 # Gaps are absolute, so that the give across a joint is taken back; slip counts from the step's start.
-                forces=np.column_stack([normal, shear]),
-                bound=bound,
-                compliance=compliance,
+                forces=before_step + pulled,
+                bound=points.bound,
+                compliance=points.compliance,
                 most=self.members.largest_forces(start),
-                load=load + resisting * before,
+                load=load + resisting * before - rows.resultant(pulled),
                 viscosity=resisting,
                 motion_so_far=motion_so_far,
                 size=size,
@@ -287,53 +357,95 @@ class Stepper:
             )
             self.programs += 1
             solution = minimise(problem, trial, multiplier)
-            forces, trial, multiplier = solution.forces, solution.trial, solution.multiplier
+            forces, trial, multiplier = solution.forces - pulled, solution.trial, solution.multiplier
             # A linearised rotation makes blocks grow: the first linearisation's forces are not kept.
-            normal = np.where(members, 0.0, forces[:, 0]) if number else normal
+            if number:
+                before_step[:, 0] = points.kept * forces[:, 0]
             motion_so_far = motion_so_far + solution.motion
             full = np.zeros((assembly.n_blocks, n_dof))
             full[free] = motion_so_far.reshape(-1, n_dof) * scales
             pose = self._with_supports(moved(place.pose, full), supports)
             predicted = problem.gap + rows.relative(solution.motion)[:, 0]
             contacts = self.measured(start, pose, place.tie_lengths)
-            residual = self._linearisation_error(contacts, predicted, forces, bound, closed)
+            residual = self._linearisation_error(contacts, predicted, forces, points, closed)
             control_error = 0.0 if control is None else abs(s - driver.control_displacement(pose)) / model.length
             if residual <= 1.0 and control_error <= EXACT:
                 break
         if not np.isfinite(motion_so_far).all():
             raise NotSolved("the movement is not finite")
         movement_size = float(np.abs(motion_so_far).max(initial=0.0))
-        if movement_size > LARGEST_PENETRATION:
-            missed = self._missed_contacts(start, place.pose, pose, movement_size)
-            if len(missed):
-                start = joined_contacts([start[~members], missed, start[members]])
-                return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=start)
+        all_points = self._with_missed(start, place.pose, pose, movement_size)
+        bonds = self._bonds_after(place, points, trial)
+        if len(all_points) > len(start) or self.mortar.broken(place.bonds, bonds):
+            # What breaks hands its forces to the others in the same step.
+            place = place if len(all_points) > len(start) else replace(place, bonds=bonds)
+            return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=all_points)
         # A larger share alternates where the normal force falls as the bound grows.
         share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
-        lag, followed = self._updated_bounds(contacts, forces, friction, bound, followed, is_new, share)
+        gap = joints.beyond_give(contacts.gaps, forces[:, 0])
+        lag, followed = self._updated_bounds(contacts, gap, forces, points, share)
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
         lengths = self.members.after(contacts, forces, place.tie_lengths)
-        multiplier /= live_size or 1.0
-        new = Place(s, pose, contacts, forces, trial, followed, multiplier, velocity, tie_lengths=lengths)
+        new = Place(
+            s,
+            pose,
+            contacts,
+            forces,
+            trial,
+            followed,
+            multiplier / (live_size or 1.0),
+            velocity,
+            tie_lengths=lengths,
+            bonds=bonds,
+        )
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
-        deepest = float(contacts.gaps[(forces[:, 0] > CARRIES) & ~members].min(initial=0.0)) / model.length
+        deepest = float(gap[(forces[:, 0] > CARRIES) & ~members].min(initial=0.0)) / model.length
         return new, motion / scales, StepError(lag, turn, movement_size, -deepest)
+
+    def _points(self, place: Place, start: Contacts) -> _StepPoints:
+        """The contact points of a step from a place."""
+        forces, trial, followed, is_new = self.transferred(place, start)
+        joints, friction = self.mortar.points(place, start), self.friction(start)
+        compliance, pulled = self.compliance(start, joints), np.zeros_like(forces)
+        pulled[:, 0] = joints.tension
+        bound = friction * followed
+        if self.mortar.present:
+            # Lost strength takes with it the tension that friction still followed.
+            bound = np.maximum(friction * np.maximum(followed, -joints.tension) + joints.cohesion, 0.0)
+        # The give of elastic joints and members stays.
+        kept = np.where(is_member(start), 0.0, 1.0 - joints.give[:, 0] / compliance[:, 0])
+        return _StepPoints(start, forces, trial, followed, is_new, friction, compliance, joints, bound, kept, pulled)
+
+    def _bonds_after(self, place: Place, points: _StepPoints, trial: np.ndarray) -> Bonds:
+        """The bonds after a step: what opens under its largest tension, or slips at its bound, loses strength."""
+        if not self.mortar.present:
+            return place.bonds
+        beyond = np.column_stack([-trial[:, 0], np.linalg.norm(trial[:, 1:], axis=1) - points.bound])
+        opening, slipped = np.maximum(beyond * points.compliance[:, :2], 0.0).T
+        return self.mortar.after(place, points.start, opening, slipped)
 
     @staticmethod
     def _largest(values: np.ndarray) -> float:
         return float(np.abs(values).max(initial=0.0))
 
     def _linearisation_error(
-        self, contacts: Contacts, predicted: np.ndarray, forces: np.ndarray, bound: np.ndarray, closed: float
+        self,
+        contacts: Contacts,
+        predicted: np.ndarray,
+        forces: np.ndarray,
+        points: _StepPoints,
+        closed: float,
     ) -> float:
         """Errors of the gaps of contact points that carry, and of what was predicted of them, over what is accepted."""
-        gap, carries = contacts.gaps / self.model.length, forces[:, 0] > CARRIES
+        gap = points.joints.beyond_give(contacts.gaps) / self.model.length
+        carries = np.abs(forces[:, 0]) > CARRIES
         touches = carries & ~is_member(contacts)
-        slides = (np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * bound)[touches].any()
+        slides = (np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * points.bound)[touches].any()
         exact = EXACT_SLIDING if slides else EXACT
-        return max(self._largest(gap[touches]) / closed, self._largest((gap - predicted)[carries]) / exact)
+        apart = (gap + points.joints.give[:, 0] * forces[:, 0])[touches]
+        return max(self._largest(apart) / closed, self._largest((gap - predicted)[carries]) / exact)
 
     def _resistance(
         self, place: Place, length: float, in_time: bool, viscosity: float
@@ -350,18 +462,18 @@ class Stepper:
     def _updated_bounds(
         self,
         contacts: Contacts,
+        gap: np.ndarray,
         forces: np.ndarray,
-        friction: np.ndarray,
-        bound: np.ndarray,
-        followed: np.ndarray,
-        is_new: np.ndarray,
+        points: _StepPoints,
         share: float | np.ndarray,
     ) -> tuple[float, np.ndarray]:
         """Change of the friction bounds of sliding joints, in weights of the structure, and followed normal forces."""
         shear_force, normal = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
-        sliding = ((shear_force >= SLIDES * bound) | (shear_force > friction * normal)) & ~is_new
+        friction, followed, is_new = points.friction, points.followed, points.is_new
+        allowed = friction * normal + points.joints.cohesion
+        sliding = ((shear_force >= SLIDES * points.bound) | (shear_force > allowed)) & ~is_new
         # In a joint that opens friction vanishes sooner.
-        gap = np.maximum(contacts.gaps, 0.0)
+        gap = np.maximum(gap, 0.0)
         share = np.maximum(share, gap / (gap + OPEN * self.model.length))
         # New contact points have the friction of their normal force at once.
         after = np.where(is_new, normal, followed + share * (normal - followed))
@@ -374,11 +486,13 @@ class Stepper:
         before = np.zeros_like(motion) if place.velocity is None else place.velocity
         return before + (motion - length * before) / (length + VELOCITY_MEMORY * self.unit)
 
-    def _missed_contacts(self, stepped: Contacts, before: Pose, pose: Pose, movement_size: float) -> Contacts:
-        """Contact points that a step has missed, where they were before it: at its end a corner is in a block.
+    def _with_missed(self, stepped: Contacts, before: Pose, pose: Pose, movement_size: float) -> Contacts:
+        """Contact points of a step with those that it has missed, where they were: at its end a corner is in a block.
 
         Raises ``Penetration`` where that corner was behind the edge already, or the step had its contact point.
         """
+        if movement_size <= LARGEST_PENETRATION:
+            return stepped
         end = self.contacts(pose)
         earlier, is_stepped = np.zeros(len(end)), np.zeros(len(end), dtype=bool)
         if len(end) and len(stepped):
@@ -389,7 +503,10 @@ class Stepper:
         found = measure_contacts(self.model.assembly, moved_vertices(self.model.assembly, before), end[deep])
         if is_stepped[deep].any() or (found.gaps < deepest).any():
             raise Penetration(movement_size)
-        return found
+        if not len(found):
+            return stepped
+        members = is_member(stepped)
+        return joined_contacts([stepped[~members], found, stepped[members]])
 
     def _with_supports(self, pose: Pose, supports: Pose) -> Pose:
         free = self.free[:, None]
