@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -68,6 +68,12 @@ class InterfaceLaw:
                 raise ValueError(
                     f"{name} is {value:g} m, but there is no strength to lose; give cohesion, or leave it out"
                 )
+
+    def with_friction(self, factor: float) -> InterfaceLaw:
+        """Return the law with friction times a factor, and no tension where its shear strength then ends."""
+        mu = factor * self.friction_coefficient
+        tension = min(self.tensile_strength, self.cohesion / mu) if mu > 0.0 else self.tensile_strength
+        return replace(self, friction_coefficient=mu, tensile_strength=tension)
 
     @property
     def crushes(self) -> bool:
@@ -136,11 +142,23 @@ class Interfaces:
         Either order.
     scatter : JointScatter, optional
         Factors on the friction of each pair of blocks; without it joints of the same materials are alike.
+    ground : mapping from str to float [Pa/m]
+        Stiffness of the ground under supports, by their names, or those of which they are numbered pieces: joints with
+        them have it for their normal stiffness, and neither tension nor cohesion.
     """
 
     default: InterfaceLaw = field(default_factory=InterfaceLaw)
     pairs: Mapping[tuple[str, str], InterfaceLaw] = field(default_factory=dict)
     scatter: JointScatter | None = None
+    ground: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check the ground."""
+        for name, stiffness in self.ground.items():
+            if not (np.isfinite(stiffness) and stiffness > 0.0):
+                raise ValueError(
+                    f"the ground under '{name}' has a stiffness of {stiffness:g} Pa/m; it must be positive"
+                )
 
     def friction(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
         """(n,) array: friction coefficient between the blocks of each pair."""
@@ -154,7 +172,22 @@ class Interfaces:
 
     def values(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray, *names: str) -> list[np.ndarray]:
         """(n,) array of each named attribute of the laws between the blocks of each pair."""
-        return [self._by_material(name, assembly, block_a, block_b) for name in names]
+        found = [self._by_material(name, assembly, block_a, block_b) for name in names]
+        if self.ground:
+            of_block = self._ground(assembly)
+            stiffness = np.fmin(of_block[block_a], of_block[block_b])
+            on_ground = ~np.isnan(stiffness)
+            given = {"normal_stiffness": stiffness[on_ground], "cohesion": 0.0, "tensile_strength": 0.0}
+            for name, values in zip(names, found, strict=True):
+                if name in given:
+                    values[on_ground] = given[name]
+        return found
+
+    def _ground(self, assembly: Assembly) -> np.ndarray:
+        """(n_blocks,) array [Pa/m]: stiffness of the ground under each block that is a support with one, else nan."""
+        whole = (name.rstrip("0123456789").removesuffix(" ") for name in assembly.names)
+        named = zip(assembly.names, whole, strict=True)
+        return np.array([self.ground.get(name, self.ground.get(one, np.nan)) for name, one in named])
 
     @property
     def laws(self) -> tuple[InterfaceLaw, ...]:
@@ -169,7 +202,7 @@ class Interfaces:
     @property
     def mortar(self) -> bool:
         """Whether an interface has cohesion, tensile strength or stiffness."""
-        return any(law.bonds or law.elastic for law in self.laws)
+        return bool(self.ground) or any(law.bonds or law.elastic for law in self.laws)
 
     def refuse_crushing(self, analysis: str) -> None:
         """Raise ``ValueError`` for compressive strength in an analysis that follows a path."""

@@ -106,7 +106,7 @@ def explain(
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
         drawn = case_assembly(case)
-        needs_dry_joints(case)
+        needs_dry_joints(case, "blockvis explain")
         mechanics.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
         ground = ground_of(drawn, case.explain, case.source)

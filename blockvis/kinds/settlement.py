@@ -17,7 +17,7 @@ from blockvis.results.about import least_reaction, loss_of, mechanism_text
 from blockvis.text import force_text
 from solver import mechanics
 
-from .kind import AnalysisKind, AnalysisRun, Course, RunInput, needs_dry_joints, without_increments
+from .kind import AnalysisKind, AnalysisRun, Course, RunInput, needs_no_crushing, without_increments
 
 #: The methods in words, as ``[analysis] increments`` has them.
 COULOMB, LINEAR_PROGRAM = mechanics.INCREMENTS
@@ -63,7 +63,7 @@ class SettlementKind(AnalysisKind):
                 '"dead"',
                 stacklevel=5,
             )
-        needs_dry_joints(case)
+        needs_no_crushing(case)
         if case.settings and case.controls.increments == LINEAR_PROGRAM:
             raise ValueError(
                 f'{case.source}: [analysis] range = true belongs to increments = "{COULOMB}"; a linear program knows '

@@ -143,7 +143,13 @@ def test_strength_from_the_case_file(tmp_path, capsys):
     weight = 0.8 * 0.5 * 2000.0 * solver.GRAVITY
     assert f"{(0.3 * weight + 2000.0 * 0.8) / 1000.0:12.6g}" in capsys.readouterr().out
     for text, words in (
-        (CASE.format("").replace('"limit load"', '"settlement"') + "[settlement]\ndirection = [0, -1]\n", "dry joints"),
+        (
+            CASE.format("compressive_strength = 1e6\n").replace('"limit load"', '"settlement"')
+            + "[settlement]\ndirection = [0, -1]\n",
+            "crushing along the path of a settlement is not followed",
+        ),
+        (CASE.format("tensile_strength = 1e5"), "[material] tensile_strength is 100000 Pa, above cohesion / friction"),
+        (CASE.format("normal_stiffness = -1.0"), "[material] normal_stiffness is -1; give a positive number"),
         (CASE.format("compressive_strength = 0.0"), "[material] compressive_strength is 0; give a positive number"),
         (CASE.format("").replace("2000.0", "-1.0"), "[material] cohesion is -1; give a stress in Pa of at least 0"),
     ):
