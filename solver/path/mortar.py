@@ -103,7 +103,7 @@ class Mortar:
         )
 
     def renamed(self, place: Place, contacts: Contacts) -> Place:
-        """The place with its bonds at these contact points: one that vanishes passes its bond to the nearest."""
+        """The place with its bonds at these contact points: one that vanishes passes its bond to the nearest ones."""
         bonds, before = place.bonds, place.contacts
         if not len(bonds) or before is None or not len(contacts) or not len(before):
             return place
@@ -114,18 +114,16 @@ class Mortar:
             return place
         length = self.model.length
         row, successor = successors(before, vanished, contacts, 1e-6 * length, NEAR * length)
-        _, taken = self._matched(contacts, bonds)
-        row, successor = row[~taken[successor]], successor[~taken[successor]]
-        _, first = np.unique(successor, return_index=True)
-        old = number[vanished[row[first]]]
-        added = contacts.features[successor[first], :3]
-        return replace(
-            place,
-            bonds=Bonds(
-                np.concatenate([bonds.features, added]),
-                *(np.concatenate([a, a[old]]) for a in (bonds.areas, bonds.left, bonds.rest)),
-            ),
-        )
+        # Equally near ones share it, and several that pass to one add up.
+        part, old = 1.0 / np.bincount(row)[row], number[vanished[row]]
+        stays = np.setdiff1d(np.arange(len(bonds)), old)
+        part, old = np.concatenate([np.ones(len(stays)), part]), np.concatenate([stays, old])
+        names = np.concatenate([bonds.features[stays], contacts.features[successor, :3]])
+        features, which = np.unique(names, axis=0, return_inverse=True)
+        which, left = which.ravel(), np.ones(len(features))
+        np.minimum.at(left, which, bonds.left[old])
+        rest = np.bincount(which, part * bonds.rest[old]) / np.bincount(which, part)
+        return replace(place, bonds=Bonds(features, np.bincount(which, part * bonds.areas[old]), left, rest))
 
     def after(self, place: Place, contacts: Contacts, opening: np.ndarray, slipped: np.ndarray) -> Bonds:
         """The bonds after a step in which points of a place opened, and slipped, in block sizes.
