@@ -145,6 +145,16 @@ class Mortar:
         left[number] = np.clip(lost, 0.0, left[number])
         return replace(bonds, left=left)
 
+    def lost(self, before: Place, after: Place) -> float:
+        """Strength along the joints that a step has taken, in units of the program."""
+        if not self.present:
+            return 0.0
+        whole, left = (
+            0.0 if place.contacts is None else float(self.points(place, place.contacts).cohesion.sum())
+            for place in (before, after)
+        )
+        return whole - left
+
     @staticmethod
     def broken(before: Bonds, after: Bonds) -> bool:
         """Whether some point has lost all that it had left."""

@@ -286,7 +286,8 @@ class Path:
                 return state, Outcome.LOCKED
             if error.penetration > WEDGED and length > FIRST_STEP * unit:
                 return replace(state, step=length / 3.0), None
-        measure = max(error.lag / self.largest_lag, error.turn / self.largest_turn)
+        lag = error.lag + self.stepper.mortar.lost(place, new) / self.stepper.weight
+        measure = max(lag / self.largest_lag, error.turn / self.largest_turn)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
         if not self._is_on_path(new, error, length, refining):
