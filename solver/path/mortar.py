@@ -91,8 +91,8 @@ class Mortar:
         friction = model.interfaces.friction(model.assembly, *blocks)
         # Corners alone, and points of members, have no area.
         across, along = (
-            np.divide(model.force, k * area * model.length, out=np.zeros(n), where=(k > 0.0) & (k * area > 0.0))
-            for k in stiffness
+            np.divide(model.force, k * area * model.length, out=np.zeros(n), where=k * area > 0.0)
+            for k in (np.where(np.isfinite(k), k, 0.0) for k in stiffness)
         )
         return JointPoints(
             tension=largest_tension(tension, cohesion, friction) * strong,
@@ -101,6 +101,15 @@ class Mortar:
             rest=np.where(bonded, self._of(place.bonds.rest, number), 0.0),
             length=model.length,
         )
+
+    def intact(self, place: Place, contacts: Contacts) -> np.ndarray:
+        """(n,) array: part of the strength of contact points that is left; empty where none had any."""
+        if not any(law.bonds for law in self.model.interfaces.laws):
+            return np.zeros(0)
+        strong = self.points(place, contacts).cohesion > 0.0
+        place = self.renamed(place, contacts)
+        number, _ = self._matched(contacts, place.bonds)
+        return np.where(strong, self._of(place.bonds.left, number), 0.0)
 
     def renamed(self, place: Place, contacts: Contacts) -> Place:
         """The place with its bonds at these contact points: one that vanishes passes its bond to the nearest ones."""
@@ -155,10 +164,10 @@ class Mortar:
         )
         return whole - left
 
-    @staticmethod
-    def broken(before: Bonds, after: Bonds) -> bool:
-        """Whether some point has lost all that it had left."""
-        return bool(((before.left > 0.0) & (after.left == 0.0)).any())
+    def broken(self, before: Bonds, after: Bonds) -> bool:
+        """Whether some point of a joint with strength has lost all that it had left."""
+        bonds = any(law.bonds for law in self.model.interfaces.laws)
+        return bonds and bool(((before.left > 0.0) & (after.left == 0.0)).any())
 
     @staticmethod
     def _matched(contacts: Contacts, bonds: Bonds) -> tuple[np.ndarray, np.ndarray]:

@@ -277,8 +277,8 @@ class Stepper:
             sense = np.where(before.block_a[vanished] == contacts.block_a[successor], 1.0, -1.0)
             vectors = np.einsum("nji,nj->ni", before.frames[vanished], place.forces[vanished]) * sense[:, None]
             passed = np.einsum("nij,nj->ni", contacts.frames[successor], vectors)
-            if not self.mortar.present:
-                passed[:, 0] = np.maximum(passed[:, 0], 0.0)
+            least = np.minimum(place.forces[vanished, 0], 0.0) if self.mortar.present else 0.0
+            passed[:, 0] = np.maximum(passed[:, 0], least)
             np.add.at(forces, successor, part[:, None] * passed)
             trial[successor] = forces[successor]
             np.add.at(followed, successor, part * place.followed[vanished])

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
-from structures import rectangle
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from structures import box, rectangle, wall
 
 import solver
+from blockvis.results.npz import packed, unpacked
 from solver import mechanics
 
 WIDTH, HEIGHT, THICKNESS = 0.25, 0.125, 0.1
@@ -45,6 +48,7 @@ def test_a_block_between_two_others_hangs_by_their_cohesion(share):
     assert holds(last)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_a_block_hangs_by_the_tension_of_its_bed(share):
     """W = t A, on a centred bed joint above it."""
@@ -63,6 +67,7 @@ def test_a_block_hangs_by_the_tension_of_its_bed(share):
     assert holds(last)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_a_block_glued_to_a_wall_opens_at_its_upper_edge(share):
     """W b/2 = (t A / 2) h about the lower end of the joint, whose upper half hangs on its end."""
@@ -84,6 +89,7 @@ def test_a_block_glued_to_a_wall_opens_at_its_upper_edge(share):
     assert holds(response.increments[-1])
 
 
+@pytest.mark.slow
 def test_a_pushed_block_breaks_loose_at_its_cohesion_and_slides_at_friction():
     """A pushover at the base: α W = μ W + c A at first, μ W once the joint has slipped."""
     cohesion = 3e3
@@ -135,3 +141,119 @@ def test_crushing_is_not_followed():
     with pytest.raises(ValueError, match="crushing along the path of a settlement is not followed"):
         held(shapes, ["free", "moving"], solver.InterfaceLaw(0.6, 0.0, 1e6))
     assert np.isinf(solver.InterfaceLaw().compressive_strength)
+
+
+@pytest.mark.slow
+def test_a_footing_that_settles_tilts_the_beam_on_springs():
+    """Three footings with K = k A each, the right one's ground settles by s: v = s/3, θ = s / (2 ℓ + 3 w²/(4 ℓ)).
+
+    A footing of width w carries at its two ends. The rest of the difference is the viscosity, 1 % of the weight.
+    """
+    arm, width, stiffness, settlement = 1.0, 0.1, 2e6, 0.02
+    pads = [rectangle(x - width / 2, -0.3, x + width / 2, 0.0) for x in (-arm, 0.0, arm)]
+    names = ["left", "middle", "right"]
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(-1.2, 0.0, 1.2, 0.4), *pads],
+        roles=["free", "fixed", "fixed", "moving"], names=["beam", *names], thickness=0.5,
+    )  # fmt: skip
+    interfaces = solver.Interfaces(ground=dict.fromkeys(names, stiffness))
+    response = solver.Structure(assembly, interfaces).settle(
+        solver.Settlement(direction=(0.0, -1.0), increment=0.01, limit=settlement)
+    )
+    first, last = response.increments[0], response.increments[-1]
+    weight, spring = mechanics.total_weight(assembly), stiffness * width * 0.5
+    assert first.support_forces[1:, 1] == pytest.approx([-weight / 3.0] * 3, rel=1e-6)
+    tilt = settlement * arm / (2.0 * arm**2 + 3.0 * width**2 / 4.0)
+    assert -last.pose.rotations[0, 0] == pytest.approx(tilt, rel=0.03)
+    assert 0.2 - last.pose.positions[0, 1] == pytest.approx(settlement / 3.0, rel=0.03)
+    assert -last.support_forces[2, 1] == pytest.approx(weight / 3.0 + spring * settlement / 3.0, rel=0.02)
+    assert last.certificate.equilibrium_residual < 1e-6
+
+
+@pytest.mark.slow
+def test_ground_does_not_pull():
+    """Where its ground has settled by more than W / K the footing has left it."""
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(0.0, 0.0, 1.0, 0.2), rectangle(0.0, -0.2, 0.7, 0.0), rectangle(0.9, -0.2, 1.0, 0.0)],
+        roles=["free", "fixed", "moving"], names=["beam", "left", "right"],
+    )  # fmt: skip
+    interfaces = solver.Interfaces(solver.InterfaceLaw(0.6, 1e4, tensile_strength=1e4), ground={"right": 1e8})
+    settlement = solver.Settlement(direction=(0.0, -1.0), increment=0.01, limit=0.01)
+    last = solver.Structure(assembly, interfaces).settle(settlement).increments[-1]
+    assert last.reaction == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("fracture", [pytest.param(0.0, marks=pytest.mark.slow), 5e-4])
+def test_a_slip_takes_the_cohesion_at_once_or_over_its_length(fracture):
+    """A pushed block has slipped by 0.25 mm: with a fracture slip of 0.5 mm half of its cohesion is left."""
+    cohesion = 3e3
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(0.0, 0.0, 0.8, 0.5), rectangle(-1.0, -1.0, 2.0, 0.0)],
+        roles=["free", "fixed"], names=["block", "ground"], thickness=0.3,
+    )  # fmt: skip
+    weight = mechanics.total_weight(assembly)
+    live = solver.point_load(assembly, 0, (weight, 0.0), point=(0.0, 0.0))
+    loads = solver.Loads(solver.self_weight(assembly).dead, live)
+    law = solver.InterfaceLaw(0.3, cohesion, fracture_slip=fracture)
+    structure = solver.Structure(assembly, solver.Interfaces(law), loads)
+    response = structure.pushover(solver.ControlDisplacement("block", (1.0, 0.0), limit=2.5e-4, increment=1.25e-4))
+    left = 0.5 if fracture else 0.0
+    assert response.increments[-1].load_multiplier == pytest.approx(0.3 + left * cohesion * 0.24 / weight, rel=0.02)
+
+
+@pytest.mark.slow
+@settings(max_examples=4, deadline=None)
+@given(friction=st.floats(0.3, 0.9), courses=st.integers(2, 4), strength=st.floats(1e-9, 1e-6))
+def test_weak_mortar_on_stiff_joints_is_a_dry_wall(friction, courses, strength):
+    """Forces at rest are found to 1e-6 of the weight; of a wall that slides, reactions follow from them to 5e-6."""
+    assembly = wall(3, courses)
+    law = solver.InterfaceLaw(
+        friction, strength, tensile_strength=strength, normal_stiffness=1e22, shear_stiffness=1e22
+    )
+    settlement = solver.Settlement(direction=(0.0, -1.0), increment=2e-3, limit=4e-3)
+    dry, weak = (
+        solver.Structure(assembly, solver.Interfaces(one)).settle(settlement)
+        for one in (solver.InterfaceLaw(friction), law)
+    )
+    weight = mechanics.total_weight(assembly)
+    for one, other in zip(dry.path, weak.path, strict=True):
+        assert other.reaction == pytest.approx(one.reaction, abs=5e-6 * weight)
+        assert other.pose.positions[assembly.free] == pytest.approx(one.pose.positions[assembly.free], abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_a_stone_in_space_hangs_by_the_tension_of_its_bed(share):
+    """W = t A, four contact points with a quarter each."""
+    assembly = solver.Assembly.from_solids(
+        [
+            box((0.0, 0.0, 0.125), (0.25, 0.25, 0.3)),
+            box((0.0, 0.0, 0.0), (0.25, 0.25, 0.125)),
+            box((0.05, 0.05, -0.1), (0.2, 0.2, 0.0)),
+        ],
+        roles=["fixed", "free", "moving"], materials=["stone", "stone", "support"],
+    )  # fmt: skip
+    weight = mechanics.total_weight(assembly)
+    strength = share * weight / 0.0625
+    law = solver.InterfaceLaw(0.6, strength, tensile_strength=strength)
+    interfaces = solver.Interfaces(law, {("support", "stone"): solver.InterfaceLaw(0.6)})
+    settlement = solver.Settlement(direction=(0.0, 0.0, -1.0), increment=1e-3, limit=2e-3)
+    last = solver.Structure(assembly, interfaces).settle(settlement).increments[-1]
+    assert last.reaction == pytest.approx(0.0 if share > 1.0 else weight, abs=1e-6 * weight)
+    assert set(last.state.intact) == ({0.0, 1.0} if share > 1.0 else {0.0})
+    assert holds(last)
+
+
+@pytest.mark.slow
+def test_a_wall_with_mortar_goes_on_from_its_checkpoint_bit_for_bit():
+    assembly = wall(3, 3)
+    interfaces = solver.Interfaces(solver.InterfaceLaw(0.6, 3e3, tensile_strength=1e3, normal_stiffness=1e10))
+    phases, loads = (
+        (solver.Settlement(direction=(0.0, -1.0), increment=1e-3, limit=3e-3),),
+        solver.self_weight(assembly),
+    )
+    whole = list(mechanics.settlement_increments(assembly, phases, interfaces=interfaces, loads=loads))
+    stored, _ = unpacked(packed(whole[1].checkpoint), mechanics.PathState)
+    again = list(mechanics.settlement_increments(assembly, phases, interfaces=interfaces, loads=loads, resume=stored))
+    assert [one.reaction for one in again] == [one.reaction for one in whole[2:]]
+    assert (again[-1].pose.positions == whole[-1].pose.positions).all()
