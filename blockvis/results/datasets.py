@@ -222,7 +222,8 @@ def contact_dataset(
         ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``,
         ``utilisation``, the part of the friction that the shear force uses up, ``state``
         (number of :class:`solver.mechanics.ContactState`), with mortar ``intact``, the part of its strength that is
-        left, ``carries`` (1 with a force), ``block_a`` and ``block_b``, ``displacement`` and ``reference`` as of :func:`block_dataset`; its field arrays, and ``state_names``. In
+        left, ``carries`` (1 with a force), ``block_a`` and ``block_b``, ``displacement`` and ``reference`` as of
+        :func:`block_dataset`; its field arrays, and ``state_names``. In
         frames of a fall, which are no equilibrium, forces are 0. In space ``shear_force`` is the size of the vector
         ``shear`` [N], and ``slip`` [m] is how far block a has moved along block b there since the layout.
     """

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from structures import box, rectangle, wall
 
 import solver
+from blockvis import generators
 from blockvis.results.npz import packed, unpacked
 from solver import mechanics
 
@@ -201,24 +202,42 @@ def test_a_slip_takes_the_cohesion_at_once_or_over_its_length(fracture):
     assert response.increments[-1].load_multiplier == pytest.approx(0.3 + left * cohesion * 0.24 / weight, rel=0.02)
 
 
+def dry_and_weak(assembly, settlement, friction, strength):
+    """The path of dry joints, and that of next to no strength and next to no give."""
+    law = solver.InterfaceLaw(
+        friction, strength, tensile_strength=strength, normal_stiffness=1e22, shear_stiffness=1e22
+    )
+    paths = [
+        solver.Structure(assembly, solver.Interfaces(one)).settle(settlement)
+        for one in (solver.InterfaceLaw(friction), law)
+    ]
+    return zip(paths[0].path, paths[1].path, strict=True)
+
+
+@pytest.mark.slow
+@settings(max_examples=4, deadline=None)
+@given(voussoirs=st.integers(7, 15), strength=st.floats(1e-9, 1e-6), spread=st.floats(0.0, 1.0))
+def test_weak_mortar_on_stiff_joints_is_a_dry_arch(voussoirs, strength, spread):
+    assembly = generators.build("arch", {"voussoirs": voussoirs})
+    weight = mechanics.total_weight(assembly)
+    settlement = solver.Settlement(direction=(spread, spread - 1.0), increment=5e-3, limit=1e-2)
+    for one, other in dry_and_weak(assembly, settlement, 0.9, strength):
+        assert other.reaction == pytest.approx(one.reaction, abs=1e-6 * weight)
+        assert other.pose.positions == pytest.approx(one.pose.positions, abs=1e-6)
+
+
 @pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(friction=st.floats(0.3, 0.9), courses=st.integers(2, 4), strength=st.floats(1e-9, 1e-6))
 def test_weak_mortar_on_stiff_joints_is_a_dry_wall(friction, courses, strength):
-    """Forces at rest are found to 1e-6 of the weight; of a wall that slides, reactions follow from them to 5e-6."""
+    """Where joints slide, a change of the dry wall's friction by 1e-9 changes reactions by 2e-4 of the weight, too."""
     assembly = wall(3, courses)
-    law = solver.InterfaceLaw(
-        friction, strength, tensile_strength=strength, normal_stiffness=1e22, shear_stiffness=1e22
-    )
-    settlement = solver.Settlement(direction=(0.0, -1.0), increment=2e-3, limit=4e-3)
-    dry, weak = (
-        solver.Structure(assembly, solver.Interfaces(one)).settle(settlement)
-        for one in (solver.InterfaceLaw(friction), law)
-    )
     weight = mechanics.total_weight(assembly)
-    for one, other in zip(dry.path, weak.path, strict=True):
-        assert other.reaction == pytest.approx(one.reaction, abs=5e-6 * weight)
-        assert other.pose.positions[assembly.free] == pytest.approx(one.pose.positions[assembly.free], abs=1e-6)
+    settlement = solver.Settlement(direction=(0.0, -1.0), increment=2e-3, limit=4e-3)
+    for one, other in dry_and_weak(assembly, settlement, friction, strength):
+        assert [other.least, other.largest] == pytest.approx([one.least, one.largest], abs=1e-6 * weight)
+        assert other.reaction == pytest.approx(one.reaction, abs=1e-3 * weight)
+        assert other.pose.positions == pytest.approx(one.pose.positions, abs=1e-5)
 
 
 @pytest.mark.slow
