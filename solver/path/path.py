@@ -277,7 +277,11 @@ class Path:
         refining = enclosing or place.s < state.refine_until
         length = self._length(state, target)
         try:
-            new, motion, error = self.stepper.step(place, length, viscosity=REFINED if refining else 1.0)
+            strength = np.inf
+            if length > FIRST_STEP * unit:
+                strength = REFUSED * self.largest_lag * self.stepper.weight
+            viscosity = REFINED if refining else 1.0
+            new, motion, error = self.stepper.step(place, length, viscosity=viscosity, strength=strength)
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))
         if self._may_be_wedged(new, error):

@@ -293,6 +293,8 @@ class Stepper:
         in_time: bool = False,
         viscosity: float = 1.0,
         candidates: Contacts | None = None,
+        strength: float = np.inf,
+        guess: np.ndarray | None = None,
     ) -> tuple[Place, np.ndarray, StepError]:
         """Take one step of the driver, or one in time with the supports at rest.
 
@@ -307,6 +309,10 @@ class Stepper:
             Times the model's; and the imperfection times the model's.
         candidates : Contacts, optional
             Contact points of the step; by default those at the place.
+        strength : float
+            Of joints along themselves, in units of the program, that may be lost.
+        guess : (n, d) array, optional
+            Trial forces to start from; by default those of the place.
 
         Returns
         -------
@@ -326,7 +332,8 @@ class Stepper:
         supports, start = driver.supports(s), self.contacts_at(place) if candidates is None else candidates
         place = self.mortar.renamed(place, start)
         points, members = self._points(place, start), is_member(start)
-        forces, trial, pulled, joints = points.forces, points.trial, points.pulled, points.joints
+        forces, pulled, joints = points.forces, points.pulled, points.joints
+        trial = points.trial if guess is None else guess
         resisting, before = self._resistance(place, length, in_time, viscosity)
         load = (model.scaled_load + (0.0 if in_time else viscosity) * self.imperfection)[free].ravel()
         closed = np.inf if in_time or viscosity == 1.0 else EXACT
@@ -374,12 +381,24 @@ class Stepper:
         if not np.isfinite(motion_so_far).all():
             raise NotSolved("the movement is not finite")
         movement_size = float(np.abs(motion_so_far).max(initial=0.0))
-        all_points = self._with_missed(start, place, pose, movement_size)
         bonds = self._bonds_after(place, points, trial)
-        if len(all_points) > len(start) or self.mortar.broken(place.bonds, bonds):
+        breaks = self.mortar.broken(place.bonds, bonds)
+        all_points = start if breaks else self._with_missed(start, place, pose, movement_size)
+        if breaks or len(all_points) > len(start):
             # What breaks hands its forces to the others in the same step.
-            place = place if len(all_points) > len(start) else replace(place, bonds=bonds)
-            return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=all_points)
+            broken = replace(place, bonds=bonds) if breaks else place
+            strength -= self.mortar.lost(place, broken)
+            if strength < 0.0:
+                raise NotSolved("much strength is lost")
+            return self.step(
+                broken,
+                length,
+                in_time=in_time,
+                viscosity=viscosity,
+                candidates=all_points,
+                strength=strength,
+                guess=trial if len(all_points) == len(start) else None,
+            )
         # A larger share alternates where the normal force falls as the bound grows.
         share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
         gap = joints.beyond_give(contacts.gaps, forces[:, 0])
