@@ -381,23 +381,16 @@ class Stepper:
         if not np.isfinite(motion_so_far).all():
             raise NotSolved("the movement is not finite")
         movement_size = float(np.abs(motion_so_far).max(initial=0.0))
-        bonds = self._bonds_after(place, points, trial)
-        breaks = self.mortar.broken(place.bonds, bonds)
-        all_points = start if breaks else self._with_missed(start, place, pose, movement_size)
-        if breaks or len(all_points) > len(start):
-            # What breaks hands its forces to the others in the same step.
-            broken = replace(place, bonds=bonds) if breaks else place
-            strength -= self.mortar.lost(place, broken)
-            if strength < 0.0:
-                raise NotSolved("much strength is lost")
+        left, again, strength = self._after_breaks(place, points, trial, pose, movement_size, strength)
+        if again is not None:
             return self.step(
-                broken,
+                left,
                 length,
                 in_time=in_time,
                 viscosity=viscosity,
-                candidates=all_points,
+                candidates=again,
                 strength=strength,
-                guess=trial if len(all_points) == len(start) else None,
+                guess=trial if len(again) == len(start) else None,
             )
         # A larger share alternates where the normal force falls as the bound grows.
         share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
@@ -436,6 +429,31 @@ class Stepper:
         # The give of elastic joints and members stays.
         kept = np.where(is_member(start), 0.0, 1.0 - joints.give[:, 0] / compliance[:, 0])
         return _StepPoints(start, forces, trial, followed, is_new, friction, compliance, joints, bound, kept, pulled)
+
+    def _after_breaks(
+        self,
+        place: Place,
+        points: _StepPoints,
+        trial: np.ndarray,
+        pose: Pose,
+        movement_size: float,
+        strength: float,
+    ) -> tuple[Place, Contacts | None, float]:
+        """The place with the bonds that a step leaves; contact points to solve it with again, if any; strength to lose.
+
+        What breaks hands its forces to the others in the same step.
+        """
+        bonds = self._bonds_after(place, points, trial)
+        left = replace(place, bonds=bonds)
+        if self.mortar.broken(place.bonds, bonds):
+            strength -= self.mortar.lost(place, left)
+            if strength < 0.0:
+                raise NotSolved("much strength is lost")
+            return left, points.start, strength
+        all_points = self._with_missed(points.start, place, pose, movement_size)
+        if len(all_points) > len(points.start):
+            return place, all_points, strength
+        return left, None, strength
 
     def _bonds_after(self, place: Place, points: _StepPoints, trial: np.ndarray) -> Bonds:
         """The bonds after a step: what opens under its largest tension, or slips at its bound, loses strength."""
