@@ -409,7 +409,7 @@ class Stepper:
             multiplier / (live_size or 1.0),
             velocity,
             tie_lengths=lengths,
-            bonds=bonds,
+            bonds=left.bonds,
         )
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
