@@ -174,7 +174,7 @@ class Interfaces:
         """(n,) array of each named attribute of the laws between the blocks of each pair."""
         found = [self._by_material(name, assembly, block_a, block_b) for name in names]
         if self.ground:
-            of_block = self._ground(assembly)
+            of_block = self.ground_stiffness(assembly)
             stiffness = np.fmin(of_block[block_a], of_block[block_b])
             on_ground = ~np.isnan(stiffness)
             given = {"normal_stiffness": stiffness[on_ground], "cohesion": 0.0, "tensile_strength": 0.0}
@@ -183,7 +183,7 @@ class Interfaces:
                     values[on_ground] = given[name]
         return found
 
-    def _ground(self, assembly: Assembly) -> np.ndarray:
+    def ground_stiffness(self, assembly: Assembly) -> np.ndarray:
         """(n_blocks,) array [Pa/m]: stiffness of the ground under each block that is a support with one, else nan."""
         whole = (name.rstrip("0123456789").removesuffix(" ") for name in assembly.names)
         named = zip(assembly.names, whole, strict=True)

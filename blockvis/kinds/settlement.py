@@ -14,6 +14,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import TRUE_OR_FALSE, Key
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import least_reaction, loss_of, mechanism_text
+from blockvis.results.bearing import bearings
 from blockvis.text import force_text
 from solver import mechanics
 
@@ -124,7 +125,7 @@ class SettlementKind(AnalysisKind):
             last = path[-1]
             lines.append(f"last reaction        {reaction(last.reaction, last)}")
             lines.append(f"last settlement      {last.parameter:12.6g} {response.settlements[last.phase].unit}")
-        return lines
+        return lines + [str(bearing) for bearing in (bearings(response, path[-1]) if path else [])]
 
     def title(self, response: solver.Response) -> str:
         """Say how it ended."""

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from structures import case_from, run_command
+from structures import case_from, drawn, rectangle, run_command
 
 import solver
 from blockvis import generators
@@ -170,3 +170,40 @@ def test_what_follows_the_geometry_refuses_strength():
         solver.InterfaceLaw(cohesion=-1.0)
     with pytest.raises(ValueError, match="compressive_strength is 0 Pa; it must be positive"):
         solver.InterfaceLaw(compressive_strength=0.0)
+
+
+GROUND = """
+[geometry]
+file = "beam.json"
+[[supports]]
+name = "left"
+outline = [[-1.05, -0.3], [-0.95, -0.3], [-0.95, 0.0], [-1.05, 0.0]]
+stiffness = 2e6
+[[supports]]
+name = "right"
+role = "moving"
+outline = [[0.95, -0.3], [1.05, -0.3], [1.05, 0.0], [0.95, 0.0]]
+stiffness = 2e6
+[settlement]
+direction = [0.0, -1.0]
+increment = 0.01
+limit = 0.01
+[output]
+animation = false
+"""
+
+
+@pytest.mark.slow
+def test_the_summary_tells_what_the_ground_carries(tmp_path, capsys):
+    """A beam on two footings: half of its weight on each, and the tilt of their settlement."""
+    drawn(tmp_path / "beam.json", [rectangle(-1.2, 0.0, 1.2, 0.4)], names=["beam"])
+    (tmp_path / "case.toml").write_text(GROUND, encoding="utf-8")
+    assert run_command(tmp_path / "case.toml", "-o", tmp_path / "out") == 0
+    said = re.findall(
+        r"ground '(\w+)': (\S+) N, pressure (\S+) Pa in the mean .* turned by (\S+) rad", capsys.readouterr().out
+    )
+    assert [name for name, *_ in said] == ["left", "right"]
+    for _, force, pressure, tilt in said:
+        assert float(force) == pytest.approx(2.4 * 0.4 * 2000.0 * solver.GRAVITY / 2.0, rel=1e-2)
+        assert float(pressure) == pytest.approx(float(force) / 0.1, rel=1e-3)
+        assert float(tilt) == pytest.approx(0.005, rel=0.03)
