@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,14 +19,25 @@ class InterfaceLaw:
     friction_coefficient : float
         Ratio of shear to normal force at sliding, from 0 to anything finite.
     cohesion : float [Pa]
-        Shear strength without compression, in limit loads only; none by default.
+        Shear strength without compression; none by default.
     compressive_strength : float [Pa]
         In limit loads only; infinite by default.
+    tensile_strength : float [Pa]
+        None by default; at most cohesion over friction coefficient, where the shear strength ends.
+    normal_stiffness, shear_stiffness : float [Pa/m]
+        Of elastic joints, whose give stays; infinite, or 0, for rigid ones.
+    fracture_opening, fracture_slip : float [m]
+        Opening and slip over which a point's cohesion and tensile strength fall to nothing; 0 for brittle joints.
     """
 
     friction_coefficient: float = 0.6
     cohesion: float = 0.0
     compressive_strength: float = np.inf
+    tensile_strength: float = 0.0
+    normal_stiffness: float = np.inf
+    shear_stiffness: float = np.inf
+    fracture_opening: float = 0.0
+    fracture_slip: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -37,11 +48,47 @@ class InterfaceLaw:
             raise ValueError(f"cohesion is {self.cohesion:g} Pa; it must be a finite number of at least 0")
         if not self.compressive_strength > 0.0:
             raise ValueError(f"compressive_strength is {self.compressive_strength:g} Pa; it must be positive")
+        tension = self.tensile_strength
+        if not (np.isfinite(tension) and tension >= 0.0):
+            raise ValueError(f"tensile_strength is {tension:g} Pa; it must be a finite number of at least 0")
+        if mu * tension > self.cohesion * (1.0 + 1e-9):
+            raise ValueError(
+                f"tensile_strength is {tension:g} Pa, above cohesion / friction_coefficient {self.cohesion / mu:g} Pa, "
+                "where the joint slides; give at most that, or more cohesion"
+            )
+        for name in ("normal_stiffness", "shear_stiffness"):
+            value = getattr(self, name)
+            if not value >= 0.0:
+                raise ValueError(f"{name} is {value:g} Pa/m; it must be positive, or left out for a rigid joint")
+        for name in ("fracture_opening", "fracture_slip"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
+            if value > 0.0 and self.cohesion == 0.0 and tension == 0.0:
+                raise ValueError(
+                    f"{name} is {value:g} m, but there is no strength to lose; give cohesion, or leave it out"
+                )
+
+    def with_friction(self, factor: float) -> InterfaceLaw:
+        """Return the law with friction times a factor, and no tension where its shear strength then ends."""
+        mu = factor * self.friction_coefficient
+        tension = min(self.tensile_strength, self.cohesion / mu) if mu > 0.0 else self.tensile_strength
+        return replace(self, friction_coefficient=mu, tensile_strength=tension)
 
     @property
-    def dry(self) -> bool:
-        """Whether there is neither cohesion nor crushing."""
-        return self.cohesion == 0.0 and self.compressive_strength == np.inf
+    def crushes(self) -> bool:
+        """Whether there is a compressive strength."""
+        return bool(self.compressive_strength < np.inf)
+
+    @property
+    def bonds(self) -> bool:
+        """Whether there is cohesion or tensile strength."""
+        return self.cohesion > 0.0 or self.tensile_strength > 0.0
+
+    @property
+    def elastic(self) -> bool:
+        """Whether joints give and stay so."""
+        return 0.0 < self.normal_stiffness < np.inf or 0.0 < self.shear_stiffness < np.inf
 
 
 @dataclass(frozen=True)
@@ -95,11 +142,23 @@ class Interfaces:
         Either order.
     scatter : JointScatter, optional
         Factors on the friction of each pair of blocks; without it joints of the same materials are alike.
+    ground : mapping from str to float [Pa/m]
+        Stiffness of the ground under supports, by their names, or those of which they are numbered pieces: joints with
+        them have it for their normal stiffness, and neither tension nor cohesion.
     """
 
     default: InterfaceLaw = field(default_factory=InterfaceLaw)
     pairs: Mapping[tuple[str, str], InterfaceLaw] = field(default_factory=dict)
     scatter: JointScatter | None = None
+    ground: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check the ground."""
+        for name, stiffness in self.ground.items():
+            if not (np.isfinite(stiffness) and stiffness > 0.0):
+                raise ValueError(
+                    f"the ground under '{name}' has a stiffness of {stiffness:g} Pa/m; it must be positive"
+                )
 
     def friction(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
         """(n,) array: friction coefficient between the blocks of each pair."""
@@ -108,22 +167,52 @@ class Interfaces:
 
     def strength(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Two (n,) arrays [Pa]: cohesion and compressive strength between the blocks of each pair."""
-        cohesion, compressive = (
-            self._by_material(name, assembly, block_a, block_b) for name in ("cohesion", "compressive_strength")
-        )
+        cohesion, compressive = self.values(assembly, block_a, block_b, "cohesion", "compressive_strength")
         return cohesion, compressive
+
+    def values(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray, *names: str) -> list[np.ndarray]:
+        """(n,) array of each named attribute of the laws between the blocks of each pair."""
+        found = [self._by_material(name, assembly, block_a, block_b) for name in names]
+        if self.ground:
+            of_block = self.ground_stiffness(assembly)
+            stiffness = np.fmin(of_block[block_a], of_block[block_b])
+            on_ground = ~np.isnan(stiffness)
+            given = {"normal_stiffness": stiffness[on_ground], "cohesion": 0.0, "tensile_strength": 0.0}
+            for name, values in zip(names, found, strict=True):
+                if name in given:
+                    values[on_ground] = given[name]
+        return found
+
+    def ground_stiffness(self, assembly: Assembly) -> np.ndarray:
+        """(n_blocks,) array [Pa/m]: stiffness of the ground under each block that is a support with one, else nan."""
+        whole = (name.rstrip("0123456789").removesuffix(" ") for name in assembly.names)
+        named = zip(assembly.names, whole, strict=True)
+        return np.array([self.ground.get(name, self.ground.get(one, np.nan)) for name, one in named])
+
+    @property
+    def laws(self) -> tuple[InterfaceLaw, ...]:
+        """All laws."""
+        return self.default, *self.pairs.values()
 
     @property
     def dry(self) -> bool:
-        """Whether no interface has cohesion or crushes."""
-        return self.default.dry and all(law.dry for law in self.pairs.values())
+        """Whether no interface has strength but friction, and none crushes."""
+        return not any(law.bonds or law.crushes for law in self.laws)
 
-    def refuse_strength(self, analysis: str) -> None:
-        """Raise ``ValueError`` for cohesion or compressive strength in an analysis that follows dry joints."""
-        if not self.dry:
-            raise ValueError(
-                f"{analysis} follows dry joints; leave cohesion and compressive_strength out, which limit loads take"
-            )
+    @property
+    def mortar(self) -> bool:
+        """Whether an interface has cohesion, tensile strength or stiffness."""
+        return bool(self.ground) or any(law.bonds or law.elastic for law in self.laws)
+
+    def refuse_crushing(self, analysis: str) -> None:
+        """Raise ``ValueError`` for compressive strength in an analysis that follows a path."""
+        if any(law.crushes for law in self.laws):
+            raise ValueError(f"crushing along the path of {analysis} is not followed; leave compressive_strength out")
+
+    def refuse_mortar(self, what: str) -> None:
+        """Raise ``ValueError`` for strength or stiffness of joints where only dry rigid ones are known."""
+        if self.mortar:
+            raise ValueError(f"{what} knows dry joints only; leave cohesion, tensile_strength and stiffness out")
 
     def _by_material(self, name: str, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
         if not self.pairs:

@@ -248,24 +248,25 @@ _CUT = ValueKind(
 
 def _strength() -> tuple[Key, ...]:
     return (
-        Key(
-            "cohesion",
-            NOT_NEGATIVE,
-            "Cohesion of the joints, in limit loads without a settlement",
-            1e5,
-            "Pa",
-            solver.InterfaceLaw.cohesion,
-        ),
-        Key(
-            "compressive_strength",
-            POSITIVE,
-            "Compressive strength of the joints, in limit loads without a settlement",
-            5e6,
-            "Pa",
-            otherwise="infinite",
-        ),
-    )
+        Key("cohesion", NOT_NEGATIVE, "Cohesion of the joints; a point that has slipped or opened has lost it",
+            1e5, "Pa", solver.InterfaceLaw.cohesion),
+        Key("tensile_strength", NOT_NEGATIVE, "Tensile strength of the joints, at most cohesion over friction; "
+            "lost with the cohesion", 5e4, "Pa", solver.InterfaceLaw.tensile_strength),
+        Key("compressive_strength", POSITIVE, "Compressive strength of the joints, in limit loads without a settlement",
+            5e6, "Pa", otherwise="infinite"),
+        Key("normal_stiffness", POSITIVE, "Stiffness of the joints across, along a path", 5e9, "Pa/m",
+            otherwise="rigid"),
+        Key("shear_stiffness", POSITIVE, "Stiffness of the joints along, along a path", 2e9, "Pa/m",
+            otherwise="rigid"),
+        Key("fracture_opening", NOT_NEGATIVE, "Opening over which a point loses its strength", 1e-4, "m",
+            solver.InterfaceLaw.fracture_opening),
+        Key("fracture_slip", NOT_NEGATIVE, "Slip over which a point loses its strength", 5e-4, "m",
+            solver.InterfaceLaw.fracture_slip),
+    )  # fmt: skip
 
+
+#: Keys of the strength and the stiffness of joints.
+OF_MORTAR = tuple(key.name for key in _strength())
 
 PARAMETERS = Section(
     "geometry.parameters",
@@ -378,6 +379,8 @@ SUPPORTS = Section(
             [[-0.5, -0.3], [4.0, -0.3], [4.0, 0.0], [-0.5, 0.0]], "m", required=True),
         Key("levels", _LEVELS, "In space, z of its bottom and top", [-0.3, 0.0], "m", otherwise="required in space"),
         Key("material", TEXT, "Material, for [[interfaces]]", "rock", otherwise="none"),
+        Key("stiffness", POSITIVE, "Subgrade modulus of the ground, which gives under the blocks on it and does not "
+            "pull; a settlement is that of the ground below", 5e7, "Pa/m", otherwise="rigid"),
     ),
     several=True,
 )  # fmt: skip

@@ -105,13 +105,13 @@ def case_text(
         *([_table(BOND, {"walls": list(walls), "bond": "running", "brick": [0.25, 0.075]}, WALLS)] if walls else ()),
         _roles(found, ground),
         *(
-            _table(case_keys.SUPPORTS, support, leaving=("material",) if in_space else ("material", "levels"))
+            _table(case_keys.SUPPORTS, support, leaving=("material", "stiffness", *(() if in_space else ("levels",))))
             for support in ground.supports
         ),
         _table(
             case_keys.MATERIAL,
             {"density": None if known else DENSITY, "friction_coefficient": FRICTION},
-            leaving=("cohesion", "compressive_strength"),
+            leaving=case_keys.OF_MORTAR,
         ),
     ]
     if ground.settles:

@@ -155,7 +155,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         roles=roles,
         role_places=placed,
         supports=tuple(_support(table) for table in top.tables("supports")),
-        **_law(keys.MATERIAL.read(top.table("material"))),
+        **_material(top.table("material")),
         densities={name: keys.MATERIALS.read(materials.table(name))["density"] for name in materials.values},
         interfaces=dict(_interface(table) for table in top.tables("interfaces")),
         imperfections=_imperfections(top),
@@ -269,9 +269,22 @@ def refuse_increment_seconds(case: Case, seconds: float | None) -> None:
 
 
 def _law(values: dict[str, Any]) -> dict[str, Any]:
-    """Take the compressive strength that is not given for infinite."""
-    strength = values["compressive_strength"]
-    return values | {"compressive_strength": math.inf if strength is None else strength}
+    """Take the compressive strength and the stiffness that are not given for infinite."""
+    infinite = ("compressive_strength", "normal_stiffness", "shear_stiffness")
+    return values | {name: math.inf for name in infinite if values[name] is None}
+
+
+def _material(table: Table) -> dict[str, Any]:
+    values = _law(keys.MATERIAL.read(table))
+    _checked_law(table, {name: value for name, value in values.items() if name != "density"})
+    return values
+
+
+def _checked_law(table: Table, values: Mapping[str, Any]) -> solver.InterfaceLaw:
+    try:
+        return solver.InterfaceLaw(**values)
+    except ValueError as error:
+        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 
 
 def _support(table: Table) -> Mapping[str, Any]:
@@ -283,7 +296,7 @@ def _support(table: Table) -> Mapping[str, Any]:
 
 def _interface(table: Table) -> tuple[tuple[str, str], solver.InterfaceLaw]:
     values = _law(keys.INTERFACES.read(table))
-    return values.pop("materials"), solver.InterfaceLaw(**values)
+    return values.pop("materials"), _checked_law(table, values)
 
 
 def _imperfections(top: Table) -> tuple[Imperfection, ...]:

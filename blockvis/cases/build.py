@@ -290,9 +290,10 @@ def _with_densities(case: Case, sketch: layout.Layout) -> layout.Layout:
 def case_interfaces(case: Case) -> solver.Interfaces:
     """Build the interface laws of a case."""
     return solver.Interfaces(
-        solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength),
+        case.law,
         dict(case.interfaces),
         scatter=joint_scatter(case.imperfections),
+        ground=case.ground,
     )
 
 

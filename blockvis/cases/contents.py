@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +90,11 @@ class Case:
     friction_coefficient: float = solver.InterfaceLaw.friction_coefficient
     cohesion: float = 0.0
     compressive_strength: float = math.inf
+    tensile_strength: float = 0.0
+    normal_stiffness: float = math.inf
+    shear_stiffness: float = math.inf
+    fracture_opening: float = 0.0
+    fracture_slip: float = 0.0
     interfaces: Mapping[tuple[str, str], solver.InterfaceLaw] = field(default_factory=dict)
     imperfections: tuple[Imperfection, ...] = ()
     settlements: tuple[solver.Settlement, ...] = ()
@@ -109,3 +114,18 @@ class Case:
     underlay: str | None = None
     sight: Sight | None = None
     cut: Cut | None = None
+
+    @property
+    def law(self) -> solver.InterfaceLaw:
+        """The law of joints for which nothing else is said."""
+        return solver.InterfaceLaw(**{one.name: getattr(self, one.name) for one in fields(solver.InterfaceLaw)})
+
+    @property
+    def laws(self) -> tuple[solver.InterfaceLaw, ...]:
+        """All laws."""
+        return self.law, *self.interfaces.values()
+
+    @property
+    def ground(self) -> dict[str, float]:
+        """Stiffness [Pa/m] of the ground under supports, by their names."""
+        return {str(s["name"]): float(s["stiffness"]) for s in self.supports if s.get("stiffness") is not None}

@@ -108,7 +108,7 @@ def explain(
         if case.ties:
             raise ValueError(f"{case.ties[0].where}: blockvis explain knows no ties; leave [[ties]] out")
         drawn = case_assembly(case)
-        needs_dry_joints(case)
+        needs_dry_joints(case, "blockvis explain")
         mechanics.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
         ground = ground_of(drawn, case.explain, case.source)

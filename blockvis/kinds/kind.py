@@ -282,11 +282,29 @@ def needs_live_load(case: Case) -> None:
         )
 
 
-def needs_dry_joints(case: Case) -> None:
-    """Raise ValueError where a joint of a case has cohesion or finite strength."""
-    laws = [solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength)]
-    if not all(law.dry for law in [*laws, *case.interfaces.values()]):
+#: Keys of joints that are more than dry ones.
+_NOT_DRY = ("cohesion", "tensile_strength", "compressive_strength", "normal_stiffness", "shear_stiffness")
+
+
+def _interfaces(case: Case) -> solver.Interfaces:
+    return solver.Interfaces(case.law, dict(case.interfaces), ground=case.ground)
+
+
+def needs_no_crushing(case: Case) -> None:
+    """Raise ValueError where a joint of a case has a compressive strength, which no path follows, or too much else."""
+    interfaces = _interfaces(case)
+    try:
+        interfaces.refuse_crushing(f"a {case.analysis}")
+        if case.controls.increments == mechanics.INCREMENTS[1]:
+            interfaces.refuse_mortar(f'[analysis] increments = "{case.controls.increments}"')
+    except ValueError as error:
+        raise ValueError(f"{case.source}: {error}") from None
+
+
+def needs_dry_joints(case: Case, what: str) -> None:
+    """Raise ValueError where a joint of a case has strength but friction, or stiffness."""
+    interfaces = _interfaces(case)
+    if interfaces.mortar or not interfaces.dry:
         raise ValueError(
-            f"{case.source}: cohesion and compressive_strength are for limit loads without a settlement; settlements "
-            "and pushovers follow dry joints"
+            f"{case.source}: {what} knows dry joints only; leave {', '.join(_NOT_DRY)} and stiffness of supports out"
         )

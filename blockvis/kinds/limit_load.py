@@ -138,7 +138,7 @@ class LimitLoadKind(AnalysisKind):
         """Check the keys, and let the last settlement stop where limit loads are wanted."""
         needs_live_load(case)
         if case.settlements:
-            needs_dry_joints(case)
+            needs_dry_joints(case, "a limit load after a settlement")
         settings: LimitLoadSettings = case.settings
         if settings.displacement is not None and not case.settlements:
             raise _displacement_without_settlement(case)

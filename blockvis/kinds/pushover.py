@@ -23,8 +23,8 @@ from .kind import (
     Course,
     RunInput,
     Steps,
-    needs_dry_joints,
     needs_live_load,
+    needs_no_crushing,
     without_increments,
 )
 from .settlement import not_reached, settlement_steps
@@ -80,7 +80,7 @@ class PushoverKind(AnalysisKind):
     def checked(self, case: Case) -> Case:
         """Check that the keys of a case fit together."""
         needs_live_load(case)
-        needs_dry_joints(case)
+        needs_no_crushing(case)
         if case.settings is None:
             raise ValueError(
                 f'{case.source}: [control] is missing; a pushover needs the displacement that grows, block = "..." and '

@@ -14,10 +14,11 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import TRUE_OR_FALSE, Key
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import least_reaction, loss_of, mechanism_text
+from blockvis.results.bearing import bearings
 from blockvis.text import force_text
 from solver import mechanics
 
-from .kind import AnalysisKind, AnalysisRun, Course, RunInput, needs_dry_joints, without_increments
+from .kind import AnalysisKind, AnalysisRun, Course, RunInput, needs_no_crushing, without_increments
 
 #: The methods in words, as ``[analysis] increments`` has them.
 COULOMB, LINEAR_PROGRAM = mechanics.INCREMENTS
@@ -64,7 +65,7 @@ class SettlementKind(AnalysisKind):
                 '"dead"',
                 stacklevel=5,
             )
-        needs_dry_joints(case)
+        needs_no_crushing(case)
         if case.settings and case.controls.increments == LINEAR_PROGRAM:
             raise ValueError(
                 f'{case.source}: [analysis] range = true belongs to increments = "{COULOMB}"; a linear program knows '
@@ -127,7 +128,7 @@ class SettlementKind(AnalysisKind):
             last = path[-1]
             lines.append(f"last reaction        {reaction(last.reaction, last)}")
             lines.append(f"last settlement      {last.parameter:12.6g} {response.settlements[last.phase].unit}")
-        return lines
+        return lines + [str(bearing) for bearing in (bearings(response, path[-1]) if path else [])]
 
     def title(self, response: solver.Response) -> str:
         """Say how it ended."""

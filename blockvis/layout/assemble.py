@@ -198,7 +198,7 @@ def supports_of(supports: Sequence[Mapping[str, Any]], dimension: int) -> Layout
         Names the support and the key.
     """
     in_space = dimension == 3
-    known = {"name", "role", "outline", "density", "material", "levels" if in_space else "thickness"}
+    known = {"name", "role", "outline", "density", "material", "stiffness", "levels" if in_space else "thickness"}
     names = [str(support.get("name", f"support {k}")) for k, support in enumerate(supports)]
     blocks, roles = [], []
     for name, support in zip(names, supports, strict=True):

@@ -221,8 +221,9 @@ def contact_dataset(
         Point arrays ``normal`` and ``tangent`` (n_contacts, 3), ``force`` (n_contacts, 3) on ``block_a`` [N],
         ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``,
         ``utilisation``, the part of the friction that the shear force uses up, ``state``
-        (number of :class:`solver.mechanics.ContactState`), ``carries`` (1 with a force), ``block_a`` and ``block_b``,
-        ``displacement`` and ``reference`` as of :func:`block_dataset`; its field arrays, and ``state_names``. In
+        (number of :class:`solver.mechanics.ContactState`), with mortar ``intact``, the part of its strength that is
+        left, ``carries`` (1 with a force), ``block_a`` and ``block_b``, ``displacement`` and ``reference`` as of
+        :func:`block_dataset`; its field arrays, and ``state_names``. In
         frames of a fall, which are no equilibrium, forces are 0. In space ``shear_force`` is the size of the vector
         ``shear`` [N], and ``slip`` [m] is how far block a has moved along block b there since the layout.
     """
@@ -253,6 +254,7 @@ def contact_grid(
         "friction": np.asarray(increment.friction, dtype=float),
         "utilisation": part_of_friction(balanced, increment.friction) * carries,
         "state": states.astype(np.int32),
+        **({"intact": increment.state.intact} if len(increment.state.intact) else {}),
         "carries": carries.astype(np.int32),
         "block_a": contacts.block_a.astype(np.int32),
         "block_b": contacts.block_b.astype(np.int32),

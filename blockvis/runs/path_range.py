@@ -37,17 +37,17 @@ class Variation:
         ----------
         case : Case
         """
-        laws = {
-            pair: replace(law, friction_coefficient=self.friction_factor * law.friction_coefficient)
-            for pair, law in case.interfaces.items()
-        }
+        laws = {pair: law.with_friction(self.friction_factor) for pair, law in case.interfaces.items()}
         controls = replace(
             case.controls,
             compliance_factor=self.compliance_factor,
             imperfection_factor=self.imperfection_factor,
         )
-        friction = self.friction_factor * case.friction_coefficient
-        return replace(case, friction_coefficient=friction, interfaces=laws, controls=controls)
+        law = case.law.with_friction(self.friction_factor)
+        friction, tension = law.friction_coefficient, law.tensile_strength
+        return replace(
+            case, friction_coefficient=friction, tensile_strength=tension, interfaces=laws, controls=controls
+        )
 
 
 #: One thing at a time, then less friction on softer joints and more on stiffer ones.

@@ -90,7 +90,7 @@ def find_limit_load(
 
     Cohesion c and compressive strength σ of the interfaces, off by default, give each contact point its part A of the
     face between two blocks (half the distance to its neighbours, times the thickness): |T| ≤ μ N + c A and
-    0 ≤ N ≤ σ A, joints still without tension. A face of two corners thus carries moments up to σ A b / 2 with all of
+    -τ A ≤ N ≤ σ A with the tensile strength τ. A face of two corners thus carries moments up to σ A b / 2 with all of
     its force at the ends: more than the stress block of a continuous face, so that crushing at a toe is found later
     than it comes. What crushes moves by the same flow rule.
 
@@ -169,7 +169,10 @@ class _State:
 
 @dataclass(frozen=True)
 class _Problem:
-    """One geometry and its loads in units of block size and mean block load; rows of the free blocks."""
+    """One geometry and its loads in units of block size and mean block load; rows of the free blocks.
+
+    Normal forces are those beyond the largest tension: it is a load of the blocks, in ``dead``.
+    """
 
     assembly: Assembly
     pose: Pose
@@ -185,6 +188,8 @@ class _Problem:
     price: np.ndarray
     cohesion: np.ndarray
     crushing: np.ndarray
+    tension: np.ndarray
+    total: float
     ties: tuple[Tie, ...] = ()
     faces: Faces | None = None
 
@@ -205,7 +210,7 @@ class _Problem:
         vertices = moved_vertices(assembly, pose)
         contacts = find_contacts(assembly, vertices, reach)
         around = contacts if interfaces.dry else find_contacts(assembly, vertices, max(reach, REACH * length))
-        cohesion, crushing = point_strength(assembly, interfaces, contacts, around)
+        cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around)
         friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         if ties:
             # Each is as long as it is, so that all carry.
@@ -213,7 +218,8 @@ class _Problem:
             members = member_contacts(ties, assembly, pose, rest, present_members(ties, rest))
             strength = np.array([ties[i].strength for i in members.features[:, 1]])
             contacts, crushing = joined_contacts([contacts, members]), np.append(crushing, strength)
-            cohesion, friction = (np.append(of, np.zeros(len(members))) for of in (cohesion, friction))
+            none = np.zeros(len(members))
+            cohesion, friction, tension = (np.append(of, none) for of in (cohesion, friction, tension))
         n_dof = loads.dead.shape[1]
         d = dimension_of(n_dof)
         units = unit_lengths(n_dof, length)
@@ -226,10 +232,15 @@ class _Problem:
         if faces is not None:
             matrix = face_wrench_matrix(contacts, faces, pose, length)
         # What a unit of normal force costs in multipliers of the scaled live load.
-        price = np.zeros(len(contacts))
+        price, is_open = np.zeros(len(contacts)), contacts.gaps > closed_gap
+        cohesion, tension = (np.where(is_open, 0.0, strength) for strength in (cohesion, tension))
+        rows = sp.csr_array(matrix)[np.repeat(free, n_dof)]
+        dead = (loads.dead[free] / units / force).ravel()
+        pulled = np.zeros((len(contacts), rows.shape[1] // max(len(contacts), 1)))
+        pulled[:, 0] = tension / force
         if displacement > 0.0:
             total = float(_lengths(live[:, :d]).sum() + _lengths(live[:, d:]).sum())
-            price = np.where(contacts.gaps > closed_gap, contacts.gaps, 0.0) / displacement * (size / total)
+            price = np.where(is_open, contacts.gaps, 0.0) / displacement * (size / total)
         return cls(
             assembly=assembly,
             pose=pose,
@@ -237,14 +248,16 @@ class _Problem:
             friction=friction,
             length=length,
             force=force,
-            matrix=sp.csr_array(matrix)[np.repeat(free, n_dof)],
-            dead=(loads.dead[free] / units / force).ravel(),
+            matrix=rows,
+            dead=dead - rows @ pulled.ravel() if tension.any() else dead,
             live=(live / size).ravel(),
             live_size=size / force,
             live_force=float(np.hypot.reduce(loads.live[free, :d].sum(axis=0))),
             price=price,
-            cohesion=cohesion / force,
-            crushing=crushing / force,
+            cohesion=np.maximum(cohesion - friction * tension, 0.0) / force,
+            crushing=(crushing + tension) / force,
+            tension=tension / force,
+            total=float(np.abs(dead).sum()),
             ties=ties,
             faces=faces,
         )
@@ -277,7 +290,7 @@ class _Problem:
         )
         forces, multiplier = columns @ solution.x[:n], float(solution.x[n]) * with_live
         unbalanced = np.abs(self.matrix @ forces + self.dead + multiplier * self.live)
-        falls = float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * float(np.abs(self.dead).sum())
+        falls = float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * self.total
         motion = -solution.row_dual[:rows]
         return _State(forces.reshape(-1, self.size), multiplier, motion, unbalanced, solution.gap, falls)
 
@@ -355,7 +368,7 @@ class _Problem:
         forces, multiplier, left, solution = solve_without_dilatancy(
             self.matrix, *loads, bound, self.crushing, self.price, normal, change_cost
         )
-        velocity, falls = -solution.row_dual[: len(self.dead)], left > FALLING_FRACTION * float(np.abs(self.dead).sum())
+        velocity, falls = -solution.row_dual[: len(self.dead)], left > FALLING_FRACTION * self.total
         return _State(forces, multiplier, velocity, unbalanced, solution.gap, falls, bound)
 
     def result(self, state: _State, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
@@ -378,7 +391,7 @@ class _Problem:
         kinematic += float(self.price @ state.forces[:, 0])
         room = relative[:, 0] + closer - slope * slip
         balance = self.matrix @ state.forces.ravel() + self.dead + multiplier * self.live
-        total = float(np.abs(self.dead).sum()) or 1.0
+        total = self.total or 1.0
         units = 1.0 / unit_lengths(self.pose.positions.shape[1] + self.pose.rotations.shape[1], self.length)
         mechanism = np.zeros((self.assembly.n_blocks, len(units)))
         size = float(np.abs(velocity).max(initial=0.0)) or 1.0
@@ -386,6 +399,7 @@ class _Problem:
         found = status not in (LimitStatus.UNBOUNDED, LimitStatus.NO_EQUILIBRIUM)
         static = multiplier / self.live_size
         forces = state.forces if self.faces is None else point_forces(self.contacts, self.faces, state.forces)
+        forces = forces - np.column_stack([self.tension, np.zeros((len(forces), forces.shape[1] - 1))])
         nothing = np.inf if status is LimitStatus.UNBOUNDED else np.nan
         return LimitLoad(
             multiplier=static if found else nothing,
@@ -393,7 +407,7 @@ class _Problem:
             certificate=Certificate(
                 equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / total,
                 friction_excess=friction_excess(state.forces, self.friction, self.cohesion) / total,
-                carrying_gap=carrying_gap(self.contacts, state.forces),
+                carrying_gap=carrying_gap(self.contacts, forces),
                 largest_penetration=largest_penetration(self.contacts),
                 duality_gap=abs(kinematic - multiplier) / (1.0 + abs(multiplier)) if found else state.gap,
                 kinematic_violation=float(np.maximum(-room, 0.0).max(initial=0.0)) / size,

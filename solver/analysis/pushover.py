@@ -52,7 +52,9 @@ def pushover_increments(
         raise ValueError("increments = 'linear program' is for settlements; leave it out for a pushover")
     control.check_dimension(assembly)
     check_blocks(assembly, controls.overlap_tolerance)
-    interfaces.refuse_strength("a pushover")
+    interfaces.refuse_crushing("a pushover")
+    if pose is not None:
+        interfaces.refuse_mortar("a pushover from a given pose")
     loads = checked_live(assembly, loads)
     if not assembly.free[assembly.index(control.block)]:
         raise ValueError(f"control block '{control.block}' is a support; name a free block")

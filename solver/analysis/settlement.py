@@ -53,8 +53,10 @@ def settlement_increments(
     """
     controls = controls or Controls()
     check_settlement(assembly, phases, controls, changes, ties)
-    interfaces.refuse_strength("a settlement")
+    interfaces.refuse_crushing("a settlement")
     by_program = controls.increments == LINEAR_PROGRAM
+    if by_program:
+        interfaces.refuse_mortar("increments = 'linear program'")
     if by_program and ties:
         raise ValueError(f"increments = 'linear program' knows no ties ('{ties[0].name}'); leave the key out")
     check_ties(ties, assembly, len(phases))

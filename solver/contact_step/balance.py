@@ -2,7 +2,8 @@
 
 Over the forces f = (N, T) of the closed contact points, with their compliance as metric::
 
-    minimise  1/2 Σ c (f - f⁰)²   subject to   A f + load = 0,   |T| ≤ μ N ≤ μ M,   and, optionally,   r · f = R
+    minimise  1/2 Σ c (f - f⁰)²   subject to   A f + load = 0,   0 ≤ N ≤ M,   |T| ≤ μ N + C,
+              and, optionally,   r · f = R
 
 From f⁰ = 0 these are the forces of least elastic energy, which are unique: those of a structure at rest. Primal-dual
 interior method in the scaling of Nesterov & Todd, see :mod:`.cones`.
@@ -37,7 +38,7 @@ class _Change:
 
 
 class _Iterate:
-    """Forces f inside their friction cones, (μ N, T) = u, with multipliers z inside theirs, and w of the limits M."""
+    """Forces f inside their friction cones, (μ N + C, T) = u, with multipliers z inside theirs, and w of the limits."""
 
     def __init__(
         self,
@@ -46,27 +47,33 @@ class _Iterate:
         compliance: np.ndarray,
         friction: np.ndarray,
         most: np.ndarray,
+        cohesion: np.ndarray,
         load: np.ndarray,
         unit_reaction: np.ndarray | None,
         reaction: float,
     ) -> None:
-        self.limited = np.flatnonzero(np.isfinite(most))
-        self.most = most[self.limited]
+        # Where there is cohesion the cone does not keep normal forces from pulling.
+        upper, lower = np.flatnonzero(np.isfinite(most)), np.flatnonzero(cohesion > 0.0)
+        self.limited = np.concatenate([upper, lower])
+        self.sense = np.concatenate([np.ones(len(upper)), -np.ones(len(lower))])
+        self.limit = np.concatenate([most[upper], np.zeros(len(lower))])
         self.rows, self.reference, self.load = rows, reference, load
         self.unit_reaction, self.reaction = unit_reaction, reaction
         n, self.d = reference.shape
         self.slope = np.ones((n, self.d))
         self.slope[:, 0] = np.maximum(friction, 1e-9)  # A cone without width has no interior.
+        self.offset = np.zeros((n, self.d))
+        self.offset[:, 0] = cohesion
         rigid = np.isinf(most) if np.isinf(most).any() else np.ones(n, dtype=bool)
         self.weight = compliance / float(compliance[rigid, 0].mean())
         # The start lies well inside the cones.
         self.forces = reference.copy()
         self.forces[:, 0] = np.minimum(np.maximum(reference[:, 0], 0.1), 0.5 * most)
         length = np.sqrt((reference[:, 1:] ** 2).sum(axis=1))
-        limit = 0.9 * self.slope[:, 0] * self.forces[:, 0]
+        limit = 0.9 * self.slope[:, 0] * self.forces[:, 0] + 0.9 * cohesion
         self.forces[:, 1:] *= np.minimum(1.0, limit / np.maximum(length, 1e-300))[:, None]
         self.z = np.zeros((self.d, n))
-        self.z[0] = np.maximum(1e-2, 1e-2 / (self.slope * self.forces)[:, 0])
+        self.z[0] = np.maximum(1e-2, 1e-2 / (self.slope * self.forces + self.offset)[:, 0])
         self.yielding = 1e-2 / self.reserve
         self.motion, self.rho, self.count = np.zeros_like(load), 0.0, 2 * n + len(self.limited)
         self.measure()
@@ -74,11 +81,11 @@ class _Iterate:
     @property
     def reserve(self) -> np.ndarray:
         """(k,) array: what is missing from limited normal forces to their limit."""
-        return np.asarray(self.most - self.forces[self.limited, 0])
+        return np.asarray(self.limit - self.sense * self.forces[self.limited, 0])
 
     def measure(self) -> None:
         """Compute the forces out of balance and the mean product."""
-        self.u = (self.slope * self.forces).T
+        self.u = (self.slope * self.forces + self.offset).T
         self.unbalanced = self.load + self.rows.resultant(self.forces)
         self.reaction_error = 0.0
         if self.unit_reaction is not None:
@@ -102,7 +109,7 @@ class _Iterate:
         self.solve = self.rows.factorised(self.stiffness, np.zeros_like(self.load))
         metric = self.weight * (self.forces - self.reference)
         self.error = metric + self.rows.relative(self.motion) - self.slope * self.z.T
-        self.error[self.limited, 0] += self.yielding
+        self.error[self.limited, 0] += self.sense * self.yielding
         if self.unit_reaction is not None:
             self.error = self.error + self.rho * self.unit_reaction
             self.unit_forces = self._forces_by(self.unit_reaction)
@@ -120,7 +127,7 @@ class _Iterate:
         """Newton's direction with what the products, those of cones in the scaling, are to change by."""
         target = self.scaling.scaled(quotient(products, self.scaling.scaled_point))
         distances = self.slope * target.T - self.error
-        distances[self.limited, 0] -= yielding_products / self.reserve
+        distances[self.limited, 0] -= self.sense * yielding_products / self.reserve
         forces = self._forces_by(distances)
         motion, rho = self.solve(self.unbalanced + self.rows.resultant(forces)), 0.0
         if self.unit_reaction is not None:
@@ -130,12 +137,12 @@ class _Iterate:
             forces = forces - rho * self.unit_forces
         forces = forces - self._forces_by(self.rows.relative(motion))
         z = target - np.einsum("nij,jn->in", self.hessian, (self.slope * forces).T)
-        yielding = (yielding_products + self.yielding * forces[self.limited, 0]) / self.reserve
+        yielding = (yielding_products + self.yielding * self.sense * forces[self.limited, 0]) / self.reserve
         return _Change(forces, z, yielding, motion, rho)
 
     def longest(self, change: _Change) -> float:
         """Largest part of a change, at most 1, that keeps everything inside."""
-        steepest = float((change.forces[self.limited, 0] / self.reserve).max(initial=1.0))
+        steepest = float((self.sense * change.forces[self.limited, 0] / self.reserve).max(initial=1.0))
         steepest = float((-change.yielding / self.yielding).max(initial=steepest))
         in_cones = min(longest_step(self.u, (self.slope * change.forces).T), longest_step(self.z, change.z))
         return min(1.0 / steepest, in_cones)
@@ -143,7 +150,7 @@ class _Iterate:
     def mean_after(self, change: _Change, part: float) -> float:
         """Mean product after a part of a change."""
         u = self.u + part * (self.slope * change.forces).T
-        reserve = self.reserve - part * change.forces[self.limited, 0]
+        reserve = self.reserve - part * self.sense * change.forces[self.limited, 0]
         of_limits = float(reserve @ (self.yielding + part * change.yielding))
         return (float((u * (self.z + part * change.z)).sum()) + of_limits) / self.count
 
@@ -165,6 +172,7 @@ def nearest_equilibrium(
     unit_reaction: np.ndarray | None = None,
     reaction: float = 0.0,
     most: np.ndarray | None = None,
+    cohesion: np.ndarray | None = None,
 ) -> np.ndarray:
     """Find the forces in equilibrium within friction that are nearest to given ones.
 
@@ -185,6 +193,8 @@ def nearest_equilibrium(
         R.
     most : (n,) array, optional
         M; no limits by default.
+    cohesion : (n,) array, optional
+        C; none by default.
 
     Returns
     -------
@@ -200,7 +210,8 @@ def nearest_equilibrium(
             raise NotSolved("nothing touches the free blocks")
         return reference
     most = np.full(len(reference), np.inf) if most is None else most
-    point = _Iterate(rows, reference, compliance, friction, most, load, unit_reaction, reaction)
+    cohesion = np.zeros(len(reference)) if cohesion is None else cohesion
+    point = _Iterate(rows, reference, compliance, friction, most, cohesion, load, unit_reaction, reaction)
     best, part = (point.residual, point.forces), 1.0
     for _ in range(ITERATIONS):
         converged = point.residual < BALANCED and point.mean < CONVERGED * max(1.0, float(point.forces[:, 0].max()))
@@ -221,7 +232,8 @@ def nearest_equilibrium(
         correction *= np.minimum(1.0, 10.0 * point.mean / np.maximum(np.abs(correction).sum(axis=0), 1e-300))
         products = -present - correction
         products[0] += 2.0 * centring * point.mean
-        closing = np.clip(-change.forces[point.limited, 0] * change.yielding, -10.0 * point.mean, 10.0 * point.mean)
+        closing = -point.sense * change.forces[point.limited, 0] * change.yielding
+        closing = np.clip(closing, -10.0 * point.mean, 10.0 * point.mean)
         change = point.direction(products, centring * point.mean - yielding_products - closing)
         part = 0.995 * point.longest(change)
         point.take(change, part)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Protocol
 
 import numpy as np
 
@@ -72,7 +73,15 @@ def joined_contacts(groups: Sequence[Contacts]) -> Contacts:
     return Contacts(*(np.concatenate([getattr(g, field.name) for g in groups]) for field in fields(Contacts)))
 
 
-def matched_contacts(contacts: Contacts, before: Contacts) -> tuple[np.ndarray, np.ndarray]:
+class Named(Protocol):
+    """What has features that name contact points."""
+
+    @property
+    def features(self) -> np.ndarray:
+        """(n, 3) or (n, 4) int array."""
+
+
+def matched_contacts(contacts: Named, before: Named) -> tuple[np.ndarray, np.ndarray]:
     """Find each contact point among those before.
 
     Returns
@@ -88,3 +97,34 @@ def matched_contacts(contacts: Contacts, before: Contacts) -> tuple[np.ndarray, 
     order = np.argsort(earlier_keys, kind="stable")
     place = order[np.minimum(np.searchsorted(earlier_keys[order], keys), len(earlier_keys) - 1)]
     return place, earlier_keys[place] == keys
+
+
+def successors(
+    before: Contacts, vanished: np.ndarray, contacts: Contacts, near: float, length: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find the contact points that stand where others of the same two blocks have vanished.
+
+    Parameters
+    ----------
+    before : Contacts
+    vanished : (k,) int array
+        Numbers of those that are not among the contact points any more.
+    contacts : Contacts
+    near, length : float [m]
+        Difference up to which points are equally near, and largest distance.
+
+    Returns
+    -------
+    row : (m,) int array
+        Numbers in ``vanished``; one that is near to several is there several times.
+    successor : (m,) int array
+    """
+    apart = np.linalg.norm(before.points[vanished][:, None] - contacts.points[None], axis=2)
+    one, other = (
+        np.sort(np.stack([c.block_a[k], c.block_b[k]], axis=1), axis=1)
+        for c, k in ((before, vanished), (contacts, slice(None)))
+    )
+    apart = np.where((one[:, None] == other[None]).all(axis=2), apart, np.inf)
+    least = apart.min(axis=1)
+    row, successor = np.nonzero((apart <= least[:, None] + near) & (apart < length))
+    return row, successor

@@ -13,7 +13,7 @@ from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import block_forces, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.program.admissible import EquilibriumBounds, admissible, in_equilibrium, unlimited
+from solver.program.admissible import EquilibriumBounds, admissible, in_equilibrium
 from solver.program.model import Model
 from solver.ties import is_member
 from solver.tolerances import COMPUTED_GAP
@@ -57,8 +57,8 @@ class EquilibriumChecks:
         except NotSolved:
             contacts, friction = self._contacts_at(place)
             self.stepper.programs += 1
-            limits = self.stepper.members.force_limits(contacts, gap)
-            return in_equilibrium(self.model, place.pose, contacts, friction, gap, limits)
+            beyond, limits = self.stepper.force_limits(place, contacts, gap)
+            return in_equilibrium(self.model, place.pose, beyond, friction, gap, limits)
         return True
 
     def nearest(self, place: Place, gap: float, reaction: float | None = None, at_rest: bool = False) -> np.ndarray:
@@ -79,16 +79,15 @@ class EquilibriumChecks:
         """
         model, free = self.model, self.stepper.free
         contacts, friction = self._contacts_at(place)
-        limits = self.stepper.members.force_limits(contacts, gap)
-        least, most = (unlimited(len(contacts)) if limits is None else limits).T
-        closed = (contacts.gaps <= gap * model.length) | is_member(contacts)
+        beyond_give, limits = self.stepper.force_limits(place, contacts, gap)
+        closed = (beyond_give.gaps <= gap * model.length) | limits.hold | is_member(contacts)
         matrix = wrench_matrix(contacts, place.pose, model.length)
         live, live_size = model.scaled_live
         load = (model.scaled_load_at(place.pose) + place.multiplier * live_size * live)[free].ravel()
         reference = np.zeros_like(contacts.points) if at_rest else self.stepper.transferred(place, contacts)[0]
         # The program is that of the normal forces beyond the least ones.
         base = np.zeros_like(reference)
-        base[:, 0] = least
+        base[:, 0] = limits.least
         rows = ContactRows(matrix, free)[closed]
         unit_reaction = None if reaction is None else self._reaction_rows(place, matrix, len(contacts))[closed]
         beyond = 0.0
@@ -99,12 +98,13 @@ class EquilibriumChecks:
         forces[closed] = base[closed] + nearest_equilibrium(
             rows,
             (reference - base)[closed],
-            self.stepper.compliance(contacts)[closed],
+            self.stepper.compliance(contacts, self.stepper.mortar.points(place, contacts))[closed],
             friction[closed],
             load + rows.resultant(base[closed]),
             unit_reaction,
             beyond,
-            (most - least)[closed],
+            (limits.most - limits.least)[closed],
+            limits.cohesion[closed],
         )
         return forces
 
@@ -168,8 +168,8 @@ class EquilibriumChecks:
         """Bounds of the reaction or multiplier in equilibrium at a place."""
         rate = None if self.model.live is not None else self.driver.rate(place.s)
         contacts, friction = self._contacts_at(place)
-        limits = self.stepper.members.force_limits(contacts, gap)
-        bounds = admissible(self.model, place.pose, contacts, friction, rate, gap=gap, limits=limits)
+        beyond, limits = self.stepper.force_limits(place, contacts, gap)
+        bounds = admissible(self.model, place.pose, beyond, friction, rate, gap=gap, limits=limits)
         self.stepper.programs += bounds.programs
         return bounds
 

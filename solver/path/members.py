@@ -8,8 +8,8 @@ import numpy as np
 
 from solver.geometry.contacts import Contacts, joined_contacts
 from solver.kinematics import Pose
-from solver.program.admissible import unlimited
 from solver.program.model import Model
+from solver.program.strength import ForceLimits
 from solver.ties import (
     ABSENT,
     BROKEN,
@@ -85,18 +85,16 @@ class Members:
         largest[members] = self.strength[contacts.features[members, 1]]
         return largest
 
-    def force_limits(self, contacts: Contacts, gap: float) -> np.ndarray | None:
-        """(n, 2) array: least and largest normal forces of contact points at a pose; None without members.
+    def force_limits(self, contacts: Contacts, gap: float) -> ForceLimits:
+        """Limits of the forces of contact points at a pose.
 
         A member may carry what it carries anywhere within a part of the gap of contact points, in block sizes.
         """
-        members = is_member(contacts)
-        if not members.any():
-            return None
-        limits, number = unlimited(len(contacts)), contacts.features[members, 1]
+        members, limits = is_member(contacts), ForceLimits.dry(len(contacts))
+        number = contacts.features[members, 1]
         give = GIVE * gap * np.array([-1.0, 1.0])
         forces = (give - contacts.gaps[members, None] / self.model.length) / self.compliance[number, None]
-        limits[members] = np.clip(forces, 0.0, self.strength[number, None])
+        limits.least[members], limits.most[members] = np.clip(forces, 0.0, self.strength[number, None]).T
         return limits
 
     def after(self, contacts: Contacts, forces: np.ndarray, lengths: np.ndarray) -> np.ndarray:

@@ -121,12 +121,14 @@ class Path:
             self._remove_blocks(fell_at)
             place = self.stepper.members.installed(place, self.number)
         else:
-            place = self.stepper.members.installed(Place.unloaded(start), self.number, ties_at)
+            place = self.stepper.unloaded(start, self.number, ties_at)
             resting = self._at_rest(place)
             if resting is None:
                 # Joints that the drawing leaves open close.
                 closed = self.fall.relaxed(place, JUMP)
-                resting = None if closed is None else self._at_rest(replace(closed, contacts=None, velocity=None))
+                resting = None
+                if closed is not None:
+                    resting = self._at_rest(self.stepper.whole(replace(closed, contacts=None, velocity=None)))
             place = resting or place
         return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
 
@@ -169,7 +171,10 @@ class Path:
                     return None
                 forces, place = bounds.forces, replace(place, multiplier=bounds.high)
         contacts = self.stepper.contacts_at(place)
-        trial = np.where(forces[:, :1] > 0.0, forces, -np.eye(forces.shape[1])[0])
+        beyond = forces.copy()
+        beyond[:, 0] += self.stepper.mortar.points(place, contacts).tension
+        trial = np.where(beyond[:, :1] > 0.0, beyond, -np.eye(forces.shape[1])[0])
+        place = self.stepper.mortar.at_rest(place, contacts, forces)
         return replace(place, contacts=contacts, forces=forces, trial=trial, followed=forces[:, 0])
 
     # The loop ----------------------------------------------------------------------------------------------------
@@ -304,7 +309,11 @@ class Path:
         refining = enclosing or place.s < state.refine_until
         length = self._length(state, target)
         try:
-            new, motion, error = self.stepper.step(place, length, viscosity=REFINED if refining else 1.0)
+            strength = np.inf
+            if length > FIRST_STEP * unit:
+                strength = REFUSED * self.largest_lag * self.stepper.weight
+            viscosity = REFINED if refining else 1.0
+            new, motion, error = self.stepper.step(place, length, viscosity=viscosity, strength=strength)
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))
         if self._may_be_wedged(new, error):
@@ -313,7 +322,8 @@ class Path:
                 return state, Outcome.LOCKED
             if error.penetration > WEDGED and length > FIRST_STEP * unit:
                 return replace(state, step=length / 3.0), None
-        measure = max(error.lag / self.largest_lag, error.turn / self.largest_turn)
+        lag = error.lag + self.stepper.mortar.lost(place, new) / self.stepper.weight
+        measure = max(lag / self.largest_lag, error.turn / self.largest_turn)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
         if not self._is_on_path(new, error, length, refining):
@@ -476,7 +486,7 @@ class Path:
         """Multiplier at the place beyond, at or below zero; None where equilibrium itself is lost, not the capacity."""
         if self.model.live is None:
             return None
-        unloaded = self.stepper.members.installed(Place.unloaded(state.start), self.number)
+        unloaded = self.stepper.unloaded(state.start, self.number)
         first, bounds = self.checks.bounds(unloaded), self.checks.bounds(beyond, CLOSING_GAP)
         vanishes = state.place.multiplier <= VANISHING * first.high
         return bounds.high if vanishes and bounds.in_equilibrium and bounds.high <= 0.0 else None

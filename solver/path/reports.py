@@ -51,18 +51,24 @@ class Reports:
         ties = self.stepper.members.told(contacts, check.forces, place.pose, place.tie_lengths)
         support_forces = on_supports(model, contacts, place.pose, check.forces)
         between = ~is_member(contacts)
+        gaps, limits = self.stepper.joint_limits(place, contacts, check.forces)
+        beyond, cohesion = check.forces.copy(), limits.cohesion[between]
+        beyond[:, 0] -= limits.least
         contacts, forces, friction = contacts[between], check.forces[between], check.friction[between]
+        # Give of elastic joints is neither a gap nor a penetration.
+        in_place = replace(contacts, gaps=gaps[between])
         certificate = Certificate(
             equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
-            friction_excess=friction_excess(forces, friction) / model.total_load,
-            carrying_gap=carrying_gap(contacts, forces),
-            largest_penetration=largest_penetration(contacts),
+            friction_excess=friction_excess(beyond[between], friction, cohesion) / model.total_load,
+            carrying_gap=carrying_gap(in_place, forces),
+            largest_penetration=largest_penetration(in_place),
             duality_gap=bounds.gap,
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
         notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
         self.notes = []
         state = self._state(place.pose, contacts, forces, friction, velocity, support_forces, ties)
+        state = replace(state, intact=self.stepper.mortar.intact(place, contacts))
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
         return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
 

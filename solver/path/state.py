@@ -12,6 +12,32 @@ from solver.program.admissible import EquilibriumBounds
 
 
 @dataclass(frozen=True)
+class Bonds:
+    """The points of joints with mortar or stiffness that were closed at rest: a point that is not among them has none.
+
+    Attributes
+    ----------
+    features : (n, 3) int array
+        That name the contact points.
+    areas : (n,) array [m²]
+        At rest.
+    left : (n,) array
+        Part of the cohesion and the tensile strength that is left.
+    rest : (n,) array [m]
+        Gap without force, of elastic joints: positive where the drawing has them compressed.
+    """
+
+    features: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    areas: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    left: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        """Count the points."""
+        return len(self.features)
+
+
+@dataclass(frozen=True)
 class Place:
     """A place of a path: everything that the next step needs of the ones before.
 
@@ -37,6 +63,8 @@ class Place:
         program.
     tie_lengths : (n_ties, 2) array [m]
         Of each tie when it was installed, nan where it is absent; and without force, nan where it is broken, too.
+    bonds : Bonds
+        Of the contact points ``contacts``, with those that are lost.
     """
 
     s: float
@@ -49,6 +77,7 @@ class Place:
     velocity: np.ndarray | None = None
     works: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     tie_lengths: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    bonds: Bonds = field(default_factory=Bonds)
 
     @classmethod
     def unloaded(cls, pose: Pose, s: float = 0.0) -> Place:

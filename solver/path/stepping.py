@@ -12,7 +12,7 @@ the limit of short steps exists.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,15 +21,17 @@ from solver.contact_step.minimise import minimise
 from solver.contact_step.problem import ContactProblem, NotSolved
 from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
-from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts
+from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts, successors
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.program.model import Model
-from solver.ties import is_member
+from solver.program.strength import ForceLimits
+from solver.ties import TieForces, is_member
 from solver.tolerances import COMPLIANCE, FRICTION_MEMORY, IMPERFECTION, SHEAR_COMPLIANCE, VELOCITY_MEMORY, VISCOSITY
 
 from .drivers import Driver
 from .members import Members, with_members
-from .state import Place
+from .mortar import JointPoints, Mortar
+from .state import Bonds, Place
 
 #: Linearisations of a step at most.
 LINEARISATIONS = 6
@@ -101,6 +103,41 @@ def viscous_weights(model: Model) -> np.ndarray:
     return np.column_stack([weight] * d + [turning] * (len(model.lengths) - d))
 
 
+@dataclass(frozen=True)
+class _StepPoints:
+    """The n contact points of a step, in units of the program.
+
+    Attributes
+    ----------
+    start : Contacts
+        At the start of the step.
+    forces, trial : (n, d) arrays
+    followed : (n,) array
+    is_new : (n,) bool array
+    friction : (n,) array
+    compliance : (n, d) array
+    joints : JointPoints
+    bound : (n,) array
+        Largest shear forces.
+    kept : (n,) array
+        Part of the give under the normal force that the next linearisation takes back.
+    pulled : (n, d) array
+        The tension: the program is that of the normal forces beyond it.
+    """
+
+    start: Contacts
+    forces: np.ndarray
+    trial: np.ndarray
+    followed: np.ndarray
+    is_new: np.ndarray
+    friction: np.ndarray
+    compliance: np.ndarray
+    joints: JointPoints
+    bound: np.ndarray
+    kept: np.ndarray
+    pulled: np.ndarray
+
+
 class Stepper:
     """Steps from one place to another under a driver.
 
@@ -118,6 +155,7 @@ class Stepper:
 
     def __init__(self, model: Model, driver: Driver) -> None:
         self.model, self.driver, self.members = model, driver, Members(model)
+        self.mortar = Mortar(model)
         self.free = model.assembly.free
         self.weights = viscous_weights(model)
         self.weight = float(np.linalg.norm(model.scaled_load[self.free, : model.dimension].sum(axis=0)))
@@ -132,6 +170,14 @@ class Stepper:
         if size > 0.0:
             imperfection = model.imperfection * IMPERFECTION
             self.imperfection[:, :d] = imperfection * self.weights[:, :1] * support_motion / size
+
+    def unloaded(self, pose: Pose, phase: int, ties_at: TieForces | None = None) -> Place:
+        """Return the place of a pose without forces, with the members of a phase, from 0, and all joints whole."""
+        return self.whole(self.members.installed(Place.unloaded(pose), phase, ties_at))
+
+    def whole(self, place: Place) -> Place:
+        """Return the place with mortar in all closed joints."""
+        return self.mortar.cast(place, self.contacts(place.pose)) if self.mortar.present else place
 
     def contacts_at(self, place: Place) -> Contacts:
         """Return the contact points at a place, those of members last."""
@@ -160,11 +206,42 @@ class Stepper:
         friction = self.model.interfaces.friction(self.model.assembly, contacts.block_a, contacts.block_b)
         return np.where(is_member(contacts), 0.0, friction)
 
-    def compliance(self, contacts: Contacts) -> np.ndarray:
+    def compliance(self, contacts: Contacts, joints: JointPoints) -> np.ndarray:
         """(n, d) array: that of joints and members, in units of the program."""
-        compliance, members = self.joint_compliance(contacts, self.model.compliance), is_member(contacts)
+        members = is_member(contacts)
+        compliance = self.joint_compliance(contacts, self.model.compliance) + joints.give
         compliance[members, 0] = self.members.compliance[contacts.features[members, 1]]
         return compliance
+
+    def force_limits(self, place: Place, contacts: Contacts, gap: float) -> tuple[Contacts, ForceLimits]:
+        """Contact points with gaps beyond the give of their joints, and the limits of their forces.
+
+        Parameters
+        ----------
+        place : Place
+        contacts : Contacts
+            At its pose.
+        gap : float
+            Of contact points that may carry, in block sizes.
+        """
+        gaps, limits = self.joint_limits(place, contacts)
+        of_members, members = self.members.force_limits(contacts, gap), is_member(contacts)
+        least, most = (
+            np.where(members, m, j) for m, j in ((of_members.least, limits.least), (of_members.most, limits.most))
+        )
+        return replace(contacts, gaps=gaps), replace(limits, least=least, most=most)
+
+    def joint_limits(
+        self, place: Place, contacts: Contacts, forces: np.ndarray | None = None
+    ) -> tuple[np.ndarray, ForceLimits]:
+        """Gaps [m] beyond the give of joints under forces, or without, and the limits of the forces between blocks."""
+        limits = ForceLimits.dry(len(contacts))
+        if not self.mortar.present:
+            return contacts.gaps, limits
+        joints, friction = self.mortar.points(place, contacts), self.friction(contacts)
+        gaps = joints.beyond_give(contacts.gaps, 0.0 if forces is None else forces[:, 0])
+        cohesion = np.maximum(joints.cohesion - friction * joints.tension, 0.0)
+        return gaps, replace(limits, least=-joints.tension, cohesion=cohesion)
 
     @staticmethod
     def joint_compliance(contacts: Contacts, factor: float = 1.0) -> np.ndarray:
@@ -193,27 +270,19 @@ class Stepper:
         followed = np.where(same, place.followed[number], 0.0)
         trial = np.where(same[:, None], place.trial[number], -np.eye(d)[0])
         _, kept = matched_contacts(before, contacts)
-        carried = ~is_member(before) & ((place.forces[:, 0] > 0.0) | (place.followed > 0.0))
+        carried = ~is_member(before) & ((place.forces[:, 0] != 0.0) | (place.followed > 0.0))
         vanished = np.flatnonzero(~kept & carried)
         is_new = ~same
         if len(vanished):
-            n_blocks = self.model.assembly.n_blocks
-            one, other = (
-                np.minimum(c.block_a[k], c.block_b[k]) * n_blocks + np.maximum(c.block_a[k], c.block_b[k])
-                for c, k in ((before, vanished), (contacts, slice(None)))
-            )
-            row, successor = np.nonzero(one[:, None] == other[None])
-            apart = np.linalg.norm(before.points[vanished[row]] - contacts.points[successor], axis=1)
-            least = np.full(len(vanished), np.inf)
-            np.minimum.at(least, row, apart)
-            near = (apart <= least[row] + 1e-6 * self.model.length) & (apart < 1e-2 * self.model.length)
+            length = self.model.length
+            row, successor = successors(before, vanished, contacts, 1e-6 * length, 1e-2 * length)
             # Equally near ones share them, so that their order does not matter.
-            row, successor = row[near], successor[near]
-            part, vanished = 1.0 / np.bincount(row, minlength=1)[row], vanished[row]
+            part, vanished = 1.0 / np.bincount(row)[row], vanished[row]
             sense = np.where(before.block_a[vanished] == contacts.block_a[successor], 1.0, -1.0)
             vectors = np.einsum("nji,nj->ni", before.frames[vanished], place.forces[vanished]) * sense[:, None]
             passed = np.einsum("nij,nj->ni", contacts.frames[successor], vectors)
-            passed[:, 0] = np.maximum(passed[:, 0], 0.0)
+            least = np.minimum(place.forces[vanished, 0], 0.0) if self.mortar.present else 0.0
+            passed[:, 0] = np.maximum(passed[:, 0], least)
             np.add.at(forces, successor, part[:, None] * passed)
             trial[successor] = forces[successor]
             np.add.at(followed, successor, part * place.followed[vanished])
@@ -228,6 +297,8 @@ class Stepper:
         in_time: bool = False,
         viscosity: float = 1.0,
         candidates: Contacts | None = None,
+        strength: float = np.inf,
+        guess: np.ndarray | None = None,
     ) -> tuple[Place, np.ndarray, StepError]:
         """Take one step of the driver, or one in time with the supports at rest.
 
@@ -242,6 +313,10 @@ class Stepper:
             Times the model's; and the imperfection times the model's.
         candidates : Contacts, optional
             Contact points of the step; by default those at the place.
+        strength : float
+            Of joints along themselves, in units of the program, that may be lost.
+        guess : (n, d) array, optional
+            Trial forces to start from; by default those of the place.
 
         Returns
         -------
@@ -259,15 +334,15 @@ class Stepper:
         # A step in time is solved to a small part of such a movement.
         s, size = (place.s, 1e-3) if in_time else (place.s + length, length / self.unit)
         supports, start = driver.supports(s), self.contacts_at(place) if candidates is None else candidates
-        forces, trial, followed, is_new = self.transferred(place, start)
-        friction, compliance, members = self.friction(start), self.compliance(start), is_member(start)
-        bound = friction * followed
+        place = self.mortar.renamed(place, start)
+        points = self._points(place, start)
+        forces, pulled, joints = points.forces, points.pulled, points.joints
+        trial = points.trial if guess is None else guess
         resisting, before = self._resistance(place, length, in_time, viscosity)
         closed = np.inf if in_time or viscosity == 1.0 else EXACT
         live, live_size = model.scaled_live
         multiplier = place.multiplier * live_size
-        # The give of members stays.
-        motion_so_far, normal, shear = np.zeros_like(before), np.where(members, 0.0, forces[:, 0]), forces[:, 1:]
+        motion_so_far, before_step = np.zeros_like(before), np.column_stack([points.kept * forces[:, 0], forces[:, 1:]])
         pose = self._with_supports(place.pose, supports)
         contacts = self.measured(start, pose, place.tie_lengths)
         for number in range(LINEARISATIONS):
@@ -276,14 +351,14 @@ class Stepper:
             load = self._load(pose, 0.0 if in_time else viscosity)
             problem = ContactProblem(
                 rows=rows,
-                gap=contacts.gaps / model.length,
+                gap=joints.beyond_give(contacts.gaps) / model.length,
                 slip=(contacts.slip - start.slip) / model.length,
                 # Gaps are absolute, so that the give across a joint is taken back; slip counts from the step's start.
-                forces=np.column_stack([normal, shear]),
-                bound=bound,
-                compliance=compliance,
+                forces=before_step + pulled,
+                bound=points.bound,
+                compliance=points.compliance,
                 most=self.members.largest_forces(start),
-                load=load + resisting * before,
+                load=load + resisting * before - rows.resultant(pulled),
                 viscosity=resisting,
                 motion_so_far=motion_so_far,
                 size=size,
@@ -293,9 +368,10 @@ class Stepper:
             )
             self.programs += 1
             solution = minimise(problem, trial, multiplier)
-            forces, trial, multiplier = solution.forces, solution.trial, solution.multiplier
+            forces, trial, multiplier = solution.forces - pulled, solution.trial, solution.multiplier
             # A linearised rotation makes blocks grow: the first linearisation's forces are not kept.
-            normal = np.where(members, 0.0, forces[:, 0]) if number else normal
+            if number:
+                before_step[:, 0] = points.kept * forces[:, 0]
             motion_so_far = motion_so_far + solution.motion
             full = np.zeros((assembly.n_blocks, n_dof))
             full[free] = motion_so_far.reshape(-1, n_dof) * scales
@@ -303,7 +379,7 @@ class Stepper:
             predicted = problem.gap + rows.relative(solution.motion)[:, 0]
             contacts = self.measured(start, pose, place.tie_lengths)
             residual = max(
-                self._linearisation_error(contacts, predicted, forces, bound, closed),
+                self._linearisation_error(contacts, predicted, forces, points, closed),
                 self._largest(self._load(pose, 0.0 if in_time else viscosity) - load) / SAME_LOAD,
             )
             control_error = 0.0 if control is None else abs(s - driver.control_displacement(pose)) / model.length
@@ -312,22 +388,39 @@ class Stepper:
         if not np.isfinite(motion_so_far).all():
             raise NotSolved("the movement is not finite")
         movement_size = float(np.abs(motion_so_far).max(initial=0.0))
-        if movement_size > LARGEST_PENETRATION:
-            missed = self._missed_contacts(start, place.pose, pose, movement_size)
-            if len(missed):
-                start = joined_contacts([start[~members], missed, start[members]])
-                return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=start)
+        left, again, strength = self._after_breaks(place, points, trial, pose, movement_size, strength)
+        if again is not None:
+            return self.step(
+                left,
+                length,
+                in_time=in_time,
+                viscosity=viscosity,
+                candidates=again,
+                strength=strength,
+                guess=trial if len(again) == len(start) else None,
+            )
         # A larger share alternates where the normal force falls as the bound grows.
         share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
-        lag, followed = self._updated_bounds(contacts, forces, friction, bound, followed, is_new, share)
+        gap = joints.beyond_give(contacts.gaps, forces[:, 0])
+        lag, followed = self._updated_bounds(contacts, gap, forces, points, share)
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
         lengths = self.members.after(contacts, forces, place.tie_lengths)
-        multiplier /= live_size or 1.0
-        new = Place(s, pose, contacts, forces, trial, followed, multiplier, velocity, tie_lengths=lengths)
+        new = Place(
+            s,
+            pose,
+            contacts,
+            forces,
+            trial,
+            followed,
+            multiplier / (live_size or 1.0),
+            velocity,
+            tie_lengths=lengths,
+            bonds=left.bonds,
+        )
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
-        touching = self._penetration(contacts, forces), self._slides(contacts, forces, bound)
+        touching = self._penetration(contacts, gap, forces), self._slides(contacts, forces, points.bound)
         return new, motion / scales, StepError(lag, turn, movement_size, *touching)
 
     @staticmethod
@@ -335,26 +428,80 @@ class Stepper:
         """Which contact points between blocks carry, (n,) bool array."""
         return (forces[:, 0] > CARRIES) & ~is_member(contacts)
 
-    def _penetration(self, contacts: Contacts, forces: np.ndarray) -> float:
-        """Deepest penetration where blocks carry, in block sizes."""
-        return -float(contacts.gaps[self._touches(contacts, forces)].min(initial=0.0)) / self.model.length
+    def _penetration(self, contacts: Contacts, gap: np.ndarray, forces: np.ndarray) -> float:
+        """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""
+        return -float(gap[self._touches(contacts, forces)].min(initial=0.0)) / self.model.length
 
     def _slides(self, contacts: Contacts, forces: np.ndarray, bound: np.ndarray) -> bool:
         touches = self._touches(contacts, forces)
         return bool((np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * bound)[touches].any())
+
+    def _points(self, place: Place, start: Contacts) -> _StepPoints:
+        """The contact points of a step from a place."""
+        forces, trial, followed, is_new = self.transferred(place, start)
+        joints, friction = self.mortar.points(place, start), self.friction(start)
+        compliance, pulled = self.compliance(start, joints), np.zeros_like(forces)
+        pulled[:, 0] = joints.tension
+        bound = friction * followed
+        if self.mortar.present:
+            # Lost strength takes with it the tension that friction still followed.
+            bound = np.maximum(friction * np.maximum(followed, -joints.tension) + joints.cohesion, 0.0)
+        # The give of elastic joints and members stays.
+        kept = np.where(is_member(start), 0.0, 1.0 - joints.give[:, 0] / compliance[:, 0])
+        return _StepPoints(start, forces, trial, followed, is_new, friction, compliance, joints, bound, kept, pulled)
+
+    def _after_breaks(
+        self,
+        place: Place,
+        points: _StepPoints,
+        trial: np.ndarray,
+        pose: Pose,
+        movement_size: float,
+        strength: float,
+    ) -> tuple[Place, Contacts | None, float]:
+        """The place with the bonds that a step leaves; contact points to solve it with again, if any; strength to lose.
+
+        What breaks hands its forces to the others in the same step.
+        """
+        bonds = self._bonds_after(place, points, trial)
+        left = replace(place, bonds=bonds)
+        if self.mortar.broken(place.bonds, bonds):
+            strength -= self.mortar.lost(place, left)
+            if strength < 0.0:
+                raise NotSolved("much strength is lost")
+            return left, points.start, strength
+        all_points = self._with_missed(points.start, place, pose, movement_size)
+        if len(all_points) > len(points.start):
+            return place, all_points, strength
+        return left, None, strength
+
+    def _bonds_after(self, place: Place, points: _StepPoints, trial: np.ndarray) -> Bonds:
+        """The bonds after a step: what opens under its largest tension, or slips at its bound, loses strength."""
+        if not self.mortar.present:
+            return place.bonds
+        beyond = np.column_stack([-trial[:, 0], np.linalg.norm(trial[:, 1:], axis=1) - points.bound])
+        opening, slipped = np.maximum(beyond * points.compliance[:, :2], 0.0).T
+        return self.mortar.after(place, points.start, opening, slipped)
 
     @staticmethod
     def _largest(values: np.ndarray) -> float:
         return float(np.abs(values).max(initial=0.0))
 
     def _linearisation_error(
-        self, contacts: Contacts, predicted: np.ndarray, forces: np.ndarray, bound: np.ndarray, closed: float
+        self,
+        contacts: Contacts,
+        predicted: np.ndarray,
+        forces: np.ndarray,
+        points: _StepPoints,
+        closed: float,
     ) -> float:
         """Errors of the gaps of contact points that carry, and of what was predicted of them, over what is accepted."""
-        gap, carries = contacts.gaps / self.model.length, forces[:, 0] > CARRIES
-        touches = self._touches(contacts, forces)
-        exact = EXACT_SLIDING if self._slides(contacts, forces, bound) else EXACT
-        return max(self._largest(gap[touches]) / closed, self._largest((gap - predicted)[carries]) / exact)
+        gap = points.joints.beyond_give(contacts.gaps) / self.model.length
+        carries = np.abs(forces[:, 0]) > CARRIES
+        touches = carries & ~is_member(contacts)
+        exact = EXACT_SLIDING if self._slides(contacts, forces, points.bound) else EXACT
+        apart = (gap + points.joints.give[:, 0] * forces[:, 0])[touches]
+        return max(self._largest(apart) / closed, self._largest((gap - predicted)[carries]) / exact)
 
     def _load(self, pose: Pose, imperfection: float) -> np.ndarray:
         """(n_free n_dof,) array: loads on the free blocks at a pose, with so many times the imperfection."""
@@ -375,18 +522,18 @@ class Stepper:
     def _updated_bounds(
         self,
         contacts: Contacts,
+        gap: np.ndarray,
         forces: np.ndarray,
-        friction: np.ndarray,
-        bound: np.ndarray,
-        followed: np.ndarray,
-        is_new: np.ndarray,
+        points: _StepPoints,
         share: float | np.ndarray,
     ) -> tuple[float, np.ndarray]:
         """Change of the friction bounds of sliding joints, in weights of the structure, and followed normal forces."""
         shear_force, normal = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
-        sliding = ((shear_force >= SLIDES * bound) | (shear_force > friction * normal)) & ~is_new
+        friction, followed, is_new = points.friction, points.followed, points.is_new
+        allowed = friction * normal + points.joints.cohesion
+        sliding = ((shear_force >= SLIDES * points.bound) | (shear_force > allowed)) & ~is_new
         # In a joint that opens friction vanishes sooner.
-        gap = np.maximum(contacts.gaps, 0.0)
+        gap = np.maximum(gap, 0.0)
         share = np.maximum(share, gap / (gap + OPEN * self.model.length))
         # New contact points have the friction of their normal force at once.
         after = np.where(is_new, normal, followed + share * (normal - followed))
@@ -399,22 +546,28 @@ class Stepper:
         before = np.zeros_like(motion) if place.velocity is None else place.velocity
         return before + (motion - length * before) / (length + VELOCITY_MEMORY * self.unit)
 
-    def _missed_contacts(self, stepped: Contacts, before: Pose, pose: Pose, movement_size: float) -> Contacts:
-        """Contact points that a step has missed, where they were before it: at its end a corner is in a block.
+    def _with_missed(self, stepped: Contacts, before: Place, pose: Pose, movement_size: float) -> Contacts:
+        """Contact points of a step with those that it has missed, where they were: at its end a corner is in a block.
 
         Raises ``Penetration`` where that corner was behind the edge already, or the step had its contact point.
         """
+        if movement_size <= LARGEST_PENETRATION:
+            return stepped
         end = self.contacts(pose)
         earlier, is_stepped = np.zeros(len(end)), np.zeros(len(end), dtype=bool)
         if len(end) and len(stepped):
             number, is_stepped = matched_contacts(end, stepped)
             earlier = np.where(is_stepped, np.minimum(stepped.gaps[number], 0.0), 0.0)
         deepest = -LARGEST_PENETRATION * self.model.length
-        deep = end.gaps - earlier < deepest
-        found = measure_contacts(self.model.assembly, moved_vertices(self.model.assembly, before), end[deep])
+        # In an elastic joint corners come closer as its force grows.
+        deep = (end.gaps - earlier < deepest) & (self.mortar.points(before, end).give[:, 0] == 0.0)
+        found = measure_contacts(self.model.assembly, moved_vertices(self.model.assembly, before.pose), end[deep])
         if is_stepped[deep].any() or (found.gaps < deepest).any():
             raise Penetration(movement_size)
-        return found
+        if not len(found):
+            return stepped
+        members = is_member(stepped)
+        return joined_contacts([stepped[~members], found, stepped[members]])
 
     def _with_supports(self, pose: Pose, supports: Pose) -> Pose:
         free = self.free[:, None]

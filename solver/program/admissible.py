@@ -15,6 +15,7 @@ from solver.programs.solve import solve_between, solve_lp
 from solver.tolerances import ACCEPTED_VIOLATION, BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
 
 from .model import Model
+from .strength import Admissible, ForceLimits
 
 #: Cost of unbalanced force, against that of the reaction: above the speed of any block per speed of the supports.
 UNBALANCED_COST = 1e4
@@ -61,7 +62,7 @@ def in_equilibrium(
     contacts: Contacts,
     friction: np.ndarray,
     gap: float = COMPUTED_GAP,
-    limits: np.ndarray | None = None,
+    limits: ForceLimits | None = None,
 ) -> bool:
     """Whether an equilibrium within friction exists at a pose, under some live load where there is one.
 
@@ -82,7 +83,7 @@ def admissible(
     rate: np.ndarray | None = None,
     *,
     gap: float = COMPUTED_GAP,
-    limits: np.ndarray | None = None,
+    limits: ForceLimits | None = None,
 ) -> EquilibriumBounds:
     """Bound the reaction or the multiplier of all equilibria within friction at a pose.
 
@@ -98,9 +99,8 @@ def admissible(
         Movement of the supports along which the reaction is bounded.
     gap : float
         Largest one of a contact point that carries force, in block sizes.
-    limits : (n_contacts, 2) array, optional
-        Least and largest normal forces, in units of the program; 0 and infinite by default. Contact points whose
-        limits are not the default carry at any gap.
+    limits : ForceLimits, optional
+        Those of dry contact points by default.
 
     Raises
     ------
@@ -156,11 +156,6 @@ def admissible(
     return EquilibriumBounds(unbalanced, values[0], values[1], max(gaps), program.programs, ordered[0], other_forces)
 
 
-def unlimited(n: int) -> np.ndarray:
-    """(n, 2) array: limits of normal forces that push only."""
-    return np.tile([0.0, np.inf], (n, 1))
-
-
 class _StaticProgram:
     """The program over all contact forces at a pose; parameters as in :func:`admissible`."""
 
@@ -172,19 +167,27 @@ class _StaticProgram:
         friction: np.ndarray,
         rate: np.ndarray | None,
         gap: float,
-        limits: np.ndarray | None,
+        limits: ForceLimits | None,
     ) -> None:
         d, blocks = model.dimension, model.assembly.free
         free = np.repeat(blocks, model.n_dof)
-        least, most = unlimited(len(contacts)).T if limits is None else limits.T
-        closed = np.flatnonzero((contacts.gaps <= gap * model.length) | (least != 0.0) | np.isfinite(most))
+        limits = ForceLimits.dry(len(contacts)) if limits is None else limits
+        least, most = limits.least, limits.most
+        closed = np.flatnonzero((contacts.gaps <= gap * model.length) | limits.hold)
         matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
         # In the plane the two rays of a cone are its forces; in space its three numbers are.
         forces_of = friction_rays(friction) if d == 2 else sp.eye_array(3 * len(contacts), format="csc")
-        self.rays = forces_of[:, np.repeat(d * closed, d) + np.tile(np.arange(d), len(closed))]
+        of_closed = np.repeat(d * closed, d) + np.tile(np.arange(d), len(closed))
+        self.rays = forces_of[:, of_closed]
+        bonded = limits.cohesion[closed] > 0.0
+        if bonded.any():
+            carried = Admissible.of(friction[closed], limits.cohesion[closed], np.full(len(closed), np.inf), d)
+            everywhere = sp.eye_array(d * len(contacts), format="csc")[:, of_closed]
+            self.rays = sp.csc_array(everywhere @ carried.columns)
         balance = sp.csc_array(matrix[free] @ self.rays)
         self.rows, self.n = balance.shape
-        self.d, self.friction, self.total, self.programs = d, friction[closed], model.total_load, 0
+        slopes = np.append(friction[closed], np.ones(int(bonded.sum())))
+        self.d, self.friction, self.total, self.programs = d, slopes, model.total_load, 0
         # The programs are those of the normal forces beyond the least ones.
         self.least = np.zeros((len(contacts), d))
         self.least[closed, 0] = least[closed]
@@ -209,9 +212,12 @@ class _StaticProgram:
         self.places: np.ndarray | None = np.repeat(pose.positions[blocks], model.n_dof, axis=0)
         limited = np.flatnonzero(np.isfinite(most))
         self.reserve = (most - least)[limited]
-        if len(limited):
+        if len(limited) or bonded.any():
             normal = sp.csc_array(sp.csr_array(self.rays)[d * limited])
-            beside = sp.csc_array((len(limited), len(objective) - self.n))
+            if bonded.any():
+                normal = sp.vstack([normal, carried.limits], format="csc")
+                self.reserve = np.append(self.reserve, carried.most)
+            beside = sp.csc_array((len(self.reserve), len(objective) - self.n))
             limits_of = sp.hstack([normal, beside])
             self.matrix, self.places = sp.csc_array(sp.vstack([self.matrix, limits_of], format="csc")), None
 

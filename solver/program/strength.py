@@ -15,8 +15,8 @@ from solver.interfaces import Interfaces
 
 def point_strength(
     assembly: Assembly, interfaces: Interfaces, contacts: Contacts, around: Contacts
-) -> tuple[np.ndarray, np.ndarray]:
-    """Cohesive shear force and largest normal force of each contact point.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cohesive shear force, largest normal force and largest tension of each contact point.
 
     Parameters
     ----------
@@ -28,17 +28,50 @@ def point_strength(
 
     Returns
     -------
-    cohesion, crushing : (n_contacts,) arrays [N]
+    cohesion, crushing, tension : (n_contacts,) arrays [N]
     """
+    n = len(contacts)
     if interfaces.dry:
-        return np.zeros(len(contacts)), np.full(len(contacts), np.inf)
+        return np.zeros(n), np.full(n, np.inf), np.zeros(n)
     place, same = matched_contacts(contacts, around)
     area = np.where(same, around.areas[place], contacts.areas)
-    cohesion, strength = interfaces.strength(assembly, contacts.block_a, contacts.block_b)
-    crushing = np.full(len(contacts), np.inf)
+    names = ("cohesion", "compressive_strength", "tensile_strength")
+    cohesion, strength, tension = interfaces.values(assembly, contacts.block_a, contacts.block_b, *names)
+    crushing = np.full(n, np.inf)
     finite = np.isfinite(strength)
     crushing[finite] = strength[finite] * area[finite]
-    return cohesion * area, crushing
+    friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
+    return cohesion * area, crushing, largest_tension(tension, cohesion, friction) * area
+
+
+def largest_tension(tension: np.ndarray, cohesion: np.ndarray, friction: np.ndarray) -> np.ndarray:
+    """(n,) array: tensile strengths, where friction is scattered no more than where shear strength ends."""
+    return np.asarray(np.minimum(tension, cohesion / np.maximum(friction, 1e-300)))
+
+
+@dataclass(frozen=True)
+class ForceLimits:
+    """Limits of contact forces, beside friction: least ≤ N ≤ most, |T| ≤ μ (N - least) + cohesion.
+
+    Attributes
+    ----------
+    least, most, cohesion : (n,) arrays
+        In units of the program.
+    """
+
+    least: np.ndarray
+    most: np.ndarray
+    cohesion: np.ndarray
+
+    @classmethod
+    def dry(cls, n: int) -> ForceLimits:
+        """Make the limits of contact points that push only."""
+        return cls(np.zeros(n), np.full(n, np.inf), np.zeros(n))
+
+    @property
+    def hold(self) -> np.ndarray:
+        """(n,) bool array: which contact points carry at any gap: those with another least or largest normal force."""
+        return np.asarray((self.least != 0.0) | np.isfinite(self.most))
 
 
 @dataclass(frozen=True)

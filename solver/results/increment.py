@@ -101,6 +101,8 @@ class State:
         where none have.
     ties : TieForces
         Empty where there are none.
+    intact : (n_contacts,) array
+        Part of its cohesion and tensile strength that each contact point has left; empty for dry joints.
     """
 
     pose: Pose
@@ -112,6 +114,7 @@ class State:
     support_forces: np.ndarray
     fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
     ties: TieForces = field(default_factory=TieForces)
+    intact: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class StoredState(Protocol):
@@ -270,8 +273,8 @@ class Increment(HasState):
     def states(self) -> np.ndarray:
         """(n_contacts,) uint8 array of :class:`ContactState`.
 
-        Open where no force is carried; hinging where it is and the joint opens at another point; sliding where
-        the point moves along the joint with the friction used up; sticking otherwise.
+        Open where no force is carried, and no mortar is left; hinging where it is carried and the joint opens at
+        another point; sliding where the point moves along the joint with the friction used up; sticking otherwise.
         """
         carrying = carries(self.forces)
         rate = SMALLEST_RATE * np.abs(self.velocity[:, : self.forces.shape[1]]).max(initial=0.0)
@@ -281,7 +284,8 @@ class Increment(HasState):
         opens = np.zeros(len(pairs), dtype=bool)
         opens[joint[self.displacements[:, 0] > rate]] = True
         states = np.full(len(carrying), ContactState.OPEN, dtype=np.uint8)
-        states[carrying] = ContactState.STICKING
+        intact = self.state.intact
+        states[carrying | (intact > 0.0 if len(intact) else False)] = ContactState.STICKING
         states[carrying & opens[joint] & (self.displacements[:, 0] <= rate)] = ContactState.HINGING
         states[sliding] = ContactState.SLIDING
         return states

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from structures import case_from, run_command
+from structures import case_from, drawn, rectangle, run_command
 
 import solver
 from blockvis import generators
@@ -143,7 +143,13 @@ def test_strength_from_the_case_file(tmp_path, capsys):
     weight = 0.8 * 0.5 * 2000.0 * solver.GRAVITY
     assert f"{(0.3 * weight + 2000.0 * 0.8) / 1000.0:12.6g}" in capsys.readouterr().out
     for text, words in (
-        (CASE.format("").replace('"limit load"', '"settlement"') + "[settlement]\ndirection = [0, -1]\n", "dry joints"),
+        (
+            CASE.format("compressive_strength = 1e6\n").replace('"limit load"', '"settlement"')
+            + "[settlement]\ndirection = [0, -1]\n",
+            "crushing along the path of a settlement is not followed",
+        ),
+        (CASE.format("tensile_strength = 1e5"), "[material] tensile_strength is 100000 Pa, above cohesion / friction"),
+        (CASE.format("normal_stiffness = -1.0"), "[material] normal_stiffness is -1; give a positive number"),
         (CASE.format("compressive_strength = 0.0"), "[material] compressive_strength is 0; give a positive number"),
         (CASE.format("").replace("2000.0", "-1.0"), "[material] cohesion is -1; give a stress in Pa of at least 0"),
     ):
@@ -152,15 +158,52 @@ def test_strength_from_the_case_file(tmp_path, capsys):
 
 
 def test_what_follows_the_geometry_refuses_strength():
-    assembly, interfaces, _ = block(cohesion=1e3)
+    assembly, interfaces, _ = block(compressive_strength=1e6)
     moving = assembly.with_roles(["free", "moving"])
-    with pytest.raises(ValueError, match="a settlement follows dry joints"):
+    with pytest.raises(ValueError, match="crushing along the path of a settlement is not followed"):
         solver.settle(moving, solver.Settlement(direction=(0, -1)), interfaces=interfaces)
     live = solver.weight_fraction(assembly, (1.0, 0.0), np.array([0]))
     loads = solver.Loads(solver.self_weight(assembly).dead, live)
-    with pytest.raises(ValueError, match="a pushover follows dry joints"):
+    with pytest.raises(ValueError, match="crushing along the path of a pushover is not followed"):
         solver.pushover(assembly, solver.ControlDisplacement("block"), loads=loads, interfaces=interfaces)
     with pytest.raises(ValueError, match="cohesion is -1 Pa"):
         solver.InterfaceLaw(cohesion=-1.0)
     with pytest.raises(ValueError, match="compressive_strength is 0 Pa; it must be positive"):
         solver.InterfaceLaw(compressive_strength=0.0)
+
+
+GROUND = """
+[geometry]
+file = "beam.json"
+[[supports]]
+name = "left"
+outline = [[-1.05, -0.3], [-0.95, -0.3], [-0.95, 0.0], [-1.05, 0.0]]
+stiffness = 2e6
+[[supports]]
+name = "right"
+role = "moving"
+outline = [[0.95, -0.3], [1.05, -0.3], [1.05, 0.0], [0.95, 0.0]]
+stiffness = 2e6
+[settlement]
+direction = [0.0, -1.0]
+increment = 0.01
+limit = 0.01
+[output]
+animation = false
+"""
+
+
+@pytest.mark.slow
+def test_the_summary_tells_what_the_ground_carries(tmp_path, capsys):
+    """A beam on two footings: half of its weight on each, and the tilt of their settlement."""
+    drawn(tmp_path / "beam.json", [rectangle(-1.2, 0.0, 1.2, 0.4)], names=["beam"])
+    (tmp_path / "case.toml").write_text(GROUND, encoding="utf-8")
+    assert run_command(tmp_path / "case.toml", "-o", tmp_path / "out") == 0
+    said = re.findall(
+        r"ground '(\w+)': (\S+) N, pressure (\S+) Pa in the mean .* turned by (\S+) rad", capsys.readouterr().out
+    )
+    assert [name for name, *_ in said] == ["left", "right"]
+    for _, force, pressure, tilt in said:
+        assert float(force) == pytest.approx(2.4 * 0.4 * 2000.0 * solver.GRAVITY / 2.0, rel=1e-2)
+        assert float(pressure) == pytest.approx(float(force) / 0.1, rel=1e-3)
+        assert float(tilt) == pytest.approx(0.005, rel=0.03)

@@ -1,0 +1,181 @@
+"""Mortar and elastic joints along a path: strength that is lost point by point, and give that stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.geometry.contacts import Contacts, matched_contacts, successors
+from solver.program.model import Model
+from solver.program.strength import largest_tension
+from solver.tolerances import COMPUTED_GAP
+
+from .state import Bonds, Place
+
+#: Opening and slip, in block sizes, over which a brittle point loses its strength: small, but no rounding.
+BRITTLE = 1e-6
+
+#: Distance, in block sizes, up to which a point takes over the bond of one that has vanished.
+NEAR = 1e-2
+
+
+@dataclass(frozen=True)
+class JointPoints:
+    """What the joints add to each of n contact points, in units of the program.
+
+    Attributes
+    ----------
+    tension, cohesion : (n,) arrays
+        Largest tension and cohesive shear force that are left.
+    give : (n, d) array
+        Elastic compliance, which stays.
+    rest : (n,) array [m]
+        Gap without force.
+    length : float [m]
+        Unit of the program.
+    """
+
+    tension: np.ndarray
+    cohesion: np.ndarray
+    give: np.ndarray
+    rest: np.ndarray
+    length: float
+
+    def beyond_give(self, gaps: np.ndarray, normal: np.ndarray | float = 0.0) -> np.ndarray:
+        """(n,) array [m]: gaps, (n,) array [m], beyond the give of joints under these normal forces."""
+        return np.asarray(gaps - self.rest + self.length * (self.give[:, 0] * normal))
+
+
+class Mortar:
+    """The mortar of a model, and the elastic joints.
+
+    Parameters
+    ----------
+    model : Model
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.present = model, model.interfaces.mortar
+
+    def cast(self, place: Place, contacts: Contacts) -> Place:
+        """The place with all of its closed joints whole."""
+        if not self.present:
+            return place
+        closed = contacts[contacts.gaps <= COMPUTED_GAP * self.model.length]
+        n = len(closed)
+        return replace(place, bonds=Bonds(closed.features[:, :3], closed.areas, np.ones(n), np.zeros(n)))
+
+    def at_rest(self, place: Place, contacts: Contacts, forces: np.ndarray) -> Place:
+        """The place with elastic joints compressed by forces in units of the program, as they are drawn."""
+        if not self.present:
+            return place
+        number, same = self._matched(contacts, place.bonds)
+        rest, give = place.bonds.rest.copy(), self.points(place, contacts).give[:, 0]
+        rest[number[same]] = (give * forces[:, 0])[same] * self.model.length
+        return replace(place, bonds=replace(place.bonds, rest=rest))
+
+    def points(self, place: Place, contacts: Contacts) -> JointPoints:
+        """What the joints add to contact points at a place."""
+        model, (n, d) = self.model, contacts.points.shape
+        if not self.present:
+            none = np.zeros(n)
+            return JointPoints(none, none, np.zeros((n, d)), none, model.length)
+        place = self.renamed(place, contacts)
+        names = ("cohesion", "tensile_strength", "normal_stiffness", "shear_stiffness")
+        blocks = contacts.block_a, contacts.block_b
+        cohesion, tension, *stiffness = model.interfaces.values(model.assembly, *blocks, *names)
+        number, bonded = self._matched(contacts, place.bonds)
+        area = np.where(bonded, self._of(place.bonds.areas, number), contacts.areas)
+        strong = np.where(bonded, self._of(place.bonds.left, number), 0.0) * area / model.force
+        friction = model.interfaces.friction(model.assembly, *blocks)
+        # Corners alone, and points of members, have no area.
+        across, along = (
+            np.divide(model.force, k * area * model.length, out=np.zeros(n), where=k * area > 0.0)
+            for k in (np.where(np.isfinite(k), k, 0.0) for k in stiffness)
+        )
+        return JointPoints(
+            tension=largest_tension(tension, cohesion, friction) * strong,
+            cohesion=cohesion * strong,
+            give=np.column_stack([across] + [along] * (d - 1)),
+            rest=np.where(bonded, self._of(place.bonds.rest, number), 0.0),
+            length=model.length,
+        )
+
+    def intact(self, place: Place, contacts: Contacts) -> np.ndarray:
+        """(n,) array: part of the strength of contact points that is left; empty where none had any."""
+        if not any(law.bonds for law in self.model.interfaces.laws):
+            return np.zeros(0)
+        strong = self.points(place, contacts).cohesion > 0.0
+        place = self.renamed(place, contacts)
+        number, _ = self._matched(contacts, place.bonds)
+        return np.where(strong, self._of(place.bonds.left, number), 0.0)
+
+    def renamed(self, place: Place, contacts: Contacts) -> Place:
+        """The place with its bonds at these contact points: one that vanishes passes its bond to the nearest ones."""
+        bonds, before = place.bonds, place.contacts
+        if not len(bonds) or before is None or not len(contacts) or not len(before):
+            return place
+        number, same = self._matched(before, bonds)
+        _, kept = matched_contacts(before, contacts)
+        vanished = np.flatnonzero(same & ~kept)
+        if not len(vanished):
+            return place
+        length = self.model.length
+        row, successor = successors(before, vanished, contacts, 1e-6 * length, NEAR * length)
+        # Equally near ones share it, and several that pass to one add up.
+        part, old = 1.0 / np.bincount(row)[row], number[vanished[row]]
+        stays = np.setdiff1d(np.arange(len(bonds)), old)
+        part, old = np.concatenate([np.ones(len(stays)), part]), np.concatenate([stays, old])
+        names = np.concatenate([bonds.features[stays], contacts.features[successor, :3]])
+        features, which = np.unique(names, axis=0, return_inverse=True)
+        which, left = which.ravel(), np.ones(len(features))
+        np.minimum.at(left, which, bonds.left[old])
+        rest = np.bincount(which, part * bonds.rest[old]) / np.bincount(which, part)
+        return replace(place, bonds=Bonds(features, np.bincount(which, part * bonds.areas[old]), left, rest))
+
+    def after(self, place: Place, contacts: Contacts, opening: np.ndarray, slipped: np.ndarray) -> Bonds:
+        """The bonds after a step in which points of a place opened, and slipped, in block sizes.
+
+        Parameters
+        ----------
+        opening : (n,) array
+            Beyond the give of the joint at its strength.
+        slipped : (n,) array
+            In this step.
+        """
+        model, bonds = self.model, place.bonds
+        number, bonded = self._matched(contacts, bonds)
+        blocks = contacts.block_a[bonded], contacts.block_b[bonded]
+        open_at, slip_at = model.interfaces.values(model.assembly, *blocks, "fracture_opening", "fracture_slip")
+        open_at, slip_at = (np.maximum(length / model.length, BRITTLE) for length in (open_at, slip_at))
+        number, left = number[bonded], bonds.left.copy()
+        lost = np.minimum(left[number] - slipped[bonded] / slip_at, 1.0 - opening[bonded] / open_at)
+        left[number] = np.clip(lost, 0.0, left[number])
+        return replace(bonds, left=left)
+
+    def lost(self, before: Place, after: Place) -> float:
+        """Strength along the joints that a step has taken, in units of the program."""
+        if not self.present:
+            return 0.0
+        whole, left = (
+            0.0 if place.contacts is None else float(self.points(place, place.contacts).cohesion.sum())
+            for place in (before, after)
+        )
+        return whole - left
+
+    def broken(self, before: Bonds, after: Bonds) -> bool:
+        """Whether some point of a joint with strength has lost all that it had left."""
+        bonds = any(law.bonds for law in self.model.interfaces.laws)
+        return bonds and bool(((before.left > 0.0) & (after.left == 0.0)).any())
+
+    @staticmethod
+    def _matched(contacts: Contacts, bonds: Bonds) -> tuple[np.ndarray, np.ndarray]:
+        """Number of the bond of each contact point, and whether it has one."""
+        if not len(bonds) or not len(contacts):
+            return np.zeros(len(contacts), dtype=np.int64), np.zeros(len(contacts), dtype=bool)
+        return matched_contacts(contacts, bonds)
+
+    @staticmethod
+    def _of(values: np.ndarray, number: np.ndarray) -> np.ndarray:
+        return values[number] if len(values) else np.zeros(len(number))

@@ -1,0 +1,278 @@
+"""Mortar along a path, and ground that gives: what statics says by hand of the point model."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from structures import box, rectangle, wall
+
+import solver
+from blockvis import generators
+from blockvis.results.npz import packed, unpacked
+from solver import mechanics
+
+WIDTH, HEIGHT, THICKNESS = 0.25, 0.125, 0.1
+
+
+def held(shapes, roles, law, dry=("support",), limit=0.002, increment=0.001, **settle):
+    """Blocks whose joints with supports named in ``dry`` have no mortar, through a settlement."""
+    materials = ["support" if role == "moving" else "stone" for role in roles]
+    assembly = solver.Assembly.from_outlines(shapes, roles=roles, materials=materials, thickness=THICKNESS)
+    pairs = {(name, "stone"): solver.InterfaceLaw(law.friction_coefficient) for name in dry}
+    structure = solver.Structure(assembly, solver.Interfaces(law, pairs))
+    settlement = solver.Settlement(direction=(0.0, -1.0), increment=increment, limit=limit)
+    return structure.settle(settlement, **settle), mechanics.total_weight(assembly)
+
+
+def holds(increment):
+    """The increment proves itself."""
+    c = increment.certificate
+    return max(c.equilibrium_residual, c.friction_excess, c.carrying_gap, c.largest_penetration) < 1e-6
+
+
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_a_block_between_two_others_hangs_by_their_cohesion(share):
+    """W = 2 c A: below it slips and rests on the support again; above it stays when the support goes."""
+    area, weight = HEIGHT * THICKNESS, 61.3125
+    law = solver.InterfaceLaw(0.6, share * weight / (2.0 * area))
+    shapes = [
+        rectangle(-0.2, 0.0, 0.0, HEIGHT),
+        rectangle(0.0, 0.0, WIDTH, HEIGHT),
+        rectangle(WIDTH, 0.0, WIDTH + 0.2, HEIGHT),
+        rectangle(0.05, -0.1, WIDTH - 0.05, 0.0),
+    ]
+    response, total = held(shapes, ["fixed", "free", "fixed", "moving"], law)
+    assert total == pytest.approx(weight)
+    last = response.increments[-1]
+    # What is left of a thrust between the two holds it by friction.
+    assert last.reaction == pytest.approx(0.0 if share > 1.0 else weight, abs=(1e-5 if share > 1.0 else 1e-2) * weight)
+    assert holds(last)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_a_block_hangs_by_the_tension_of_its_bed(share):
+    """W = t A, on a centred bed joint above it."""
+    weight = 61.3125
+    strength = share * weight / (WIDTH * THICKNESS)
+    shapes = [
+        rectangle(0.0, HEIGHT, WIDTH, 0.3),
+        rectangle(0.0, 0.0, WIDTH, HEIGHT),
+        rectangle(0.05, -0.1, WIDTH - 0.05, 0.0),
+    ]
+    response, _ = held(
+        shapes, ["fixed", "free", "moving"], solver.InterfaceLaw(0.6, strength, tensile_strength=strength)
+    )
+    last = response.increments[-1]
+    assert last.reaction == pytest.approx(0.0 if share > 1.0 else weight, abs=1e-5 * weight)
+    assert holds(last)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_a_block_glued_to_a_wall_opens_at_its_upper_edge(share):
+    """W b/2 = (t A / 2) h about the lower end of the joint, whose upper half hangs on its end."""
+    weight = 61.3125
+    strength = share * weight * WIDTH / (HEIGHT * HEIGHT * THICKNESS)
+    law = solver.InterfaceLaw(0.6, 3.0 * strength, tensile_strength=strength)
+    shapes = [
+        rectangle(-0.3, 0.0, 0.0, HEIGHT),
+        rectangle(0.0, 0.0, WIDTH, HEIGHT),
+        rectangle(0.1, -0.1, WIDTH + 0.1, 0.0),
+    ]
+    response, _ = held(shapes, ["fixed", "free", "moving"], law)
+    reaction = response.increments[-1].reaction
+    if share > 1.0:
+        assert reaction == pytest.approx(0.0, abs=1e-5 * weight)
+    else:
+        # It turns about the lower end of the joint, and lies on the support with its far corner.
+        assert reaction == pytest.approx(weight / 2.0, rel=1e-2)
+    assert holds(response.increments[-1])
+
+
+@pytest.mark.slow
+def test_a_pushed_block_breaks_loose_at_its_cohesion_and_slides_at_friction():
+    """A pushover at the base: α W = μ W + c A at first, μ W once the joint has slipped."""
+    cohesion = 3e3
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(0.0, 0.0, 0.8, 0.5), rectangle(-1.0, -1.0, 2.0, 0.0)],
+        roles=["free", "fixed"], names=["block", "ground"], thickness=0.3,
+    )  # fmt: skip
+    weight = mechanics.total_weight(assembly)
+    loads = solver.Loads(
+        solver.self_weight(assembly).dead, solver.point_load(assembly, 0, (weight, 0.0), point=(0.0, 0.0))
+    )
+    structure = solver.Structure(assembly, solver.Interfaces(solver.InterfaceLaw(0.3, cohesion)), loads)
+    control = solver.ControlDisplacement("block", (1.0, 0.0), limit=0.004, increment=0.002)
+    response = structure.pushover(control)
+    found = [increment.load_multiplier for increment in response.increments]
+    assert found[0] == pytest.approx(0.3 + cohesion * 0.24 / weight, rel=1e-6)
+    assert found[1:3] == pytest.approx([0.3, 0.3], rel=1e-6)
+
+
+def test_a_pulled_couplet_has_its_weight_and_tension_as_limit_load():
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(0.0, 0.0, 0.8, 0.5), rectangle(-1.0, -1.0, 2.0, 0.0)], roles=["free", "fixed"], thickness=0.3
+    )
+    weight = mechanics.total_weight(assembly)
+    interfaces = solver.Interfaces(solver.InterfaceLaw(0.3, 1e4, tensile_strength=2e4))
+    for flow in ("associative", "non-associative"):
+        loads = solver.Loads(solver.self_weight(assembly).dead, solver.point_load(assembly, 0, (0.0, weight)))
+        found = solver.limit_load(assembly, loads=loads, interfaces=interfaces, flow=flow)
+        assert found.multiplier == pytest.approx(1.0 + 2e4 * 0.24 / weight, rel=1e-6)
+        assert found.forces[:, 0] == pytest.approx([-2e4 * 0.12] * 2, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        ({"cohesion": 1e3, "tensile_strength": 1e4}, "tensile_strength is 10000 Pa, above cohesion / "),
+        ({"tensile_strength": -1.0}, "tensile_strength is -1 Pa; it must be a finite number of at least 0"),
+        ({"normal_stiffness": -1.0}, "normal_stiffness is -1 Pa/m; it must be positive"),
+        ({"fracture_slip": 1e-4}, "fracture_slip is 0.0001 m, but there is no strength to lose"),
+    ],
+)  # fmt: skip
+def test_a_joint_law_that_cannot_be_is_refused(law, message):
+    with pytest.raises(ValueError, match=message):
+        solver.InterfaceLaw(0.6, **law)
+
+
+def test_crushing_is_not_followed():
+    shapes = [rectangle(0.0, 0.0, WIDTH, HEIGHT), rectangle(0.0, -0.1, WIDTH, 0.0)]
+    with pytest.raises(ValueError, match="crushing along the path of a settlement is not followed"):
+        held(shapes, ["free", "moving"], solver.InterfaceLaw(0.6, 0.0, 1e6))
+    assert np.isinf(solver.InterfaceLaw().compressive_strength)
+
+
+@pytest.mark.slow
+def test_a_footing_that_settles_tilts_the_beam_on_springs():
+    """Three footings with K = k A each, the right one's ground settles by s: v = s/3, θ = s / (2 ℓ + 3 w²/(4 ℓ)).
+
+    A footing of width w carries at its two ends. The rest of the difference is the viscosity, 1 % of the weight.
+    """
+    arm, width, stiffness, settlement = 1.0, 0.1, 2e6, 0.02
+    pads = [rectangle(x - width / 2, -0.3, x + width / 2, 0.0) for x in (-arm, 0.0, arm)]
+    names = ["left", "middle", "right"]
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(-1.2, 0.0, 1.2, 0.4), *pads],
+        roles=["free", "fixed", "fixed", "moving"], names=["beam", *names], thickness=0.5,
+    )  # fmt: skip
+    interfaces = solver.Interfaces(ground=dict.fromkeys(names, stiffness))
+    response = solver.Structure(assembly, interfaces).settle(
+        solver.Settlement(direction=(0.0, -1.0), increment=0.01, limit=settlement)
+    )
+    first, last = response.increments[0], response.increments[-1]
+    weight, spring = mechanics.total_weight(assembly), stiffness * width * 0.5
+    assert first.support_forces[1:, 1] == pytest.approx([-weight / 3.0] * 3, rel=1e-6)
+    tilt = settlement * arm / (2.0 * arm**2 + 3.0 * width**2 / 4.0)
+    assert -last.pose.rotations[0, 0] == pytest.approx(tilt, rel=0.03)
+    assert 0.2 - last.pose.positions[0, 1] == pytest.approx(settlement / 3.0, rel=0.03)
+    assert -last.support_forces[2, 1] == pytest.approx(weight / 3.0 + spring * settlement / 3.0, rel=0.02)
+    assert last.certificate.equilibrium_residual < 1e-6
+
+
+@pytest.mark.slow
+def test_ground_does_not_pull():
+    """Where its ground has settled by more than W / K the footing has left it."""
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(0.0, 0.0, 1.0, 0.2), rectangle(0.0, -0.2, 0.7, 0.0), rectangle(0.9, -0.2, 1.0, 0.0)],
+        roles=["free", "fixed", "moving"], names=["beam", "left", "right"],
+    )  # fmt: skip
+    interfaces = solver.Interfaces(solver.InterfaceLaw(0.6, 1e4, tensile_strength=1e4), ground={"right": 1e8})
+    settlement = solver.Settlement(direction=(0.0, -1.0), increment=0.01, limit=0.01)
+    last = solver.Structure(assembly, interfaces).settle(settlement).increments[-1]
+    assert last.reaction == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("fracture", [pytest.param(0.0, marks=pytest.mark.slow), 5e-4])
+def test_a_slip_takes_the_cohesion_at_once_or_over_its_length(fracture):
+    """A pushed block has slipped by 0.25 mm: with a fracture slip of 0.5 mm half of its cohesion is left."""
+    cohesion = 3e3
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(0.0, 0.0, 0.8, 0.5), rectangle(-1.0, -1.0, 2.0, 0.0)],
+        roles=["free", "fixed"], names=["block", "ground"], thickness=0.3,
+    )  # fmt: skip
+    weight = mechanics.total_weight(assembly)
+    live = solver.point_load(assembly, 0, (weight, 0.0), point=(0.0, 0.0))
+    loads = solver.Loads(solver.self_weight(assembly).dead, live)
+    law = solver.InterfaceLaw(0.3, cohesion, fracture_slip=fracture)
+    structure = solver.Structure(assembly, solver.Interfaces(law), loads)
+    response = structure.pushover(solver.ControlDisplacement("block", (1.0, 0.0), limit=2.5e-4, increment=1.25e-4))
+    left = 0.5 if fracture else 0.0
+    assert response.increments[-1].load_multiplier == pytest.approx(0.3 + left * cohesion * 0.24 / weight, rel=0.02)
+
+
+def dry_and_weak(assembly, settlement, friction, strength):
+    """The path of dry joints, and that of next to no strength and next to no give."""
+    law = solver.InterfaceLaw(
+        friction, strength, tensile_strength=strength, normal_stiffness=1e22, shear_stiffness=1e22
+    )
+    paths = [
+        solver.Structure(assembly, solver.Interfaces(one)).settle(settlement)
+        for one in (solver.InterfaceLaw(friction), law)
+    ]
+    return zip(paths[0].path, paths[1].path, strict=True)
+
+
+@pytest.mark.slow
+@settings(max_examples=4, deadline=None)
+@given(voussoirs=st.integers(7, 15), strength=st.floats(1e-9, 1e-6), spread=st.floats(0.0, 1.0))
+def test_weak_mortar_on_stiff_joints_is_a_dry_arch(voussoirs, strength, spread):
+    assembly = generators.build("arch", {"voussoirs": voussoirs})
+    weight = mechanics.total_weight(assembly)
+    settlement = solver.Settlement(direction=(spread, spread - 1.0), increment=5e-3, limit=1e-2)
+    for one, other in dry_and_weak(assembly, settlement, 0.9, strength):
+        assert other.reaction == pytest.approx(one.reaction, abs=1e-6 * weight)
+        assert other.pose.positions == pytest.approx(one.pose.positions, abs=1e-6)
+
+
+@pytest.mark.slow
+@settings(max_examples=4, deadline=None)
+@given(friction=st.floats(0.3, 0.9), courses=st.integers(2, 4), strength=st.floats(1e-9, 1e-6))
+def test_weak_mortar_on_stiff_joints_is_a_dry_wall(friction, courses, strength):
+    """Where joints slide, a change of the dry wall's friction by 1e-9 changes reactions by 2e-4 of the weight, too."""
+    assembly = wall(3, courses)
+    weight = mechanics.total_weight(assembly)
+    settlement = solver.Settlement(direction=(0.0, -1.0), increment=2e-3, limit=4e-3)
+    for one, other in dry_and_weak(assembly, settlement, friction, strength):
+        assert [other.least, other.largest] == pytest.approx([one.least, one.largest], abs=1e-6 * weight)
+        assert other.reaction == pytest.approx(one.reaction, abs=1e-3 * weight)
+        assert other.pose.positions == pytest.approx(one.pose.positions, abs=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_a_stone_in_space_hangs_by_the_tension_of_its_bed(share):
+    """W = t A, four contact points with a quarter each."""
+    assembly = solver.Assembly.from_solids(
+        [
+            box((0.0, 0.0, 0.125), (0.25, 0.25, 0.3)),
+            box((0.0, 0.0, 0.0), (0.25, 0.25, 0.125)),
+            box((0.05, 0.05, -0.1), (0.2, 0.2, 0.0)),
+        ],
+        roles=["fixed", "free", "moving"], materials=["stone", "stone", "support"],
+    )  # fmt: skip
+    weight = mechanics.total_weight(assembly)
+    strength = share * weight / 0.0625
+    law = solver.InterfaceLaw(0.6, strength, tensile_strength=strength)
+    interfaces = solver.Interfaces(law, {("support", "stone"): solver.InterfaceLaw(0.6)})
+    settlement = solver.Settlement(direction=(0.0, 0.0, -1.0), increment=1e-3, limit=2e-3)
+    last = solver.Structure(assembly, interfaces).settle(settlement).increments[-1]
+    assert last.reaction == pytest.approx(0.0 if share > 1.0 else weight, abs=1e-6 * weight)
+    assert set(last.state.intact) == ({0.0, 1.0} if share > 1.0 else {0.0})
+    assert holds(last)
+
+
+@pytest.mark.slow
+def test_a_wall_with_mortar_goes_on_from_its_checkpoint_bit_for_bit():
+    assembly = wall(3, 3)
+    interfaces = solver.Interfaces(solver.InterfaceLaw(0.6, 3e3, tensile_strength=1e3, normal_stiffness=1e10))
+    phases, loads = (
+        (solver.Settlement(direction=(0.0, -1.0), increment=1e-3, limit=3e-3),),
+        solver.self_weight(assembly),
+    )
+    whole = list(mechanics.settlement_increments(assembly, phases, interfaces=interfaces, loads=loads))
+    stored, _ = unpacked(packed(whole[1].checkpoint), mechanics.PathState)
+    again = list(mechanics.settlement_increments(assembly, phases, interfaces=interfaces, loads=loads, resume=stored))
+    assert [one.reaction for one in again] == [one.reaction for one in whole[2:]]
+    assert (again[-1].pose.positions == whole[-1].pose.positions).all()
