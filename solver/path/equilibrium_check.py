@@ -126,6 +126,15 @@ class EquilibriumChecks:
             return EquilibriumCheck(place, contacts, friction, bounds.forces, nearest, bounds)
         low, high = (value if np.isfinite(value) else target for value in (bounds.low, bounds.high))
         measured = float(np.clip(target, low, max(low, high)))
+        if self.model.live is None and self.stepper.mortar.gives:
+            # Ground that gives has forces by its pose; the reaction of the path has the viscosity in it.
+            try:
+                forces = self.nearest(place, gap)
+            except NotSolved:
+                pass
+            else:
+                measured = float(np.clip(self.reaction(place, contacts, forces), low, max(low, high)))
+                return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
         determined = high - low <= 1e-6 * max(abs(low), abs(high))
         try:
             forces = self._forces_with(place, measured, determined, gap)

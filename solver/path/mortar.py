@@ -56,7 +56,8 @@ class Mortar:
     """
 
     def __init__(self, model: Model) -> None:
-        self.model, self.present = model, model.interfaces.mortar
+        self.model, self.present, interfaces = model, model.interfaces.mortar, model.interfaces
+        self.gives = bool(interfaces.ground)
 
     def cast(self, place: Place, contacts: Contacts) -> Place:
         """The place with all of its closed joints whole."""
