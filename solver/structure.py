@@ -270,7 +270,7 @@ class Structure(Shown):
             ties=self.ties,
             ties_at=ties_at,
         )
-        return replace(found, analysed=(self.assembly, self.interfaces, under.loads))
+        return replace(found, analysed=(self.assembly, self.interfaces, under.loads, self.ties))
 
     def envelope(
         self,
@@ -321,6 +321,7 @@ class Structure(Shown):
             parameter=parameter,
             measured=measured,
             control=control,
+            ties=self.ties,
         )
 
 

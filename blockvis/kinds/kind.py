@@ -114,6 +114,7 @@ class AnalysisRun:
             parameter=self.course.parameter,
             measured=self.course.measured,
             control=self.course.control,
+            ties=self.given.ties,
             changes=self.given.changes,
         )
 

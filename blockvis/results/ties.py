@@ -60,9 +60,8 @@ def stored_ties(folder: Path) -> tuple[solver.Tie, ...]:
 
 def known_ties(response: solver.Response) -> tuple[solver.Tie, ...]:
     """Find the ties of a response: those it knows, or those of the folder that its increments are read from."""
-    own: tuple[solver.Tie, ...] = getattr(response, "ties", ())
-    if own or not response.increments:
-        return own
+    if response.ties or not response.increments:
+        return response.ties
     folder = folder_of(response.increments[0])
     return () if folder is None else stored_ties(folder)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 
 import solver
@@ -32,12 +31,6 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
     if any(source is not None and source.resolve() == Path(folder).resolve() for source in sources):
         raise ValueError(f"the response is read from '{folder}' itself; write it to another folder")
     ties = known_ties(response)
-    if not ties and response.increments and len(response.increments[0].ties.forces):
-        warnings.warn(
-            f"'{folder}': the response has forces of ties and not their names: ties.csv and ties.pvd are not written; "
-            "run a case file with [[ties]] for them",
-            stacklevel=2,
-        )
     results = ResultsFolder(folder, response.assembly, overwrite=overwrite, parameter=response.parameter, ties=ties)
     for increment in response.increments:
         results.add(increment)

@@ -16,6 +16,7 @@ from solver.interfaces import Interfaces
 from solver.kinematics import Pose, relative_velocities
 from solver.loads import GRAVITY, Loads, Settlement
 from solver.phases import PhaseChange, loads_in
+from solver.ties import Tie
 from solver.views import Shown, views
 
 from .certificate import Certificate
@@ -123,6 +124,7 @@ class Response(Shown):
         What is measured along them.
     control : optional
         What drives the parameter where no settlement does: the ControlDisplacement of a pushover.
+    ties : tuple of Tie
     changes : tuple of PhaseChange
         Of blocks and dead loads between the settlements.
     """
@@ -140,6 +142,7 @@ class Response(Shown):
     parameter: Quantity = SETTLEMENT
     measured: Quantity = REACTION
     control: Control | None = None
+    ties: tuple[Tie, ...] = ()
     changes: tuple[PhaseChange, ...] = ()
 
     def __repr__(self) -> str:
@@ -336,7 +339,7 @@ class LimitLoad(HasState, Shown):
     held : State or StoredState, optional
         The limit state: pose, closed contact points, their forces at the limit, and the mechanism as its velocity. In
         memory, or in a file; None where it is kept with the increment that reports the limit load.
-    analysed : (Assembly, Interfaces, Loads), optional
+    analysed : (Assembly, Interfaces, Loads, ties), optional
         Whose limit load it is.
     """
 
@@ -349,7 +352,9 @@ class LimitLoad(HasState, Shown):
     programs: int
     held: State | StoredState | None = field(default=None, repr=False, compare=False)
     torsion: str = "points"
-    analysed: tuple[Assembly, Interfaces, Loads] | None = field(default=None, repr=False, compare=False)
+    analysed: tuple[Assembly, Interfaces, Loads, tuple[Tie, ...]] | None = field(
+        default=None, repr=False, compare=False
+    )
 
     @property
     def mechanism(self) -> np.ndarray:
@@ -403,7 +408,7 @@ class LimitLoad(HasState, Shown):
         """
         if self.analysed is None:
             raise ValueError("this limit load does not know its structure; the response that reports it does")
-        assembly, interfaces, loads = self.analysed
+        assembly, interfaces, loads, ties = self.analysed
         return Response(
             assembly,
             settlements=(),
@@ -416,6 +421,7 @@ class LimitLoad(HasState, Shown):
             limits=(self,),
             parameter=LOAD_POSITION,
             measured=LOAD_MULTIPLIER,
+            ties=ties,
         )
 
     def __str__(self) -> str:

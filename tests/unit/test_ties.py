@@ -109,6 +109,7 @@ def test_analyses_that_know_no_ties_refuse_them(tmp_path):
     assert 'increments = "linear program" knows no ties' in said
 
 
+@pytest.mark.slow
 def test_a_tie_adds_to_the_acceleration_that_overturns_a_pier_and_to_what_is_left_of_it(tmp_path):
     live = {"kind": "live", "weight_fraction": [1.0, 0.0]}
     stay = TIE | {"to": {"fixed": [-2.0, 1.5]}, "from": [0.25, 1.5], "strength": 500.0}
@@ -257,6 +258,7 @@ def test_a_picture_draws_the_tie_in_the_colour_of_its_state(run, tmp_path):
     assert palette.YIELDING in colours
 
 
+@pytest.mark.slow
 def test_a_run_that_was_stopped_goes_on_with_its_ties(run, tmp_path):
     folder = tmp_path / "stopped"
     shutil.copytree(run.folder, folder)
