@@ -2,7 +2,7 @@
 
 A step of time h minimises over the movement v of all blocks, with their movement u in free flight::
 
-    1/2 (v - u)ᵀ M/h² (v - u) + what contact points ask for (solver.contact_step.problem)
+    1/2 (v - u)ᵀ M/h² (v - u) + what contact points ask for (mechanics.ContactProblem)
 
 It is implicit and without restitution. Rotations are counted about the principal axes of each block, in which its
 inertia is diagonal. A contact point is a point of one block before a plane that rides on the other.

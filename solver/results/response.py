@@ -313,6 +313,10 @@ class LimitStatus(StrEnum):
     NOT_CONVERGED = "not converged"
 
 
+#: What a limit load is of.
+Analysed = tuple[Assembly, Interfaces, Loads, tuple[Tie, ...]]
+
+
 @dataclass(frozen=True)
 class LimitLoad(HasState, Shown):
     """The capacity of a structure under live loads at one geometry.

@@ -36,6 +36,8 @@ LOOSER = dict.fromkeys(
     2e-3,
 ) | {
     "wall_with_arch": 5e-3,
+    # Which of brittle joints breaks first may follow from rounding.
+    "wall_with_mortar": 1e-2,
     # A brick slips a little earlier with one kernel: 4.7e-3 of the last reaction, within the step tolerance.
     "wall_self_weight": 1e-2,
     "panel_settlement_friction": 2e-3,
@@ -61,6 +63,7 @@ SLOW = {
     "facade",
     "panel_settlement_friction",
     "wall_with_arch",
+    "wall_with_mortar",
     "corner_of_walls",
     "cross_vault_corner",
     "dome_spreading",
@@ -79,6 +82,7 @@ ENDS = {
     "wall_self_weight": (solver.Status.LIMIT_REACHED, 0.2069),
     "wall_loaded": (solver.Status.LIMIT_REACHED, 0.2215),
     "wall_with_arch": (solver.Status.COLLAPSED, None),
+    "wall_with_mortar": (solver.Status.LIMIT_REACHED, None),
     "arch_moving_load": (solver.Status.COLLAPSED, None),
     "wall_horizontal_acceleration": (solver.Status.COLLAPSED, 0.509956),
     "wall_horizontal_after_settlement": (solver.Status.COLLAPSED, 0.509956),
