@@ -104,6 +104,7 @@ def test_flow_without_dilatancy_reaches_the_solver(tmp_path):
     assert "values, no bounds, differ by" in _in_words(response, tmp_path)
 
 
+@pytest.mark.slow
 def test_envelope_of_a_load_that_moves_over_an_arch(tmp_path, capsys):
     folder, summary = ran(ARCH, tmp_path)
     rows = table(folder / "envelope.csv")
@@ -131,6 +132,7 @@ def test_envelope_of_a_load_that_moves_over_an_arch(tmp_path, capsys):
     assert "load multiplier α" in curve
 
 
+@pytest.mark.slow
 def test_live_load_is_drawn_where_it_acts_at_each_position(tmp_path):
     """The arrow stands over the place of the load, whichever position is drawn."""
 
@@ -219,6 +221,7 @@ increment = 0.03
 )
 
 
+@pytest.mark.slow
 def test_a_mechanism_that_moves_upright_in_space_swings(tmp_path):
     text = '[geometry]\nlayout = "column"\ndimension = 3\n[analysis]\nkind = "limit load"\n'
     lifted = '[[loads]]\nkind = "live"\nweight_fraction = [0.0, 0.0, 1.0]\n'
@@ -229,6 +232,7 @@ def test_a_mechanism_that_moves_upright_in_space_swings(tmp_path):
     assert (np.diff(rising) > 0.0).all()
 
 
+@pytest.mark.slow
 def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     folder, summary = ran(PUSHED + "[output]\nanimation = false\n", tmp_path, drawn=True)
     rows = table(folder / "response.csv")
@@ -291,6 +295,7 @@ def test_pushover_after_a_tilt_starts_at_what_is_left(tmp_path):
     assert "nothing is left to push over" in summary["message"]
 
 
+@pytest.mark.slow
 def test_pressure_on_the_top_and_on_an_edge(tmp_path):
     """Pressure p on the flank of b × h overturns it at p h²/2 = W b/2; pressure on the top holds it."""
     push = '[[loads]]\nkind = "live"\npressure = 1000.0\ndirection = [1.0, 0.0]\n'

@@ -43,6 +43,7 @@ def _without_timings(path: Path) -> bytes:
     return re.sub(*TIMINGS[path.name], data) if path.name in TIMINGS else data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drawn", [pytest.param(True, marks=pytest.mark.slow), False], ids=["drawn", "undrawn"])
 def test_two_runs_write_the_same_bytes_and_can_be_run_again(tmp_path, drawn):
     assert main(["layout", "arch", "voussoirs=8", "-o", str(tmp_path / "arch.json")]) == 0

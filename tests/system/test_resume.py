@@ -283,6 +283,7 @@ def test_ctrl_c_ends_cleanly_and_the_run_resumes(whole, tmp_path, monkeypatch, c
     _same_result(whole / "out", out)
 
 
+@pytest.mark.slow
 def test_resuming_a_finished_run_draws_what_is_missing(whole, tmp_path, capsys):
     out = shutil.copytree(whole / "out", tmp_path / "out")
     before = (out / "response.csv").read_bytes()

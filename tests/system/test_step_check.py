@@ -72,6 +72,7 @@ def run_here(folder, text, *options):
     return run_command(folder / "case.toml", "-o", folder / "out", "--no-pictures", *options)
 
 
+@pytest.mark.slow
 def test_a_run_prints_its_step_error_by_default(tmp_path):
     done = run(tmp_path, CASE)
     assert done.returncode == 0, done.stderr

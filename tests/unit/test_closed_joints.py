@@ -398,6 +398,7 @@ def blunted(ring, style):
     return dense + np.random.default_rng(len(dense)).uniform(-1e-3, 1e-3, dense.shape)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize(
@@ -445,6 +446,7 @@ def test_the_way_can_be_chosen():
     assert close_joints(rings[:4], 0.01, method="voronoi").method == "voronoi"
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_mortar_that_is_drawn_is_laidaway_however_wide_and_openings_in_it_stay(tmp_path):
     from blockvis import read

@@ -52,6 +52,7 @@ def test_any_increment_is_drawn_on_demand(tmp_path):
         draw_cracks(response, 999, tmp_path / "none.png")
 
 
+@pytest.mark.slow
 def test_cracks_in_space_are_darker_where_they_are_wider(tmp_path, monkeypatch):
     """Two boxes whose joint opens like a wedge by up to 80 mm: four classes, and the label of the only crack."""
     assembly = solver.Assembly.from_solids([box((-1, 0, 0), (0, 1, 1)), box((0, 0, 0), (1, 1, 1))])

@@ -59,6 +59,7 @@ def outlines(assembly, pose):
 EACH = pytest.mark.parametrize("structure", [shipped_arch, pytest.param(panel, marks=pytest.mark.thorough)])
 
 
+@pytest.mark.slow
 @EACH
 def test_blocks_never_overlap_by_a_hundredth(structure):
     response, fall = structure(), fallen(structure)

@@ -116,6 +116,7 @@ def four_blocks(apart):
     return assembly, solver.Pose(assembly.centroids + away, np.zeros((4, 1)))
 
 
+@pytest.mark.slow
 @given(st.floats(0.01, 0.2))
 def test_the_pocket_where_four_cracks_meet_is_air(apart):
     assembly, pose = four_blocks(apart)
@@ -231,6 +232,7 @@ def test_carried_there_and_back(turn, x, y):
     np.testing.assert_allclose(mechanics.carried(there, np.array([0]), after, before), point, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("response_of", [arch_response, vault_response], ids=["plane", "space"])
 def test_a_mechanism_that_rises_swings_as_far_as_it_is_to(response_of):
     response = response_of()

@@ -47,6 +47,7 @@ def openings(response):
     return joints["opening"][joints["initial"] == 1]
 
 
+@pytest.mark.slow
 def test_a_translation_by_a_profile_is_the_ordinary_settlement():
     arch = structures.arch_response().assembly
     steps = {"increment": 0.01, "limit": 0.03}

@@ -112,6 +112,7 @@ def too_wide(monkeypatch):
     return random_program(5, rows=rows, columns=3 * rows, equalities=rows // 2)
 
 
+@pytest.mark.slow
 def test_what_is_no_narrow_band_is_left_to_hipo(too_wide):
     found, known = solve_lp(too_wide), solve_lp(too_wide, ("simplex",))
     assert found.route == "hipo"
@@ -400,6 +401,7 @@ def programs_of(monkeypatch, assembly, **settlement):
     return kept
 
 
+@pytest.mark.slow
 def test_walls_take_it_and_it_agrees_with_highs(monkeypatch):
     """Every program of a wall of 140 bricks."""
     kept = programs_of(monkeypatch, wall(15, 9), direction=(0.0, -1.0), increment=2e-3, limit=2e-3)

@@ -115,6 +115,7 @@ def rotation(angle):
     return np.array([[c, -s], [s, c]])
 
 
+@pytest.mark.slow
 def test_cases_collapse_slide_and_settle():
     assert original("hinging arch").stop is solver.Status.COLLAPSED
     assert original("sliding arch").stop is solver.Status.COLLAPSED

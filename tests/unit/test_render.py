@@ -174,6 +174,7 @@ def test_films_have_their_frames(tmp_path, suffix, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.slow
 def test_films_that_cannot_be(tmp_path):
     with pytest.raises(ValueError, match=r"641 × 360.*even"):
         animate(arch_response(), tmp_path / "odd.mp4", size=(641, 360))

@@ -216,6 +216,7 @@ def test_limit_reached():
     assert np.diff(response.settlement).min() > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, pytest.param(1e-5, marks=pytest.mark.thorough)])
 def test_bracket_is_as_narrow_as_asked(tolerance):
     settlement = solver.Settlement(direction=(1, 0), increment=0.02, limit=1, tolerance=tolerance)
@@ -313,6 +314,7 @@ def sliding_response():
 RESPONSES = {"arch": arch_response, "wall": wall_response, "sliding arch": sliding_response}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RESPONSES)
 def test_certificates(name):
     response = RESPONSES[name]()

@@ -38,6 +38,7 @@ def ordinary():
     return solver.settle(_arch(), _spread(), friction_coefficient=0.7, controls=solver.Controls(falling_frames=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "scale", [1e-5, 1e-3, *(pytest.param(scale, marks=pytest.mark.thorough) for scale in (1e-6, 1e-2, 100.0))]
 )
@@ -71,6 +72,7 @@ def test_any_place(ordinary, scale):
     assert np.abs(last.contacts.points - GRID).max() < 10 * scale
 
 
+@pytest.mark.slow
 def test_a_support_that_turns_about_a_point_of_the_grid():
     """The centre of rotation moves with the local origin: a block on a tilting slab overturns at atan(b / h)."""
     slab = np.array([[-1, -1], [2, -1], [2, 0], [-1, 0]]) + GRID

@@ -52,7 +52,6 @@ WHITE_BOX = {
     "unit/test_tolerances.py": 1,
     "unit/test_video.py": 3,
     "unit/test_written_files.py": 10,
-    "validation/test_mortar.py": 2,
     "validation/test_space_static.py": 3,
 }
 

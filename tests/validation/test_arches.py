@@ -49,6 +49,7 @@ def test_spreading(embrace, ratio, n, collapse, first, last):
     assert response.collapse.reaction / response.total_weight == pytest.approx(last, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("embrace", "ratio", "n", "collapse", "first", "last", "h_first", "h_last"), SINKING)
 def test_sinking(embrace, ratio, n, collapse, first, last, h_first, h_last):
     response = _settle(embrace, ratio, n, (0, -1))
