@@ -99,6 +99,9 @@ def from_flat(arrays: Mapping[str, np.ndarray], kind: type[T], **given: Any) -> 
     for field in dataclasses.fields(kind):  # type: ignore[arg-type]
         if field.name in given:
             continue
+        if field.name not in arrays and field.default_factory is not dataclasses.MISSING:
+            # Arrays that came later: files of before have none.
+            continue
         one = hints[field.name]
         if dataclasses.is_dataclass(one):
             fields[field.name] = from_flat(arrays, one)  # type: ignore[arg-type]

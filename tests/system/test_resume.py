@@ -233,7 +233,7 @@ def test_killed_limit_loads_and_pushovers_resume(tmp_path, monkeypatch, kind, mo
     before = [file.stat().st_mtime_ns for file in sorted((tmp_path / "out" / "increments").glob("state_*"))][:kept]
     assert len(before) == kept
     found = []
-    for module, name in ((solver, "limit_load"), (mechanics, "settlement_increments")):
+    for module, name in ((solver.Structure, "limit_load"), (mechanics, "settlement_increments")):
         function = getattr(module, name)
         monkeypatch.setattr(
             module, name, lambda *a, name=name, function=function, **k: found.append(name) or function(*a, **k)
