@@ -6,6 +6,7 @@ friction; it says nothing about the settlement at collapse and nothing of the st
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -96,15 +97,23 @@ def fall_of(response: solver.Response, progress: Callable[[float], None] | None 
     collapsed = response.stop == solver.Status.COLLAPSED and response.parameter.is_path and not response.limits
     if not collapsed or collapse is None or not path or not collapse.mechanism.any():
         return None
-    push = PUSH * np.sqrt(solver.GRAVITY * response.assembly.block_size)
+    assembly = response.assembly
+    push = PUSH * np.sqrt(solver.GRAVITY * assembly.block_size)
+    enough = 0.0 if assembly.dimension == 2 else MOST * _falling_mass(response)
+    best, most = None, 0.0
     for _ in range(DOUBLINGS + 1):
         fall = _followed(response, push, progress)
-        fallen = np.linalg.norm(fall.positions[-1] - fall.positions[0], axis=1) > FALLEN * response.assembly.block_size
-        in_space = response.assembly.dimension == 3
-        if fallen.any() and (not in_space or response.assembly.masses[fallen].sum() > MOST * _falling_mass(response)):
-            return fall
+        fallen = np.linalg.norm(fall.positions[-1] - fall.positions[0], axis=1) > FALLEN * assembly.block_size
+        mass = float(assembly.masses[fallen].sum())
+        # No more falls by a larger push: the mechanism takes blocks with it that come to rest.
+        if best is not None and mass <= most:
+            break
+        if mass > most:
+            best, most = fall, mass
+        if most > enough:
+            break
         push *= 2.0
-    return None
+    return best
 
 
 def _falling_mass(response: solver.Response) -> float:
@@ -122,7 +131,8 @@ def _followed(response: solver.Response, push: float, progress: Callable[[float]
     for number in range(1, round(LONGEST * RATE) + 1):
         try:
             engine.advance(1.0 / RATE)
-        except mechanics.NotSolved:
+        except mechanics.NotSolved as failure:
+            warnings.warn(f"the fall is followed for {(number - 1) / RATE:g} s only: {failure}", stacklevel=2)
             break
         poses.append(engine.pose)
         if progress is not None:
