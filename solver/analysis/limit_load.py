@@ -37,7 +37,7 @@ from solver.ties import (
     tie_ends,
     tie_lengths,
 )
-from solver.tolerances import CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
+from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25
@@ -48,10 +48,9 @@ RELAXATION, PROGRAMS = 0.9, 300
 #: Non-associative flow: programs after which the next one follows of so many changes, and part of the new forces then.
 PLAIN_PROGRAMS, REMEMBERED, ACCELERATED = 40, 15, 0.5
 
-#: Non-associative flow has converged when the multiplier changes by less than the first and shear forces exceed
-#: friction by less than the second, relative to the multiplier and to the largest normal force; the third in space,
-#: where the multiplier is off by as much.
-MULTIPLIER_CHANGE = 1e-7
+#: Non-associative flow has converged when the multiplier changes by less than programs are solved to, and shear forces
+#: exceed friction by less than this part of the largest normal force; the second in space, where the multiplier is off
+#: by as much.
 FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE = 1e-6, 1e-8
 
 #: Cost of a change of a normal force in the non-associative programs, in multipliers: it only decides between equals.
@@ -347,7 +346,7 @@ class _Problem:
             excess = float(beyond.max(initial=0.0)) / largest
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
             error = np.inf if state.falls else max(excess, change)
-            settled = excess <= most_excess and change <= MULTIPLIER_CHANGE and not state.falls
+            settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
             if nearest is balanced or settled or error < least:
                 nearest, least, used = state, error, normal
             if settled:
