@@ -120,7 +120,7 @@ def regions_of(
             region.openings.append(drawn[k].shape)
     left = [k for k in others if not opened[k] and drawn[k].block >= 0]
     notes = [*layout.notes, *_reaching_out(every), *_left_in(drawn, left, every)]
-    used = [drawn[k] for k in (*walls, *(k for k in others if opened[k]))]
+    used = [drawn[k] for k in (*walls, *filter(opened.get, others))]
     return regions, replace(_without(layout, used), notes=tuple(notes))
 
 
