@@ -27,7 +27,6 @@ WHITE_BOX = {
     "system/test_path_range.py": 11,
     "system/test_report_use.py": 5,
     "system/test_results_in_space.py": 16,
-    "system/test_resume.py": 4,
     "system/test_step_check.py": 8,
     "system/test_study_campaign.py": 7,
     "unit/test_case_keys.py": 7,
@@ -36,7 +35,6 @@ WHITE_BOX = {
     "unit/test_curves.py": 6,
     "unit/test_dimensions.py": 12,
     "unit/test_explanation.py": 21,
-    "unit/test_extras.py": 2,
     "unit/test_fall.py": 8,
     "unit/test_fall_in_space.py": 4,
     "unit/test_films.py": 7,
@@ -51,8 +49,7 @@ WHITE_BOX = {
     "unit/test_ties.py": 5,
     "unit/test_tolerances.py": 1,
     "unit/test_video.py": 3,
-    "unit/test_written_files.py": 10,
-    "validation/test_space_static.py": 3,
+    "unit/test_written_files.py": 12,
 }
 
 
