@@ -22,7 +22,7 @@ FACES = {
 #: a number that has become smaller is made smaller here.
 WHITE_BOX = {
     "formats/test_gmsh_cad.py": 1,
-    "system/test_drawing.py": 6,
+    "system/test_drawing.py": 5,
     "system/test_memory.py": 8,
     "system/test_path_range.py": 11,
     "system/test_report_use.py": 5,
