@@ -51,7 +51,7 @@ def test_the_curve_names_the_failure_of_a_run(tmp_path):
     response = arch_response()
     failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=response.path[:4])
     told = said(failed, tmp_path / "failed.svg")
-    assert "solver failed at 0.0600 m: the curve is not complete" in told
+    assert "solver failed at 60.00 mm: the curve is not complete" in told
     assert not any("failed" in line for line in said(response, tmp_path / "whole.svg"))
 
 
