@@ -21,7 +21,6 @@ FACES = {
 #: Files that look inside, each with how many names it takes from there. None may come to it and no number may grow;
 #: a number that has become smaller is made smaller here.
 WHITE_BOX = {
-    "formats/test_gmsh_cad.py": 1,
     "system/test_drawing.py": 5,
     "system/test_memory.py": 8,
     "system/test_path_range.py": 11,
