@@ -14,14 +14,11 @@ from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
 from .geometry.shapes import Shapes
-from .geometry.surfaces import polyhedra_of
+from .geometry.surfaces import SMALLEST_SHAPE_FACTOR, polyhedra_of
 from .tolerances import DRAWN_GAP
 from .views import Shown
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
-
-#: Area of a block, as a part of its perimeter squared, below which it is a line: its centroid has six digits only.
-SMALLEST_SHAPE_FACTOR = 1e-9
 
 
 @dataclass(frozen=True)

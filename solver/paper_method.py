@@ -59,7 +59,7 @@ from solver.results.increment import Increment, State, Status, carries, used_up
 from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse
 from solver.tolerances import (
-    ACCEPTED_VIOLATION,
+    ACCEPTED_ERROR,
     AT_LIMIT,
     BALANCE_TOLERANCE,
     CARRYING_FRACTION,
@@ -279,7 +279,7 @@ class _Phase:
         except SupportsLocked:
             # Drawings and programs are off by as much; blocks that are wedged cannot give way to it.
             arguments["gaps"] = np.where(
-                np.abs(arguments["gaps"]) < ACCEPTED_VIOLATION * self.length, 0.0, arguments["gaps"]
+                np.abs(arguments["gaps"]) < ACCEPTED_ERROR * self.length, 0.0, arguments["gaps"]
             )
             return solve_program(self.inputs, pose, contacts, **arguments)
 

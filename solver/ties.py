@@ -22,7 +22,7 @@ MEMBER = 9
 TOLD_YIELDING = 1.0 - 1e-3
 
 #: What a member does at an increment, by number: not yet or no longer there, without force, elastic, yielding, broken.
-STATES = ABSENT, SLACK, ELASTIC, YIELDING, BROKEN = range(5)
+ABSENT, SLACK, ELASTIC, YIELDING, BROKEN = range(5)
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,12 @@ FEASIBILITY_TOLERANCE = 1e-10
 #: Distance from the boundary of its friction cone at which a contact point is on it.
 AT_LIMIT = 1e-9
 
-#: Feasibility of interior solutions of large programs; the smallest one costs a tenth more iterations.
+#: Error of interior solutions of large programs; the smallest one costs a tenth more iterations.
 INTERIOR_TOLERANCE = 1e-8
 
-#: Violation of rows, bounds and reduced costs that our own check of a solution accepts.
-ACCEPTED_VIOLATION = 1e-7
-
-#: Relative difference of the two objectives that our own check accepts.
-ACCEPTED_GAP = 1e-7
+#: Violation of rows, bounds and reduced costs, and relative difference of the two objectives, that our own check of a
+#: solution accepts.
+ACCEPTED_ERROR = 1e-7
 
 #: Violation of rows and cones by a ray of a conic program, its largest number 1, that is a proof.
 RAY_BALANCE = 1e-8

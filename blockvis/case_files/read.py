@@ -131,13 +131,6 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     """Make a case of the values of a parsed TOML text; paths in it are relative to the folder of ``source``."""
     top = Table(values, "", source)
     geometry = _geometry(top.table("geometry"))
-    placed = read_places(top.table("roles"))
-    roles = {
-        name: role for name, role in top.table("roles").values.items() if name not in PLACES or isinstance(role, str)
-    }
-    for name, role in roles.items():
-        if role not in mechanics.ROLES:
-            raise ValueError(f'{source}: [roles] "{name}" is {shortened(role)}; a role is {", ".join(mechanics.ROLES)}')
     materials = top.table("materials")
     phases = [keys.SETTLEMENT.read(table) for table in top.tables("settlement")]
     motions = [_settlement(table, one) for table, one in zip(top.tables("settlement"), phases, strict=True)]
@@ -152,8 +145,8 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         text=text,
         **geometry | {"file": None if geometry["file"] is None else source.parent / geometry["file"]},
         bonds=_bonds(top, geometry["file"]),
-        roles=roles,
-        role_places=placed,
+        roles=_roles(top.table("roles")),
+        role_places=read_places(top.table("roles")),
         supports=tuple(_support(table) for table in top.tables("supports")),
         **_material(top.table("material")),
         densities={name: keys.MATERIALS.read(materials.table(name))["density"] for name in materials.values},
@@ -179,6 +172,16 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     )
     top.finish()
     return _checked(case, settings)
+
+
+def _roles(table: Table) -> dict[str, str]:
+    """Read the roles of [roles] that are given by name."""
+    roles = {name: role for name, role in table.values.items() if name not in PLACES or isinstance(role, str)}
+    for name, role in roles.items():
+        if role not in mechanics.ROLES:
+            one_of = ", ".join(mechanics.ROLES)
+            raise ValueError(f'{table.source}: [roles] "{name}" is {shortened(role)}; a role is {one_of}')
+    return roles
 
 
 def _geometry(table: Table) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import solver
@@ -18,42 +19,49 @@ def check_coordinates(case: Case, assembly: solver.Assembly) -> None:
         Names the key, and how many numbers it needs.
     """
     d = assembly.dimension
-    where = "in space" if d == 3 else "in the plane"
-    given: list[tuple[str, str, Any]] = []
+    control = case.settings if isinstance(case.settings, solver.ControlDisplacement) else None
+    given = [("control", key, getattr(control, key, None)) for key in ("direction", "point")]
+    for table, key, numbers in (*_of_settlements(case, d), *_of_loads(case, d), *given):
+        if numbers is not None and len(numbers) != d:
+            wanted = "three numbers [x, y, z]" if d == 3 else "two numbers [x, y]"
+            raise ValueError(
+                f"{case.source}: [{table}] {key} has {len(numbers)} numbers, but the blocks are {_where(d)}; give "
+                f"{wanted}"
+            )
+    if d == 3:
+        _refuse_plane_keys(case)
+
+
+def _where(d: int) -> str:
+    return "in space" if d == 3 else "in the plane"
+
+
+def _of_settlements(case: Case, d: int) -> Iterator[tuple[str, str, Any]]:
+    """Table, key and numbers of the directions and points of settlements of d dimensions."""
     for k, settlement in enumerate(case.settlements, start=1):
         table = f"settlement {k}" if len(case.settlements) > 1 else "settlement"
-        given += [(table, key, getattr(settlement, key)) for key in ("direction", "rotation_centre")]
         for key in ("rotation_axis", "radial_from"):
             if d == 2 and getattr(settlement, key) is not None:
-                raise ValueError(f"{case.source}: [{table}] {key} belongs to blocks in space; these are {where}")
+                raise ValueError(f"{case.source}: [{table}] {key} belongs to blocks in space; these are {_where(d)}")
+        yield from ((table, key, getattr(settlement, key)) for key in ("direction", "rotation_centre"))
+
+
+def _of_loads(case: Case, d: int) -> Iterator[tuple[str, str, Any]]:
+    """Table, key and numbers of the forces and points of loads on blocks of d dimensions."""
     for k, load in enumerate(case.loads, start=1):
         table = f"loads {k}" if len(case.loads) > 1 else "loads"
-        force = load.force if load.has_force else None
-        moment = load.moment if load.has_moment else None
-        given += [
-            (table, "weight_fraction", load.weight_fraction),
-            (table, "force", force),
-            (table, "point", load.point),
-        ]
-        if moment is not None and (d == 3) != isinstance(moment, tuple):
+        if load.has_moment and (d == 3) != isinstance(load.moment, tuple):
             wanted = "three numbers [mx, my, mz]" if d == 3 else "one number"
-            raise ValueError(f"{case.source}: [{table}] moment: the blocks are {where}; give {wanted}")
+            raise ValueError(f"{case.source}: [{table}] moment: the blocks are {_where(d)}; give {wanted}")
         if d == 3 and load.pressure is not None:
             raise ValueError(f"{case.source}: [{table}] pressure belongs to blocks in the plane; in space give forces")
         if d == 3 and load.positions and load.y is None:
             raise ValueError(f"{case.source}: [{table}] positions: the blocks are in space; add the line's y = ... [m]")
         if d == 2 and load.y is not None:
-            raise ValueError(f"{case.source}: [{table}] y is that of positions in space; the blocks are {where}")
-    control = case.settings if isinstance(case.settings, solver.ControlDisplacement) else None
-    given += [("control", key, getattr(control, key, None)) for key in ("direction", "point")]
-    for table, key, numbers in given:
-        if numbers is not None and len(numbers) != d:
-            wanted = "three numbers [x, y, z]" if d == 3 else "two numbers [x, y]"
-            raise ValueError(
-                f"{case.source}: [{table}] {key} has {len(numbers)} numbers, but the blocks are {where}; give {wanted}"
-            )
-    if d == 3:
-        _refuse_plane_keys(case)
+            raise ValueError(f"{case.source}: [{table}] y is that of positions in space; the blocks are {_where(d)}")
+        yield table, "weight_fraction", load.weight_fraction
+        yield table, "force", load.force if load.has_force else None
+        yield table, "point", load.point
 
 
 def _refuse_plane_keys(case: Case) -> None:

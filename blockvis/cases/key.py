@@ -37,7 +37,7 @@ class ValueKind:
     read: Callable[[Table, Key], Any] = _as_it_is
 
 
-def _list_of(item: Mapping[str, Any], least: int = 0, most: int | None = None) -> dict[str, Any]:
+def _list_of(item: Mapping[str, Any], least: int, most: int | None = None) -> dict[str, Any]:
     return {"type": "array", "items": item, "minItems": least} | ({} if most is None else {"maxItems": most})
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -263,22 +263,31 @@ def cut_ground(
     solver.Assembly
         The pieces of a support "ground" are named "ground 1", "ground 2" ... from left to right.
     """
-    bending = [profile for profile in profiles if profile is not None]
     if assembly.dimension != 2:
         return assembly
-    if chosen is None:
-        extents = {int(i): assembly.outline(int(i))[:, 0] for i in np.flatnonzero(assembly.moving)} if bending else {}
-        chosen = [i for i, x in extents.items() if any(p.bends(float(x.min()), float(x.max())) for p in bending)]
+    chosen = _bent_supports(assembly, profiles) if chosen is None else chosen
     pieces = {i: cut for i in chosen if len(cut := _cut(assembly, i)) > 1}
     if not pieces:
         return assembly
+    listed = ", ".join(f"'{assembly.names[i]}' into {len(cut)} pieces" for i, cut in pieces.items())
+    warnings.warn(f"the ground follows the profile: cut under the joints of the first course, {listed}", stacklevel=3)
+    return _with_pieces(assembly, pieces)
+
+
+def _bent_supports(assembly: solver.Assembly, profiles: Sequence[Profile | None]) -> list[int]:
+    """Choose the moving supports over which a profile bends."""
+    bending = [profile for profile in profiles if profile is not None]
+    extents = {i: assembly.outline(i)[:, 0] for i in np.flatnonzero(assembly.moving).tolist()} if bending else {}
+    return [i for i, x in extents.items() if any(p.bends(float(x.min()), float(x.max())) for p in bending)]
+
+
+def _with_pieces(assembly: solver.Assembly, pieces: Mapping[int, Sequence[np.ndarray]]) -> solver.Assembly:
+    """Put pieces, from left to right, in the place of blocks, by their numbers."""
     rows: list[tuple[Any, int, str]] = []
     for i in range(assembly.n_blocks):
         parts = pieces.get(i, [assembly.outline(i)])
         names = [f"{assembly.names[i]} {k}" for k in range(1, len(parts) + 1)] if i in pieces else [assembly.names[i]]
         rows += [(outline, i, name) for outline, name in zip(parts, names, strict=True)]
-    listed = ", ".join(f"'{assembly.names[i]}' into {len(cut)} pieces" for i, cut in pieces.items())
-    warnings.warn(f"the ground follows the profile: cut under the joints of the first course, {listed}", stacklevel=3)
     owner = [i for _, i, _ in rows]
     return solver.Assembly.from_outlines(
         [outline for outline, _, _ in rows],

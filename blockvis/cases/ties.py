@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -397,19 +396,3 @@ def _in_metres(point: tuple[float, ...], assembly: solver.Assembly) -> str:
 
 def _written(point: Sequence[float]) -> str:
     return f"({', '.join(f'{x:g}' for x in point)})"
-
-
-def tie_words(tie: solver.Tie, assembly: solver.Assembly) -> str:
-    """Say in a line what a tie is and what holds it."""
-    ends = [
-        f"{'ground' if block is None else repr(assembly.names[block])} {_written(point)}"
-        for block, point in zip(tie.blocks, tie.points, strict=True)
-    ]
-    more: list[Any] = [f"{tie.stiffness:.4g} N/m"]
-    if np.isfinite(tie.strength):
-        more.append(f"{'breaks' if tie.brittle else 'yields'} at {tie.strength:.4g} N")
-    if tie.prestress:
-        more.append(f"prestress {tie.prestress:.4g} N")
-    if tie.phase > 1:
-        more.append(f"from settlement {tie.phase} on")
-    return f"{tie.kind} '{tie.name}' from {ends[0]} to {ends[1]}, {', '.join(more)}"

@@ -72,6 +72,12 @@ class _Found:
     misses: list[float] = field(default_factory=list)
     skipped: Counter[str] = field(default_factory=Counter)
 
+    @property
+    def points(self) -> np.ndarray:
+        """(n, 3) array: all points of outlines and lines."""
+        every = [*self.rings, *(points for points, _ in self.lines), *(rings[0] for rings, _ in self.holed)]
+        return np.concatenate(every) if every else np.zeros((0, 3))
+
 
 def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     """Read parsed GeoJSON, which states no unit; None if it is another kind of JSON."""
@@ -277,11 +283,10 @@ def layout_of_features(
     found = _Found(skipped=Counter(skipped or {}))
     for k, feature in enumerate(features):
         _add(feature.geometry, k, found)
-    every = [*found.rings, *(points for points, _ in found.lines), *(rings[0] for rings, _ in found.holed)]
-    listed = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
-    if not every:
+    every, listed = found.points, ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
+    if not len(every):
         raise ValueError(f"'{path}' has no polygon (found: {listed or 'nothing'}); draw each block as one polygon")
-    order, notes = _order(np.concatenate(every), reading.view, path)
+    order, notes = _order(every, reading.view, path)
     rows = _rows(features)
     rings = [ring[:, order] for ring in found.rings]
     outlines = [*rings, *(holed[0][:, order] for holed, _ in found.holed)]
@@ -290,21 +295,15 @@ def layout_of_features(
     if listed:
         notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
     kinds = _parts(rows, found.of)
-    left_out = [_hole(*(ring[:, order] for ring in holed), row=rows[k]) for holed, k in found.holed]
-    lines = _lines(found, rows, order)
-    wanted = [line for line in lines if reading.wants([line.layer, line.handle])]
-    left_out += [
-        LeftOut("asked line", line.points, "", line.layer, line.handle, closed=False)
-        for line in lines
-        if not reading.wants([line.layer, line.handle])
-    ]
+    wanted, unwanted = _lines(found, rows, order, reading)
     faces = faces_of_lines(wanted, rings)
     _replace_cut(rings, kinds, faces)
-    left_out += faces.left_out
+    holes = [_hole(*(ring[:, order] for ring in holed), row=rows[k]) for holed, k in found.holed]
+    left_out = [*holes, *unwanted, *faces.left_out]
     if not rings and all(item.kind == "open" for item in left_out):
         raise ValueError(f"'{path}' has no polygon: {nothing_closed(faces)}; draw each block as one polygon")
     notes += [faces_note(faces, wanted)] if faces.rings else []
-    notes += faces.notes + joined_note(found.misses, float(np.ptp(np.concatenate(every), axis=0).max()))
+    notes += faces.notes + joined_note(found.misses, float(np.ptp(every, axis=0).max()))
     layout = Layout(
         blocks=tuple(rings),
         names=tuple(row["name"] for row in kinds),
@@ -315,12 +314,18 @@ def layout_of_features(
     return with_rows(layout, kinds)
 
 
-def _lines(found: _Found, rows: Sequence[Mapping[str, Any]], order: list[int]) -> list[Line]:
-    """Name the open lines after the features that have them."""
-    return [
-        Line(points[:, order], rows[k].get("group", ""), rows[k]["name"], must_close=len(points) > 2)
-        for points, k in found.lines
-    ]
+def _lines(
+    found: _Found, rows: Sequence[Mapping[str, Any]], order: list[int], reading: Reading
+) -> tuple[list[Line], list[LeftOut]]:
+    """Name the open lines after the features that have them, and leave out those that are not wanted."""
+    wanted, left_out = [], []
+    for points, k in found.lines:
+        line = Line(points[:, order], rows[k].get("group", ""), rows[k]["name"], must_close=len(points) > 2)
+        if reading.wants([line.layer, line.handle]):
+            wanted.append(line)
+        else:
+            left_out.append(LeftOut("asked line", line.points, "", line.layer, line.handle, closed=False))
+    return wanted, left_out
 
 
 def _replace_cut(rings: list[np.ndarray], rows: list[dict[str, Any]], faces: Faces) -> None:

@@ -445,13 +445,12 @@ def write(layout: Layout, path: Path) -> None:
         nodes += [f"{float(x)!r} {float(y)!r} 0" for x, y in ring]
         cells = cells_of_ring(ring)
         for kind, width in ((2, 3), (3, 4)):
-            chosen = [cell for cell in cells if len(cell) == width]
-            if chosen:
-                n_parts += 1
+            chosen = np.array([cell for cell in cells if len(cell) == width], dtype=int)
+            if len(chosen):
                 elements.append(f"2 {i + 1} {kind} {len(chosen)}")
-                for cell in chosen:
-                    n_elements += 1
-                    elements.append(" ".join(map(str, [n_elements, *(n_nodes + k + 1 for k in cell)])))
+                numbers = n_elements + 1 + np.arange(len(chosen))
+                elements += [" ".join(map(str, row)) for row in np.column_stack([numbers, n_nodes + 1 + chosen])]
+                n_parts, n_elements = n_parts + 1, n_elements + len(chosen)
         n_nodes += len(ring)
     lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat"]
     lines += ["$PhysicalNames", str(len(number))]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +102,30 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
     noisy = not labels.is_mask and not labels.names
     speck = SPECK_OF_NOISE if noisy else SPECK
     regions = regions_of(labels.numbers, None if smallest is None else smallest / placement.pixel, speck)
+    _check_stones(path, labels, regions, placement)
+    if smallest is None:
+        _check_sizes(path, regions, placement)
+    found = outlined(regions, STAIRS if tolerance is None else tolerance / placement.pixel)
+    holes = {k: inner for k, inner in found.holes.items() if _hole_share(found.rings[k], inner) > PINHOLES}
+    filled = [k for k in found.holes if k not in holes]
+    names, groups = _named(labels, regions)
+    rings = tuple(_turned(placement.placed(ring * [1.0, -1.0])) for ring in found.rings)
+    notes = _notes(labels, regions, found, placement)
+    if filled:
+        text = f"pinholes were filled, each less than {100 * PINHOLES:g} % of its stone, of {len(filled)}, the first "
+        notes = (*notes, Note(CHANGED, f"{text}'{names[filled[0]]}'"))
+    layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit, notes=notes)
+    _check_holes(path, labels, regions, holes)
+    around = {}
+    for k, inner in holes.items():
+        placed = tuple(placement.placed(hole * [1.0, -1.0]) for hole in inner)
+        message = f"'{names[k]}' has {len(placed)} holes; fill them, or give what lies around the stones as background"
+        around[k] = LeftOut("hole", rings[k], message, holes=placed)
+    return layout.leaving_out(around)
+
+
+def _check_stones(path: Path, labels: Labels, regions: Regions, placement: Placement) -> None:
+    """Refuse pictures without stones, masks of one region, and what is neither a mask nor a label image."""
     n = len(regions.labels)
     if n == 0:
         what = f"all of it is background ({labels.background})" if labels.background else "it is of one value"
@@ -120,32 +144,18 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
             f"'{path}' is no mask or label image: {share} of its pixels have no label's value; write it without "
             "shading and antialiasing, as PNG"
         )
-    if smallest is None:
-        _check_sizes(path, regions, placement)
-    found = outlined(regions, STAIRS if tolerance is None else tolerance / placement.pixel)
-    holes = {k: inner for k, inner in found.holes.items() if _hole_share(found.rings[k], inner) > PINHOLES}
-    filled = [k for k in found.holes if k not in holes]
-    names, groups = _named(labels, regions)
-    rings = tuple(_turned(placement.placed(ring * [1.0, -1.0])) for ring in found.rings)
-    notes = _notes(labels, regions, found, placement)
-    if filled:
-        text = f"pinholes were filled, each less than {100 * PINHOLES:g} % of its stone, of {len(filled)}, the first "
-        notes = (*notes, Note(CHANGED, f"{text}'{names[filled[0]]}'"))
-    layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit, notes=notes)
-    holed = sum(int(regions.areas[k]) for k in holes)
-    if holed > MOST_HOLED * regions.areas.sum():
-        largest = max(holes, key=lambda k: int(regions.areas[k]))
+
+
+def _check_holes(path: Path, labels: Labels, regions: Regions, holed: Collection[int]) -> None:
+    """Refuse pictures of which too much are regions with holes: there the background is taken for stones."""
+    area = sum(int(regions.areas[k]) for k in holed)
+    if area > MOST_HOLED * regions.areas.sum():
+        largest = max(holed, key=lambda k: int(regions.areas[k]))
         that = f"that ({labels.names[regions.labels[largest] - 1]})" if labels.names else "its other value"
         raise ValueError(
-            f"'{path}' is no picture of stones: {100.0 * holed / regions.areas.sum():.0f} % of what is not background "
+            f"'{path}' is no picture of stones: {100.0 * area / regions.areas.sum():.0f} % of what is not background "
             f"({labels.background or 'none'}) has holes; if {that} lies around the stones, give it as background"
         )
-    around = {}
-    for k, inner in holes.items():
-        placed = tuple(placement.placed(hole * [1.0, -1.0]) for hole in inner)
-        message = f"'{names[k]}' has {len(placed)} holes; fill them, or give what lies around the stones as background"
-        around[k] = LeftOut("hole", rings[k], message, holes=placed)
-    return layout.leaving_out(around)
 
 
 def _check_sizes(path: Path, regions: Regions, placement: Placement) -> None:

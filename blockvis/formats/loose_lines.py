@@ -94,30 +94,37 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -
     borders = [shapely.LinearRing(ring) for ring, good in zip(outlines, usable, strict=True) if good]
     flat = _joined(flat, borders, size, found)
     segments = shapely.set_precision([shapely.LineString(points) for points in flat], GRID * size)
-    rest = set(range(len(lines)))
+    cutting = _cut_outlines(
+        [ring if good else None for ring, good in zip(outlines, usable, strict=True)], segments, every, size, found
+    )
+    rest = [k for k in range(len(lines)) if k not in cutting]
+    _add_faces([lines[k] for k in rest], [segments[k] for k in rest], outlines, every, size, found)
+    return found
+
+
+def _cut_outlines(
+    outlines: Sequence[np.ndarray | None], segments: Any, every: Any, size: float, found: Faces
+) -> set[int]:
+    """Cut outlines, but None, along the lines within them; numbers of the lines that cut one."""
+    import shapely
+
+    cutting: set[int] = set()
     tree = shapely.STRtree(segments)
     for i, ring in enumerate(outlines):
-        if not usable[i]:
-            continue
         area = shapely.Polygon(ring)
-        around = area.buffer(2 * MEETS * size) if area.is_valid else None
-        inside = [] if around is None else [int(k) for k in tree.query(around, "contains")]
+        if area.is_empty or not area.is_valid:
+            continue
+        inside = tree.query(area.buffer(2 * MEETS * size), "contains").tolist()
         pieces = _cut(area, [segments[k] for k in inside], GRID * size) if inside else []
         if pieces:
             found.pieces[i] = [_sharpened(piece, every, GRID * size) for piece in pieces]
-            rest -= set(inside)
+            cutting |= set(inside)
     if found.pieces:
-        n, cutting = sum(map(len, found.pieces.values())), len(lines) - len(rest)
+        n = sum(map(len, found.pieces.values()))
         around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
-        found.notes.append(
-            Note(
-                CHANGED,
-                f"cut: {cutting} lines within {around} into {n} blocks; leave their layer out "
-                "(ignore) if they are no joints",
-            )
-        )
-    _add_faces([lines[k] for k in sorted(rest)], [segments[k] for k in sorted(rest)], outlines, every, size, found)
-    return found
+        said = f"cut: {len(cutting)} lines within {around} into {n} blocks"
+        found.notes.append(Note(CHANGED, f"{said}; leave their layer out (ignore) if they are no joints"))
+    return cutting
 
 
 def joined_ends(points: np.ndarray) -> tuple[np.ndarray, float] | None:
@@ -194,20 +201,9 @@ def _joined(flat: list[np.ndarray], borders: list[Any], size: float, found: Face
         end = flat[k][e]
         reach = min(MEETS * size, SHORTENED * float(shapely.length(others[k])))
         near = [int(j) for j in tree.query(shapely.Point(end), "dwithin", MEETS * size) if j != k]
-        best, distance = end, reach
-        for j in near:
-            # Corners and ends first, then any point of the line; a line that has moved is taken where it is now.
-            line = shapely.LineString(flat[j]) if j < len(flat) else others[j]
-            corners = np.array(line.coords)
-            apart = np.hypot(*(corners - end).T)
-            point = line.interpolate(line.project(shapely.Point(end)))
-            for candidate, d in (
-                (corners[apart.argmin()], apart.min()),
-                ((point.x, point.y), point.distance(shapely.Point(end))),
-            ):
-                if d <= distance:
-                    best, distance = np.array(candidate), float(d)
-                    break
+        # A line that has moved is taken where it is now.
+        there = [shapely.LineString(flat[j]) if j < len(flat) else others[j] for j in near]
+        best, distance = _nearest(there, end, reach)
         if distance < reach and distance > 0.0:
             flat[k][e] = best
             moved.append(distance)
@@ -215,6 +211,25 @@ def _joined(flat: list[np.ndarray], borders: list[Any], size: float, found: Face
         said = f"joined: {len(moved)} ends of lines that missed another by up to {max(moved):.3g} units"
         found.notes.append(Note(CHANGED, said))
     return flat
+
+
+def _nearest(lines: Sequence[Any], end: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
+    """Find the place on lines to which an end belongs, and its distance; corners and ends of a line come first."""
+    import shapely
+
+    best, distance = end, reach
+    for line in lines:
+        corners = np.array(line.coords)
+        apart = np.hypot(*(corners - end).T)
+        point = line.interpolate(line.project(shapely.Point(end)))
+        for candidate, d in (
+            (corners[apart.argmin()], apart.min()),
+            ((point.x, point.y), point.distance(shapely.Point(end))),
+        ):
+            if d <= distance:
+                best, distance = np.array(candidate), float(d)
+                break
+    return best, distance
 
 
 def _cut(area: Any, segments: list[Any], grid: float) -> list[np.ndarray]:

@@ -10,7 +10,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -426,10 +426,7 @@ def _path(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarra
         elif not command or command in "Zz":
             raise ValueError("has numbers without a command in its path; repair it")
         kind, relative = command.upper(), command.islower()
-        taken = tokens[k : k + _TAKES[kind]]
-        if len(taken) < _TAKES[kind] or any(not token[1] for token in taken):
-            raise ValueError(f"has a path command '{command}' with too few numbers; repair it")
-        v = [float(token[1]) for token in taken]
+        v = _numbers_of(command, tokens[k : k + _TAKES[kind]])
         k += _TAKES[kind]
         if kind == "Z":
             parts.append((np.array(points).reshape(-1, 2), True))
@@ -463,6 +460,13 @@ def _path(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarra
     if len(points) > 1:
         parts.append((np.array(points), False))
     return parts
+
+
+def _numbers_of(command: str, taken: Sequence[tuple[str, str]]) -> list[float]:
+    """Read the numbers of a path command."""
+    if len(taken) < _TAKES[command.upper()] or any(not token[1] for token in taken):
+        raise ValueError(f"has a path command '{command}' with too few numbers; repair it")
+    return [float(token[1]) for token in taken]
 
 
 def _bezier(controls: list[np.ndarray], where: _Context) -> list[np.ndarray]:

@@ -46,7 +46,7 @@ class PlaneSolid:
     place: np.ndarray
 
 
-def with_plane_faces(points: np.ndarray, triangles: np.ndarray, tolerance: float = WARPED) -> PlaneSolid:
+def with_plane_faces(points: np.ndarray, triangles: np.ndarray) -> PlaneSolid:
     """Join the triangles around a body to plane faces, and fit planes to those that are warped.
 
     Parameters
@@ -54,14 +54,12 @@ def with_plane_faces(points: np.ndarray, triangles: np.ndarray, tolerance: float
     points : (n, 3) array
     triangles : (m, 3) int array
         All seen in the same sense from outside.
-    tolerance : float
-        Largest warp of a face, as a fraction of the width of the body; what is farther from a plane stays triangles.
     """
     used, index = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], index.reshape(-1, 3)
     if volume(points, triangles) < 0.0:
         triangles = triangles[:, ::-1]
-    near = tolerance * width_of(points, triangles)
+    near = WARPED * width_of(points, triangles)
     faces = [ring for region in _regions(points, triangles, near) for ring in _rings_of(triangles[region])]
     return fitted(*_without_straight(points, faces, near), near)
 

@@ -393,13 +393,13 @@ def _feet_in_space(found: Inspection) -> list[_Foot]:
     height = high[:, 2] - low[:, 2]
     near = COURSE * float(np.median(height))
     course = np.flatnonzero(low[:, 2] <= low[:, 2].min() + near)
-    plans = [shapely.MultiPoint(points[:, :2]).convex_hull for points in corners]
+    plans = np.array([shapely.MultiPoint(points[:, :2]).convex_hull for points in corners])
     boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
     touching = _touching(boxes, 1e-3 * near + _opening(found))
     feet: list[_Foot] = []
     for k in course.tolist():
         lower = [j for j in touching[k] if low[j, 2] < low[k, 2] - 1e-6 * near]
-        covered = plans[k].intersection(shapely.union_all([plans[j] for j in lower])).area if lower else 0.0
+        covered = plans[k].intersection(shapely.union_all(plans[lower])).area if lower else 0.0
         if covered > (1.0 - EXPOSED) * plans[k].area:
             continue
         bed = _bed(corners[k], LEVEL * height[k], NARROW * plans[k].area)

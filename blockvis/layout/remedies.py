@@ -28,14 +28,12 @@ NAMED = 6
 MOST = 20_000
 
 
-def deep_overlaps(layout: Layout, tolerance: float | None = None) -> list[tuple[int, int]]:
+def deep_overlaps(layout: Layout) -> list[tuple[int, int]]:
     """Find the pairs of blocks of which a run refuses the overlap, drawn twice or not.
 
     Parameters
     ----------
     layout : Layout
-    tolerance : float, optional [m]
-        Depth that is resolved; by default that of a run.
     """
     dropped = dropped_twins(layout, duplicates(layout.every_corner), {})
     kept = [i for i in range(layout.n_blocks) if i not in dropped]
@@ -46,7 +44,7 @@ def deep_overlaps(layout: Layout, tolerance: float | None = None) -> list[tuple[
     else:
         assembly = solver.Assembly.from_outlines(drawn.outlines, names=drawn.names)
         allowed = DEFAULT_OVERLAP * float(np.median(assembly.widths))
-    return [(kept[i], kept[j]) for i, j, _ in overlaps(assembly, allowed if tolerance is None else tolerance)]
+    return [(kept[i], kept[j]) for i, j, _ in overlaps(assembly, allowed)]
 
 
 def proposed_ignore(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -123,9 +124,8 @@ def without_ignored(layout: Layout, ignore: Sequence[str], only: Sequence[str]) 
     if not ignore and not only:
         return layout
     known = [labels_of(layout, i) for i in range(layout.n_blocks)]
-    beside = [(item.layer, item.name) for item in layout.left_out]
-    every = [label for labels in (*known, *beside) for label in labels if label]
-    looks = {look for own in (*layout.looks, *(item.looks for item in layout.left_out)) for look in own}
+    every = list(filter(None, chain(*known, *((item.layer, item.name) for item in layout.left_out))))
+    looks = set(chain(*layout.looks, *(item.looks for item in layout.left_out)))
     if only and (unmatched := _unmatched(only, every, looks)):
         raise ValueError(f"{layout.source or 'the drawing'}: only: {unmatched[0]}; correct it")
     unmatched = _unmatched([pattern for pattern in ignore if look_of(pattern) not in KINDS], every, looks)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -56,15 +56,7 @@ def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[n
     chains = [_chains(ids, points, nodes) for nodes in [_nodes(around, len(points))] for ids in around]
     kept: set[int] = set()
     for _ in range(4):
-        whole = {_key(chain) for block in kept for chain in chains[block]}
-        short = {
-            key: key if key in whole else _simple(key, points, tolerance)
-            for key in {_key(chain) for parts in chains for chain in parts}
-        }
-        found = []
-        for parts in chains:
-            ids = [i for chain in parts for i in _turned(short[_key(chain)], chain)[:-1]]
-            found.append(points[ids])
+        found = _shortened(chains, kept, points, tolerance)
         bad = _spoilt(found, outlines, tolerance) - kept
         if not bad:
             break
@@ -78,6 +70,18 @@ def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[n
         f"outlines were finer than needed: {before} corners of {len(outlines)} blocks were simplified to {after} "
         f"within {tolerance:.2g} m (outline_tolerance; 0 keeps every corner)"
     )
+
+
+def _shortened(
+    chains: Sequence[Sequence[tuple[int, ...]]], kept: Collection[int], points: np.ndarray, tolerance: float
+) -> list[np.ndarray]:
+    """Put outlines together again of their chains, those of kept blocks as they are, the others simplified."""
+    whole = {_key(chain) for block in kept for chain in chains[block]}
+    short = {
+        key: key if key in whole else _simple(key, points, tolerance)
+        for key in {_key(chain) for parts in chains for chain in parts}
+    }
+    return [points[[i for chain in parts for i in _turned(short[_key(chain)], chain)[:-1]]] for parts in chains]
 
 
 def _shared_corners(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,12 @@ from solver import mechanics
 
 from . import palette
 from .inspection_sheet import Contents, Kind, draw_contents
+
+#: How supports are drawn: label, colour and hatch of each role.
+_SUPPORTS = {
+    mechanics.FIXED: ("fixed", palette.SUPPORT, "////"),
+    mechanics.MOVING: ("moving", palette.MOVING, "\\\\\\\\"),
+}
 
 if TYPE_CHECKING:
     from blockvis.layout.inspect import Inspection
@@ -91,31 +97,13 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
     sorted_out |= dict.fromkeys(falling, "falls") | dict.fromkeys((k for pair in deep for k in pair[:2]), "overlap")
     wrong = tuple(kept[k] for k in no_blocks(inspection.facing.solids)) if inspection.refused else ()
     sorted_out |= dict.fromkeys(wrong, "refused")
-    own = {k: sorted_out.get(k) or inspection.roles[k] for k in kept}
     walls = walls_to_fill(layout)
-    if walls:
-        # What lies in an outline without stones is an opening: no ground goes under it.
-        ground = None
-    kinds = [
-        Kind(label, colour, tuple(k for k in kept if own[k] == key), hatch)
-        for key, label, colour, hatch in (
-            (mechanics.FREE, "opening, or block" if walls else "free", palette.DRAWN, ""),
-            (mechanics.FIXED, "fixed", palette.SUPPORT, "////"),
-            (mechanics.MOVING, "moving", palette.MOVING, "\\\\\\\\"),
-            ("twice", "drawn twice", palette.TWICE, ""),
-            ("falls", "does not stand", palette.FALLS, ""),
-            ("overlap", "overlapping, refused", palette.REFUSED, ""),
-            ("refused", "refused", palette.REFUSED, ""),
-        )
-    ]
-    if ground is not None:
-        first, layout = layout.n_blocks, layout.with_more(ground.blocks, names=ground.names, roles=ground.roles)
-        for role, colour, hatch in (
-            (mechanics.FIXED, palette.SUPPORT, "////"),
-            (mechanics.MOVING, palette.MOVING, "\\\\\\\\"),
-        ):
-            laid = tuple(first + k for k, given in enumerate(ground.roles) if given == role)
-            kinds.append(Kind(f"ground of blockvis new, {role}", colour, laid, hatch))
+    own = {k: sorted_out.get(k) or inspection.roles[k] for k in kept}
+    kinds = _kinds(own, "opening, or block" if walls else "free")
+    # What lies in an outline without stones is an opening: no ground goes under it.
+    if ground is not None and not walls:
+        kinds += _kinds_of_ground(ground, layout.n_blocks)
+        layout = layout.with_more(ground.blocks, names=ground.names, roles=ground.roles)
     middles = [_overlap(layout, i, j) for i, j, _ in deep[:MOST_NAMED]]
     crossings = crossings_left_out(layout) if layout.dimension == 2 else np.zeros((0, 3))
     counted = (("deepest overlaps", len(middles)), ("crosses itself", len(crossings)))
@@ -124,13 +112,37 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
         layout=layout,
         title=f"{_name(layout)}: {len(kept)} block{'s' * (len(kept) != 1)}{in_space}, read in {layout.unit}",
         findings=(*_findings(inspection, deep), *walls.values()),
-        kinds=tuple(kind for kind in kinds if kind.blocks),
+        kinds=tuple(kinds),
         named=tuple(kept),
         marked=wrong[:MOST_NAMED],
         rings=np.concatenate([np.array(middles).reshape(-1, layout.dimension), crossings]),
         rings_are=", ".join(f"{what}: {n}" for what, n in counted if n),
         joints=inspection.joints,
     )
+
+
+def _kinds(own: Mapping[int, str], free: str) -> list[Kind]:
+    """List the kinds of blocks that there are, from what each block is; free ones are called so."""
+    looks = {
+        mechanics.FREE: (free, palette.DRAWN, ""),
+        **_SUPPORTS,
+        "twice": ("drawn twice", palette.TWICE, ""),
+        "falls": ("does not stand", palette.FALLS, ""),
+        "overlap": ("overlapping, refused", palette.REFUSED, ""),
+        "refused": ("refused", palette.REFUSED, ""),
+    }
+    blocks = {key: tuple(k for k, what in own.items() if what == key) for key in looks}
+    return [Kind(label, colour, blocks[key], hatch) for key, (label, colour, hatch) in looks.items() if blocks[key]]
+
+
+def _kinds_of_ground(ground: Layout, first: int) -> list[Kind]:
+    """List the kinds of blocks that would be laid as ground, numbered from the first."""
+    blocks = {role: tuple(first + k for k, given in enumerate(ground.roles) if given == role) for role in _SUPPORTS}
+    return [
+        Kind(f"ground of blockvis new, {role}", colour, blocks[role], hatch)
+        for role, (_, colour, hatch) in _SUPPORTS.items()
+        if blocks[role]
+    ]
 
 
 def _findings(inspection: Inspection, deep: Sequence[tuple[int, int, float]]) -> tuple[str, ...]:

@@ -412,15 +412,13 @@ class SolidScene:
         *,
         width: float = 1.0,
         forward: float = 0.0,
-        lit: bool = False,
     ) -> None:
         look: dict[str, Any] = {"color": tuple(c / 255.0 for c in colour)} if isinstance(colour, tuple) else {}
         if not look:
             mesh.point_data["colour"] = np.asarray(colour, dtype=np.uint8).reshape(-1, 3)
             look = {"scalars": "colour", "rgb": True, "show_scalar_bar": False}
         actor = self._plotter.add_mesh(
-            mesh, **look, line_width=self._over * width, lighting=lit, ambient=AMBIENT,
-            diffuse=DIFFUSE, reset_camera=False, render=False,
+            mesh, **look, line_width=self._over * width, lighting=False, reset_camera=False, render=False,
         )  # fmt: skip
         drawn_forward(actor, forward)
         # The cut faces lie in the plane, and their edges.

@@ -28,7 +28,6 @@ def write_vtu(
     path: str | os.PathLike[str],
     *,
     strings: bool = True,
-    last: bool = True,
     durable: bool = True,
 ) -> Path:
     """Write a dataset as VTU, whole or not at all.
@@ -42,7 +41,7 @@ def write_vtu(
     strings : bool
         Whether arrays of strings are written as such, which meshio does not read; otherwise each is a field array of
         bytes, its strings in UTF-8 with a line feed after each.
-    last, durable : bool
+    durable : bool
         As of :func:`blockvis.system.atomic_files.atomic_file`.
 
     Notes
@@ -68,7 +67,7 @@ def write_vtu(
     if dataset.GetPolyhedronFaces() is not None:
         text = _FACES.sub(lambda _: _face_arrays(dataset), text, count=1)
         text = text.replace('version="2.3"', 'version="1.0"', 1)
-    return write_atomic(path, text, last=last, durable=durable)
+    return write_atomic(path, text, durable=durable)
 
 
 def _with_bytes(dataset: vtkUnstructuredGrid) -> vtkUnstructuredGrid:

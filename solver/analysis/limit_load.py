@@ -37,7 +37,7 @@ from solver.ties import (
     tie_ends,
     tie_lengths,
 )
-from solver.tolerances import CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
+from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25
@@ -48,10 +48,9 @@ RELAXATION, PROGRAMS = 0.9, 300
 #: Non-associative flow: programs after which the next one follows of so many changes, and part of the new forces then.
 PLAIN_PROGRAMS, REMEMBERED, ACCELERATED = 40, 15, 0.5
 
-#: Non-associative flow has converged when the multiplier changes by less than the first and shear forces exceed
-#: friction by less than the second, relative to the multiplier and to the largest normal force; the third in space,
-#: where the multiplier is off by as much.
-MULTIPLIER_CHANGE = 1e-7
+#: Non-associative flow has converged when the multiplier changes by less than programs are solved to, and shear forces
+#: exceed friction by less than this part of the largest normal force; the second in space, where the multiplier is off
+#: by as much.
 FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE = 1e-6, 1e-8
 
 #: Cost of a change of a normal force in the non-associative programs, in multipliers: it only decides between equals.
@@ -116,14 +115,7 @@ def find_limit_load(
     it was loaded, and may fall below this one. Its two values agree where it has converged, but are no bounds.
     Convergence is not proved either; "not converged" says so and gives the program that came nearest.
     """
-    if flow not in ("associative", "non-associative"):
-        raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
-    if torsion not in TORSIONS:
-        raise ValueError(f"torsion is '{torsion}'; it is 'points' or 'uniform'")
-    if torsion == UNIFORM and assembly.dimension == 2:
-        raise ValueError("torsion is 'uniform', but faces of blocks in the plane have none; leave it out")
-    if torsion == UNIFORM and ties:
-        raise ValueError(f"torsion = 'uniform' knows no ties ('{ties[0].name}'); take torsion = 'points'")
+    _check_options(assembly, flow, torsion, displacement, ties)
     check_blocks(assembly, overlap_tolerance)
     check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
     loads = checked_live(assembly, loads)
@@ -131,8 +123,6 @@ def find_limit_load(
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
     loads = replace(loads, dead=loads.dead_at(assembly, pose), fills=())
-    if not (np.isfinite(displacement) and displacement >= 0.0):
-        raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
     rest = tie_lengths(tie_ends(ties, assembly, pose)) if ties_at is None else ties_at.rest
     standing = tuple(tie for tie, length in zip(ties, rest, strict=True) if not np.isnan(length))
     problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap, displacement, torsion, standing)
@@ -148,6 +138,20 @@ def find_limit_load(
         return problem.non_associative(balanced, status)
     except Unbounded:
         return problem.result(balanced, LimitStatus.UNBOUNDED, flow, 2)
+
+
+def _check_options(assembly: Assembly, flow: str, torsion: str, displacement: float, ties: Sequence[Tie]) -> None:
+    """Refuses unknown words, and what does not go together."""
+    if flow not in ("associative", "non-associative"):
+        raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
+    if torsion not in TORSIONS:
+        raise ValueError(f"torsion is '{torsion}'; it is 'points' or 'uniform'")
+    if torsion == UNIFORM and assembly.dimension == 2:
+        raise ValueError("torsion is 'uniform', but faces of blocks in the plane have none; leave it out")
+    if torsion == UNIFORM and ties:
+        raise ValueError(f"torsion = 'uniform' knows no ties ('{ties[0].name}'); take torsion = 'points'")
+    if not (np.isfinite(displacement) and displacement >= 0.0):
+        raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
 
 
 @dataclass(frozen=True)
@@ -347,7 +351,7 @@ class _Problem:
             excess = float(beyond.max(initial=0.0)) / largest
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
             error = np.inf if state.falls else max(excess, change)
-            settled = excess <= most_excess and change <= MULTIPLIER_CHANGE and not state.falls
+            settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
             if nearest is balanced or settled or error < least:
                 nearest, least, used = state, error, normal
             if settled:

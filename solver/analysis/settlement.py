@@ -56,17 +56,8 @@ def settlement_increments(
     interfaces.refuse_crushing("a settlement")
     by_program = controls.increments == LINEAR_PROGRAM
     if by_program:
-        interfaces.refuse_mortar("increments = 'linear program'")
-    if by_program and ties:
-        raise ValueError(f"increments = 'linear program' knows no ties ('{ties[0].name}'); leave the key out")
+        _refuse_by_program(assembly, interfaces, loads, ties, changes)
     check_ties(ties, assembly, len(phases))
-    if by_program and assembly.dimension == 3:
-        raise ValueError("increments = 'linear program' is for blocks in the plane; leave it out for blocks in space")
-    if by_program and (loads.fills or changes):
-        raise ValueError(
-            "increments = 'linear program' knows one structure under loads that stay as they are; leave it out, or "
-            "fill and changes between phases"
-        )
     if resume is not None and (resume.phase >= len(phases) or len(resume.start.rotations) != assembly.n_blocks):
         raise ValueError(
             f"the checkpoint is of phase {resume.phase + 1} with {len(resume.start.rotations)} blocks; there are "
@@ -84,6 +75,22 @@ def settlement_increments(
         follow = partial(_increments, ties=near_ties, changes=changes, on_step=on_step)
     steps = follow(near, local, interfaces, loads, controls, resume)
     return TimedIncrements(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
+
+
+def _refuse_by_program(
+    assembly: Assembly, interfaces: Interfaces, loads: Loads, ties: Sequence[Tie], changes: Sequence[PhaseChange]
+) -> None:
+    """Refuses what the paper's linear programs do not know."""
+    interfaces.refuse_mortar("increments = 'linear program'")
+    if ties:
+        raise ValueError(f"increments = 'linear program' knows no ties ('{ties[0].name}'); leave the key out")
+    if assembly.dimension == 3:
+        raise ValueError("increments = 'linear program' is for blocks in the plane; leave it out for blocks in space")
+    if loads.fills or changes:
+        raise ValueError(
+            "increments = 'linear program' knows one structure under loads that stay as they are; leave it out, or "
+            "fill and changes between phases"
+        )
 
 
 def _increments(
@@ -177,6 +184,14 @@ def check_settlement(
             if phase.blocks is not None and assembly.moving.any():
                 raise ValueError(f"{which} moves no support: of its blocks ({named}) none has the role 'moving'")
             raise ValueError(f"{which} moves no support: give one of the blocks the role 'moving': {named}")
+    _check_changes(assembly, phases, changes, ties)
+    check_blocks(assembly, controls.overlap_tolerance)
+
+
+def _check_changes(
+    assembly: Assembly, phases: Sequence[Settlement], changes: Sequence[PhaseChange], ties: Sequence[Tie]
+) -> None:
+    """Refuses changes before a phase, or of a tie, that is not there, and those that leave nothing to move."""
     for change in changes:
         if not 0 <= change.phase < len(phases):
             raise ValueError(f"a change comes before settlement phase {change.phase + 1}; there are {len(phases)}")
@@ -192,4 +207,3 @@ def check_settlement(
             raise ValueError(f"settlement phase {number + 1} moves only supports that have been taken away; keep one")
         if gone.any() and not (assembly.free & ~gone).any():
             raise ValueError(f"before settlement phase {number + 1} all free blocks are taken away; keep one")
-    check_blocks(assembly, controls.overlap_tolerance)

@@ -6,12 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .interior import interior_point
+from .interior import BALANCED, interior_point
 from .problem import ContactProblem, NotSolved, StepSolution
 from .stiffness import Singular, Solve
-
-#: Largest force out of balance, in block weights: a hundred times that changed reactions by 0.4 %.
-BALANCED = 1e-9
 
 #: Factorisations of Newton's method, and force out of balance, in block weights, beyond which it would take more: the
 #: interior method, which takes 8 to 14 wherever it starts, takes over.

@@ -35,9 +35,6 @@ EDGES_TRIED, CORNERS_TRIED = 6, 24
 #: A plane with corners in it cuts this far beside them, less than manifold3d tells apart and more than its rounding.
 BESIDE_PLANE = 1e-13
 
-#: Faces of a part and of its block that overlap by less than this lie beside each other.
-OVERLAPS = 1e-6
-
 #: How much an edge that a cut runs through, and makes a corner of, outweighs of the edges along which it runs.
 THROUGH_EDGE = 1e-3
 
@@ -377,7 +374,7 @@ def _is_inner(face: np.ndarray, whole: _Piece, flatness: float) -> bool:
     for ring, other in ((np.broadcast_to(face, (len(own), *face.shape)), own), (own, face[None])):
         outward = unit(cross(np.roll(ring, -1, axis=1) - ring, normal))
         inside = dot(ring[:, :, None] - other[:, None], outward[:, :, None]).max(axis=2)
-        apart |= (inside <= OVERLAPS).any(axis=1)
+        apart |= (inside <= ON_PLANE).any(axis=1)
     return bool(apart.all())
 
 

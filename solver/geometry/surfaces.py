@@ -16,8 +16,8 @@ from .flat_faces import ONE_WAY, SLIVER, edges_of, merged_faces, renumbered
 from .polyhedra import Polyhedra
 from .solids import Solids, dot
 
-#: A block with less volume than this fraction of its surface to the power 3/2 is a sheet: double precision leaves about
-#: six digits of its centroid.
+#: A block with less volume than this fraction of its surface to the power 3/2 is a sheet, one with less area than this
+#: fraction of its perimeter squared a line: double precision leaves about six digits of its centroid.
 SMALLEST_SHAPE_FACTOR = 1e-9
 
 #: What a block is in a file: its corners, and the corners around each of its faces.

@@ -26,7 +26,7 @@ REFINED = 1e-3
 #: Steps in time, with those that are refused.
 TIME_STEPS = 200
 
-#: Movement of the blocks in the first frame of a fall, in block sizes: large against the compliance of the joints.
+#: Movement, in block sizes, that is large against the compliance of the joints: that of the first frame of a fall.
 MECHANISM = 1e-3
 
 #: Movement in a step in time above which it is repeated, shorter, and in which nothing has moved, in block sizes.

@@ -57,9 +57,6 @@ FALLEN = 0.1
 #: Part of the first multiplier under which one may vanish within a bracket.
 VANISHING = 0.05
 
-#: Movement of the supports, in block sizes, in which the joints' compliance is used up.
-ONSET = 1e-3
-
 
 class Outcome(Enum):
     """How an advance towards a parameter ended."""
@@ -252,7 +249,7 @@ class Path:
 
     def _onset(self) -> float:
         """Parameter at which the joints' compliance is used up."""
-        return min(ONSET * self.stepper.unit, self._next_stop(0.0))
+        return min(MECHANISM * self.stepper.unit, self._next_stop(0.0))
 
     def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""

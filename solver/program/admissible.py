@@ -12,7 +12,7 @@ from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.programs.problem import LinearProgram, Solution, SolveError, Unbounded
 from solver.programs.solve import solve_between, solve_lp
-from solver.tolerances import ACCEPTED_VIOLATION, BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
+from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
 
 from .model import Model
 from .strength import Admissible, ForceLimits
@@ -255,9 +255,9 @@ class _StaticProgram:
             solution = self.bound(0.0)
         except SolveError as error:
             best = error.best
-            if best is None or best.violation > ACCEPTED_VIOLATION:
+            if best is None or best.violation > ACCEPTED_ERROR:
                 raise
-            if self.unbalanced(best) <= ACCEPTED_VIOLATION:
+            if self.unbalanced(best) <= ACCEPTED_ERROR:
                 return best, 0.0
             # The dual objective bounds the forces out of balance from below, at whatever accuracy.
             if best.dual_objective <= 2.0 * best.gap:

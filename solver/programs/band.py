@@ -10,13 +10,10 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from solver.tolerances import ACCEPTED_GAP
+from solver.tolerances import ACCEPTED_ERROR, INTERIOR_TOLERANCE
 
 from .problem import LinearProgram, Solution, Unbounded
 from .threads import NotLimited, one_thread
-
-#: Violation of rows and reduced costs, absolute, and relative difference of the objectives at which a point is optimal.
-TOLERANCE = 1e-8
 
 #: Iterations at most: walls of 6,500 blocks take 90.
 ITERATIONS = 200
@@ -334,7 +331,7 @@ def _solved(program: LinearProgram) -> tuple[np.ndarray, np.ndarray, int]:
         error = method.error(residuals)
         if error < least:
             least, best, least_at = error, method.point, iteration
-        if error < TOLERANCE or (least < ACCEPTED_GAP / 2.0 and iteration - least_at >= 5):
+        if error < INTERIOR_TOLERANCE or (least < ACCEPTED_ERROR / 2.0 and iteration - least_at >= 5):
             return best.primal[method.x], best.row_dual, iteration
         method.iterate(residuals)
         if iteration % 5 == 0:

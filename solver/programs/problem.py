@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from solver.tolerances import ACCEPTED_GAP, ACCEPTED_VIOLATION, RAY_BALANCE
+from solver.tolerances import ACCEPTED_ERROR, RAY_BALANCE
 
 
 class SolveError(RuntimeError):
@@ -226,4 +226,4 @@ class Solution:
     @property
     def accepted(self) -> bool:
         """Whether the solution passes our own check."""
-        return self.violation <= ACCEPTED_VIOLATION and self.gap <= ACCEPTED_GAP
+        return self.violation <= ACCEPTED_ERROR and self.gap <= ACCEPTED_ERROR

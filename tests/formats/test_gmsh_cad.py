@@ -8,7 +8,6 @@ import pytest
 import shapely
 
 from blockvis import read, read_layout
-from blockvis.formats import gmsh_cad
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is an extra", exc_type=(ImportError, OSError))
 pytestmark = pytest.mark.cad
@@ -48,7 +47,7 @@ def test_a_script_may_not_reach_out(tmp_path, line):
 
 
 def test_a_script_without_end_is_stopped(tmp_path, monkeypatch):
-    monkeypatch.setattr(gmsh_cad, "LONGEST_SECONDS", 2)
+    monkeypatch.setattr("blockvis.formats.gmsh_cad.LONGEST_SECONDS", 2)
     (tmp_path / "a.geo").write_text("For i In {0 : 1e12}\n  x = i;\nEndFor\n", encoding="utf-8")
     with pytest.raises(ValueError, match="gmsh did not finish within 2 s"):
         read(tmp_path / "a.geo")
@@ -155,7 +154,7 @@ def test_transfinite_surfaces_and_fields_of_the_script_are_not_in_the_way(tmp_pa
 
 
 def test_a_script_that_asks_for_too_much_memory_is_stopped(tmp_path, monkeypatch):
-    monkeypatch.setattr(gmsh_cad, "MOST_MEMORY", 150 * 2**20)
+    monkeypatch.setattr("blockvis.formats.gmsh_cad.MOST_MEMORY", 150 * 2**20)
     # As on a machine of many processors: what their threads map is not the file's.
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "64")
     (tmp_path / "a.geo").write_text(CURVES, encoding="utf-8")

@@ -10,18 +10,15 @@ from structures import arch_response, parted, pixels, wall
 import blockvis
 import solver
 from blockvis import draw_curve
-from blockvis.kinds.kinds import KINDS
-from blockvis.pictures import palette
-from blockvis.pictures.captions import drops_at_start, parameter_text, state_text
-from blockvis.pictures.curves import CurvePanel
 
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):
     path = draw_curve(arch_response(), tmp_path / "new" / "curve.png")
     picture = pixels(path)
     assert picture.shape == (1000, 1600, 3)
-    for colour in (palette.FORCE, palette.WARNING):
-        assert ((np.abs(picture - np.array(colour)) < 20).all(axis=2)).sum() > 300
+    red, _, blue = np.moveaxis(picture, 2, 0)
+    assert (blue > red + 100).sum() > 300, "the curve"
+    assert (red > blue + 100).sum() > 300, "the collapse"
     assert [p.name for p in path.parent.iterdir()] == ["curve.png"]
 
 
@@ -54,8 +51,7 @@ def test_the_curve_names_the_failure_of_a_run(tmp_path):
     response = arch_response()
     failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=response.path[:4])
     told = said(failed, tmp_path / "failed.svg")
-    place = parameter_text(response.path[3].parameter, failed)
-    assert f"solver failed at {place}: the curve is not complete" in told
+    assert "solver failed at 60.00 mm: the curve is not complete" in told
     assert not any("failed" in line for line in said(response, tmp_path / "whole.svg"))
 
 
@@ -91,8 +87,8 @@ def test_ticks_are_plain_numbers(tmp_path):
 def test_a_curve_of_many_increments_is_a_line_without_dots(tmp_path):
     """Dots stand at few increments; no list of hinges over the plot, however often they change."""
     few, many = (parted(wall(4, 3), n, 0) for n in (10, 60))
-    blue, path = palette.hexadecimal(palette.FORCE), tmp_path / "curve.svg"
-    uses = [draw_curve(response, path).read_text(encoding="utf-8").count(blue) for response in (few, many)]
+    path = tmp_path / "curve.svg"
+    uses = [draw_curve(response, path).read_text(encoding="utf-8").count("#145ca8") for response in (few, many)]
     assert uses[0] >= 10
     assert uses[1] <= 4
     assert not any("hinge" in line for line in said(few, tmp_path / "few.svg"))
@@ -112,34 +108,18 @@ def test_a_single_limit_load_has_numbers_on_both_axes(tmp_path):
 def test_a_reaction_that_leaves_that_at_rest_at_once_has_no_line_from_there(tmp_path):
     response = parted(wall(4, 3), 4, 0)
     rest, *others = response.path
-    assert not drops_at_start(response)
     assert "at rest" not in said(response, tmp_path / "curve.svg")
     rest = replace(rest, measured=3500.0, reaction=3500.0, least=1000.0, largest=4000.0)
     response = replace(response, increments=(rest, *others))
-    assert drops_at_start(response)
     assert "at rest" in said(response, tmp_path / "curve.svg")
     # A linear program gives the least reaction from the first increment on.
-    assert not drops_at_start(replace(response, increments=(replace(rest, largest=np.nan), *others)))
+    by_program = replace(response, increments=(replace(rest, largest=np.nan), *others))
+    assert "at rest" not in said(by_program, tmp_path / "curve.svg")
 
 
-def test_small_settlements_are_written_in_millimetres():
-    response = parted(wall(4, 3), 3, 0, settlement=0.005)
-    assert parameter_text(0.0025, response) == "2.50 mm"
-    assert parameter_text(0.0025, arch_response()) == "0.0025 m"
-
-
-def test_the_dot_moves_along_the_panel():
-    response = arch_response()
-    panel = CurvePanel(response, (300, 200), 14)
-
-    def dot(increment):
-        picture = np.asarray(panel.image(increment)).astype(int)
-        rows, columns = np.nonzero((np.abs(picture - np.array(palette.SETTLEMENT)) < 20).all(axis=2))
-        return columns.mean(), rows.mean()
-
-    start, end = dot(response.path[0]), dot(response.path[-1])
-    assert end[0] > start[0] + 100
-    assert end[1] < start[1]
+def test_small_settlements_are_written_in_millimetres(tmp_path):
+    response = replace(parted(wall(4, 3), 3, 0, settlement=0.005), stop=solver.Status.SOLVER_FAILED)
+    assert "solver failed at 5.00 mm: the curve is not complete" in said(response, tmp_path / "curve.svg")
 
 
 @pytest.mark.slow
@@ -158,14 +138,3 @@ def test_phases_in_other_units_share_no_axis(tmp_path):
     assert {"settlement [rad]", "reaction [kN·m]"} <= set(told) or {"settlement [rad]", "reaction [N·m]"} <= set(told)
     assert any(line.endswith("phase 2 of 2") for line in told)
     assert "reaction / weight W" not in told
-    first, last = (state_text(increment, response) for increment in (response.path[1], response.path[-1]))
-    assert first.startswith(("Settlement 50.00 mm", "Settlement 0.0500 m"))
-    assert "1.0000 W" in first
-    assert re.fullmatch(r"Settlement 0\.463\d rad   ·   Reaction [\d.]+ k?N·m", last)
-    lines = KINDS["settlement"].lines(response)
-    assert any(re.fullmatch(r"first reaction +9810 N   1\.000000 W", line) for line in lines)
-    assert any(re.fullmatch(r"last reaction +[\d.]+ N·m", line) for line in lines)
-    panel = CurvePanel(response, (300, 200), 12)
-    blank = np.asarray(panel.image(response.path[1]))
-    assert (blank == np.asarray(panel._picture)).all(), "no dot for a phase that is not on the curve"
-    assert (np.asarray(panel.image(response.path[-1])) != blank).any()

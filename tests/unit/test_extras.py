@@ -1,6 +1,5 @@
 """Without the packages of an extra: one line names the command that installs them, and the rest works."""
 
-import os
 import re
 import subprocess
 import sys
@@ -11,9 +10,17 @@ import pytest
 
 import blockvis
 from blockvis.cli import main
-from blockvis.system.extras import EXTRAS, PACKAGES
 
 ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+def packages(lines):
+    return [re.match(r"[\w-]+", line)[0] for line in lines]
+
+
+#: What the extra for studies makes importable.
+STUDIES = [name.replace("-", "_") for name in packages(PROJECT["optional-dependencies"]["studies"])]
 
 STUDY = """
 [study]
@@ -58,7 +65,7 @@ def without(hidden, *arguments):
 
 @pytest.mark.slow
 def test_sweep_without_its_packages_names_the_command(study, tmp_path):
-    done = without(EXTRAS["studies"], "sweep", study, "-o", tmp_path / "out")
+    done = without(STUDIES, "sweep", study, "-o", tmp_path / "out")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
         "blockvis: studies need dask, distributed, pandas, pyarrow, SALib, tomli_w, which this environment lacks; "
@@ -69,12 +76,12 @@ def test_sweep_without_its_packages_names_the_command(study, tmp_path):
 
 @pytest.mark.slow
 def test_all_but_studies_runs_without_their_packages(study, tmp_path):
-    done = without(EXTRAS["studies"], "run", tmp_path / "case.toml", "-o", tmp_path / "out", "--no-film")
+    done = without(STUDIES, "run", tmp_path / "case.toml", "-o", tmp_path / "out", "--no-film")
     assert done.returncode in (0, 4), done.stderr
     assert {"summary.json", "curve.png", "report.html"} <= {p.name for p in (tmp_path / "out").iterdir()}
 
 
-@pytest.mark.parametrize("name", EXTRAS["studies"])
+@pytest.mark.parametrize("name", STUDIES)
 def test_each_package_of_studies_is_missed_by_name(name, study, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(ImportError, match=rf"^studies need {name}, which .*pip install 'blockvis\[studies\]'$"):
@@ -87,18 +94,15 @@ def test_each_package_of_studies_is_missed_by_name(name, study, tmp_path, monkey
 def test_reading_geometry_without_gmsh_names_the_command(tmp_path, monkeypatch, capsys):
     # gmsh is loaded in a process of its own: one that stands in for a missing one is found first.
     (tmp_path / "gmsh.py").write_text("raise ModuleNotFoundError(\"No module named 'gmsh'\")", encoding="utf-8")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
+    monkeypatch.syspath_prepend(str(tmp_path))
     assert main(["info", str(ROOT / "assets" / "semicircular_arch.geo")]) == 2
     said = capsys.readouterr().err
     assert "(No module named 'gmsh'); install with: pip install 'blockvis[cad]'" in said
     assert said.count("\n") == 1
 
 
-def test_extras_are_those_of_the_project_file():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    core = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
-    for extra, modules in EXTRAS.items():
-        packages = {re.match(r"[\w-]+", line)[0] for line in project["optional-dependencies"][extra]}
-        assert packages == {PACKAGES.get(name, name).replace("_", "-") for name in modules}
-        assert not packages & core
-    assert "blockvis[studies]" in project["optional-dependencies"]["test"], "the README's test command tests studies"
+def test_extras_are_beside_what_is_always_needed():
+    extras = PROJECT["optional-dependencies"]
+    for extra in ("studies", "cad", "geo", "dae"):
+        assert not set(packages(extras[extra])) & set(packages(PROJECT["dependencies"]))
+    assert "blockvis[studies]" in extras["test"], "the README's test command tests studies"

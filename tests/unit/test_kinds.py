@@ -220,3 +220,20 @@ def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monke
         r"settlement 0\.0\d+ of at most 0.4 m, increment 1 in steps of 0\.\d+, 1 blocks moving, '[\w ]+' moves most",
         stream.getvalue(),
     )
+
+
+def test_words_of_phases_in_other_units():
+    """A block on a support that sinks, then tilts."""
+    assembly = solver.Assembly.from_outlines(
+        [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]], roles=["moving", "free"]
+    )
+    sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.05, limit=0.05)
+    tilts = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.1, limit=0.1)
+    response = solver.settle(assembly, (sinks, tilts), friction_coefficient=0.8)
+    first, last = (state_text(increment, response) for increment in (response.path[1], response.path[-1]))
+    assert first.startswith(("Settlement 50.00 mm", "Settlement 0.0500 m"))
+    assert "1.0000 W" in first
+    assert re.fullmatch(r"Settlement 0\.1000 rad   ·   Reaction [\d.]+ k?N·m", last)
+    lines = KINDS["settlement"].lines(response)
+    assert any(re.fullmatch(r"first reaction +9810 N   1\.000000 W", line) for line in lines)
+    assert any(re.fullmatch(r"last reaction +[\d.]+ N·m", line) for line in lines)

@@ -546,7 +546,7 @@ def test_an_order_of_the_rows_makes_no_difference_but_the_width():
 
 def test_what_comes_no_nearer_is_taken_where_the_check_accepts_it(monkeypatch):
     """A tolerance below rounding is never reached; what was nearest passes the check."""
-    monkeypatch.setattr(band, "TOLERANCE", 1e-30)
+    monkeypatch.setattr(band, "INTERIOR_TOLERANCE", 1e-30)
     found = solved(chain(5, 60))
     assert found.accepted
     assert found.iterations < 60

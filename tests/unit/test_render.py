@@ -16,6 +16,7 @@ from structures import BENT, alike, arch_response, parted, pixels, wall
 import solver
 from blockvis import animate, draw_mechanism, draw_still
 from blockvis.pictures import flat_scene, palette
+from blockvis.pictures.curves import CurvePanel
 from blockvis.pictures.drawer import Drawer, Look, magnified
 from blockvis.pictures.film import film_of
 from blockvis.pictures.flat_scene import FlatScene
@@ -303,3 +304,25 @@ def test_bands_of_a_picture_fit_together(monkeypatch):
     bands = np.asarray(drawer.picture(response.path[-1])).astype(int)
     # Where a line is cut off at the edge of a band, its smoothing may differ by a shade.
     assert np.abs(whole - bands).max() <= 16
+
+
+def test_the_dot_moves_along_the_curve_beside_the_blocks():
+    response = arch_response()
+    panel = CurvePanel(response, (300, 200), 14)
+    places = [np.nonzero(alike(panel.image(k), palette.SETTLEMENT, 20)) for k in (response.path[0], response.path[-1])]
+    (start, end) = (np.mean(place, axis=1) for place in places)
+    assert end[1] > start[1] + 100
+    assert end[0] < start[0]
+
+
+def test_the_curve_beside_the_blocks_has_no_dot_for_a_phase_that_is_not_on_it():
+    assembly = solver.Assembly.from_outlines(
+        [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]], roles=["moving", "free"]
+    )
+    sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.05, limit=0.1)
+    tilts = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.1, limit=0.1)
+    response = solver.settle(assembly, (sinks, tilts), friction_coefficient=0.8)
+    panel = CurvePanel(response, (300, 200), 12)
+    blank = panel.image(response.path[1])
+    assert not alike(blank, palette.SETTLEMENT, 20).any()
+    assert alike(panel.image(response.path[-1]), palette.SETTLEMENT, 20).any()

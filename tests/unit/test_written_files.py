@@ -2,6 +2,7 @@
 
 import errno
 import gc
+import io
 import itertools
 import os
 import re
@@ -11,6 +12,7 @@ import threading
 import types
 from pathlib import Path
 
+import numpy as np
 import pytest
 from structures import arch_response
 
@@ -20,6 +22,7 @@ from blockvis import generators, read_case, save_layout
 from blockvis.cli import main
 from blockvis.results import folder as results_folder
 from blockvis.results.folder import ResultsExist, ResultsFolder
+from blockvis.results.npz import packed, unpacked
 from blockvis.results.record import Record
 from blockvis.system import atomic_files, processes
 from blockvis.system.atomic_files import PARTIAL, atomic_file, write_atomic
@@ -343,3 +346,36 @@ def test_names_that_a_console_cannot_show_are_escaped(tmp_path):
 def test_the_schema_is_ascii(capsys):
     assert main(["schema"]) == 0
     assert capsys.readouterr().out.isascii()
+
+
+def test_two_runs_cannot_write_to_one_folder(tmp_path):
+    assembly = generators.arch()
+    first = ResultsFolder(tmp_path / "out", assembly)
+    for overwrite in (False, True):
+        with pytest.raises(ResultsExist, match=r"results already|another run is writing"):
+            ResultsFolder(tmp_path / "out", assembly, overwrite=overwrite)
+    del first
+    ResultsFolder(tmp_path / "out", assembly, overwrite=True)
+
+
+def test_a_checkpoint_is_stored_to_the_last_bit():
+    arch = generators.arch()
+    spread = [solver.Settlement(direction=(1, 0), increment=0.01, limit=0.03)]
+    setting = {"interfaces": solver.Interfaces(solver.InterfaceLaw(0.7)), "loads": solver.self_weight(arch)}
+    found = list(mechanics.settlement_increments(arch, spread, **setting))
+    checkpoint, extra = unpacked(packed(found[1].checkpoint, increments=2), mechanics.PathState)
+    assert extra == {"increments": 2}
+    again = list(mechanics.settlement_increments(arch, spread, resume=checkpoint, **setting))
+    assert [one.reaction for one in again] == [one.reaction for one in found[2:]]
+    for one, other in zip(again, found[2:], strict=True):
+        np.testing.assert_array_equal(one.forces, other.forces)
+        np.testing.assert_array_equal(one.pose.positions, other.pose.positions)
+
+
+def test_stored_values_refuse_what_they_cannot_hold():
+    with pytest.raises(TypeError, match="cannot be stored"):
+        packed(mechanics.Ending(solver.Status.LOCKED, {"a": 1}))
+    buffer = io.BytesIO()
+    np.savez(buffer, tree=np.array('{"value": {"phase": 1}, "extra": {}}'))
+    with pytest.raises(ValueError, match="it has the fields"):
+        unpacked(buffer.getvalue(), mechanics.PathState)

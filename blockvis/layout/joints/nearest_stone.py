@@ -85,8 +85,6 @@ def share_out(
     thickness: float,
     anchored: np.ndarray,
     mortar: Sequence[LeftOut] = (),
-    *,
-    simpler: float = SIMPLER,
 ) -> list[np.ndarray]:
     """Give mortar to the nearest stone.
 
@@ -100,8 +98,6 @@ def share_out(
         Blocks that keep their place: the mortar beside them goes to the others.
     mortar : sequence of LeftOut
         Surfaces of mortar as drawn, with the stones as their holes; holes without a stone are openings.
-    simpler : float
-        Fraction of the size of a typical stone to which borders are simplified.
 
     Returns
     -------
@@ -127,7 +123,7 @@ def share_out(
     holder = _holders(faces, shapes, masonry, points, owner, anchored)
     cells = [_joined_faces(faces[holder == i], shapes[i], grid) for i in range(len(shapes))]
     size = float(np.median(np.sqrt(shapely.area(shapes[growing]))))
-    simple = shapely.coverage_simplify(np.array(cells), simpler * size)
+    simple = shapely.coverage_simplify(np.array(cells), SIMPLER * size)
     if anchored.any() and not anchored.all():
         simple = _along_anchored(simple, np.array(cells), np.flatnonzero(anchored), grid)
     rings = [np.array(shapely.orient_polygons(cell).exterior.coords)[:-1] for cell in simple]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -69,16 +70,25 @@ def extended_to_lines(
         )
         wide = shapely.Polygon(extended_rings[block]).buffer(0)
         shape = shapely.union_all([shapes[block].buffer(0), shapely.intersection(wide, strip)])
-        near = [int(j) for j in tree.query(shape) if j != block]
-        cut = shapely.difference(shape, shapely.union_all([shapes[j].buffer(0) for j in near]))
-        piece = max(shapely.get_parts(cut), key=shapely.area, default=None)
-        if piece is not None and piece.geom_type == "Polygon" and piece.area > 0.0:
-            shapes[block] = shapely.Polygon(piece.exterior)
-            final[block] = np.array(shapely.orient_polygons(shapes[block]).exterior.coords)[:-1]
+        piece = _largest_piece(shape, [shapes[j] for j in tree.query(shape).tolist() if j != block])
+        if piece is not None:
+            shapes[block] = piece
+            final[block] = np.array(shapely.orient_polygons(piece).exterior.coords)[:-1]
     involved = {int(edges.block[edge]) for k in uncommon for edge in (found.edge_a[k], found.edge_b[k])}
     return merge_close_corners(
         final, sorted(involved), anchored, MERGED * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max())
     )
+
+
+def _largest_piece(shape: Any, others: Sequence[Any]) -> Any:
+    """Cut others out of a shape, and take the outer border of its largest piece; None where nothing is left."""
+    import shapely
+
+    cut = shapely.difference(shape, shapely.union_all([other.buffer(0) for other in others]))
+    piece = max(shapely.get_parts(cut), key=shapely.area, default=None)
+    if piece is None or piece.geom_type != "Polygon" or piece.area <= 0.0:
+        return None
+    return shapely.Polygon(piece.exterior)
 
 
 def _extended_edges(
@@ -232,22 +242,26 @@ def merge_close_corners(
     if anchors:
         distance, nearest = cKDTree(np.concatenate(anchors)).query(centre)
         centre = np.where((distance <= reach)[:, None], np.concatenate(anchors)[nearest], centre)
-    lookup = cKDTree(movable)
-    result = list(rings)
+    lookup, result, same = cKDTree(movable), list(rings), max(10 * closed, 1e-7 * reach)
     for i in near:
-        if anchored[i]:
-            continue
-        distance, nearest = lookup.query(shared[i])
-        moved = np.where((distance <= max(10 * closed, 1e-7 * reach))[:, None], centre[group[nearest]], shared[i])
-        apart = np.hypot(*(moved - np.roll(moved, 1, axis=0)).T) > closed
-        extent = float(np.ptp(moved, axis=0).max())
-        if extent <= closed:
-            # The joints are wider than the block: it keeps its outline, and the overlap is refused later, by name.
-            continue
-        ring = without_collinear(moved[apart], 10 * closed / extent)
-        if len(ring) >= 3 and shapely.Polygon(ring).is_valid:
-            result[i] = ring
+        if not anchored[i]:
+            distance, nearest = lookup.query(shared[i])
+            moved = np.where((distance <= same)[:, None], centre[group[nearest]], shared[i])
+            result[i] = _merged(moved, rings[i], closed)
     return result
+
+
+def _merged(moved: np.ndarray, ring: np.ndarray, closed: float) -> np.ndarray:
+    """Return an outline with its corners moved, those at one place once, or as it was where that leaves none."""
+    import shapely
+
+    apart = np.hypot(*(moved - np.roll(moved, 1, axis=0)).T) > closed
+    extent = float(np.ptp(moved, axis=0).max())
+    if extent <= closed:
+        # The joints are wider than the block: it keeps its outline, and the overlap is refused later, by name.
+        return ring
+    merged = without_collinear(moved[apart], 10 * closed / extent)
+    return merged if len(merged) >= 3 and shapely.Polygon(merged).is_valid else ring
 
 
 def with_corners_on_edges(ring: np.ndarray, points: np.ndarray, index: Any, closed: float) -> np.ndarray:
