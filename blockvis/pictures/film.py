@@ -66,6 +66,23 @@ def film_of(
     return len(draws), frames()
 
 
+def poster_of(drawer: Drawer) -> Image.Image:
+    """Draw the one frame that stands for a film: where the fall is fastest, or a mechanism farthest out, or the end.
+
+    Parameters
+    ----------
+    drawer : Drawer
+    """
+    fall, last = drawer.fall, drawer.increments[-1]
+    if fall is not None and len(fall) > 1:
+        speeds = np.linalg.norm(np.diff(fall.positions, axis=0), axis=2) / np.diff(fall.times)[:, None]
+        fastest = int((speeds**2 @ drawer.assembly.masses).argmax())
+        return drawer.falling_picture(float(fall.times[fastest + 1]))
+    governing = drawer.response.governing
+    # Of states that stand by themselves the lowest is the answer.
+    return drawer.picture(last if last.status == solver.Status.FALLING or governing is None else governing)
+
+
 def state_at(response: solver.Response, at: float) -> solver.Increment:
     """Find what is shown at a parameter over all phases [m or rad]: between two increments blocks move evenly.
 

@@ -50,7 +50,7 @@ _LISTS = (
 )
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz", TIES)
 _PICTURES = (
-    *("report.html", "report.pdf", "curve.png", "curve.svg", "mechanism.png", "cracks.png", "last.png"),
+    *("report.html", "report.pdf", "curve.png", "curve.svg", "mechanism.png", "cracks.png", "last.png", "poster.png"),
     "paraview_colours.py",
     *(f"collapse{suffix}" for suffix in VIDEO_SUFFIXES),
 )

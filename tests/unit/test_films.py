@@ -1,10 +1,11 @@
 """Films between increments and at states that stand by themselves, and what of a run is drawn."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from structures import box, case_from, dropped_brick, posed
+from structures import arch_response, box, case_from, dropped_brick, pixels, posed
 
 import solver
 from blockvis import animate
@@ -66,6 +67,26 @@ def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
     assert lengths == pytest.approx([lengths[0]] * 3)
     assert state.load_multiplier == pytest.approx((before.load_multiplier + after.load_multiplier) / 2.0)
     assert len(list(animate(response, tmp_path / "frames", size=SIZE, fps=5, seconds=1.0).iterdir())) == 5 + 4
+
+
+@pytest.mark.slow
+def test_a_poster_is_where_the_fall_is_fastest(tmp_path):
+    frames = animate(
+        arch_response(), tmp_path / "frames", size=SIZE, fps=25, seconds=0.1, poster=tmp_path / "poster.png"
+    )
+    pictures, poster = [pixels(frame)[20:160] for frame in sorted(frames.iterdir())], pixels(tmp_path / "poster.png")
+    chosen = [k for k, picture in enumerate(pictures) if (picture == poster[20:160]).all()]
+    # What is drawn anew, of a fall that takes a second or two behind half a second of rest.
+    changes = [np.abs(after - before).sum() for before, after in pairwise(pictures)]
+    assert len(chosen) == 1
+    assert 20 < chosen[0] < 60
+    assert changes[chosen[0] - 1] > 0.7 * max(changes[5:])
+
+
+def test_the_poster_of_what_does_not_fall_is_its_end(tmp_path):
+    poster = tmp_path / "poster.png"
+    frames = animate(sideways_block(), tmp_path / "frames", size=SIZE, fps=5, seconds=1.0, poster=poster)
+    assert poster.read_bytes() == max(frames.iterdir()).read_bytes()
 
 
 def test_what_falls_is_not_hidden_by_what_stands():
