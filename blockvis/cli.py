@@ -896,7 +896,7 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     from .formats.read import save_layout
 
     if not response.path:
-        raise ValueError(f"nothing in '{options.source}' is in equilibrium ({response.stop}): no deformed layout")
+        raise ValueError(f"there is no deformed layout: {response.message or response.stop}")
     last = response.path[-1]
     save_layout(response.assembly, target, pose=last.pose)
     where = f"{response.parameter.name} {last.parameter:.6g} {response.parameter.unit}".rstrip()
