@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from structures import arch_response, box, case_from, dropped_brick, pixels, posed
+from structures import arch_response, box, brick, case_from, dropped_brick, pixels, posed, rectangle
 
 import solver
 from blockvis import animate
@@ -53,6 +53,26 @@ def test_a_film_tells_what_is_lost_and_goes_on():
     assert told[-1][0] == pytest.approx(1.0)
     assert [badge for parameter, badge, _ in told if parameter < gone] == [None] * sum(p < gone for p, *_ in told)
     assert all(lost for parameter, _, lost in told if parameter >= named[0])
+
+
+def test_a_film_tells_what_is_taken_away_between_settlements():
+    outlines = [
+        rectangle(0.0, -1.0, 2.0, 0.0),
+        rectangle(2.0, -1.0, 4.0, 0.0),
+        *(brick(x, 0.0, 1.0, 0.5) for x in (0, 1)),
+    ]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "moving", "free", "free"])
+    down = solver.Settlement((0, -1), increment=0.01, limit=0.01)
+    change = solver.PhaseChange(1, np.array([False, False, False, True]))
+    response = solver.Structure(assembly, friction_coefficient=0.6).settle([down, down], changes=[change])
+    drawer = Drawer(response, Look(forces="none"), SIZE, response.path)
+    told = []
+    drawer.picture = lambda state, badge=None: told.append((badge, bool(state.removed.any())))
+    list(film_of(drawer, 10.0, 4.0)[1])
+    first = next(k for k, (badge, _) in enumerate(told) if badge)
+    assert told[first : first + 10] == [(f"TAKEN AWAY · {assembly.names[3]}", True)] * 10
+    assert {badge for badge, _ in told[:first] + told[first + 10 :]} == {None}
+    assert not any(gone for _, gone in told[:first])
 
 
 def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
