@@ -469,7 +469,9 @@ class Drawer:
     def _keys_of_joints(self) -> list[Key]:
         seen, keys = self._seen, []
         if seen.cracks:
-            kind, widest = ("area", "") if self._flat else ("line", f", up to {width_text(seen.widest)}")
+            # Where a mechanism swings alone, nothing is open in equilibrium.
+            widest = "" if self._flat or seen.widest == 0.0 else f", up to {width_text(seen.widest)}"
+            kind = "area" if self._flat else "line"
             keys.append(Key(kind, f"open joint{widest}", palette.OPEN, layers=("crack", "crack edge")))
         marked = [
             *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),
