@@ -388,6 +388,7 @@ def _add_report(verbs: Any) -> None:
     report = verbs.add_parser("report", help="the report of a results folder again, as a page or on paper")
     report.add_argument("results", metavar="OUT")
     report.add_argument("--pdf", action="store_true", help="write report.pdf, A4, as well")
+    _add_sight(report)
     report.set_defaults(verb=_report)
 
 
@@ -895,7 +896,7 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     from .formats.read import save_layout
 
     if not response.path:
-        raise ValueError(f"nothing in '{options.source}' is in equilibrium ({response.stop}): no deformed layout")
+        raise ValueError(f"there is no deformed layout: {response.message or response.stop}")
     last = response.path[-1]
     save_layout(response.assembly, target, pose=last.pose)
     where = f"{response.parameter.name} {last.parameter:.6g} {response.parameter.unit}".rstrip()
@@ -973,11 +974,11 @@ def _render(options: argparse.Namespace) -> int:
     if options.animation != "none":
         progress = DrawingProgress()
         try:
-            look |= seen_from
+            look |= seen_from | {"poster": folder / "poster.png"}
             animate(response, folder / options.animation, size=size, fall=fall, progress=progress.frame, **look)
         finally:
             progress.done()
-        drawn.append(options.animation)
+        drawn += [options.animation, "poster.png"]
     print(f"drawn in {folder}/: {', '.join(drawn)}")
     return 0
 
@@ -986,6 +987,8 @@ def _report(options: argparse.Namespace) -> int:
     from .runs.reopen import open_results
 
     folder = Path(options.results)
+    if not options.pdf and (options.view or options.section):
+        raise ValueError("--view and --section are of the report on paper, report.html turns; add --pdf")
     response = open_results(folder)
     fall = _write_report(response, folder)
     written = ["report.html"]
@@ -1004,6 +1007,7 @@ def _report(options: argparse.Namespace) -> int:
             error=str(stored_check(folder) or ""),
             band=stored_range(folder),
             underlay=stored_underlay(folder),
+            **_seen_from(options, folder, response),
         )
         written.append("report.pdf")
     print(f"written in {folder}/: {', '.join(written)}")

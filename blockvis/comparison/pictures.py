@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
 from blockvis.pictures import palette
-from blockvis.pictures.captions import force_unit, parameter_label, parameter_unit, value_label
+from blockvis.pictures.captions import drops_at_start, force_unit, parameter_label, parameter_unit, value_label
 from blockvis.pictures.curves import TEXT
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import END, PAUSE
@@ -52,7 +52,10 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
         response, ink = side.response, palette.hexadecimal(colour)
         x, y = response.parameters * per_length, response.values / factor
         marker = "o" if len(x) == 1 or not comparison.is_path else ""
-        axes.plot(x, y, line, marker=marker, color=ink, linewidth=2.0, label=side.label)
+        # The drop from rest is no part of the path, as in the curve of one run.
+        first = 1 if drops_at_start(response) else 0
+        axes.plot(x[: 2 * first], y[: 2 * first], ":", color=ink, linewidth=1.5)
+        axes.plot(x[first:], y[first:], line, marker=marker, color=ink, linewidth=2.0, label=side.label)
         if response.collapse is not None:
             axes.plot(x[-1:], y[-1:], "X", color=ink, markersize=9)
             axes.axvline(x[-1], color=ink, linewidth=1.0, linestyle=":")

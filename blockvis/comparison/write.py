@@ -39,7 +39,8 @@ def compare(
     folder : str or Path
         Where it is written.
     film : str, optional
-        Name of the film in the folder, in .mp4, .gif or .webp; none without a name. Limit loads have none.
+        Name of the film in the folder, in .mp4, .gif or .webp, or of a folder of its frames; none without a name.
+        Limit loads have none.
     overwrite : bool
         Whether a comparison that is there already may be replaced.
     progress : callable, optional
@@ -56,8 +57,11 @@ def compare(
         If a folder holds no results, if the two cannot be compared, or if the folder holds something already.
     """
     folder = Path(folder)
-    if film is not None and Path(film).suffix.lower() not in VIDEO_SUFFIXES:
-        raise ValueError(f"'{film}' is no film that blockvis writes; end its name in {', '.join(VIDEO_SUFFIXES)}")
+    if film is not None and Path(film).suffix.lower() not in ("", *VIDEO_SUFFIXES):
+        raise ValueError(
+            f"'{film}' is no film that blockvis writes; end its name in {', '.join(VIDEO_SUFFIXES)}, "
+            "or in / for a folder of pictures"
+        )
     _refuse(folder, (PAGE, CURVES, STATIONS, *([film] if film else [])), overwrite)
     found = compared(one, other)
     make_folder(folder)
@@ -67,7 +71,8 @@ def compare(
     if film is not None and found.is_path:
         film_in_step(found, folder / film, progress=progress)
         written.append(film)
-    page = comparison_html(found, curves.read_bytes(), stations.read_bytes(), film if film in written else None)
+    played = film if film in written and Path(film).suffix else None
+    page = comparison_html(found, curves.read_bytes(), stations.read_bytes(), played)
     write_atomic(folder / PAGE, page)
     return written
 

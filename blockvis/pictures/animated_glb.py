@@ -44,7 +44,14 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     -----
     The path takes six seconds in proportion to its parameter. Between two poses glTF turns each block about its
     centroid, and no corner takes a short cut. Blocks in the plane are extruded by their thickness.
+
+    Raises
+    ------
+    ValueError
+        Where there is no increment.
     """
+    if not response.increments:
+        raise ValueError(f"there is no motion to write to '{path}': {response.message or response.stop}")
     times, poses = _played(response, fall)
     moves = [_as_gltf(pose, response.assembly.dimension) for pose in poses]
     places, turns = np.array([place for place, _ in moves]), np.array([turn for _, turn in moves])

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import solver
+from blockvis.dynamics.fall import CAPTION
 from blockvis.results.about import loss_of
 from blockvis.text import force_text, padded_text
 from solver import mechanics
@@ -194,6 +195,13 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
 def badge_of(response: solver.Response) -> str:
     """Warning on frames that are no equilibrium."""
     return "MECHANISM · pseudo-motion" if response.swings else "FALLING · pseudo-time"
+
+
+def fall_text(response: solver.Response) -> str:
+    """Say how a fall was followed, and without what."""
+    ties = ["ties let go"] if response.ties else []
+    fill = ["fill weighs on, not shown"] if response.loads.fills else []
+    return "   ·   ".join([CAPTION, *ties, *fill])
 
 
 def lost_text(response: solver.Response) -> str:

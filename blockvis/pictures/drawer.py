@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 import solver
-from blockvis.dynamics.fall import CAPTION, Fall, falling_increment
+from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.layout.sights import Cut, Sight
 from blockvis.results.cracks import cracks_of, main_cracks
 from blockvis.results.joints import end_openings, faces_at, initial_joints
@@ -20,7 +20,7 @@ from solver import mechanics
 
 from . import palette
 from .backfill import fill_bodies
-from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, matters
+from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, fall_text, matters
 from .flat_scene import FlatScene
 from .frame import ColourBar, Frame, Key, Sheet, framed, write_labels
 from .live_load import LiveLoads
@@ -393,7 +393,7 @@ class Drawer:
         return self.picture(
             falling_increment(self.response, self.fall.at(time)),
             title=f"Fall   ·   {time:.2f} s after the last equilibrium",
-            note=f"{CAPTION}   ·   true scale",
+            note=f"{fall_text(self.response)}   ·   true scale",
             badge=FALL_BADGE if self._moves(time) else "",
             blocks_only=True,
         )
@@ -469,7 +469,9 @@ class Drawer:
     def _keys_of_joints(self) -> list[Key]:
         seen, keys = self._seen, []
         if seen.cracks:
-            kind, widest = ("area", "") if self._flat else ("line", f", up to {width_text(seen.widest)}")
+            # Where a mechanism swings alone, nothing is open in equilibrium.
+            widest = "" if self._flat or seen.widest == 0.0 else f", up to {width_text(seen.widest)}"
+            kind = "area" if self._flat else "line"
             keys.append(Key(kind, f"open joint{widest}", palette.OPEN, layers=("crack", "crack edge")))
         marked = [
             *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),

@@ -66,6 +66,23 @@ def film_of(
     return len(draws), frames()
 
 
+def poster_of(drawer: Drawer) -> Image.Image:
+    """Draw the one frame that stands for a film: where the fall is fastest, or a mechanism farthest out, or the end.
+
+    Parameters
+    ----------
+    drawer : Drawer
+    """
+    fall, last = drawer.fall, drawer.increments[-1]
+    if fall is not None and len(fall) > 1:
+        speeds = np.linalg.norm(np.diff(fall.positions, axis=0), axis=2) / np.diff(fall.times)[:, None]
+        fastest = int((speeds**2 @ drawer.assembly.masses).argmax())
+        return drawer.falling_picture(float(fall.times[fastest + 1]))
+    governing = drawer.response.governing
+    # Of states that stand by themselves the lowest is the answer.
+    return drawer.picture(last if last.status == solver.Status.FALLING or governing is None else governing)
+
+
 def state_at(response: solver.Response, at: float) -> solver.Increment:
     """Find what is shown at a parameter over all phases [m or rad]: between two increments blocks move evenly.
 
@@ -131,18 +148,19 @@ def _drawn_at(
 def _losses_told(
     response: solver.Response, path: Sequence[solver.Increment], total: np.ndarray, places: np.ndarray, lasting: int
 ) -> list[str | None]:
-    """Say for each place of a film which blocks have left for good at the increments just before it, if any have."""
+    """Say for each place of a film which blocks were lost or taken away just before it, if any were."""
     words: list[str | None] = [None] * len(places)
-    if not response.losses:
+    if not (response.losses or response.changes):
         return words
     before = path[0].fallen
     for increment, at in zip(path[1:], total[1:], strict=True):
         gone = np.flatnonzero(increment.fallen & ~before)
         before = increment.fallen
         if len(gone):
+            fate = "TAKEN AWAY" if increment.removed[gone].all() else "LOST"
             name = response.assembly.names[gone[0]] if len(gone) == 1 else f"{len(gone)} blocks"
             first = int(np.searchsorted(places, at))
-            words[first : first + lasting] = [f"LOST · {name}"] * len(words[first : first + lasting])
+            words[first : first + lasting] = [f"{fate} · {name}"] * len(words[first : first + lasting])
     return words
 
 

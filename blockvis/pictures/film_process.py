@@ -243,6 +243,6 @@ def _draw(
         say("fall", fall)
     if response.path:
         draw_curve(response, path.with_name("curve.png"))
-    look: dict[str, Any] = {"underlay": underlay, **seen_from}
+    look: dict[str, Any] = {"underlay": underlay, "poster": path.with_name("poster.png"), **seen_from}
     animate(response, path, fall=fall, progress=lambda done, total: say("drawing", (done, total)), **look)
     say("drawn", None)

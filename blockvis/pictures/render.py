@@ -17,7 +17,7 @@ from blockvis.results.about import loss_of
 from blockvis.system.atomic_files import atomic_file
 
 from .drawer import Drawer, Look
-from .film import film_of
+from .film import film_of, poster_of
 from .swing import MOST_PARTS, shown_increments, swing_of
 from .underlay import Underlay
 from .video import write_film
@@ -171,6 +171,7 @@ def animate(
     progress: Callable[[int, int], None] | None = None,
     view: str | Mapping[str, float] | Sight | None = None,
     section: str | Mapping[str, Any] | Cut | None = None,
+    poster: str | os.PathLike[str] | None = None,
 ) -> Path:
     """Write the settlement and the fall as a film.
 
@@ -182,7 +183,7 @@ def animate(
     ----------
     response : solver.Response
     path : path
-        Ending in .mp4, .gif or .webp.
+        Ending in .mp4, .gif or .webp; a name without an ending is a folder of pictures.
     size : (int, int)
         Width and height in pixels, both even.
     fps : float
@@ -199,6 +200,8 @@ def animate(
         Called with the frames drawn and their number.
     view, section
         As of :func:`draw_still`; a film has one view.
+    poster : path, optional
+        Of a picture that stands for the film where it does not play: the frame in which the fall is fastest.
 
     Returns
     -------
@@ -213,7 +216,10 @@ def animate(
     shown = shown_increments(response) if fall is None else response.path
     drawer = Drawer(response, look, size, shown, curve=curve, fall=fall, underlay=underlay)
     _, frames = film_of(drawer, fps, seconds, progress)
-    return write_film(frames, path, size=size, fps=fps)
+    film = write_film(frames, path, size=size, fps=fps)
+    if poster is not None:
+        _save(poster_of(drawer), poster)
+    return film
 
 
 def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:

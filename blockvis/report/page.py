@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 import solver
-from blockvis.dynamics.fall import CAPTION, Fall, falling_increment
+from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures import palette
 from blockvis.pictures.captions import (
@@ -25,6 +25,7 @@ from blockvis.pictures.captions import (
     collapse_places,
     drops_at_start,
     failure_text,
+    fall_text,
     force_unit,
     in_one_unit,
     parameter_label,
@@ -353,12 +354,13 @@ def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, An
     for frame in shown:
         increment = frame.increment
         if frame.time is not None:
-            caption = f"{CAPTION}  ·  {frame.time:.2f} s"
+            caption = f"{fall_text(response)}   ·   {frame.time:.2f} s"
         else:
-            caption = state_text(increment, response).replace("   ·   ", "  ·  ")
+            caption = state_text(increment, response)
             if len(response.settlements) > 1:
                 caption += f"  ·  phase {increment.phase + 1}"
         phase = min(increment.phase, max(len(response.settlements) - 1, 0))
+        caption = caption.replace("   ·   ", "  ·  ")
         frames.append({"caption": caption, "falling": frame.falling, "curve": frame.curve, "phase": phase})
     return frames
 

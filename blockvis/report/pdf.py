@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -51,6 +52,8 @@ def write_pdf(
     error: str = "",
     band: ReactionRange | None = None,
     underlay: Underlay | None = None,
+    view: Any = None,
+    section: Any = None,
 ) -> Path:
     """Write the report as a document of A4 pages.
 
@@ -68,6 +71,8 @@ def write_pdf(
         Of the reaction, drawn behind the curve.
     underlay : Underlay, optional
         A photograph under blocks in the plane.
+    view, section
+        Of blocks in space, as of :func:`blockvis.draw_still`.
 
     Returns
     -------
@@ -80,6 +85,7 @@ def write_pdf(
     """
     if not response.increments:
         raise ValueError(f"there is no increment to show: {response.message or response.stop}")
+    eye = {"view": view, "section": section}
     origin = about(response)
     paper = _Paper(f"{origin.name} · {origin.version}".strip(" ·"))
     # A number and its unit stay on one line.
@@ -89,21 +95,21 @@ def write_pdf(
     if response.stop is solver.Status.SOLVER_FAILED:
         paper.warning(failure_text(response))
     with TemporaryDirectory() as folder:
-        paper.picture(draw_mechanism(response, Path(folder) / "mechanism.png", underlay=underlay))
+        paper.picture(draw_mechanism(response, Path(folder) / "mechanism.png", underlay=underlay, **eye))
         name, _, value = error.partition(": ")
         rows = [*summary_rows(response, fall), *([(name, value)] if value else []), *range_rows(band)]
         paper.tabulate("Numbers", ("", ""), rows, (62.0, 112.0))
         if response.path:
             last = response.path[-1]
             paper.heading("Last equilibrium" if response.parameter.is_path else "Last state", 12.0, PICTURE)
-            paper.picture(draw_still(response, last, Path(folder) / "last.png", underlay=underlay))
+            paper.picture(draw_still(response, last, Path(folder) / "last.png", underlay=underlay, **eye))
             paper.heading("Curve", 12.0, PICTURE)
             paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), 140.0)
             paper.tabulate("States", *_states(response))
             cracks = cracks_of(response.assembly, last.pose, fallen=last.fallen)
             if cracks:
                 paper.heading("Cracks", 12.0, PICTURE)
-                paper.picture(draw_cracks(response, -1, Path(folder) / "cracks.png"))
+                paper.picture(draw_cracks(response, -1, Path(folder) / "cracks.png", **eye))
                 paper.tabulate("Cracks at the last equilibrium", *_crack_table(cracks))
     ties = tie_rows(response)
     if ties:

@@ -50,7 +50,7 @@ _LISTS = (
 )
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz", TIES)
 _PICTURES = (
-    *("report.html", "report.pdf", "curve.png", "curve.svg", "mechanism.png", "cracks.png", "last.png"),
+    *("report.html", "report.pdf", "curve.png", "curve.svg", "mechanism.png", "cracks.png", "last.png", "poster.png"),
     "paraview_colours.py",
     *(f"collapse{suffix}" for suffix in VIDEO_SUFFIXES),
 )
@@ -421,6 +421,7 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
     assembly = stored_assembly(folder)
     files = StoredIncrements(folder)
     increments = [files.opened(k) for k in range(len(files))]
+    nothing = f"the run in '{folder}' has found nothing yet; go on with it by blockvis run --resume {folder}"
     summary: dict[str, Any] = {}
     if (folder / "summary.json").is_file():
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
@@ -431,7 +432,7 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
         loads=solver.self_weight(assembly),
         increments=tuple(increments),
         stop=solver.Status(summary.get("status", solver.Status.INTERRUPTED)),
-        message=summary.get("message", ""),
+        message=summary.get("message", "" if increments else nothing),
         collapse=_collapse_of(summary, increments, assembly),
     )
     return response, summary

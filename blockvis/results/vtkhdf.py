@@ -48,7 +48,7 @@ def write_vtkhdf(response: solver.Response, path: Path, *, shape: str = "moved")
     VTK knows no strings in series: names are left out, ``block_id`` counts the blocks.
     """
     if not response.path:
-        raise ValueError(f"nothing is in equilibrium ({response.stop}): there is no path to write to '{path}'")
+        raise ValueError(f"there is no path to write to '{path}': {response.message or response.stop}")
     source = _Series(response, shape)
     writer = vtkHDFWriter()
     writer.SetInputConnection(source.GetOutputPort())

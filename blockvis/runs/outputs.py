@@ -180,7 +180,7 @@ class Drawing(Output):
                 from blockvis.pictures.render import animate
 
                 try:
-                    look: dict[str, Any] = {"underlay": underlay, **eye}
+                    look: dict[str, Any] = {"underlay": underlay, "poster": folder / "poster.png", **eye}
                     animate(response, folder / animation, fall=fall, progress=progress.frame, **look)
                 finally:
                     progress.done()

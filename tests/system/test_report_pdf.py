@@ -3,7 +3,9 @@
 import re
 
 import pytest
+from structures import vault_response
 
+import blockvis
 from blockvis.cli import main
 
 
@@ -24,3 +26,24 @@ def test_a_report_of_nothing_is_refused(tmp_path, capsys):
     assert main(["report", str(tmp_path), "--pdf"]) == 2
     assert "holds no results" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_a_view_is_of_the_report_on_paper(arch_results, capsys):
+    assert main(["report", str(arch_results), "--view", "below"]) == 2
+    assert "--view and --section are of the report on paper, report.html turns; add --pdf" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_blocks_in_space_are_on_paper_as_they_are_asked_for(tmp_path, monkeypatch):
+    seen = []
+
+    def noted(response, *places, **words):
+        seen.append((words["view"], words["section"]))
+        return blockvis.draw_curve(response, places[-1])
+
+    for name in ("draw_mechanism", "draw_still", "draw_cracks"):
+        monkeypatch.setattr(f"blockvis.report.pdf.{name}", noted)
+    response = vault_response()
+    blockvis.write(response, tmp_path / "out")
+    assert main(["report", str(tmp_path / "out"), "--pdf", "--view", "30,20", "--section", "y = 0.2"]) == 0
+    assert seen == [({"azimuth": 30, "elevation": 20}, "y = 0.2")] * 3

@@ -1,10 +1,11 @@
 """Films between increments and at states that stand by themselves, and what of a run is drawn."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from structures import box, case_from, dropped_brick, posed
+from structures import arch_response, box, brick, case_from, dropped_brick, pixels, posed, rectangle
 
 import solver
 from blockvis import animate
@@ -54,6 +55,26 @@ def test_a_film_tells_what_is_lost_and_goes_on():
     assert all(lost for parameter, _, lost in told if parameter >= named[0])
 
 
+def test_a_film_tells_what_is_taken_away_between_settlements():
+    outlines = [
+        rectangle(0.0, -1.0, 2.0, 0.0),
+        rectangle(2.0, -1.0, 4.0, 0.0),
+        *(brick(x, 0.0, 1.0, 0.5) for x in (0, 1)),
+    ]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "moving", "free", "free"])
+    down = solver.Settlement((0, -1), increment=0.01, limit=0.01)
+    change = solver.PhaseChange(1, np.array([False, False, False, True]))
+    response = solver.Structure(assembly, friction_coefficient=0.6).settle([down, down], changes=[change])
+    drawer = Drawer(response, Look(forces="none"), SIZE, response.path)
+    told = []
+    drawer.picture = lambda state, badge=None: told.append((badge, bool(state.removed.any())))
+    list(film_of(drawer, 10.0, 4.0)[1])
+    first = next(k for k, (badge, _) in enumerate(told) if badge)
+    assert told[first : first + 10] == [(f"TAKEN AWAY · {assembly.names[3]}", True)] * 10
+    assert {badge for badge, _ in told[:first] + told[first + 10 :]} == {None}
+    assert not any(gone for _, gone in told[:first])
+
+
 def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
     response = sideways_block()
     loads = LiveLoads(response, response.path, 1.0)
@@ -66,6 +87,26 @@ def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
     assert lengths == pytest.approx([lengths[0]] * 3)
     assert state.load_multiplier == pytest.approx((before.load_multiplier + after.load_multiplier) / 2.0)
     assert len(list(animate(response, tmp_path / "frames", size=SIZE, fps=5, seconds=1.0).iterdir())) == 5 + 4
+
+
+@pytest.mark.slow
+def test_a_poster_is_where_the_fall_is_fastest(tmp_path):
+    frames = animate(
+        arch_response(), tmp_path / "frames", size=SIZE, fps=25, seconds=0.1, poster=tmp_path / "poster.png"
+    )
+    pictures, poster = [pixels(frame)[45:140] for frame in sorted(frames.iterdir())], pixels(tmp_path / "poster.png")
+    chosen = [k for k, picture in enumerate(pictures) if (picture == poster[45:140]).all()]
+    # What is drawn anew, of a fall that takes a second or two behind half a second of rest.
+    changes = [np.abs(after - before).sum() for before, after in pairwise(pictures)]
+    assert len(chosen) == 1
+    assert 20 < chosen[0] < 60
+    assert changes[chosen[0] - 1] > 0.7 * max(changes[5:])
+
+
+def test_the_poster_of_what_does_not_fall_is_its_end(tmp_path):
+    poster = tmp_path / "poster.png"
+    frames = animate(sideways_block(), tmp_path / "frames", size=SIZE, fps=5, seconds=1.0, poster=poster)
+    assert poster.read_bytes() == max(frames.iterdir()).read_bytes()
 
 
 def test_what_falls_is_not_hidden_by_what_stands():
