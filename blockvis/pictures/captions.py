@@ -233,9 +233,10 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
     if not (response.swings and increment.status == solver.Status.FALLING):
         parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")
     parts.append(f"W = {force_text(response.total_weight)}")
-    lost = int(increment.fallen.sum())
-    if lost and increment.status != solver.Status.FALLING:
-        parts.append(f"{lost} block{'s' if lost != 1 else ''} lost")
+    removed = int(increment.removed.sum())
+    for count, fate in ((removed, "taken away"), (int(increment.fallen.sum()) - removed, "lost")):
+        if count and increment.status != solver.Status.FALLING:
+            parts.append(f"{count} block{'s' if count != 1 else ''} {fate}")
     return state_text(increment, response), "   ·   ".join(parts)
 
 

@@ -171,6 +171,12 @@ class TieCourses:
                 TieCourse(t.name, t.kind, 0.0, at, increment.phase + 1, None, None, 0.0, "") for t in self.ties
             ]
         for k, (before, force, state) in enumerate(zip(self._found, found.forces, found.states, strict=True)):
+            tie = self.ties[k]
+            if state == mechanics.BROKEN and before.breaks_at is None:
+                # It has carried its strength since the last increment.
+                force = -tie.strength if tie.kind == mechanics.PROP else tie.strength
+            elif state not in (mechanics.ELASTIC, mechanics.YIELDING):
+                force = 0.0
             larger = abs(force) > abs(before.force)
             self._found[k] = TieCourse(
                 before.name,
@@ -180,7 +186,7 @@ class TieCourses:
                 increment.phase + 1 if larger else before.phase,
                 at if before.yields_at is None and state == mechanics.YIELDING else before.yields_at,
                 at if before.breaks_at is None and state == mechanics.BROKEN else before.breaks_at,
-                float(force),
+                0.0 if state == mechanics.BROKEN else float(force),
                 STATE_WORDS[state],
             )
 
@@ -207,10 +213,8 @@ def tie_texts(course: TieCourse, unit: str = "m") -> tuple[str, str, str]:
     unit : str
         Of settlements.
     """
-    sense = "" if course.force == 0.0 else " tension" if course.force > 0.0 else " compression"
-    largest = f"{force_text(abs(course.force))}{sense}"
-    if sense:
-        largest += f" at {course.at:.4g} {unit}"
+    sense = "tension" if course.force > 0.0 else "compression"
+    largest = f"{force_text(abs(course.force))} {sense} at {course.at:.4g} {unit}" if course.force else "no force"
     fate = [
         f"{word} at {at:.4g} {unit}"
         for word, at in (("yields", course.yields_at), ("breaks", course.breaks_at))
