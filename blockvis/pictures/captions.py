@@ -103,7 +103,11 @@ def force_unit(response: solver.Response) -> tuple[float, str]:
     unit = response.measured.unit
     if not response.measured.is_force:
         return 1.0, unit
-    largest = max((abs(i.measured) for i in response.path), default=0.0)
+    return unit_for(max((abs(i.measured) for i in response.path), default=0.0), unit)
+
+
+def unit_for(largest: float, unit: str = "N") -> tuple[float, str]:
+    """Divisor and unit in which values up to a largest one [N or N·m] read well."""
     for factor, prefix in ((1e6, "M"), (1e3, "k")):
         if largest >= factor:
             return factor, prefix + unit

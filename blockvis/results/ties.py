@@ -23,6 +23,9 @@ TIES = "ties.npz"
 #: Words of the states, in the order of ``solver.mechanics.TieForces.states``.
 STATE_WORDS = ("absent", "slack", "elastic", "yielding", "broken")
 
+#: Ties whose force is drawn over the settlement: more would not be told apart.
+MOST_CURVES = 6
+
 #: Columns of ties.csv.
 COLUMNS = ("increment", "phase", "settlement", "name", "kind", "force", "elongation", "state")
 
@@ -202,6 +205,38 @@ def tie_courses(response: solver.Response) -> tuple[TieCourse, ...]:
     for increment in response.path if courses.ties else ():
         courses.add(increment)
     return courses.courses
+
+
+@dataclass(frozen=True)
+class TieForceCurves:
+    """Forces of the ties over the increments in equilibrium.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of at most :data:`MOST_CURVES` ties that carry, the largest force first.
+    forces : (n_increments, n_names) array [N]
+        Tension positive; nan where a tie is not there.
+    states : (n_increments, n_names) int array
+        Numbers of :data:`STATE_WORDS`.
+    """
+
+    names: tuple[str, ...]
+    forces: np.ndarray
+    states: np.ndarray
+
+
+def tie_force_curves(response: solver.Response) -> TieForceCurves | None:
+    """Collect the forces of ties along a path; None where none is there."""
+    ties, path = known_ties(response), response.path
+    if not ties or len(path) < 2:
+        return None
+    found = [increment.ties for increment in path]
+    forces, states = np.array([of.forces for of in found]), np.array([of.states for of in found])
+    forces = np.where(np.isin(states, (mechanics.ELASTIC, mechanics.YIELDING)), forces, 0.0)
+    forces[states == mechanics.ABSENT] = np.nan
+    chosen = np.argsort(-np.nan_to_num(np.abs(forces)).max(axis=0), kind="stable")[:MOST_CURVES]
+    return TieForceCurves(tuple(ties[k].name for k in chosen), forces[:, chosen], states[:, chosen])
 
 
 def tie_texts(course: TieCourse, unit: str = "m") -> tuple[str, str, str]:
