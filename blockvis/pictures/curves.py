@@ -211,7 +211,6 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
     factor, unit = unit_for(float(np.abs(ties.forces).max(initial=0.0)))
     for name, forces, states, shade in zip(ties.names, ties.forces.T, ties.states.T, palette.TIE_SHADES, strict=False):
         colour = palette.hexadecimal(shade)
-        name += ", slack" * bool((states == mechanics.SLACK).all())
         axes.plot(
             total,
             forces / factor,

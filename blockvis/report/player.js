@@ -213,7 +213,7 @@
   }
 
   // Axes of a curve c over the settlement, with its labels; gives where numbers are on the canvas.
-  function axes(pen, w, h, c, colours) {
+  function curveAxes(pen, w, h, c, colours) {
     const left = 62, right = 12, top = 14, bottom = 44, over = model.curve, [xMin, xMax] = over.single ? [0, 1] : [over.x_min, over.x_max || 1];
     const X = (s) => left + (w - left - right) * (s - xMin) / (xMax - xMin), Y = (r) => h - bottom - (h - top - bottom) * (r - c.y_min) / (c.y_max - c.y_min);
     pen.font = `12.5px ${FONT}`; pen.lineWidth = 1; pen.lineCap = "butt";
@@ -235,7 +235,7 @@
 
   // Forces of the ties over the settlement, with the names at the end of the lines' colours.
   function paintTieCurves(pen, w, h, k, colours) {
-    const c = model.tie_curves, { X, Y, left, top } = axes(pen, w, h, c, colours), s = model.curve.settlement;
+    const c = model.tie_curves, { X, Y, left, top } = curveAxes(pen, w, h, c, colours), s = model.curve.settlement;
     const at = Math.min(model.frames[k].curve - model.curve.first, s.length - 1);
     pen.lineJoin = "round"; pen.textAlign = "left"; pen.textBaseline = "middle";
     let x = left + 4;
@@ -252,7 +252,7 @@
   function paintCurve(pen, w, h, k, colours) {
     const c = model.curve;
     if (!c.settlement.length) return;
-    const { X, Y, left, right, top, bottom } = axes(pen, w, h, c, colours), yHigh = c.y_max;
+    const { X, Y, left, right, top, bottom } = curveAxes(pen, w, h, c, colours), yHigh = c.y_max;
     pen.strokeStyle = dark.matches && colours === DARK ? "#6aa9e0" : model.colours.force; pen.lineWidth = 2; pen.lineJoin = "round";
     pen.save(); pen.beginPath(); pen.rect(left - 3, top - 3, w - left - right + 6, h - top - bottom + 6); pen.clip(); pen.beginPath();
     if (c.band.length) {

@@ -227,7 +227,7 @@ class TieForceCurves:
 
 
 def tie_force_curves(response: solver.Response) -> TieForceCurves | None:
-    """Collect the forces of ties along a path; None where none is there."""
+    """Collect the forces of ties along a path; None where none carries."""
     ties, path = known_ties(response), response.path
     if not ties or len(path) < 2:
         return None
@@ -235,7 +235,11 @@ def tie_force_curves(response: solver.Response) -> TieForceCurves | None:
     forces, states = np.array([of.forces for of in found]), np.array([of.states for of in found])
     forces = np.where(np.isin(states, (mechanics.ELASTIC, mechanics.YIELDING)), forces, 0.0)
     forces[states == mechanics.ABSENT] = np.nan
-    chosen = np.argsort(-np.nan_to_num(np.abs(forces)).max(axis=0), kind="stable")[:MOST_CURVES]
+    largest = np.nan_to_num(np.abs(forces)).max(axis=0)
+    told = (largest > 0.0) | (states == mechanics.BROKEN).any(axis=0)
+    chosen = [k for k in np.argsort(-largest, kind="stable").tolist() if told[k]][:MOST_CURVES]
+    if not chosen:
+        return None
     return TieForceCurves(tuple(ties[k].name for k in chosen), forces[:, chosen], states[:, chosen])
 
 
