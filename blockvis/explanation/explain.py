@@ -13,10 +13,11 @@ import numpy as np
 
 import solver
 from blockvis.case_files.read import case_file_text, case_of, parsed_toml
-from blockvis.cases.build import case_assembly
+from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cases.contents import Case
 from blockvis.kinds.kind import needs_dry_joints
 from blockvis.kinds.kinds import KINDS
+from blockvis.runs.plan import refuse_ties
 from blockvis.runs.progress import StudyProgress
 from solver import mechanics
 
@@ -105,9 +106,9 @@ def explain(
         if not isinstance(case, Case):
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
-        if case.ties:
-            raise ValueError(f"{case.ties[0].where}: blockvis explain knows no ties; leave [[ties]] out")
+        refuse_ties(case)
         drawn = case_assembly(case)
+        case_ties(case, drawn)
         needs_dry_joints(case, "blockvis explain")
         mechanics.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
