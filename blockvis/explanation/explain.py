@@ -108,7 +108,7 @@ def explain(
         case = replace(case, settlements=(), profiles=())
         refuse_ties(case)
         drawn = case_assembly(case)
-        case_ties(case, drawn)
+        _refuse_grounded(case_ties(case, drawn), case)
         needs_dry_joints(case, "blockvis explain")
         mechanics.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
@@ -143,6 +143,16 @@ def explain(
     if folder is not None:
         write_explanation(found, folder, overwrite=overwrite)
     return found
+
+
+def _refuse_grounded(ties: Sequence[solver.Tie], case: Case) -> None:
+    """Raise ValueError for ties from the ground: causes are movements of supports against each other alone."""
+    for tie in ties:
+        if None in tie.blocks:
+            raise ValueError(
+                f"{case.source}: [ties '{tie.name}'] is held by the ground, against which blockvis explain knows no "
+                "movement; hold both ends by blocks or supports"
+            )
 
 
 def read_explained(path: str | Path) -> Case:
