@@ -13,15 +13,15 @@ import matplotlib.pyplot as plt
 import blockvis
 import solver
 
-arch = blockvis.generators.arch_on_piers(voussoirs=9, pier_width=0.5, pier_height=1.0, pier_blocks=2)
+arch = blockvis.generators.arch_on_piers(voussoirs=9, pier_width=0.5, pier_height=2.0, pier_blocks=2)
 piers = arch.index("left pier 2"), arch.index("right pier 2")
-fill = blockvis.lay_backfill(arch, "voussoir *", surface=2.5, unit_weight=16e3)
+fill = blockvis.lay_backfill(arch, "voussoir *", surface=3.5, unit_weight=16e3)
 out = solver.Settlement(direction=(1, 0), increment=0.04, limit=0.6)
 
 
 def spread(strength, fills=()):
     """Follow the right pier outwards, with a tie at the springing that yields at a strength [N], or without."""
-    tie = solver.Tie("iron", piers, ((-1.25, 0.95), (1.25, 0.95)), stiffness=4e7, strength=strength or 1.0)
+    tie = solver.Tie("iron", piers, ((-1.25, 1.95), (1.25, 1.95)), stiffness=4e7, strength=strength or 1.0)
     loads = replace(solver.self_weight(arch), fills=fills)
     structure = solver.Structure(arch, loads=loads, friction_coefficient=0.6, ties=[tie] if strength else [])
     return structure.settle(out, controls=solver.Controls(falling_frames=0))
