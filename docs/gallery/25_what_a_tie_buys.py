@@ -35,6 +35,7 @@ bare = [spread(strength) for strength in strengths]
 filled = [spread(strength, (fill,)) for strength in strengths]
 for strength, one, other in zip(strengths, bare, filled, strict=True):
     print(f"{strength:5.0f} N   {one.collapse.displacement:.3f} m   with fill {other.collapse.displacement:.3f} m")
+assert filled[-1].collapse.displacement > 1.4 * filled[0].collapse.displacement
 
 # %%
 # What the tie does along the way: ``response.members(k)`` has force, elongation and state of each.

@@ -20,3 +20,4 @@ for name, law in (("dry", dry), ("with mortar", mortar)):
     last = responses[name].path[-1]
     print(f"{name:12s} reaction of the sinking ground {last.reaction / responses[name].total_weight:.3f} W")
     blockvis.draw_still(responses[name], -1, f"{name.replace(' ', '_')}.png")
+assert responses["with mortar"].path[-1].reaction < 0.7 * responses["dry"].path[-1].reaction

@@ -5,9 +5,11 @@ import json
 import re
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import structures
 from PIL import Image
 
 import blockvis
@@ -15,7 +17,9 @@ import solver
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cli import main
+from blockvis.results.ties import TieCourses, tie_texts
 from blockvis.runs.plan import planned
+from solver import mechanics
 
 #: Two piers of a block each, 0.5 m wide and 2 m high, 2 m apart, on a ground; the right one stands on what moves.
 PIERS = {
@@ -255,6 +259,67 @@ def test_a_folder_with_ties_opens_with_them_and_viewers_get_lines(run):
     assert lines.n_cells == 1
     assert {"force", "elongation", "state", "name"} <= set(lines.cell_data)
     assert lines.cell_data["force"][0] == again.path[1].ties.forces[0]
+
+
+@pytest.mark.slow
+def test_ties_are_a_dataset_a_block_of_the_series_and_a_rod_of_the_animation(run, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    lines = run.response.members(-1)
+    assert (lines.n_cells, str(lines["name"][0])) == (1, "iron")
+    assert lines["force"][0] == run.response.path[-1].ties.forces[0]
+    for suffix in ("vtkhdf", "glb"):
+        assert main(["convert", str(run.folder), str(tmp_path / f"tied.{suffix}")]) == 0
+    reader = pyvista.HDFReader(tmp_path / "tied.vtkhdf")
+    reader.reader.SetStep(len(run.response.path) - 1)
+    assert reader.read()["ties"]["force"] == pytest.approx([3000.0])
+    data = (tmp_path / "tied.glb").read_bytes()
+    tree = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    (rod,) = [k for k, node in enumerate(tree["nodes"]) if node.get("name") == "[ties] iron"]
+    assert tree["nodes"][rod]["scale"][2] == pytest.approx(2.6)
+    moved = {c["target"]["path"] for c in tree["animations"][0]["channels"] if c["target"]["node"] == rod}
+    assert moved == {"translation", "rotation", "scale"}
+
+
+def test_the_report_has_the_force_of_the_tie_over_the_settlement(run, tmp_path):
+    page = blockvis.write_report(run.response, tmp_path / "report.html").read_text(encoding="utf-8")
+    model = json.loads(re.search(r'<script id="model" type="application/json">(.*?)</script>', page, re.DOTALL)[1])
+    (line,) = model["tie_curves"]["lines"]
+    np.testing.assert_allclose(line["force"], [i.ties.forces[0] / 1e3 for i in run.response.path], atol=1e-6)
+    assert model["ties"][-1][0]["words"] == "iron 3 kN, yielding"
+    low, high = np.array(model["bounds"]).reshape(2, 2)
+    ends = np.array(model["ties"][-1][0]["ends"]) - model["origin"]
+    assert (ends >= low).all()
+    assert (ends <= high).all()
+
+
+@pytest.mark.slow
+def test_the_curve_has_a_panel_for_ties(run, tmp_path):
+    tied, bare = (
+        Image.open(blockvis.draw_curve(response, tmp_path / f"{k}.png")).size
+        for k, response in enumerate((run.response, structures.arch_response()))
+    )
+    assert tied[1] == 1.5 * bare[1]
+
+
+def increment_at(parameter, force, state):
+    found = mechanics.TieForces(np.array([force]), np.zeros(1), np.zeros(1), np.array([state]), np.zeros((1, 2, 2)))
+    return SimpleNamespace(status=solver.Status.EQUILIBRIUM, parameter=parameter, phase=0, ties=found)
+
+
+@pytest.mark.parametrize(
+    ("kind", "path", "words"),
+    [
+        ("tie", [(0.0, 1e-4, "SLACK"), (0.1, 0.0, "BROKEN")], ("800 N tension at 0.1 m", "breaks at 0.1 m")),
+        ("prop", [(0.0, -5.0, "ELASTIC"), (0.1, 0.0, "BROKEN")], ("800 N compression at 0.1 m", "breaks at 0.1 m")),
+        ("tie", [(0.0, 1e-4, "SLACK"), (0.1, 1e-5, "SLACK")], ("no force", "slack at the end")),
+    ],
+)
+def test_a_broken_tie_has_carried_its_strength_and_a_slack_one_nothing(kind, path, words):
+    tie = solver.Tie("wire", (0, 1), ((0.0, 0.0), (1.0, 0.0)), 1e5, kind=kind, strength=800.0, brittle=True)
+    courses = TieCourses([tie])
+    for parameter, force, state in path:
+        courses.add(increment_at(parameter, force, getattr(mechanics, state)))
+    assert tie_texts(courses.courses[0])[1:] == words
 
 
 def test_a_picture_draws_the_tie_in_the_colour_of_its_state(run, tmp_path):
