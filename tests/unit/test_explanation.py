@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import structures
 
+import blockvis
 import solver
 from blockvis import generators
 from blockvis.case_files.read import parse_case
@@ -21,7 +22,6 @@ from blockvis.explanation.candidates import (
     trough,
     twins_of,
 )
-from blockvis.explanation.explain import explain
 from blockvis.explanation.forward import AS_FAR, ENOUGH, FARTHEST, LEANING, Variant, ordered, reach_of, workers_for
 from blockvis.explanation.likelihood import Comparison, Trust
 from blockvis.explanation.observations import read_observations
@@ -372,4 +372,4 @@ def test_runs_of_causes_have_the_ties_of_the_case(tmp_path):
     (tmp_path / "case.toml").write_text(layout + grounded, encoding="utf-8")
     (tmp_path / "cracks.csv").write_text("kind,block_a,block_b,width\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"case.toml: \[ties 'iron'\] is held by the ground"):
-        explain(tmp_path / "case.toml", tmp_path / "cracks.csv")
+        blockvis.explain(tmp_path / "case.toml", tmp_path / "cracks.csv")

@@ -5,7 +5,6 @@ import json
 import re
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,9 +16,7 @@ import solver
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cli import main
-from blockvis.results.ties import TieCourses, tie_texts
 from blockvis.runs.plan import planned
-from solver import mechanics
 
 #: Two piers of a block each, 0.5 m wide and 2 m high, 2 m apart, on a ground; the right one stands on what moves.
 PIERS = {
@@ -301,25 +298,16 @@ def test_the_curve_has_a_panel_for_ties(run, tmp_path):
     assert tied[1] == 1.5 * bare[1]
 
 
-def increment_at(parameter, force, state):
-    found = mechanics.TieForces(np.array([force]), np.zeros(1), np.zeros(1), np.array([state]), np.zeros((1, 2, 2)))
-    return SimpleNamespace(status=solver.Status.EQUILIBRIUM, parameter=parameter, phase=0, ties=found)
-
-
-@pytest.mark.parametrize(
-    ("kind", "path", "words"),
-    [
-        ("tie", [(0.0, 1e-4, "SLACK"), (0.1, 0.0, "BROKEN")], ("800 N tension at 0.1 m", "breaks at 0.1 m")),
-        ("prop", [(0.0, -5.0, "ELASTIC"), (0.1, 0.0, "BROKEN")], ("800 N compression at 0.1 m", "breaks at 0.1 m")),
-        ("tie", [(0.0, 1e-4, "SLACK"), (0.1, 1e-5, "SLACK")], ("no force", "slack at the end")),
-    ],
-)
-def test_a_broken_tie_has_carried_its_strength_and_a_slack_one_nothing(kind, path, words):
-    tie = solver.Tie("wire", (0, 1), ((0.0, 0.0), (1.0, 0.0)), 1e5, kind=kind, strength=800.0, brittle=True)
-    courses = TieCourses([tie])
-    for parameter, force, state in path:
-        courses.add(increment_at(parameter, force, getattr(mechanics, state)))
-    assert tie_texts(courses.courses[0])[1:] == words
+def test_a_broken_tie_has_carried_its_strength_and_a_slack_one_carries_nothing(tmp_path):
+    wire = TIE | {"strength": 100.0, "brittle": True}
+    slack = TIE | {"name": "slack", "kind": "prop"}
+    run = blockvis.run_case(case_with(tmp_path, wire, slack), tmp_path / "out", pictures=False, film=False)
+    broken, idle = run.summary["ties"]
+    assert (broken["largest_force"], broken["last_force"], broken["last_state"]) == (100.0, 0.0, "broken")
+    assert broken["breaks_at"] == broken["largest_force_at"] > 0.0
+    # The prop is touched as the piers come to rest.
+    assert (idle["last_force"], idle["last_state"]) == (0.0, "slack")
+    assert abs(idle["largest_force"]) < 0.1
 
 
 def test_a_picture_draws_the_tie_in_the_colour_of_its_state(run, tmp_path):
