@@ -59,6 +59,17 @@ def padded_text(value: float, digits: int) -> str:
     return _digits(value, digits, True)
 
 
+def rounded_text(value: float) -> str:
+    """Write a number with three digits, without a power of ten below a million.
+
+    Examples
+    --------
+    >>> rounded_text(3000.0), rounded_text(0.61234), rounded_text(2.1e11)
+    ('3000', '0.612', '2.1e+11')
+    """
+    return f"{float(f'{value:.3g}'):g}"
+
+
 def _digits(value: float, digits: int, padded: bool) -> str:
     return f"{value:#.{digits}g}".rstrip(".") if padded and value else f"{value:.{digits}g}"
 

@@ -54,7 +54,7 @@ def html(value: Any) -> str:
 
 
 def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.UnstructuredGrid:
-    """Make a dataset of the blocks, joints or contact points of an increment, below 0 one from the end of the path."""
+    """Make a dataset of blocks, joints, contact points or ties of an increment, below 0 from the end of the path."""
     from .results.datasets import block_dataset, contact_dataset, joint_dataset
     from .results.mechanism_arrays import at_last_equilibrium, falling_in
 
@@ -65,6 +65,11 @@ def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.Unstru
         increment = at_last_equilibrium(response)
     if of == "blocks":
         return block_dataset(assembly, increment, shape=shape, falls=falling_in(response) if ends else None)
+    if of == "members":
+        from .results.tie_grid import tie_dataset
+        from .results.ties import known_ties
+
+        return tie_dataset(known_ties(response), assembly, increment, shape=shape)
     return (joint_dataset if of == "joints" else contact_dataset)(assembly, increment, shape=shape)
 
 

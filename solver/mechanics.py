@@ -41,11 +41,12 @@ from .results.quantities import (
     settlement_in,
 )
 from .results.response import Control, path_parameters, total_weight
-from .ties import ABSENT, BROKEN, ELASTIC, PROP, SLACK, TIE, YIELDING, TieForces, tie_ends
+from .ties import ABSENT, BAR, BROKEN, ELASTIC, PROP, SLACK, TIE, YIELDING, TieForces, tie_ends
 from .ties import KINDS as TIE_KINDS
 
 __all__ = [
     "ABSENT",
+    "BAR",
     "BROKEN",
     "CONTROL_DISPLACEMENT",
     "ELASTIC",

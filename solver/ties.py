@@ -219,7 +219,7 @@ def member_contacts(
 
 
 def plastic_forces(
-    ties: Sequence[Tie], assembly: Assembly, pose: Pose, contacts: Contacts, forces: np.ndarray
+    ties: Sequence[Tie], assembly: Assembly, pose: Pose, contacts: Contacts, forces: np.ndarray, before: np.ndarray
 ) -> TieForces:
     """Return what members do at a limit load, where their elongation has no meaning.
 
@@ -230,11 +230,17 @@ def plastic_forces(
     pose : Pose
     contacts : Contacts
     forces : (n_contacts, d) array [N]
+    before : (n_ties,) int array
+        Numbers of :data:`STATES`: what is absent or broken stays it.
     """
+    if not ties:
+        return TieForces()
     force, ends = member_forces(contacts, forces, len(ties)), tie_ends(ties, assembly, pose)
     strength = np.array([tie.strength for tie in ties])
     state = member_states(np.abs(force), strength, float(np.abs(forces).max(initial=0.0)))
-    return TieForces(force, np.zeros(len(ties)), tie_lengths(ends), state, ends) if ties else TieForces()
+    gone = np.isin(before, (ABSENT, BROKEN))
+    rest = np.where(gone, np.nan, tie_lengths(ends))
+    return TieForces(force, np.zeros(len(ties)), rest, np.where(gone, before, state), ends)
 
 
 def member_forces(contacts: Contacts, forces: np.ndarray, n_ties: int) -> np.ndarray:

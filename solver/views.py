@@ -18,7 +18,7 @@ class Views(Protocol):
         """Give the value as HTML."""
 
     def dataset(self, response: Any, of: str, k: int, shape: str) -> Any:
-        """Give the "blocks", "joints" or "contacts" of increment k as a dataset."""
+        """Give the "blocks", "joints", "contacts" or "members" of increment k as a dataset."""
 
     def fall(self, response: Any, time: float, shape: str) -> Any:
         """Give the blocks so many seconds after the last equilibrium as a dataset."""

@@ -168,7 +168,7 @@ def read_ties(tables: Sequence[Table], layers: Sequence[str]) -> tuple[TieCase, 
         if one.layer and not matches([one.layer], layers):
             raise table.error("layer", f"is '{one.layer}', which is not in [geometry] ties; add it there")
         if not one.layer and one.name in [other.name for other in found if not other.layer]:
-            raise table.error("name", f"'{one.name}' is there twice; give each tie its own name")
+            raise table.error("name", "is there twice; give each tie its own name")
         found.append(one)
     return tuple(found)
 
@@ -184,6 +184,10 @@ def check_layers(entries: Sequence[TieCase], layers: Sequence[str], source: Path
 
 
 def _tie(table: Table) -> TieCase:
+    where = f"{table.source}: [{table.where}]"
+    if isinstance(table.values.get("name"), str):
+        # Messages on its values name the tie.
+        table.where += f" '{table.values['name']}'"
     values = TIES.read(table)
     layer = values["layer"] or ""
     if layer:
@@ -194,7 +198,7 @@ def _tie(table: Table) -> TieCase:
         raise table.error("name", 'is missing; name the tie, as name = "tie at the springing"')
     for key in () if layer else ("from", "to"):
         if values[key] is None:
-            raise table.error(key, f"of '{values['name']}' is missing; give a point [x, y]")
+            raise table.error(key, "is missing; give a point [x, y]")
     by_section = values["area"] is not None or values["modulus"] is not None
     if values["stiffness"] is not None and by_section:
         raise table.error("stiffness", "and area or modulus are both given; give stiffness, or area and modulus")
@@ -208,9 +212,7 @@ def _tie(table: Table) -> TieCase:
         raise table.error("brittle", "is true, and no strength says at which force it breaks; add strength = ... [N]")
     ends = () if layer else (values["from"], values["to"])
     own = {key: values[key] for key in ("kind", "stiffness", "area", "modulus", "brittle", "prestress", "phase")}
-    return TieCase(
-        values["name"] or layer, ends, layer, strength=strength, where=f"{table.source}: [{table.where}]", **own
-    )
+    return TieCase(values["name"] or layer, ends, layer, strength=strength, where=where, **own)
 
 
 def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tuple[Layout, tuple[LeftOut, ...]]:

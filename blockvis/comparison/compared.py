@@ -14,7 +14,7 @@ import solver
 from blockvis.dynamics.fall import Fall
 from blockvis.pictures.captions import parameter_text
 from blockvis.pictures.film import state_at
-from blockvis.report.page import summary_rows
+from blockvis.report.page import summary_rows, tie_rows
 from blockvis.results.cracks import Crack, cracks_of
 from blockvis.results.fall_files import stored_fall
 from blockvis.results.folder import stored_case
@@ -137,7 +137,11 @@ class Comparison:
 
     def rows(self) -> list[tuple[str, str, str]]:
         """List the numbers of both runs under one name, as the report of each has them."""
-        tables = [dict(summary_rows(side.response, side.fall)) for side in self.sides]
+        tables = [
+            dict(summary_rows(side.response, side.fall))
+            | {name: f"{largest}; {fate}" for name, largest, fate in tie_rows(side.response)}
+            for side in self.sides
+        ]
         one, other = tables
         rows = [(name, one.get(name, "–"), other.get(name, "–")) for name in dict.fromkeys([*one, *other])]
         if self.is_path:

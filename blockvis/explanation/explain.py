@@ -13,10 +13,11 @@ import numpy as np
 
 import solver
 from blockvis.case_files.read import case_file_text, case_of, parsed_toml
-from blockvis.cases.build import case_assembly
+from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cases.contents import Case
 from blockvis.kinds.kind import needs_dry_joints
 from blockvis.kinds.kinds import KINDS
+from blockvis.runs.plan import refuse_ties
 from blockvis.runs.progress import StudyProgress
 from solver import mechanics
 
@@ -105,9 +106,9 @@ def explain(
         if not isinstance(case, Case):
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
-        if case.ties:
-            raise ValueError(f"{case.ties[0].where}: blockvis explain knows no ties; leave [[ties]] out")
+        refuse_ties(case)
         drawn = case_assembly(case)
+        _refuse_grounded(case_ties(case, drawn), case)
         needs_dry_joints(case, "blockvis explain")
         mechanics.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
@@ -142,6 +143,16 @@ def explain(
     if folder is not None:
         write_explanation(found, folder, overwrite=overwrite)
     return found
+
+
+def _refuse_grounded(ties: Sequence[solver.Tie], case: Case) -> None:
+    """Raise ValueError for ties from the ground: causes are movements of supports against each other alone."""
+    for tie in ties:
+        if None in tie.blocks:
+            raise ValueError(
+                f"{case.source}: [ties '{tie.name}'] is held by the ground, against which blockvis explain knows no "
+                "movement; hold both ends by blocks or supports"
+            )
 
 
 def read_explained(path: str | Path) -> Case:

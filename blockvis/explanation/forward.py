@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.cases.build import case_interfaces, case_loads
+from blockvis.cases.build import case_interfaces, case_loads, case_ties
 from blockvis.cases.contents import Case
 from blockvis.kinds.kind import RunInput
 from blockvis.kinds.settlement import SettlementKind
@@ -202,7 +202,8 @@ def ordered(
     middle, half = (x.max() + x.min()) / 2.0, max(float(np.ptp(x)) / 2.0, 1e-300)
     heavier = 1.0 + LEANING * variant.heavier_side * (x - middle) / half
     loads = replace(loads, dead=loads.dead * heavier[:, None])
-    return Order(RunInput(varied, moving, case_interfaces(varied), loads), reach[1])
+    given = RunInput(varied, moving, case_interfaces(varied), loads, ties=case_ties(case, moving))
+    return Order(given, reach[1])
 
 
 def followed(order: Order) -> Run:

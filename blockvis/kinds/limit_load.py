@@ -88,11 +88,14 @@ class LimitLoadCheckpoint:
         Where the settlement stands along which they are asked for.
     pose : solver.Pose, optional
         Where the settlement ended that comes before the places of a load.
+    ties : solver.mechanics.TieForces, optional
+        What ties did there.
     """
 
     limits: tuple[solver.LimitLoad, ...]
     settlement: mechanics.PathState | None = None
     pose: solver.Pose | None = None
+    ties: mechanics.TieForces | None = None
 
 
 class LimitLoadKind(AnalysisKind):
@@ -388,11 +391,11 @@ def _over_places(
 ) -> Steps:
     """Limit states for each place of a moving load at the end of the settlements; then the mechanism of the lowest."""
     standing, programs = run.given.loads, 0
-    pose = None if resume is None else resume.pose
+    pose, ties = (None, None) if resume is None else (resume.pose, resume.ties)
     steps = settlement_steps(run.given, whole=True) if resume is None else without_increments()
     for increment in steps:
         programs += increment.programs
-        pose = increment.pose
+        pose, ties = increment.pose, increment.ties
         if increment.status == solver.Status.FALLING:
             yield _read_for_multipliers(increment)
     if steps.ending.stop is not solver.Status.LIMIT_REACHED:
@@ -406,13 +409,13 @@ def _over_places(
             break
         else:
             loads = replace(standing, live=standing.live + live(number))
-            state = replace(_limit_state(run, loads, pose, None, programs), parameter=float(x))
+            state = replace(_limit_state(run, loads, pose, None, programs, ties), parameter=float(x))
             programs = 0
         multiplier = float(np.nan_to_num(state.load_multiplier, nan=-np.inf, posinf=np.inf))
         if shown is None or multiplier < least:
             chosen, shown, least = number, state, multiplier
         if number >= len(found):
-            yield replace(state, checkpoint=_checkpoint(run, pose=pose))
+            yield replace(state, checkpoint=_checkpoint(run, pose=pose, ties=ties))
     # A load that moves is kept at the place that governs.
     run.given = replace(run.given, loads=replace(standing, live=standing.live + live(chosen)))
     assert shown is not None
@@ -426,11 +429,14 @@ def _read_for_multipliers(increment: solver.Increment) -> solver.Increment:
 
 
 def _checkpoint(
-    run: AnalysisRun, *, settlement: mechanics.PathState | None = None, pose: solver.Pose | None = None
+    run: AnalysisRun,
+    *,
+    settlement: mechanics.PathState | None = None,
+    pose: solver.Pose | None = None,
+    ties: mechanics.TieForces | None = None,
 ) -> LimitLoadCheckpoint:
-    return LimitLoadCheckpoint(
-        tuple(replace(limit, held=None, analysed=None) for limit in run.limits), settlement, pose
-    )
+    limits = tuple(replace(limit, held=None, analysed=None) for limit in run.limits)
+    return LimitLoadCheckpoint(limits, settlement, pose, ties)
 
 
 def _wanted(case: Case, increment: solver.Increment) -> bool:
@@ -448,13 +454,14 @@ def _limit_state(
     pose: solver.Pose | None,
     at: solver.Increment | None,
     programs: int,
+    ties: mechanics.TieForces | None = None,
 ) -> solver.Increment:
     case, assembly = run.given.case, run.given.assembly
     started = time.perf_counter()
     try:
         limit = solver.Structure(assembly, run.given.interfaces, loads, ties=run.given.ties).limit_load(
             pose=pose,
-            ties_at=None if at is None else at.ties,
+            ties_at=ties if at is None else at.ties,
             flow=case.settings.flow,
             torsion=case.settings.torsion,
             displacement=_displacement(case, assembly),

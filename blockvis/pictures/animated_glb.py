@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,17 @@ from blockvis.dynamics.fall import Fall
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import layout_of
 from blockvis.layout.solids import prism, triangles_of
+from blockvis.results.ties import known_ties
 from blockvis.system.atomic_files import write_atomic
+from solver import mechanics
 
 from . import palette
 
 #: Seconds in which the path passes, that the last equilibrium and the end stand, and of a frame of pseudo-time.
 PATH, STANDS, FRAME = 6.0, 0.5, 0.1
+
+#: Radius of ties, in block sizes.
+TIE_RADIUS = 0.03
 
 #: Rotation that turns z upwards into y upwards, as glTF has it.
 UPRIGHT = Rotation.from_euler("x", -90, degrees=True)
@@ -43,7 +49,8 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     Notes
     -----
     The path takes six seconds in proportion to its parameter. Between two poses glTF turns each block about its
-    centroid, and no corner takes a short cut. Blocks in the plane are extruded by their thickness.
+    centroid, and no corner takes a short cut. Blocks in the plane are extruded by their thickness. Ties are rods from
+    end to end; one that is broken, or not there yet, and all in a fall have no size.
 
     Raises
     ------
@@ -52,13 +59,14 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     """
     if not response.increments:
         raise ValueError(f"there is no motion to write to '{path}': {response.message or response.stop}")
-    times, poses = _played(response, fall)
+    times, poses, shown = _played(response, fall)
+    ties = known_ties(response)
     moves = [_as_gltf(pose, response.assembly.dimension) for pose in poses]
     places, turns = np.array([place for place, _ in moves]), np.array([turn for _, turn in moves])
     # Of the two quaternions of a rotation the one next to the last: players go the short way.
     for k in range(1, len(turns)):
         turns[k] *= np.where((turns[k] * turns[k - 1]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
-    tree, binary = _chunks(_still(response.assembly))
+    tree, binary = _chunks(_still(response.assembly, ties))
     buffer = _Buffer(tree, binary)
     numbers = {node["name"]: number for number, node in enumerate(tree["nodes"]) if "mesh" in node}
     clock = buffer.added(times, "SCALAR")
@@ -72,16 +80,28 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
             kind = "VEC3" if what == "translation" else "VEC4"
             channels.append({"sampler": len(samplers), "target": {"node": numbers[name], "path": what}})
             samplers.append({"input": clock, "output": buffer.added(values, kind), "interpolation": "LINEAR"})
+    rods = _rods(response, ties, poses, shown)
+    for k, tie in enumerate(ties):
+        for what, values, kind in zip(
+            ("translation", "rotation", "scale"), rods, ("VEC3", "VEC4", "VEC3"), strict=True
+        ):
+            node = numbers[_rod_name(tie)]
+            tree["nodes"][node][what] = values[0, k].tolist()
+            channels.append({"sampler": len(samplers), "target": {"node": node, "path": what}})
+            # Rods come and go at once.
+            moves_how = "STEP" if what == "scale" else "LINEAR"
+            samplers.append({"input": clock, "output": buffer.added(values[:, k], kind), "interpolation": moves_how})
     if channels:
         tree["animations"] = [{"name": response.analysis, "samplers": samplers, "channels": channels}]
     return write_atomic(path, buffer.packed())
 
 
-def _played(response: solver.Response, fall: Fall | None) -> tuple[np.ndarray, list[solver.Pose]]:
-    """Seconds, (n,), at which the blocks are at which poses."""
+def _played(response: solver.Response, fall: Fall | None) -> tuple[np.ndarray, list[solver.Pose], list[int]]:
+    """Seconds, (n,), at which the blocks are at which poses, and the increments of these, -1 in a fall."""
     path, along = response.path, response.parameters
     initial = solver.Pose.initial(response.assembly)
     poses = [increment.pose for increment in path] or [initial]
+    numbers = list(range(len(path)))
     reach = float(along[-1]) if len(along) else 0.0
     times = list(PATH * along / reach) if reach > 0.0 else [0.1 * k for k in range(len(poses))]
     start = times[-1] + STANDS
@@ -91,12 +111,48 @@ def _played(response: solver.Response, fall: Fall | None) -> tuple[np.ndarray, l
     else:
         frames = [i.pose for i in response.increments if i.status == solver.Status.FALLING]
         if frames:
-            times, poses = [*times, start], [*poses, poses[-1]]
+            times, poses, numbers = [*times, start], [*poses, poses[-1]], [*numbers, len(path) - 1]
         times += [start + FRAME * (k + 1) for k in range(len(frames))]
         poses += frames
     times, poses = [*times, times[-1] + STANDS], [*poses, poses[-1]]
+    numbers = [*numbers, *[-1] * (len(poses) - 1 - len(numbers))]
+    numbers.append(numbers[-1])
     kept = np.flatnonzero(np.diff(np.array(times), prepend=-1.0) > 1e-6)
-    return np.array(times)[kept], [poses[k] for k in kept.tolist()]
+    return np.array(times)[kept], [poses[k] for k in kept.tolist()], [numbers[k] for k in kept.tolist()]
+
+
+def _rods(
+    response: solver.Response, ties: Sequence[solver.Tie], poses: Sequence[solver.Pose], shown: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places (n, n_ties, 3), quaternions (n, n_ties, 4) and scales (n, n_ties, 3) of rods along z.
+
+    ``shown`` (n,) are numbers of the increments that the poses are of, -1 in a fall.
+    """
+    assembly = response.assembly
+    ends = np.array([mechanics.tie_ends(ties, assembly, pose) for pose in poses]).reshape(
+        len(poses), len(ties), 2, assembly.dimension
+    )
+    if assembly.dimension == 2:
+        ends = np.concatenate([ends, np.zeros((*ends.shape[:3], 1))], axis=3)
+    else:
+        ends = UPRIGHT.apply(ends.reshape(-1, 3)).reshape(ends.shape)
+    along = ends[:, :, 1] - ends[:, :, 0]
+    length = np.linalg.norm(along, axis=2, keepdims=True)
+    # From z to a direction by half a turn about the line midway between the two.
+    midway = along / length + np.array([0.0, 0.0, 1.0])
+    midway[np.linalg.norm(midway, axis=2) < 1e-9] = [1.0, 0.0, 0.0]
+    midway /= np.linalg.norm(midway, axis=2, keepdims=True)
+    turns = np.concatenate([midway, np.zeros_like(length)], axis=2)
+    there = np.zeros((len(poses), len(ties), 1))
+    for k, number in enumerate(shown):
+        if ties and number >= 0:
+            there[k, :, 0] = ~np.isin(response.path[number].ties.states, (mechanics.ABSENT, mechanics.BROKEN))
+    radius = np.full((*length.shape[:2], 2), TIE_RADIUS * assembly.block_size)
+    return ends.mean(axis=2), turns, there * np.concatenate([radius, length], axis=2)
+
+
+def _rod_name(tie: solver.Tie) -> str:
+    return f"[ties] {tie.name}"
 
 
 def _as_gltf(pose: solver.Pose, dimension: int) -> tuple[np.ndarray, np.ndarray]:
@@ -113,8 +169,8 @@ def _node_names(assembly: solver.Assembly) -> list[str]:
     return [name if names.index(name) == k else f"{name} ({k})" for k, name in enumerate(names)]
 
 
-def _still(assembly: solver.Assembly) -> bytes:
-    """Write the blocks about their centroids as .glb, each a node with its row in the extras."""
+def _still(assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> bytes:
+    """Write the blocks about their centroids as .glb, each a node with its row in the extras, and rods for ties."""
     import trimesh
 
     layout = layout_of(assembly)
@@ -135,6 +191,13 @@ def _still(assembly: solver.Assembly) -> bytes:
         )
         mesh.visual = trimesh.visual.TextureVisuals(material=paint)
         scene.add_geometry(mesh, node_name=name, geom_name=name)
+    for tie in ties:
+        rod = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=12)
+        paint = trimesh.visual.material.PBRMaterial(
+            baseColorFactor=[*palette.TIE, 255], metallicFactor=0.0, roughnessFactor=0.9
+        )
+        rod.visual = trimesh.visual.TextureVisuals(material=paint)
+        scene.add_geometry(rod, node_name=_rod_name(tie), geom_name=_rod_name(tie))
 
     def signed(tree: dict[str, Any]) -> None:
         tree["asset"]["generator"] = "blockvis"

@@ -104,7 +104,11 @@ def force_unit(response: solver.Response) -> tuple[float, str]:
     unit = response.measured.unit
     if not response.measured.is_force:
         return 1.0, unit
-    largest = max((abs(i.measured) for i in response.path), default=0.0)
+    return unit_for(max((abs(i.measured) for i in response.path), default=0.0), unit)
+
+
+def unit_for(largest: float, unit: str = "N") -> tuple[float, str]:
+    """Divisor and unit in which values up to a largest one [N or N·m] read well."""
     for factor, prefix in ((1e6, "M"), (1e3, "k")):
         if largest >= factor:
             return factor, prefix + unit
@@ -241,9 +245,10 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
     if not (response.swings and increment.status == solver.Status.FALLING):
         parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")
     parts.append(f"W = {force_text(response.total_weight)}")
-    lost = int(increment.fallen.sum())
-    if lost and increment.status != solver.Status.FALLING:
-        parts.append(f"{lost} block{'s' if lost != 1 else ''} lost")
+    removed = int(increment.removed.sum())
+    for count, fate in ((removed, "taken away"), (int(increment.fallen.sum()) - removed, "lost")):
+        if count and increment.status != solver.Status.FALLING:
+            parts.append(f"{count} block{'s' if count != 1 else ''} {fate}")
     return state_text(increment, response), "   ·   ".join(parts)
 
 

@@ -15,7 +15,9 @@ from PIL import Image, ImageDraw
 import solver
 from blockvis.results.about import about, collapse_mechanism, counts_text
 from blockvis.results.reaction_range import ReactionRange
+from blockvis.results.ties import TieForceCurves, known_ties, tie_force_curves
 from blockvis.system.atomic_files import atomic_file
+from solver import mechanics
 
 from . import palette
 from .captions import (
@@ -28,6 +30,7 @@ from .captions import (
     parameter_text,
     parameter_unit,
     shown_range,
+    unit_for,
     value_label,
 )
 
@@ -54,7 +57,7 @@ def draw_curve(
     """Draw the reaction over the settlement, absolute and divided by the weight, and mark the collapse.
 
     Limit loads and pushovers have the load multiplier over their parameter: settlement, position of the load or control
-    displacement; a single limit load is drawn as a rigid-plastic diagram.
+    displacement; a single limit load is drawn as a rigid-plastic diagram. Forces of ties along a path stand below.
 
     Parameters
     ----------
@@ -76,9 +79,17 @@ def draw_curve(
         name += f"   ·   phase {response.path[-1].phase + 1} of {len(response.settlements)}" if response.path else ""
     if path.suffix.lower() not in CURVE_SUFFIXES:
         raise ValueError(f"'{path.name}' is no curve that blockvis draws; end its name in {', '.join(CURVE_SUFFIXES)}")
-    figure = Figure(figsize=size, layout="constrained")
-    axes = figure.add_subplot()
+    ties = tie_force_curves(response) if response.parameter.is_path else None
+    if ties is None:
+        figure = Figure(figsize=size, layout="constrained")
+        axes = figure.add_subplot()
+    else:
+        figure = Figure(figsize=(size[0], 1.5 * size[1]), layout="constrained")
+        axes, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.2))
     _draw(axes, response, events=True, band=band)
+    if ties is not None:
+        _draw_ties(below, response, ties)
+        axes.set_xlabel("")
     name += "" if band is None else f"   ·   band: range of {band.runs.max(initial=0)} runs"
     axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK))
     with atomic_file(path) as partial:
@@ -186,10 +197,66 @@ def _draw(
                 "unbounded", (place, 0.88), xycoords=("data", "axes fraction"), ha="center", va="top", rotation=90,
                 fontsize=0.8 * text, color=palette.hexadecimal(palette.FAINT),
             )  # fmt: skip
+    if events and response.settlements:
+        _mark_phases(axes, response, total, text)
     if response.collapse is not None and len(path):
         _mark_collapse(axes, response, total, values, text, events)
     if response.stop is solver.Status.SOLVER_FAILED:
         _mark_failure(axes, response, total, values, text, events)
+
+
+def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> None:
+    """Draw the forces of ties, tension positive, where they yield and where they break."""
+    total = response.parameters * parameter_unit(response)[0]
+    factor, unit = unit_for(float(np.abs(ties.forces).max(initial=0.0)))
+    for name, forces, states, shade in zip(ties.names, ties.forces.T, ties.states.T, palette.TIE_SHADES, strict=False):
+        colour = palette.hexadecimal(shade)
+        axes.plot(
+            total,
+            forces / factor,
+            "-",
+            color=colour,
+            linewidth=2.0,
+            label=f"{name}{', slack' * bool((states == mechanics.SLACK).all())}",
+        )
+        for state, mark, word in ((mechanics.YIELDING, "o", "yields"), (mechanics.BROKEN, "X", "broken")):
+            first = np.flatnonzero(states == state)[:1]
+            axes.plot(total[first], forces[first] / factor, mark, color=colour, markersize=7, zorder=4)
+            for k in first.tolist():
+                axes.annotate(
+                    word, (total[k], forces[k] / factor), xytext=(7, 4), textcoords="offset points",
+                    fontsize=0.8 * TEXT, color=colour,
+                )  # fmt: skip
+    axes.axhline(0.0, color=palette.hexadecimal(palette.FAINT), linewidth=0.8)
+    axes.set_ylabel(f"force of ties, tension + [{unit}]", fontsize=TEXT)
+    axes.set_xlabel(parameter_label(response), fontsize=TEXT)
+    axes.tick_params(labelsize=0.9 * TEXT)
+    axes.ticklabel_format(useOffset=False, style="plain")
+    axes.grid(color="#e4e4e4", linewidth=0.8)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(x=0.02, y=0.16)
+    axes.legend(loc="best", fontsize=0.9 * TEXT, frameon=False, ncols=min(3, len(ties.names)))
+
+
+def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text: float) -> None:
+    """Mark where a settlement begins and what changes before it."""
+    path, grey = response.path, palette.hexadecimal(palette.FAINT)
+    for k in range(1, len(path)):
+        if path[k].phase == path[k - 1].phase:
+            continue
+        words = [f"settlement {path[k].phase + 1}"]
+        taken = int(path[k].removed.sum()) - int(path[k - 1].removed.sum())
+        if taken:
+            words.append(f"{taken} block{'s' if taken != 1 else ''} taken away")
+        changes = [change for change in response.changes if change.phase == path[k].phase]
+        words += [f"'{name}' taken away" for change in changes for name in change.ties]
+        words += ["dead load changed"] * any(change.dead is not None for change in changes)
+        words += [f"'{tie.name}' installed" for tie in known_ties(response) if tie.phase == path[k].phase + 1]
+        axes.axvline(total[k - 1], color=grey, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1)
+        axes.annotate(
+            "\n".join(words), (total[k - 1], 0.98), xycoords=("data", "axes fraction"), xytext=(5, 0),
+            textcoords="offset points", va="top", fontsize=0.85 * text, color=grey,
+        )  # fmt: skip
 
 
 def _draw_band(

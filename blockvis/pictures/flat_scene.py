@@ -27,7 +27,7 @@ from .underlay import COVER, CarriedPhotograph, Underlay
 ORDER = (
     "earth", "backfill", "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding",
     "motion outline", "force line", "force",
-    "tie rim", "tie slack", "tie elastic", "tie yielding", "tie broken", "tie end",
+    "tie rim", "tie ground", "tie slack", "tie elastic", "tie pressed", "tie yielding", "tie broken", "tie end",
     "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top", "arrow rim", "arrow top",
 )  # fmt: skip
 

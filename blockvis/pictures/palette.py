@@ -52,6 +52,8 @@ PARTS = np.array(
 #: violet, ochre, teal.
 PALE_OUTLINE = (204, 199, 191)
 SURVEYED = ((190, 30, 30), (20, 92, 168), (46, 125, 50), (126, 55, 178), (184, 110, 0), (0, 121, 125))
+#: Of the forces of ties over a settlement; blue is the reaction, and red what fails.
+TIE_SHADES = (*SURVEYED[2:], *SURVEYED[:2])
 
 #: Of the colour of blocks so much is left in a drawing of cracks.
 SURVEY = 0.3

@@ -16,22 +16,31 @@ from solver import mechanics
 from . import palette
 from .frame import Key
 
-#: States that are drawn, back to front.
-DRAWN = (mechanics.SLACK, mechanics.ELASTIC, mechanics.YIELDING, mechanics.BROKEN)
+#: Elastic and in compression, which pictures tell from tension.
+PRESSED = len(STATE_WORDS)
+
+#: States that are drawn, back to front, and their words.
+DRAWN = (mechanics.SLACK, mechanics.ELASTIC, PRESSED, mechanics.YIELDING, mechanics.BROKEN)
+WORDS = (*STATE_WORDS, "pressed")
 
 #: Colours by state.
 COLOURS = {
     mechanics.SLACK: palette.FAINT,
     mechanics.ELASTIC: palette.TIE,
+    PRESSED: palette.FORCE,
     mechanics.YIELDING: palette.YIELDING,
     mechanics.BROKEN: palette.WARNING,
 }
 
 #: Widths of lines by state, and how much wider those of props are, in pixels of a picture 1080 high.
 WIDTHS, PROPS = {mechanics.SLACK: 2.5, mechanics.ELASTIC: 6.0, mechanics.YIELDING: 8.0, mechanics.BROKEN: 5.0}, 1.8
+WIDTHS[PRESSED] = WIDTHS[mechanics.ELASTIC]
 
 #: A slack line has a dash in so many pixels of a picture 1080 high; of a broken one this part is left at either end.
 DASH, STUB = 22.0, 0.42
+
+#: Width of what stands for the ground at an end that it holds, in pixels of a picture 1080 high.
+EARTH = 3.0
 
 #: Most ties that are named in a picture: those with the largest forces.
 MOST_NAMED = 6
@@ -70,19 +79,21 @@ class DrawnTies:
 
     Attributes
     ----------
-    seen : set of int
-        States that were found so far by :meth:`survey`.
+    seen : set of (int, str)
+        States and kinds that were found so far by :meth:`survey`.
     """
 
     def __init__(self, response: solver.Response) -> None:
         self._assembly, self._ties = response.assembly, known_ties(response)
         self._props = np.array([tie.kind == mechanics.PROP for tie in self._ties], dtype=bool)
-        self.seen: set[int] = set()
+        self._grounded = np.array([[b is None for b in tie.blocks] for tie in self._ties], dtype=bool).reshape(-1, 2)
+        self.seen: set[tuple[int, str]] = set()
 
     def survey(self, increment: solver.Increment) -> None:
         """Take note of what ties do at an increment, for the legend."""
         if self._ties:
-            self.seen |= set(self._states(increment).tolist()) - {mechanics.ABSENT}
+            kinds = [tie.kind for tie in self._ties]
+            self.seen |= set(zip(self._states(increment).tolist(), kinds, strict=True))
 
     def ends(self, poses: Sequence[solver.Pose]) -> np.ndarray:
         """(n, d) array [m]: where the ends are at poses."""
@@ -103,7 +114,9 @@ class DrawnTies:
             Length of a dash and a gap.
         """
         states, ends = self._states(increment), mechanics.tie_ends(self._ties, self._assembly, shown)
-        found = []
+        there = self._grounded & (states != mechanics.ABSENT)[:, None]
+        earth = earth_lines(ends[there], ends[:, ::-1][there], dash)
+        found = [Strands("tie ground", earth, np.zeros((0, self._assembly.dimension)), palette.INK, EARTH)]
         for state in DRAWN:
             for wide in (False, True):
                 here = ends[(states == state) & (self._props == wide)]
@@ -113,7 +126,7 @@ class DrawnTies:
                 elif state == mechanics.BROKEN:
                     lines = _stubs(here)
                 width = WIDTHS[state] * (PROPS if wide else 1.0)
-                layer = f"tie {STATE_WORDS[state]}{'/wide' * wide}"
+                layer = f"tie {WORDS[state]}{'/wide' * wide}"
                 anchors = here.reshape(-1, self._assembly.dimension)
                 found.append(Strands(layer, lines, anchors, COLOURS[state], width))
         return found
@@ -130,49 +143,84 @@ class DrawnTies:
         return middles[order], words, [COLOURS[int(states[k])] for k in order]
 
     def told(self, increment: solver.Increment) -> list[dict[str, Any]]:
-        """List what a page draws of an increment, as JSON has it: ends [m], words, colour, width [pixel], dashes."""
+        """List what a page draws of an increment, as JSON has it.
+
+        Ends, lines and ends that the ground holds [m]; words beside it and in the legend, colour, width [pixel], dash.
+        """
         states, ends = self._states(increment), mechanics.tie_ends(self._ties, self._assembly, increment.pose)
         told = []
         for k in np.flatnonzero(states != mechanics.ABSENT).tolist():
             state = int(states[k])
+            lines = _stubs(ends[[k]]) if state == mechanics.BROKEN else ends[[k]]
             told.append(
                 {
                     "ends": np.round(ends[k], 5).tolist(),
+                    "lines": np.round(lines, 5).tolist(),
+                    "ground": self._grounded[k].astype(int).tolist(),
                     "words": self._words(k, abs(float(increment.ties.forces[k])), state),
-                    "state": "" if state == mechanics.ELASTIC else STATE_WORDS[state],
-                    "kind": self._ties[k].kind,
+                    "key": _legend_words(state, [self._ties[k].kind]),
                     "colour": palette.hexadecimal(COLOURS[state]),
                     "width": 0.6 * WIDTHS[state] * (PROPS if self._props[k] else 1.0),
-                    "dash": [7, 6] if state == mechanics.SLACK else [18, 6] if state == mechanics.BROKEN else [],
+                    "dash": [7, 6] if state == mechanics.SLACK else [],
                 }
             )
         return told
 
     def keys(self) -> list[Key]:
         """Return the legend."""
-        kinds = list(dict.fromkeys(tie.kind for tie in self._ties))
-        what = " or ".join(kinds)
-        return [
-            Key(
-                "dash" if state == mechanics.SLACK else "line",
-                what if state == mechanics.ELASTIC else f"{STATE_WORDS[state]} {what}",
-                COLOURS[state],
-                layers=(f"tie {STATE_WORDS[state]}",),
-            )
-            for state in DRAWN
-            if state in self.seen
-        ]
+        found: list[Key] = []
+        for state in DRAWN:
+            kinds = [kind for kind in mechanics.TIE_KINDS if (state, kind) in self.seen]
+            if kinds:
+                shape = "dash" if state == mechanics.SLACK else "line"
+                found.append(Key(shape, _legend_words(state, kinds), COLOURS[state], layers=(f"tie {WORDS[state]}",)))
+        return found
 
     def _words(self, k: int, size: float, state: int) -> str:
-        name = self._ties[k].name
-        carries = state in (mechanics.ELASTIC, mechanics.YIELDING)
-        return f"{name} {force_text(size) if carries else STATE_WORDS[state]}"
+        tie = self._ties[k]
+        if state in (mechanics.SLACK, mechanics.BROKEN):
+            return f"{tie.name} {WORDS[state]}"
+        sense = "" if tie.kind != mechanics.BAR else " compression" if state == PRESSED else " tension"
+        return f"{tie.name} {force_text(size)}{', yielding' if state == mechanics.YIELDING else sense}"
 
     def _states(self, increment: solver.Increment) -> np.ndarray:
         states = increment.ties.states
         if increment.status == solver.Status.FALLING or len(states) != len(self._ties):
             return np.full(len(self._ties), mechanics.ABSENT)
-        return states
+        return np.where((states == mechanics.ELASTIC) & (increment.ties.forces < 0.0), PRESSED, states)
+
+
+def _legend_words(state: int, kinds: Sequence[str]) -> str:
+    """Say in the legend what members of some kinds do."""
+    if state in (mechanics.ELASTIC, PRESSED):
+        sense = "compression" if state == PRESSED else "tension"
+        return " or ".join(f"{kind} in {sense}" if kind == mechanics.BAR else kind for kind in kinds)
+    return f"{WORDS[state]} {' or '.join(kinds)}"
+
+
+def earth_lines(places: np.ndarray, others: np.ndarray, size: float) -> np.ndarray:
+    """(5 n, 2, d) array [m]: hatched plates at the ends (n, d) of members whose other ends are at (n, d) [m].
+
+    Parameters
+    ----------
+    places, others : (n, d) array [m]
+    size : float [m]
+        Half the width of a plate.
+    """
+    away = places - others
+    away = away / np.linalg.norm(away, axis=1, keepdims=True)
+    if places.shape[1] == 2:
+        across = np.stack([-away[:, 1], away[:, 0]], axis=1)
+    else:
+        # Level, and of an upright member to the right in the drawing.
+        across = np.cross(away, [0.0, 0.0, 1.0])
+        across[np.linalg.norm(across, axis=1) < 1e-6] = [1.0, 0.0, 0.0]
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+    plates = [np.stack([places - size * across, places + size * across], axis=1)]
+    for share in (-0.4, 0.1, 0.6, 1.0):
+        foot = places + share * size * across
+        plates.append(np.stack([foot, foot + 0.5 * size * (away - across)], axis=1))
+    return np.concatenate(plates)
 
 
 def dashed(ends: np.ndarray, length: float) -> np.ndarray:

@@ -91,6 +91,7 @@ def model_of_frames(
         "has_forces": bool(len(sizes)),
         "live_words": "",
         "ground": None,
+        "fill": None,
         "force_unit": FORCE_FINENESS * largest,
         "force_length": length_per_force(sizes, largest, 1.5 * assembly.block_size, extent),
         "force_scale": [shown_force, force_text(shown_force)],

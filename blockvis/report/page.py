@@ -19,6 +19,7 @@ import solver
 from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures import palette
+from blockvis.pictures.backfill import fill_bodies
 from blockvis.pictures.captions import (
     FALL_BADGE,
     badge_of,
@@ -32,6 +33,7 @@ from blockvis.pictures.captions import (
     parameter_unit,
     shown_range,
     state_text,
+    unit_for,
     value_label,
 )
 from blockvis.pictures.live_load import LiveLoads
@@ -42,7 +44,7 @@ from blockvis.results.about import about, counts_text, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
-from blockvis.results.ties import tie_courses, tie_texts
+from blockvis.results.ties import tie_courses, tie_force_curves, tie_texts
 from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text
 from solver import mechanics
@@ -60,6 +62,9 @@ MOST_FRAMES, MOST_POSES, FEWEST_FRAMES = 160, 640_000, 24
 
 #: Seconds the path takes at even settlement, each frame of a fall without time, and the pause before a fall.
 PATH_SECONDS, FALL_SECONDS, PAUSE = 6.0, 0.06, 0.6
+
+#: Length of the longest arrow of the load of a fill, as a part of the larger side of the picture.
+FILL_ARROW = 0.1
 
 #: How the picture of blocks in space is turned and moved.
 TURNING = "the mouse or Shift with the arrows turns the picture, the mouse with Shift moves it"
@@ -296,6 +301,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
         # In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.
         "joints_of_fall": fall is None,
         "curve": _curve(response, band),
+        "tie_curves": _tie_curves(response),
     }  # fmt: skip
 
 
@@ -305,7 +311,10 @@ def _model_in_plane(response: solver.Response, shown: list[solver.Increment], gr
     joints = initial_joints(assembly)
     frame, largest, _ = surveyed(assembly, joints, shown)
     live = LiveLoads(response, shown, float(frame.size.max()))
-    model = model_of_frames(response, joints, shown, frame.holding(live.tails), largest)
+    tied = DrawnTies(response).ends([shown[0].pose, shown[-1].pose])
+    heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, 2)
+    frame = frame.holding(np.concatenate([live.tails, tied, heads]))
+    model = model_of_frames(response, joints, shown, frame, largest)
     origin, unit = np.array(model["origin"]), model["unit"]
     own = {
         "offsets": deflated(assembly.offsets, len(assembly.offsets)),
@@ -314,7 +323,37 @@ def _model_in_plane(response: solver.Response, shown: list[solver.Increment], gr
     return model | {
         "live_words": live.words if live.largest > 0.0 else "",
         "ground": None if ground is None else float(ground - origin[1]),
+        "fill": _fill(response, shown, origin, FILL_ARROW * float(frame.size.max())),
         "packed": model["packed"] | own | _packed_live(live, shown, origin, unit),
+    }
+
+
+def _fill(
+    response: solver.Response, shown: list[solver.Increment], origin: np.ndarray, longest: float
+) -> dict[str, Any] | None:
+    """Give the pieces of blocks under fill, which carry it as they move, with the law of its load; None without fill.
+
+    A piece has its block, its ends and the surface [m], thickness times unit weight [N/m²], the pressure coefficient.
+    """
+    fills = response.loads.fills
+    if not fills:
+        return None
+    pieces: list[list[float]] = []
+    for fill in fills:
+        assert fill.thickness is not None
+        ends = np.round(fill.pieces - origin, 5)
+        weights = fill.unit_weight * fill.thickness
+        for block, (first, last), weight in zip(fill.block.tolist(), ends.tolist(), weights.tolist(), strict=True):
+            surface = round(float(fill.surface - origin[1]), 5)
+            pieces.append([block, *first, *last, surface, weight, fill.pressure_coefficient])
+    largest = max(float(np.abs(fill.load(response.assembly, shown[0].pose)[:, :2]).max()) for fill in fills)
+    return {
+        "pieces": pieces,
+        # Blocks that have left take the fill over them along.
+        "gone": [np.flatnonzero(increment.fallen).tolist() for increment in shown],
+        "scale": longest / (largest or 1.0),
+        "words": f"load of the fill, {force_text(largest)} on a block at most",
+        "colours": [palette.hexadecimal(c) for c in (palette.FILL, palette.FILL_HATCH, palette.FILL_RIM)],
     }
 
 
@@ -398,9 +437,6 @@ def _curve(response: solver.Response, band: ReactionRange | None) -> dict[str, A
     first = min(0.0, float(x.min(initial=0.0))) * 1.02
     widest = max([float(x.max(initial=0.0)), collapse or 0.0, float(total.max(initial=0.0))]) * 1.02 or 1.0
 
-    def ticks(low: float, high: float, n: int) -> list[float]:
-        return [float(f"{t:.6g}") for t in MaxNLocator(n).tick_values(low, high) if low <= t <= high]
-
     return {
         # Frames before this one are of phases in another unit.
         "first": before - len(response.path) if len(response.settlements) > 1 else 0,
@@ -414,13 +450,43 @@ def _curve(response: solver.Response, band: ReactionRange | None) -> dict[str, A
         "x_max": widest,
         "y_min": low,
         "y_max": high,
-        "x_ticks": ticks(first, widest, 5),
-        "y_ticks": ticks(low, high, 5),
+        "x_ticks": _ticks(first, widest, 5),
+        "y_ticks": _ticks(low, high, 5),
         "x_label": parameter_label(response),
         "y_label": value_label(response),
         # One limit load has no path: it is drawn as a rigid-plastic diagram.
         "single": not response.parameter.is_path and len(response.path) == 1,
     }
+
+
+def _tie_curves(response: solver.Response) -> dict[str, Any] | None:
+    """Give forces of ties over the settlement, in the places of the curve above; None where there are no ties."""
+    response = in_one_unit(response)
+    found = tie_force_curves(response) if response.parameter.is_path else None
+    if found is None:
+        return None
+    factor, unit = unit_for(float(np.nan_to_num(np.abs(found.forces)).max(initial=0.0)))
+    forces = found.forces / factor
+    low, high = min(0.0, float(np.nanmin(forces))), max(0.0, float(np.nanmax(forces)))
+    margin = 0.08 * (high - low) or 1.0
+    return {
+        "y_label": f"ties, tension + [{unit}]",
+        "y_min": low - margin * (low < 0.0),
+        "y_max": high + margin,
+        "y_ticks": _ticks(low - margin, high + margin, 4),
+        "lines": [
+            {
+                "name": name,
+                "colour": palette.hexadecimal(shade),
+                "force": [float(f"{v:.7g}") if np.isfinite(v) else None for v in force],
+            }
+            for name, shade, force in zip(found.names, palette.TIE_SHADES, forces.T, strict=False)
+        ],
+    }
+
+
+def _ticks(low: float, high: float, n: int) -> list[float]:
+    return [float(f"{t:.6g}") for t in MaxNLocator(n).tick_values(low, high) if low <= t <= high]
 
 
 def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tuple[str, str]]:

@@ -98,6 +98,41 @@
   }
   const support = hatch();
 
+  // Fill lies on pieces of blocks, up to its surface, wherever they are.
+  function tiled([paper, line]) {
+    const tile = document.createElement("canvas"), pen = tile.getContext("2d");
+    tile.width = tile.height = 14;
+    pen.fillStyle = paper; pen.fillRect(0, 0, 14, 14);
+    pen.strokeStyle = line; pen.lineWidth = 0.9;
+    pen.beginPath();
+    for (const x of [-14, 0, 14]) { pen.moveTo(x - 1, -1); pen.lineTo(x + 15, 15); }
+    pen.stroke();
+    return canvas.getContext("2d").createPattern(tile, "repeat");
+  }
+  const hatched = model.fill && tiled(model.fill.colours);
+  function fillPieces(k) {
+    const gone = new Set(model.fill.gone[k]);
+    return model.fill.pieces.filter(([b]) => !gone.has(b)).map(([b, x0, y0, x1, y1, surface, weight, across]) => {
+      const p = carried(shown, b, x0, y0), r = carried(shown, b, x1, y1), depth = Math.max(0, surface - (p[1] + r[1]) / 2);
+      // Along the outward normal, which is upwards.
+      const up = p[0] - r[0], load = up > 0 ? weight * depth : 0;
+      return { p, r, surface, fx: load * across * (p[1] - r[1]), fy: -load * up };
+    });
+  }
+  function drawFill(pen, k) {
+    const [paper, , rim] = model.fill.colours, pieces = fillPieces(k);
+    pen.fillStyle = pen instanceof SvgPen ? paper : hatched;
+    for (const { p, r, surface } of pieces) { ring(pen, [p, r, [r[0], surface], [p[0], surface]]); pen.fill(); }
+    pen.strokeStyle = rim; pen.lineWidth = 1.5;
+    lineBetween(pen, pieces.map(({ p, r, surface }) => [p[0], surface, r[0], surface]));
+  }
+  function drawFillLoad(pen, k) {
+    for (const { p, r, fx, fy } of fillPieces(k)) {
+      const x = (p[0] + r[0]) / 2, y = (p[1] + r[1]) / 2, s = model.fill.scale;
+      arrow(pen, px(x - s * fx), py(y - s * fy), px(x), py(y), model.fill.colours[2], 2);
+    }
+  }
+
   function fillOf(b, vector) {
     if (model.roles[b]) return vector ? model.colours.support : support;
     if (state.colours === "mechanism" && model.tints.length) return model.tints[b];
@@ -133,6 +168,7 @@
       pen.strokeStyle = model.colours.hatch; pen.lineWidth = 1.5;
       pen.beginPath(); pen.moveTo(0, py(model.ground)); pen.lineTo(w, py(model.ground)); pen.stroke();
     }
+    if (model.fill && !falling) drawFill(pen, near);
     if (layers.start) drawStart(pen, colours);
     state.cracks = 0;
     const lines = layers.cracks && (!falling || model.joints_of_fall) ? drawCracks(pen) : [];
@@ -153,6 +189,7 @@
     if (state.magnify === 1 && Math.abs(state.frame - near) < 0.5) {
       if (layers.sliding) drawSliding(pen, near);
       if (!falling) drawForces(pen, near);
+      if (layers.forces && model.fill && !falling) drawFillLoad(pen, near);
       if (layers.hinges) drawHinges(pen, near);
       drawLive(pen, near);
     }

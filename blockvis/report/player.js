@@ -75,18 +75,43 @@
     pen.closePath(); pen.fill();
   }
 
-  // Ties, props and bars of a frame, from end to end, each with its force; onPage says where a point is on the canvas.
+  // Ties, props and bars of a frame, each with its force; placed says where a point is on the canvas.
   function drawTies(pen, k, colours, placed) {
     if (state.magnify !== 1 || Math.abs(state.frame - k) >= 0.5) return;
+    const at = (p) => placed(p.map((v, i) => v - model.origin[i])), written = [];
     for (const tie of model.ties[k]) {
-      const [[x0, y0], [x1, y1]] = tie.ends.map((p) => placed(p.map((v, i) => v - model.origin[i])));
+      const ends = tie.ends.map(at);
       pen.strokeStyle = pen.fillStyle = tie.colour; pen.lineWidth = tie.width; pen.lineCap = "butt"; pen.setLineDash(tie.dash);
-      pen.beginPath(); pen.moveTo(x0, y0); pen.lineTo(x1, y1); pen.stroke(); pen.setLineDash([]);
-      for (const [x, y] of [[x0, y0], [x1, y1]]) { pen.beginPath(); pen.arc(x, y, 1.2 * tie.width, 0, 2 * Math.PI); pen.fill(); }
-      const x = (x0 + x1) / 2, y = (y0 + y1) / 2 - 12, half = 4 * tie.words.length;
-      pen.fillStyle = colours.paper; pen.fillRect(x - half, y - 9, 2 * half, 18);
-      pen.fillStyle = colours.ink; pen.font = `13px ${FONT}`; pen.textAlign = "center"; pen.textBaseline = "middle"; pen.fillText(tie.words, x, y);
+      for (const [[x0, y0], [x1, y1]] of tie.lines.map((line) => line.map(at))) { pen.beginPath(); pen.moveTo(x0, y0); pen.lineTo(x1, y1); pen.stroke(); }
+      pen.setLineDash([]);
+      for (const [x, y] of ends) { pen.beginPath(); pen.arc(x, y, 1.2 * tie.width, 0, 2 * Math.PI); pen.fill(); }
+      ends.forEach((end, i) => { if (tie.ground[i]) drawEarth(pen, end, ends[1 - i], colours); });
     }
+    // Names over all lines, along their line where another name is in the way.
+    pen.font = `13px ${FONT}`; pen.textAlign = "center"; pen.textBaseline = "middle"; pen.lineWidth = 1.2;
+    for (const tie of model.ties[k]) {
+      const [[x0, y0], [x1, y1]] = tie.ends.map(at), half = 4 * tie.words.length;
+      const boxes = [0.5, 0.3, 0.7, 0.15, 0.85].map((t) => [x0 + t * (x1 - x0), y0 + t * (y1 - y0)]);
+      const free = boxes.find(([x, y]) => written.every(([u, v, other]) => Math.abs(x - u) > half + other + 4 || Math.abs(y - v) > 22)) || boxes[0];
+      const [x, y] = free;
+      written.push([x, y, half]);
+      pen.fillStyle = colours.paper; pen.strokeStyle = tie.colour;
+      pen.beginPath(); pen.moveTo(x - half, y - 9); pen.lineTo(x + half, y - 9); pen.lineTo(x + half, y + 9); pen.lineTo(x - half, y + 9); pen.closePath();
+      pen.fill(); pen.stroke();
+      pen.fillStyle = colours.ink; pen.fillText(tie.words, x, y);
+    }
+  }
+
+  // The ground that holds an end: a hatched plate across the line.
+  function drawEarth(pen, [x, y], [u, v], colours) {
+    const away = norm(x - u, y - v) || 1, ax = (x - u) / away, ay = (y - v) / away, wide = 10;
+    pen.strokeStyle = colours.ink; pen.lineWidth = 1.6;
+    pen.beginPath(); pen.moveTo(x + wide * ay, y - wide * ax); pen.lineTo(x - wide * ay, y + wide * ax);
+    for (const share of [-0.9, -0.4, 0.1, 0.6]) {
+      const p = x + share * wide * ay, r = y - share * wide * ax;
+      pen.moveTo(p, r); pen.lineTo(p + 0.5 * wide * (ax + ay), r + 0.5 * wide * (ay - ax));
+    }
+    pen.stroke();
   }
 
   const FONT = "system-ui, DejaVu Sans, sans-serif";
@@ -156,7 +181,9 @@
     if (layers.thrust && marked && !falling && thrustLine(k).length) add("line", "thrust line", model.colours.force);
     const was = `${model.space ? "thin" : "dashed"}: where the support was`;
     if (layers.start && model.arrows.length) add("line", falling ? was : `settlement; ${was}`, falling ? model.colours.hatch : model.colours.settlement);
-    if (marked) for (const told of new Set(model.ties[k].map((tie) => JSON.stringify([`${tie.state} ${tie.kind}`.trim(), tie.colour])))) add("line", ...JSON.parse(told));
+    if (marked) for (const told of new Set(model.ties[k].map((tie) => JSON.stringify([tie.key, tie.colour])))) add("line", ...JSON.parse(told));
+    if (model.fill && !falling) add("area", "fill", model.fill.colours[1]);
+    if (model.fill && marked && layers.forces && !falling) add("line", model.fill.words, model.fill.colours[2]);
     if (marked && model.live_words) add("line", model.live_words, model.colours.live);
     if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.moving]);
     if (state.colours === "displacement") add("ramp", `displacement, 0 to ${+(1000 * model.largest_displacement).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.ramp.join(",")})`);
@@ -180,13 +207,15 @@
   function drawCurve(k) {
     const target = $("curve"), pen = sharp(target);
     paintCurve(pen, target.clientWidth, target.clientHeight, k, theme());
+    if (!model.tie_curves) return;
+    const ties = $("tie-curve");
+    paintTieCurves(sharp(ties), ties.clientWidth, ties.clientHeight, k, theme());
   }
 
-  function paintCurve(pen, w, h, k, colours) {
-    const c = model.curve;
-    if (!c.settlement.length) return;
-    const left = 62, right = 12, top = 14, bottom = 44, [xMin, xMax, yLow, yHigh] = c.single ? [0, 1, c.y_min, c.y_max] : [c.x_min, c.x_max || 1, c.y_min, c.y_max];
-    const X = (s) => left + (w - left - right) * (s - xMin) / (xMax - xMin), Y = (r) => h - bottom - (h - top - bottom) * (r - yLow) / (yHigh - yLow);
+  // Axes of a curve c over the settlement, with its labels; gives where numbers are on the canvas.
+  function curveAxes(pen, w, h, c, colours) {
+    const left = 62, right = 12, top = 14, bottom = 44, over = model.curve, [xMin, xMax] = over.single ? [0, 1] : [over.x_min, over.x_max || 1];
+    const X = (s) => left + (w - left - right) * (s - xMin) / (xMax - xMin), Y = (r) => h - bottom - (h - top - bottom) * (r - c.y_min) / (c.y_max - c.y_min);
     pen.font = `12.5px ${FONT}`; pen.lineWidth = 1; pen.lineCap = "butt";
     pen.strokeStyle = colours.grid; pen.fillStyle = colours.ink;
     pen.textAlign = "right"; pen.textBaseline = "middle";
@@ -195,12 +224,35 @@
       pen.fillText(`${tick}`, left - 6, Y(tick));
     }
     pen.textAlign = "center"; pen.textBaseline = "top";
-    for (const tick of c.single ? [] : c.x_ticks) {
+    for (const tick of over.single ? [] : over.x_ticks) {
       pen.beginPath(); pen.moveTo(X(tick), top); pen.lineTo(X(tick), h - bottom); pen.stroke();
       pen.fillText(`${tick}`, X(tick), h - bottom + 5);
     }
-    pen.fillText(c.single ? "displacement of the mechanism, any size" : c.x_label, (left + w - right) / 2, h - 17);
+    pen.fillText(over.single ? "displacement of the mechanism, any size" : over.x_label, (left + w - right) / 2, h - 17);
     pen.save(); pen.translate(13, (h - bottom + top) / 2); pen.rotate(-Math.PI / 2); pen.textBaseline = "middle"; pen.fillText(c.y_label, 0, 0); pen.restore();
+    return { X, Y, left, right, top, bottom };
+  }
+
+  // Forces of the ties over the settlement, with the names at the end of the lines' colours.
+  function paintTieCurves(pen, w, h, k, colours) {
+    const c = model.tie_curves, { X, Y, left, top } = curveAxes(pen, w, h, c, colours), s = model.curve.settlement;
+    const at = Math.min(model.frames[k].curve - model.curve.first, s.length - 1);
+    pen.lineJoin = "round"; pen.textAlign = "left"; pen.textBaseline = "middle";
+    let x = left + 4;
+    for (const line of c.lines) {
+      pen.strokeStyle = pen.fillStyle = line.colour; pen.lineWidth = 2;
+      pen.beginPath();
+      line.force.forEach((f, i) => { if (f !== null) (i && line.force[i - 1] !== null ? pen.lineTo(X(s[i]), Y(f)) : pen.moveTo(X(s[i]), Y(f))); });
+      pen.moveTo(x, top - 7); pen.lineTo(x + 14, top - 7); pen.stroke();
+      pen.fillStyle = colours.ink; pen.fillText(line.name, x + 18, top - 7); x += 32 + pen.measureText(line.name).width;
+      if (at >= 0 && line.force[at] !== null) { pen.fillStyle = line.colour; pen.beginPath(); pen.arc(X(s[at]), Y(line.force[at]), 4.5, 0, 2 * Math.PI); pen.fill(); }
+    }
+  }
+
+  function paintCurve(pen, w, h, k, colours) {
+    const c = model.curve;
+    if (!c.settlement.length) return;
+    const { X, Y, left, right, top, bottom } = curveAxes(pen, w, h, c, colours), yHigh = c.y_max;
     pen.strokeStyle = dark.matches && colours === DARK ? "#6aa9e0" : model.colours.force; pen.lineWidth = 2; pen.lineJoin = "round";
     pen.save(); pen.beginPath(); pen.rect(left - 3, top - 3, w - left - right + 6, h - top - bottom + 6); pen.clip(); pen.beginPath();
     if (c.band.length) {
@@ -457,8 +509,8 @@
   const field = (text) => (/[",\n\r]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
   const table = (rows) => new Blob([rows.map((row) => row.map((v) => field(String(v ?? ""))).join(",")).join("\n") + "\n"], { type: "text/csv" });
   $("csv").addEventListener("click", () => {
-    const c = model.curve;
-    save(table([[c.x_label || "state", c.y_label], ...c.settlement.map((s, i) => [s, c.reaction[i]])]), fileName("_curve.csv"));
+    const c = model.curve, tied = model.tie_curves ? model.tie_curves.lines : [];
+    save(table([[c.x_label || "state", c.y_label, ...tied.map((line) => `${line.name}: ${model.tie_curves.y_label}`)], ...c.settlement.map((s, i) => [s, c.reaction[i], ...tied.map((line) => line.force[i])])]), fileName("_curve.csv"));
   });
   $("joints").addEventListener("click", () => {
     const k = Math.min(Math.round(state.frame), nFrames - 1);
@@ -489,6 +541,7 @@
   $("mechanism").disabled = !model.tints.length;
   $("start").disabled = !model.arrows.length;
   $("svg").disabled = model.space;
+  $("tie-curve").hidden = !model.tie_curves;
   const some = model.frames.findIndex((f) => !f.falling);
   $("thrust").disabled = some < 0 || !thrustLine(some).length;
   const c = model.curve, known = c.reaction.filter((v) => v !== null);

@@ -23,6 +23,9 @@ TIES = "ties.npz"
 #: Words of the states, in the order of ``solver.mechanics.TieForces.states``.
 STATE_WORDS = ("absent", "slack", "elastic", "yielding", "broken")
 
+#: Ties whose force is drawn over the settlement: more would not be told apart.
+MOST_CURVES = 6
+
 #: Columns of ties.csv.
 COLUMNS = ("increment", "phase", "settlement", "name", "kind", "force", "elongation", "state")
 
@@ -171,6 +174,12 @@ class TieCourses:
                 TieCourse(t.name, t.kind, 0.0, at, increment.phase + 1, None, None, 0.0, "") for t in self.ties
             ]
         for k, (before, force, state) in enumerate(zip(self._found, found.forces, found.states, strict=True)):
+            tie = self.ties[k]
+            if state == mechanics.BROKEN and before.breaks_at is None:
+                # It has carried its strength since the last increment.
+                force = -tie.strength if tie.kind == mechanics.PROP else tie.strength
+            elif state not in (mechanics.ELASTIC, mechanics.YIELDING):
+                force = 0.0
             larger = abs(force) > abs(before.force)
             self._found[k] = TieCourse(
                 before.name,
@@ -180,7 +189,7 @@ class TieCourses:
                 increment.phase + 1 if larger else before.phase,
                 at if before.yields_at is None and state == mechanics.YIELDING else before.yields_at,
                 at if before.breaks_at is None and state == mechanics.BROKEN else before.breaks_at,
-                float(force),
+                0.0 if state == mechanics.BROKEN else float(force),
                 STATE_WORDS[state],
             )
 
@@ -198,6 +207,42 @@ def tie_courses(response: solver.Response) -> tuple[TieCourse, ...]:
     return courses.courses
 
 
+@dataclass(frozen=True)
+class TieForceCurves:
+    """Forces of the ties over the increments in equilibrium.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of at most :data:`MOST_CURVES` ties that carry, the largest force first.
+    forces : (n_increments, n_names) array [N]
+        Tension positive; nan where a tie is not there.
+    states : (n_increments, n_names) int array
+        Numbers of :data:`STATE_WORDS`.
+    """
+
+    names: tuple[str, ...]
+    forces: np.ndarray
+    states: np.ndarray
+
+
+def tie_force_curves(response: solver.Response) -> TieForceCurves | None:
+    """Collect the forces of ties along a path; None where none carries."""
+    ties, path = known_ties(response), response.path
+    if not ties or len(path) < 2:
+        return None
+    found = [increment.ties for increment in path]
+    forces, states = np.array([of.forces for of in found]), np.array([of.states for of in found])
+    forces = np.where(np.isin(states, (mechanics.ELASTIC, mechanics.YIELDING)), forces, 0.0)
+    forces[states == mechanics.ABSENT] = np.nan
+    largest = np.nan_to_num(np.abs(forces)).max(axis=0)
+    told = (largest > 0.0) | (states == mechanics.BROKEN).any(axis=0)
+    chosen = [k for k in np.argsort(-largest, kind="stable").tolist() if told[k]][:MOST_CURVES]
+    if not chosen:
+        return None
+    return TieForceCurves(tuple(ties[k].name for k in chosen), forces[:, chosen], states[:, chosen])
+
+
 def tie_texts(course: TieCourse, unit: str = "m") -> tuple[str, str, str]:
     """Say what a tie is, its largest force and where, and what became of it.
 
@@ -207,10 +252,8 @@ def tie_texts(course: TieCourse, unit: str = "m") -> tuple[str, str, str]:
     unit : str
         Of settlements.
     """
-    sense = "" if course.force == 0.0 else " tension" if course.force > 0.0 else " compression"
-    largest = f"{force_text(abs(course.force))}{sense}"
-    if sense:
-        largest += f" at {course.at:.4g} {unit}"
+    sense = "tension" if course.force > 0.0 else "compression"
+    largest = f"{force_text(abs(course.force))} {sense} at {course.at:.4g} {unit}" if course.force else "no force"
     fate = [
         f"{word} at {at:.4g} {unit}"
         for word, at in (("yields", course.yields_at), ("breaks", course.breaks_at))

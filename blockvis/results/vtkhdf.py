@@ -19,14 +19,16 @@ from blockvis.system.atomic_files import atomic_file
 from .datasets import block_grid, contact_grid, joint_grid
 from .joint_faces import initial_joints
 from .mechanism_arrays import at_last_equilibrium, falling_in
-from .viewer_files import GRIDS, output_times
+from .tie_grid import tie_grid
+from .ties import known_ties
+from .viewer_files import GRIDS, TIE_GRID, output_times
 
 #: Level of zlib.
 COMPRESSION = 4
 
 
 def write_vtkhdf(response: solver.Response, path: Path, *, shape: str = "moved") -> Path:
-    """Write the path of a response as one file: blocks, contact points and joints, time is the parameter.
+    """Write the path of a response as one file: blocks, contact points, joints and ties, time is the parameter.
 
     Parameters
     ----------
@@ -75,7 +77,7 @@ class _Series(VTKPythonAlgorithmBase):
     def __init__(self, response: solver.Response, shape: str) -> None:
         super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkMultiBlockDataSet")
         self._response, self._shape, self._joints = response, shape, initial_joints(response.assembly)
-        self._times = output_times(response.path)
+        self._times, self._ties = output_times(response.path), known_ties(response)
 
     def RequestInformation(self, _request: Any, _inputs: Any, outputs: Any) -> int:
         """Say which times there are."""
@@ -90,7 +92,7 @@ class _Series(VTKPythonAlgorithmBase):
         time = about.Get(asked) if about.Has(asked) else self._times[0]
         number = int(np.abs(np.array(self._times) - time).argmin())
         together = vtkMultiBlockDataSet.GetData(about)
-        for k, (name, grid) in enumerate(zip(GRIDS, self._grids(number), strict=True)):
+        for k, (name, grid) in enumerate(zip((*GRIDS, TIE_GRID), self._grids(number), strict=False)):
             together.SetBlock(k, _without_strings(grid))
             together.GetMetaData(k).Set(vtkCompositeDataSet.NAME(), name)
         return 1
@@ -104,6 +106,7 @@ class _Series(VTKPythonAlgorithmBase):
             block_grid(assembly, increment, shape=shape, falls=falls),
             contact_grid(assembly, increment, shape=shape),
             joint_grid(assembly, increment, shape=shape, joints=self._joints),
+            *((tie_grid(self._ties, assembly, increment, shape=shape),) if self._ties else ()),
         )
 
 

@@ -79,8 +79,6 @@ def refuse_ties(case: Case) -> None:
             raise ValueError(
                 f'{who}: increments = "{case.controls.increments}" knows no ties; leave increments out, or [[ties]]'
             )
-        if case.settlements and any(load.positions for load in case.loads):
-            raise ValueError(f"{who}: positions after a settlement know no ties; leave [[ties]] or positions out")
         if tie.phase > max(len(case.settlements), 1):
             raise ValueError(
                 f"{who}: phase is {tie.phase}, and there {_are(len(case.settlements))}; give the settlement, counted "

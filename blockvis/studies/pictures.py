@@ -15,8 +15,11 @@ from matplotlib.figure import Figure
 
 import solver
 from blockvis.pictures import palette
+from blockvis.pictures.ties import COLOURS
 from blockvis.results.about import LOCAL
 from blockvis.system.atomic_files import atomic_file
+from blockvis.text import rounded_text
+from solver import mechanics
 
 from .fragility import CONFIDENCE, Fragility, fragility_of
 from .sensitivity import Swing, first_order, outcome, swings
@@ -188,7 +191,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
         axes.set_xlabel(name, fontsize=TEXT)
         _plain_frame(axes)
     panels[0].set_ylabel(f"collapse displacement [{unit}]", fontsize=TEXT)
-    panels[0].set_ylim(bottom=-0.02 * float(np.nanmax(y)))
+    panels[0].set_ylim(-0.02 * float(np.nanmax(y)), 1.06 * float(np.nanmax(y)))
     handles = [_mark(CLASSES[k], MARKS[k], label) for k, label in enumerate(labels)]
     rest = sum(classes.values()) - sum(classes[one] for one in shown)
     if rest:
@@ -258,6 +261,10 @@ def _draw_shape(axes: Axes, shape: dict[str, np.ndarray], low: np.ndarray, high:
             rings, facecolor=colours, edgecolor=palette.hexadecimal(palette.OUTLINE), linewidth=width, zorder=2
         )
     )
+    for ends, state in zip(shape.get("ties", ()), shape.get("tie_states", ()), strict=True):
+        if state in COLOURS and state != mechanics.BROKEN:
+            dashes = "--" if state == mechanics.SLACK else "-"
+            axes.plot(*ends.T, dashes, color=palette.hexadecimal(COLOURS[int(state)]), linewidth=1.8, zorder=3)
     length = 0.09 * float((high - low).max())
     for place, direction in shape.get("arrows", ()):
         axes.annotate(
@@ -337,7 +344,7 @@ def _length(table: pd.DataFrame) -> tuple[float, str]:
 
 
 def _short(value: float | str) -> str:
-    return textwrap.shorten(value, 16) if isinstance(value, str) else f"{value:.3g}"
+    return textwrap.shorten(value, 16) if isinstance(value, str) else rounded_text(value)
 
 
 def _mark(colour: str, mark: str, label: str, *, hollow: bool = False):  # type: ignore[no-untyped-def]

@@ -21,6 +21,7 @@ from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import least_reaction, loss_in
 from blockvis.results.swinging import swing_factors
+from blockvis.results.ties import known_ties
 from blockvis.runs.plan import planned
 from solver import mechanics
 
@@ -131,7 +132,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         "hinges": len(mechanism.hinges),
         "sliding_joints": len(mechanism.sliding),
     }
-    return found, _shape(assembly, falls, mechanism, response.settlements[falls.phase])
+    return found, _shape(assembly, falls, mechanism, response.settlements[falls.phase], known_ties(response))
 
 
 def _numbers(response: solver.Response) -> dict[str, Any]:
@@ -204,7 +205,11 @@ def _joints(names: Sequence[str], pairs: Sequence[Sequence[int]]) -> str:
 
 
 def _shape(
-    assembly: solver.Assembly, falling: solver.Increment, mechanism: mechanics.Mechanism, settlement: solver.Settlement
+    assembly: solver.Assembly,
+    falling: solver.Increment,
+    mechanism: mechanics.Mechanism,
+    settlement: solver.Settlement,
+    ties: Sequence[solver.Tie],
 ) -> bytes:
     """Pack the blocks as the mechanism displaces them, in single precision, for a small picture.
 
@@ -216,7 +221,7 @@ def _shape(
     size = float(np.ptp(at_rest[free], axis=0).max())
     (factor,) = swing_factors(assembly, falling, SWING, np.ones(1))
     moved = mechanics.swung(falling.pose, falling.velocity * factor)
-    vertices = mechanics.moved_vertices(assembly, moved)
+    vertices, tied = mechanics.moved_vertices(assembly, moved), mechanics.tie_ends(ties, assembly, moved)
     if assembly.dimension == 2:
         low, high = at_rest[free].min(axis=0) - 0.15 * size, at_rest[free].max(axis=0) + 0.15 * size
         _, places, directions = settlement_arrows(assembly, settlement, falling.pose, Frame(low, high))
@@ -224,6 +229,7 @@ def _shape(
     else:
         _, *arrows = settlement_arrows(assembly, settlement, falling.pose)
         places, directions = (VIEW.projected(ends) for ends in arrows)
+        tied = VIEW.projected(tied.reshape(-1, 3)).reshape(-1, 2, 2)
         corners, offsets, block = _seen_faces(assembly, vertices)
         vertices, at_rest = (VIEW.projected(points[corners]) for points in (vertices, at_rest))
     buffer = io.BytesIO()
@@ -235,6 +241,8 @@ def _shape(
         parts=mechanism.parts[block].astype(np.int16),
         free=assembly.free[block],
         arrows=np.stack([places, directions], axis=1).astype(np.float32),
+        ties=tied.astype(np.float32),
+        tie_states=falling.ties.states.astype(np.int8),
     )
     return buffer.getvalue()
 

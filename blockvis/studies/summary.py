@@ -12,6 +12,7 @@ import numpy as np
 
 import solver
 from blockvis.results.about import LOCAL
+from blockvis.text import rounded_text
 
 from .fragility import fragility_of
 from .sensitivity import first_order, swings
@@ -141,4 +142,4 @@ def _mechanism_lines(classes: dict[str, int]) -> list[str]:
 
 
 def _value(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.3g}"
+    return value if isinstance(value, str) else rounded_text(value)

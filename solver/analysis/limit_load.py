@@ -27,6 +27,9 @@ from solver.results.certificate import Certificate, carrying_gap, friction_exces
 from solver.results.increment import State
 from solver.results.response import LimitLoad, LimitStatus, limit_state
 from solver.ties import (
+    ABSENT,
+    BROKEN,
+    ELASTIC,
     Tie,
     TieForces,
     check_ties,
@@ -123,9 +126,8 @@ def find_limit_load(
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
     loads = replace(loads, dead=loads.dead_at(assembly, pose), fills=())
-    rest = tie_lengths(tie_ends(ties, assembly, pose)) if ties_at is None else ties_at.rest
-    standing = tuple(tie for tie, length in zip(ties, rest, strict=True) if not np.isnan(length))
-    problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap, displacement, torsion, standing)
+    states = np.full(len(ties), ELASTIC) if ties_at is None else ties_at.states
+    problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap, displacement, torsion, tuple(ties), states)
     balanced, status = problem.balanced(with_live=False), LimitStatus.FOUND
     if balanced.falls:
         falling, status = balanced, LimitStatus.HELD
@@ -194,7 +196,8 @@ class _Problem:
     crushing: np.ndarray
     tension: np.ndarray
     total: float
-    ties: tuple[Tie, ...] = ()
+    ties: tuple[Tie, ...]
+    tie_states: np.ndarray
     faces: Faces | None = None
 
     @classmethod
@@ -208,6 +211,7 @@ class _Problem:
         displacement: float,
         torsion: str,
         ties: tuple[Tie, ...],
+        tie_states: np.ndarray,
     ) -> _Problem:
         length, free = assembly.block_size, assembly.free
         reach = max(closed_gap, REACH * length) if displacement > 0.0 else closed_gap
@@ -216,9 +220,10 @@ class _Problem:
         around = contacts if interfaces.dry else find_contacts(assembly, vertices, max(reach, REACH * length))
         cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around)
         friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-        if ties:
+        there = ~np.isin(tie_states, (ABSENT, BROKEN))
+        if there.any():
             # Each is as long as it is, so that all carry.
-            rest = tie_lengths(tie_ends(ties, assembly, pose))
+            rest = np.where(there, tie_lengths(tie_ends(ties, assembly, pose)), np.nan)
             members = member_contacts(ties, assembly, pose, rest, present_members(ties, rest))
             strength = np.array([ties[i].strength for i in members.features[:, 1]])
             contacts, crushing = joined_contacts([contacts, members]), np.append(crushing, strength)
@@ -263,6 +268,7 @@ class _Problem:
             tension=tension / force,
             total=float(np.abs(dead).sum()),
             ties=ties,
+            tie_states=tie_states,
             faces=faces,
         )
 
@@ -428,7 +434,8 @@ class _Problem:
         """The arrays of a limit load, from forces [N]."""
         between = ~is_member(self.contacts)
         state = limit_state(self.pose, self.contacts[between], forces[between], self.friction[between], mechanism)
-        return replace(state, ties=plastic_forces(self.ties, self.assembly, self.pose, self.contacts, forces))
+        ties = plastic_forces(self.ties, self.assembly, self.pose, self.contacts, forces, self.tie_states)
+        return replace(state, ties=ties)
 
 
 def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs: int) -> np.ndarray:

@@ -268,6 +268,13 @@ class Response(Shown):
         """Make a PyVista dataset of the contact points of an increment and their forces; as :meth:`mesh`."""
         return views().dataset(self, "contacts", k, shape)
 
+    def members(self, k: int = -1, *, shape: str = "moved") -> Any:
+        """Make a PyVista dataset of the ties, props and bars of an increment: a line each; as :meth:`mesh`.
+
+        Cell arrays are ``force`` [N], tension positive, ``elongation`` [m], ``state``, ``name`` and ``kind``.
+        """
+        return views().dataset(self, "members", k, shape)
+
     def fall(self, time: float, *, shape: str = "moved") -> Any:
         """Make a PyVista dataset of the blocks so many seconds after the last equilibrium; as :meth:`mesh`."""
         return views().fall(self, time, shape)

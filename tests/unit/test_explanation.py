@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import structures
 
+import blockvis
 import solver
 from blockvis import generators
 from blockvis.case_files.read import parse_case
@@ -357,3 +358,18 @@ def test_twins_are_one_cause_for_cracks_and_two_for_displaced_points():
     (cause,) = ranked([one, other], apart=False)
     assert (cause.name, cause.also) == ("left moves left", ("right moves right",))
     assert len(ranked([one, other], apart=True)) == 2
+
+
+TIED = '[[ties]]\nname = "iron"\nfrom = [-0.9, 0.3]\nto = [0.9, 0.3]\nstiffness = 1e7\n'
+
+
+def test_runs_of_causes_have_the_ties_of_the_case(tmp_path):
+    layout = '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 6 }\n'
+    case = parse_case(layout + TIED + "[settlement]\ndirection = [0, -1]\n", CASE)
+    _, (one, *_) = candidates(ARCH)
+    assert [tie.name for tie in ordered(case, ARCH, one.motions, Variant(0.6, 0), (0.02, 0.01)).given.ties] == ["iron"]
+    grounded = TIED.replace("[0.9, 0.3]", "{ fixed = [2.0, 0.0] }")
+    (tmp_path / "case.toml").write_text(layout + grounded, encoding="utf-8")
+    (tmp_path / "cracks.csv").write_text("kind,block_a,block_b,width\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"case.toml: \[ties 'iron'\] is held by the ground"):
+        blockvis.explain(tmp_path / "case.toml", tmp_path / "cracks.csv")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import structures
 from PIL import Image
 
 import blockvis
@@ -76,7 +77,7 @@ def test_area_and_modulus_give_the_stiffness(tmp_path):
         ({"to": [0.25, 0.5]}, "both ends are in the block 'left'"),
         ({"to": {"block": "rihgt", "point": [0, 0]}}, "no block is called 'rihgt'"),
         ({"from": {"fixed": [0, 1]}, "to": {"fixed": [1, 1]}}, "both ends are in the ground"),
-        ({"strength": -5.0}, "strength is -5; give a positive number"),
+        ({"strength": -5.0}, "[ties 'iron'] strength is -5; give a positive number"),
         ({"kind": "prop", "to": [0.25, 1.5]}, "a prop has no length: both ends are at (0.25, 1.5)"),
         ({"kind": "chain"}, "choose from tie, prop, bar"),
         ({"area": 1e-4}, "stiffness and area or modulus are both given"),
@@ -85,7 +86,7 @@ def test_area_and_modulus_give_the_stiffness(tmp_path):
         ({"phase": 2}, "phase is 2, and there is one settlement"),
         ({"prestress": 10.0, "strength": 5.0}, "prestress is 10 N, not below the strength of 5 N"),
         ({"brittle": True}, "brittle is true, and no strength says"),
-        ({"to": None}, "to of 'iron' is missing; give a point [x, y]"),
+        ({"to": None}, "[ties 'iron'] to is missing; give a point [x, y]"),
         ({"name": None}, "name is missing"),
         ({"to": {"block": "right"}}, 'give [x, y], { block = "name", point = [x, y] } or { fixed = [x, y] }'),
         ({"to": [2.75, 1.0, 1.5]}, "has three coordinates, and the blocks lie in the plane"),
@@ -98,15 +99,24 @@ def test_what_cannot_be_a_tie_is_refused_in_a_line(tmp_path, change, words):
 
 
 def test_a_name_used_twice_is_refused(tmp_path):
-    assert "[ties 2] name 'iron' is there twice" in refused(tmp_path, TIE, TIE)
+    assert "[ties 2 'iron'] name is there twice" in refused(tmp_path, TIE, TIE)
 
 
-def test_analyses_that_know_no_ties_refuse_them(tmp_path):
-    moving = {"kind": "live", "force": [0.0, -1.0], "positions": [0.2, 0.3, 2]}
-    said = refused(tmp_path, TIE, analysis={"kind": "limit load"}, loads=[moving])
-    assert "positions after a settlement know no ties" in said
+def test_increments_by_linear_program_refuse_ties(tmp_path):
     said = refused(tmp_path, TIE, analysis={"increments": "linear program"})
     assert 'increments = "linear program" knows no ties' in said
+
+
+@pytest.mark.slow
+def test_positions_after_a_settlement_have_the_ties_that_it_has_left(tmp_path):
+    # The left pier, of weight W, 0.5 m wide and 2 m high, is pushed to the left at its top: W b/2 + S 1.5 m = α 2 m.
+    across, push = TIE | {"strength": 100.0}, {"kind": "live", "force": [-1.0, 0.0], "positions": [0.2, 0.3, 2]}
+    for brittle, held in ((True, 0.0), (False, 150.0)):
+        case = case_with(tmp_path, across | {"brittle": brittle}, analysis={"kind": "limit load"}, loads=[push])
+        weight = case_assembly(case).masses[0] * solver.GRAVITY
+        found = blockvis.run_case(case, tmp_path / str(brittle), pictures=False, film=False).response.limits
+        # What the settlement has leant the pier by is below a micrometre.
+        assert [limit.multiplier for limit in found] == pytest.approx([(0.25 * weight + held) / 2.0] * 2, rel=1e-5)
 
 
 @pytest.mark.slow
@@ -246,6 +256,58 @@ def test_a_folder_with_ties_opens_with_them_and_viewers_get_lines(run):
     assert lines.n_cells == 1
     assert {"force", "elongation", "state", "name"} <= set(lines.cell_data)
     assert lines.cell_data["force"][0] == again.path[1].ties.forces[0]
+
+
+@pytest.mark.slow
+def test_ties_are_a_dataset_a_block_of_the_series_and_a_rod_of_the_animation(run, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    lines = run.response.members(-1)
+    assert (lines.n_cells, str(lines["name"][0])) == (1, "iron")
+    assert lines["force"][0] == run.response.path[-1].ties.forces[0]
+    for suffix in ("vtkhdf", "glb"):
+        assert main(["convert", str(run.folder), str(tmp_path / f"tied.{suffix}")]) == 0
+    reader = pyvista.HDFReader(tmp_path / "tied.vtkhdf")
+    reader.reader.SetStep(len(run.response.path) - 1)
+    assert reader.read()["ties"]["force"] == pytest.approx([3000.0])
+    data = (tmp_path / "tied.glb").read_bytes()
+    tree = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    (rod,) = [k for k, node in enumerate(tree["nodes"]) if node.get("name") == "[ties] iron"]
+    assert tree["nodes"][rod]["scale"][2] == pytest.approx(2.6)
+    moved = {c["target"]["path"] for c in tree["animations"][0]["channels"] if c["target"]["node"] == rod}
+    assert moved == {"translation", "rotation", "scale"}
+
+
+def test_the_report_has_the_force_of_the_tie_over_the_settlement(run, tmp_path):
+    page = blockvis.write_report(run.response, tmp_path / "report.html").read_text(encoding="utf-8")
+    model = json.loads(re.search(r'<script id="model" type="application/json">(.*?)</script>', page, re.DOTALL)[1])
+    (line,) = model["tie_curves"]["lines"]
+    np.testing.assert_allclose(line["force"], [i.ties.forces[0] / 1e3 for i in run.response.path], atol=1e-6)
+    assert model["ties"][-1][0]["words"] == "iron 3 kN, yielding"
+    low, high = np.array(model["bounds"]).reshape(2, 2)
+    ends = np.array(model["ties"][-1][0]["ends"]) - model["origin"]
+    assert (ends >= low).all()
+    assert (ends <= high).all()
+
+
+@pytest.mark.slow
+def test_the_curve_has_a_panel_for_ties(run, tmp_path):
+    tied, bare = (
+        Image.open(blockvis.draw_curve(response, tmp_path / f"{k}.png")).size
+        for k, response in enumerate((run.response, structures.arch_response()))
+    )
+    assert tied[1] == 1.5 * bare[1]
+
+
+def test_a_broken_tie_has_carried_its_strength_and_a_slack_one_carries_nothing(tmp_path):
+    wire = TIE | {"strength": 100.0, "brittle": True}
+    slack = TIE | {"name": "slack", "kind": "prop"}
+    run = blockvis.run_case(case_with(tmp_path, wire, slack), tmp_path / "out", pictures=False, film=False)
+    broken, idle = run.summary["ties"]
+    assert (broken["largest_force"], broken["last_force"], broken["last_state"]) == (100.0, 0.0, "broken")
+    assert broken["breaks_at"] == broken["largest_force_at"] > 0.0
+    # The prop is touched as the piers come to rest.
+    assert (idle["last_force"], idle["last_state"]) == (0.0, "slack")
+    assert abs(idle["largest_force"]) < 0.1
 
 
 def test_a_picture_draws_the_tie_in_the_colour_of_its_state(run, tmp_path):
