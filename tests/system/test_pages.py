@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 #: Pages that are written by hand; Sphinx runs the scripts of the gallery and the tutorials.
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "starting").glob("*.md"))]
 
-BLOCK = re.compile(r"^(?:<!-- (.*) -->\n)?```(sh|text|toml|python)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+BLOCK = re.compile(r"^(?:<!-- ([^\n]*) -->\n)?```(sh|text|toml|python)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 #: Seconds, and how many programs were solved: of the machine.
 MACHINE = re.compile(r"\d[\d.,]* (?=s\b|programs)")
