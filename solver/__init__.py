@@ -12,54 +12,91 @@ Conventions, written once:
 This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 """
 
-from .assembly import Assembly
-from .backfill import Backfill
-from .interfaces import InterfaceLaw, Interfaces, JointScatter
-from .kinematics import Pose
-from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
-from .path.controls import Controls
-from .path.drivers import ControlDisplacement
-from .phases import PhaseChange
-from .programs.problem import SolveError
-from .results.certificate import Certificate
-from .results.increment import Increment, Status
-from .results.response import Collapse, Envelope, LimitLoad, LimitStatus, LocalLoss, Response
-from .structure import Structure, limit_load, pushover, settle
-from .surface_loads import edge_pressure, load_on_top, surface_pressure
-from .ties import Tie
+from __future__ import annotations
 
-__all__ = [
-    "GRAVITY",
-    "Assembly",
-    "Backfill",
-    "Certificate",
-    "Collapse",
-    "ControlDisplacement",
-    "Controls",
-    "Envelope",
-    "Increment",
-    "InterfaceLaw",
-    "Interfaces",
-    "JointScatter",
-    "LimitLoad",
-    "LimitStatus",
-    "Loads",
-    "LocalLoss",
-    "PhaseChange",
-    "Pose",
-    "Response",
-    "Settlement",
-    "SolveError",
-    "Status",
-    "Structure",
-    "Tie",
-    "edge_pressure",
-    "limit_load",
-    "load_on_top",
-    "point_load",
-    "pushover",
-    "self_weight",
-    "settle",
-    "surface_pressure",
-    "weight_fraction",
-]
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .assembly import Assembly as Assembly
+    from .backfill import Backfill as Backfill
+    from .interfaces import InterfaceLaw as InterfaceLaw
+    from .interfaces import Interfaces as Interfaces
+    from .interfaces import JointScatter as JointScatter
+    from .kinematics import Pose as Pose
+    from .loads import GRAVITY as GRAVITY
+    from .loads import Loads as Loads
+    from .loads import Settlement as Settlement
+    from .loads import point_load as point_load
+    from .loads import self_weight as self_weight
+    from .loads import weight_fraction as weight_fraction
+    from .path.controls import Controls as Controls
+    from .path.drivers import ControlDisplacement as ControlDisplacement
+    from .phases import PhaseChange as PhaseChange
+    from .programs.problem import SolveError as SolveError
+    from .results.certificate import Certificate as Certificate
+    from .results.increment import Increment as Increment
+    from .results.increment import Status as Status
+    from .results.response import Collapse as Collapse
+    from .results.response import Envelope as Envelope
+    from .results.response import LimitLoad as LimitLoad
+    from .results.response import LimitStatus as LimitStatus
+    from .results.response import LocalLoss as LocalLoss
+    from .results.response import Response as Response
+    from .structure import Structure as Structure
+    from .structure import limit_load as limit_load
+    from .structure import pushover as pushover
+    from .structure import settle as settle
+    from .surface_loads import edge_pressure as edge_pressure
+    from .surface_loads import load_on_top as load_on_top
+    from .surface_loads import surface_pressure as surface_pressure
+    from .ties import Tie as Tie
+
+#: Public names and where they live; loaded when first used, because scipy takes half a second to import.
+_HOMES = {
+    "Assembly": "assembly",
+    "Backfill": "backfill",
+    "Certificate": "results.certificate",
+    "Collapse": "results.response",
+    "ControlDisplacement": "path.drivers",
+    "Controls": "path.controls",
+    "Envelope": "results.response",
+    "GRAVITY": "loads",
+    "Increment": "results.increment",
+    "InterfaceLaw": "interfaces",
+    "Interfaces": "interfaces",
+    "JointScatter": "interfaces",
+    "LimitLoad": "results.response",
+    "LimitStatus": "results.response",
+    "Loads": "loads",
+    "LocalLoss": "results.response",
+    "PhaseChange": "phases",
+    "Pose": "kinematics",
+    "Response": "results.response",
+    "Settlement": "loads",
+    "SolveError": "programs.problem",
+    "Status": "results.increment",
+    "Structure": "structure",
+    "Tie": "ties",
+    "edge_pressure": "surface_loads",
+    "limit_load": "structure",
+    "load_on_top": "surface_loads",
+    "point_load": "loads",
+    "pushover": "structure",
+    "self_weight": "loads",
+    "settle": "structure",
+    "surface_pressure": "surface_loads",
+    "weight_fraction": "loads",
+}
+
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    raise AttributeError(f"module 'solver' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, *(name for name in globals() if name.startswith("__"))]

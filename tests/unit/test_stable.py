@@ -23,6 +23,22 @@ increment = 0.001
 limit = 0.001
 """
 
+#: What ties, fill and mortar add.
+STRENGTHENED = """
+[[ties]]
+name = "iron"
+from = [-0.6, 0.8]
+to = [0.6, 0.8]
+stiffness = 1e6
+[[backfill]]
+over = "voussoir *"
+surface = 1.5
+unit_weight = 18000.0
+[material]
+cohesion = 1e5
+tensile_strength = 1e5
+"""
+
 
 def _tables(schema):
     """Tables that a value may be, alone, in a list or one of several kinds."""
@@ -57,16 +73,18 @@ def _options():
         yield from (f"{verb} {word}" for action in parser._actions for word in action.option_strings)
 
 
-def _written(folder, layout, direction):
-    """Columns and arrays of the files of a small run."""
-    (folder / "case.toml").write_text(CASE.format(layout=layout, direction=direction), encoding="utf-8")
+def _written(folder, layout, direction, more=""):
+    """Files of a small run, their columns and arrays, and the keys of its summary."""
+    (folder / "case.toml").write_text(CASE.format(layout=layout, direction=direction) + more, encoding="utf-8")
     out = folder / "out"
     blockvis.run_case(folder / "case.toml", out, outputs=())
-    for name in ("response.csv", "joints.csv"):
-        with (out / name).open(encoding="utf-8", newline="") as table:
-            yield from (f"{name} {column}" for column in next(csv.reader(table)))
-    for what in ("blocks", "contacts", "joints"):
-        grid = pv.read(min((out / "increments").glob(f"{what}_*.vtu")))
+    yield from (f"file {path.name}" for path in out.iterdir())
+    yield from (f"summary.json {key}" for key in json.loads((out / "summary.json").read_text(encoding="utf-8")))
+    for path in out.glob("*.csv"):
+        with path.open(encoding="utf-8", newline="") as table:
+            yield from (f"{path.name} {column}" for column in next(csv.reader(table)))
+    for path in (out / "increments").glob("*_00000.vtu"):
+        what, grid = path.name.partition("_")[0], pv.read(path)
         for place, data in (("point", grid.point_data), ("cell", grid.cell_data), ("file", grid.field_data)):
             yield from (f"{what} {place} {name}" for name in data)
 
@@ -76,6 +94,8 @@ def _present(what, folder, capsys):
         return set(_written(folder, "arch", [1.0, 0.0]))
     if what == "results in space":
         return set(_written(folder, "extruded arch", [1.0, 0.0, 0.0]))
+    if what == "results with ties, fill and mortar":
+        return set(_written(folder, "arch", [1.0, 0.0], STRENGTHENED))
     return {
         "blockvis": lambda: {name for name in blockvis.__all__ if hasattr(blockvis, name)},
         "solver": lambda: {name for name in solver.__all__ if hasattr(solver, name)},
