@@ -1,15 +1,15 @@
-"""Walls beside engines: each along the same settlement in blockvis, pymunk, MuJoCo and LMGC90, at a step and at half of it.
+"""Walls beside engines: the same settlement in blockvis, pymunk, MuJoCo and LMGC90, at a step and at half of it.
 
-    python benchmarks/peers/walls.py OUT.jsonl [--walls arch door] [--engines pymunk mujoco compas_lmgc90] [--seconds 120]
+    python benchmarks/peers/walls.py OUT.jsonl [--walls arch door] [--engines pymunk mujoco] [--seconds 120]
     python benchmarks/peers/walls.py OUT.jsonl --table > docs/walls_beside_engines.md
 
 Every run is a line of OUT.jsonl; runs that are there already are not repeated, so that it can be measured in parts.
 Seconds are processor time, after which a run of an engine is given up.
 
 Two questions. How far does a wall go? Engines move the support at a speed, and from four fifths of our own collapse on
-at a tenth of it; the wall has fallen once a block moves faster than ``FALLING`` √(g · block size), and the displacement
-found is where the fastest block last moved at no more than twice its rate in our path, or less than ``CREEPING`` of that
-speed. What does the support carry on the way? Engines tremble: the mean over the last ``MEAN_OVER`` before each look.
+at a tenth of it; the wall has fallen once a block moves faster than ``FALLING`` √(g · block size), and what is found is
+where the fastest block last moved at no more than twice its rate in our path and ``CREEPING`` of that speed. What does
+the support carry on the way? Engines tremble: the mean over the last ``MEAN_OVER`` before each look.
 
 Ground that turns stays in engines, and gravity turns the other way; compas_lmgc90 cannot turn gravity.
 """
@@ -108,6 +108,9 @@ def flat_arch() -> solver.Assembly:
     return solver.Assembly.from_outlines(boxes, roles=["free", "free", "fixed", "moving"])
 
 
+#: Of the examples.
+WINDOW = "wall_horizontal_after_settlement"
+
 SPREADS, SINKS, TILTS = (
     {"direction": (1.0, 0.0)},
     {"direction": (0.0, -1.0)},
@@ -123,7 +126,7 @@ WALLS = {
     "pointed arch, supports spread": Wall(generators.pointed_arch, 0.7, SPREADS, 0.02, 2.0, 0.02),
     "portal, a pier moves out": Wall(generators.portal, 0.6, SPREADS, 0.02, 2.0, 0.02),
     "column of 5 blocks on ground that tilts": Wall(
-        lambda: generators.column(blocks=5, width=0.5, block_height=0.25), 0.7, TILTS, 0.02, 1.0, 0.01, exact=math.atan(0.4)
+        lambda: generators.column(width=0.5, block_height=0.25), 0.7, TILTS, 0.02, 1.0, 0.01, exact=math.atan(0.4)
     ),
     "arch of 25 voussoirs on ground that tilts": Wall(
         lambda: on_turning_ground(
@@ -147,7 +150,7 @@ WALLS = {
         lambda: door().assembly, 0.5, SINKS, 0.01, 0.164, 0.01, looks=(0.061, 0.164)
     ),
     "wall with a window, half of its ground sinks": Wall(
-        lambda: example("wall_horizontal_after_settlement", (0.03,)).assembly, 0.6, SINKS, 0.005, 0.03, 0.01, looks=(0.01, 0.03)
+        lambda: example(WINDOW, (0.03,)).assembly, 0.6, SINKS, 0.005, 0.03, 0.01, looks=(0.01, 0.03)
     ),
     "bay of a façade, half of its ground sinks": Wall(
         lambda: bay().assembly, 0.6, SINKS, 0.005, 0.02, 0.005, looks=(0.01, 0.02)
