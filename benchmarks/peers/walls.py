@@ -124,9 +124,9 @@ WALLS = {
         flat_arch, 2.0, SPREADS, 0.01, 0.2, 0.01, exact=2.0 * (math.sqrt(1.0 + 0.25**2) - 1.0)
     ),
     "pointed arch, supports spread": Wall(generators.pointed_arch, 0.7, SPREADS, 0.02, 2.0, 0.04),
-    "portal, a pier moves out": Wall(generators.portal, 0.6, SPREADS, 0.02, 2.0, 0.1),
+    "portal, a pier moves out": Wall(generators.portal, 0.6, SPREADS, 0.02, 2.0, 0.2),
     "column of 5 blocks on ground that tilts": Wall(
-        lambda: generators.column(width=0.5, block_height=0.25), 0.7, TILTS, 0.02, 1.0, 0.02, exact=math.atan(0.4)
+        lambda: generators.column(width=0.5, block_height=0.25), 0.7, TILTS, 0.02, 1.0, 0.05, exact=math.atan(0.4)
     ),
     "arch of 25 voussoirs on ground that tilts": Wall(
         lambda: on_turning_ground(
@@ -136,27 +136,27 @@ WALLS = {
         TILTS,
         0.02,
         1.0,
-        0.02,
+        0.05,
         exact=math.radians(17.10),
         source="LACT3",
     ),
     "wall of 4 × 8 bricks on ground that tilts": Wall(
-        lambda: on_turning_ground(generators.wall(bricks=4, courses=8)), 0.7, TILTS, 0.02, 1.0, 0.02
+        lambda: on_turning_ground(generators.wall(bricks=4, courses=8)), 0.7, TILTS, 0.02, 1.0, 0.05
     ),
     "panel of 5 × 6 bricks, half of its base sinks": Wall(
-        lambda: generators.panel(nb=5, nc=6), 0.3, SINKS, 0.02, 0.38, 0.02, looks=(0.2, 0.38)
+        lambda: generators.panel(nb=5, nc=6), 0.3, SINKS, 0.02, 0.2, 0.04, looks=(0.1, 0.2)
     ),
     "wall with a door, half of its ground sinks": Wall(
-        lambda: door().assembly, 0.5, SINKS, 0.01, 0.164, 0.01, looks=(0.061, 0.164)
+        lambda: door().assembly, 0.5, SINKS, 0.01, 0.061, 0.02, looks=(0.03, 0.061)
     ),
     "wall with a window, half of its ground sinks": Wall(
         lambda: example(WINDOW, (0.03,)).assembly, 0.6, SINKS, 0.005, 0.03, 0.01, looks=(0.01, 0.03)
     ),
     "bay of a façade, half of its ground sinks": Wall(
-        lambda: bay().assembly, 0.6, SINKS, 0.005, 0.02, 0.005, looks=(0.01, 0.02)
+        lambda: bay().assembly, 0.6, SINKS, 0.005, 0.02, 0.02, looks=(0.01, 0.02)
     ),
     "dome of 8 lunes, springers spread": Wall(
-        lambda: generators.dome(cap=15.0), 0.7, {"radial_from": (0.0, 0.0)}, 0.04, 0.5, 0.02, exact=0.1721334
+        lambda: generators.dome(cap=15.0), 0.7, {"radial_from": (0.0, 0.0)}, 0.04, 0.5, 0.05, exact=0.1721334
     ),
     "corner of 16 bricks, a support sinks": Wall(
         lambda: generators.l_corner(bricks=2, across=2, courses=4),
