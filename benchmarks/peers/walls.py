@@ -141,7 +141,7 @@ WALLS = {
         source="LACT3",
     ),
     "wall of 4 × 8 bricks on ground that tilts": Wall(
-        lambda: on_turning_ground(generators.wall(bricks=4, courses=8)), 0.7, TILTS, 0.02, 1.0, 0.05
+        lambda: on_turning_ground(generators.wall(bricks=4, courses=8)), 0.7, TILTS, 0.02, 1.0, 0.1
     ),
     "panel of 5 × 6 bricks, half of its base sinks": Wall(
         lambda: generators.panel(nb=5, nc=6), 0.3, SINKS, 0.02, 0.2, 0.04, looks=(0.1, 0.2)
