@@ -113,7 +113,7 @@ def test_minimum_thickness_of_the_semicircle(n, thinnest):
 
 @pytest.mark.slow
 def test_pointed_arch_keeps_the_hinge_at_its_apex():
-    """Physics engines and long increments pass 0.26 m as it is; a step that was too long ended on an equilibrium afar."""
+    """As engines and long increments do; a step that was too long ended on an equilibrium afar, at 0.26 m."""
     arch = generators.pointed_arch()
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.28)
     response = solver.settle(arch, spread, friction_coefficient=0.7)
