@@ -123,7 +123,7 @@ WALLS = {
     "flat arch of two blocks, supports spread": Wall(
         flat_arch, 2.0, SPREADS, 0.01, 0.2, 0.01, exact=2.0 * (math.sqrt(1.0 + 0.25**2) - 1.0)
     ),
-    "pointed arch, supports spread": Wall(generators.pointed_arch, 0.7, SPREADS, 0.02, 2.0, 0.04),
+    "pointed arch, supports spread": Wall(generators.pointed_arch, 0.7, SPREADS, 0.05, 2.0, 0.2),
     "portal, a pier moves out": Wall(generators.portal, 0.6, SPREADS, 0.02, 2.0, 0.2),
     "column of 5 blocks on ground that tilts": Wall(
         lambda: generators.column(width=0.5, block_height=0.25), 0.7, TILTS, 0.02, 1.0, 0.05, exact=math.atan(0.4)
@@ -233,7 +233,8 @@ def theirs(wall: Wall, engine: str, time_step: float, budget: float, our: dict[s
             found["why"] = f"given up at {d[-1]:.4g}"
         return {**found, "found": [float(part.mean()) if len(part) else math.nan for part in near]}
     if not fallen:
-        return {**found, "found": [], "why": f"stands at {d[-1]:.4g}" if len(d) else "nothing"}
+        verdict = "stands" if len(d) and d[-1] >= end else "given up"
+        return {**found, "found": [], "why": f"{verdict} at {d[-1]:.4g}" if len(d) else "nothing"}
     at_speed = np.array([drive.speed if s < slow_from else drive.slow for s in way])
     calm = np.array(speeds) <= 2.0 * our["rate"] * at_speed + CREEPING * fast
     if not calm.any():
