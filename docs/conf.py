@@ -26,7 +26,7 @@ extensions = [
     # Formulas as pictures: a page that is opened from the disk has no network to fetch MathJax from.
     "matplotlib.sphinxext.mathmpl",
 ]
-exclude_patterns = ["_build", "gallery", "tutorials", "generated/validation_tables.md"]
+exclude_patterns = ["_build", "gallery", "tutorials", "generated/validation_tables.md", "walls_beside_engines.md"]
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
 autosummary_generate = True

@@ -149,7 +149,9 @@ def engine_arch(name: str, response: solver.Response, time_step: float, speed: f
     slope = float(np.diff(kinematic[-4::3, 1])[0] / np.diff(kinematic[-4::3, 0])[0])
     thickness = float(arch.widths[arch.free].min())
     samples, spent, fallen = [], 0.0, False
-    path = physics_engines.in_a_process(name, arch, (1.0, 0.0), speed, time_step, ARCH_FRICTION, budget=budget)
+    path = physics_engines.in_a_process(
+        name, arch, physics_engines.Drive((1.0, 0.0), speed), time_step, ARCH_FRICTION, budget=budget
+    )
     for so_far, sample in path:
         spent = so_far
         d, sunk = sample.displacement, crown(arch, sample.positions)
@@ -232,8 +234,7 @@ def settling_panel(bricks: int, courses: int, engines: list[str], budget: float)
         path = physics_engines.in_a_process(
             name,
             assembly,
-            (0.0, -1.0),
-            SETTLING_SPEED,
+            physics_engines.Drive((0.0, -1.0), SETTLING_SPEED),
             time_step,
             PANEL_FRICTION,
             budget=budget,

@@ -3,7 +3,7 @@
 Each is a generator of samples (displacement of the moving supports, centroids of all blocks, force of the structure on
 the moving supports), so that whoever looks at them decides when to stop. The settings are those of somebody who knows
 the engine and wants statics from it: exact outlines, contacts as stiff as the time step allows, no restitution,
-converged contact solvers, and the supports at rest for ``REST`` before they move.
+converged contact solvers, and the supports at rest for ``REST`` before they move as a ``Drive`` says.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from math import cos, inf, sin
 from typing import Any
 
 import numpy as np
@@ -22,11 +23,47 @@ import numpy as np
 import solver
 from blockvis.layout.layout import layout_of
 
-__all__ = ["ENGINES", "IN_SPACE", "Sample", "in_a_process"]
+__all__ = ["ENGINES", "IN_SPACE", "Drive", "Sample", "in_a_process"]
 
 #: Time at rest before the supports move, and between two samples [s]; forces are means between samples.
 REST = 0.3
 SAMPLING = 0.01
+
+
+@dataclass(frozen=True)
+class Drive:
+    """How supports move.
+
+    Attributes
+    ----------
+    direction : (2,), or in space (n_blocks, 3), array or sequence
+        In space a row for each block. A single number, 1 or -1, stands for ground that turns, counter-clockwise or
+        clockwise: it stays, and gravity turns the other way, so that blocks are seen from the ground.
+    speed : float [m/s, or rad/s where the ground turns]
+    slow, slow_from : float
+        The speed from a displacement on: what falls takes time, in which fast supports go on.
+    """
+
+    direction: Any
+    speed: float
+    slow: float = 0.0
+    slow_from: float = inf
+
+    def at(self, clock: float) -> tuple[float, float]:
+        """Displacement and speed at a time since the supports began to move [s]."""
+        change = self.slow_from / self.speed
+        if clock < change:
+            return self.speed * max(clock, 0.0), self.speed if clock > -1e-9 else 0.0
+        return self.slow_from + self.slow * (clock - change), self.slow
+
+    @property
+    def turns(self) -> bool:
+        return np.ndim(self.direction) == 0
+
+    def gravity(self, clock: float) -> tuple[float, float]:
+        """Acceleration in the plane as the ground sees it [m/s²]."""
+        angle = self.direction * self.at(clock)[0] if self.turns else 0.0
+        return -solver.GRAVITY * sin(angle), -solver.GRAVITY * cos(angle)
 
 
 @dataclass(frozen=True)
@@ -37,7 +74,7 @@ class Sample:
     ----------
     time : float [s]
         Since the supports began to move; negative before.
-    displacement : float [m]
+    displacement : float [m, or rad]
         Of the moving supports.
     positions : (n_blocks, 2) array [m]
         Centroids.
@@ -52,18 +89,12 @@ class Sample:
 
 
 def pymunk_path(
-    assembly: solver.Assembly,
-    direction: tuple[float, float],
-    speed: float,
-    time_step: float,
-    friction: float,
-    sampling: float,
+    assembly: solver.Assembly, drive: Drive, time_step: float, friction: float, sampling: float
 ) -> Iterator[Sample]:
     """Chipmunk: sequential impulses in two dimensions; polygons of zero radius."""
     import pymunk
 
     space = pymunk.Space()
-    space.gravity = (0.0, -solver.GRAVITY)
     space.iterations = 200
     space.collision_slop = 1e-5 * assembly.block_size  # 0.1 by default, made for pixels
     bodies, shapes = [], []
@@ -87,29 +118,25 @@ def pymunk_path(
         impulse[:] += np.array(arbiter.total_impulse)  # on the body by which the arbiter was asked for
 
     per_sample = max(1, round(sampling / time_step))
-    start = assembly.centroids[moving[0]]
+    start, along = assembly.centroids[moving[0]], np.zeros(2) if drive.turns else np.array(drive.direction)
     for sample in range(10**9):
         clock = sample * per_sample * time_step - REST
-        velocity = tuple(speed * np.array(direction)) if clock > -1e-9 else (0.0, 0.0)
         for i in moving:
-            bodies[i].velocity = velocity
+            bodies[i].velocity = tuple(map(float, drive.at(clock)[1] * along))
         impulse[:] = 0.0
-        for _ in range(per_sample):
+        for step in range(per_sample):
+            space.gravity = drive.gravity(clock + step * time_step)
             space.step(time_step)
             for i in moving:
                 bodies[i].each_arbiter(gather, bodies[i])
         positions = np.array([tuple(body.position) for body in bodies])
-        displacement = float((positions[moving[0]] - start) @ direction)
-        yield Sample(clock + per_sample * time_step, displacement, positions, impulse / (per_sample * time_step))
+        clock += per_sample * time_step
+        displacement = drive.at(clock)[0] if drive.turns else float((positions[moving[0]] - start) @ along)
+        yield Sample(clock, displacement, positions, impulse / (per_sample * time_step))
 
 
 def mujoco_path(
-    assembly: solver.Assembly,
-    direction: tuple[float, float],
-    speed: float,
-    time_step: float,
-    friction: float,
-    sampling: float,
+    assembly: solver.Assembly, drive: Drive, time_step: float, friction: float, sampling: float
 ) -> Iterator[Sample]:
     """MuJoCo: convex contact optimisation; prisms whose bodies have the three joints of plane motion."""
     import mujoco
@@ -128,9 +155,10 @@ def mujoco_path(
             joints = (
                 '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="hinge" axis="0 0 1"/>'
             )
-        elif assembly.moving[i]:
+        elif assembly.moving[i] and not drive.turns:
             # so heavy that contact forces do not slow it down; a mocap body would move without dragging anything along
-            joints = f'<joint name="drive{i}" type="slide" axis="{direction[0]} {direction[1]} 0" armature="1e8"/>'
+            x_axis, y_axis = drive.direction
+            joints = f'<joint name="drive{i}" type="slide" axis="{x_axis} {y_axis} 0" armature="1e8"/>'
         # supports meet blocks, not each other
         meets = 1 if assembly.free[i] else 0
         gravity = "" if assembly.free[i] else ' gravcomp="1"'
@@ -141,7 +169,7 @@ def mujoco_path(
     model = _mujoco_model(assembly, meshes, bodies, f"0 {-solver.GRAVITY} 0", time_step, friction)
     data = mujoco.MjData(model)
     moving = np.flatnonzero(assembly.moving)
-    drives = [model.joint(f"drive{i}") for i in moving]
+    drives = [] if drive.turns else [model.joint(f"drive{i}") for i in moving]
     ids = np.array([model.body(f"b{i}").id for i in range(assembly.n_blocks)])
     is_moving = np.zeros(model.nbody, dtype=bool)
     is_moving[ids[moving]] = True
@@ -149,12 +177,11 @@ def mujoco_path(
     wrench, force = np.zeros(6), np.zeros(2)
     for sample in range(10**9):
         clock = sample * per_sample * time_step - REST
-        now = speed if clock > -1e-9 else 0.0
         force[:] = 0.0
         for step in range(per_sample):
+            model.opt.gravity[:2] = drive.gravity(clock + step * time_step)
             for joint in drives:
-                data.qpos[joint.qposadr[0]] = now * (max(clock, 0.0) + step * time_step)
-                data.qvel[joint.dofadr[0]] = now
+                data.qpos[joint.qposadr[0]], data.qvel[joint.dofadr[0]] = drive.at(clock + step * time_step)
             mujoco.mj_step(model, data)
             touching = is_moving[model.geom_bodyid[data.contact.geom]]
             for k in np.flatnonzero(touching.any(axis=1)):
@@ -162,9 +189,8 @@ def mujoco_path(
                 # the frame's first axis points from the first geom to the second, on which the force acts
                 on_second = data.contact.frame[k].reshape(3, 3).T @ wrench[:3]
                 force += on_second[:2] if touching[k, 1] else -on_second[:2]
-        positions = data.xpos[ids, :2].copy()
-        displacement = float(data.qpos[drives[0].qposadr[0]])
-        yield Sample(clock + per_sample * time_step, displacement, positions, force / per_sample)
+        clock += per_sample * time_step
+        yield Sample(clock, drive.at(clock)[0], data.xpos[ids, :2].copy(), force / per_sample)
 
 
 def _mujoco_model(
@@ -201,13 +227,15 @@ def _strips(outline: np.ndarray, width: float, gap: float) -> list[np.ndarray]:
     return [np.array([[a, low], [b, low], [b, high], [a, high]]) for a, b in ends]
 
 
+def _evolution(drive: Drive, part: float, time_step: float) -> np.ndarray:
+    """Times and velocities of a component of the drive, between which LMGC90 interpolates."""
+    fast, slow, change = drive.speed * part, drive.slow * part, REST + min(drive.slow_from / drive.speed, 1e5)
+    times = [0.0, REST, REST + time_step, change, change + time_step, 1e6]
+    return np.array([times, [0.0, 0.0, fast, fast, slow, slow]])
+
+
 def lmgc90_path(
-    assembly: solver.Assembly,
-    direction: tuple[float, float],
-    speed: float,
-    time_step: float,
-    friction: float,
-    sampling: float,
+    assembly: solver.Assembly, drive: Drive, time_step: float, friction: float, sampling: float
 ) -> Iterator[Sample]:
     """LMGC90: non-smooth contact dynamics; polyhedra that cannot move out of the plane."""
     from compas_lmgc90.solver import Solver
@@ -240,11 +268,9 @@ def lmgc90_path(
         for component in held:
             engine.apply_velocity(body, component, 0.0)
         if assembly.moving[i]:
-            for component, part in zip(("Vx", "Vz"), direction, strict=True):
+            for component, part in zip(("Vx", "Vz"), drive.direction, strict=True):
                 if part:
-                    v = speed * part
-                    evolution = [[0.0, REST, REST + time_step, 1e6], [0.0, 0.0, v, v]]
-                    engine.apply_velocity(body, component, np.array(evolution))
+                    engine.apply_velocity(body, component, _evolution(drive, part, time_step))
     engine.preprocess()
     moving = np.flatnonzero(assembly.moving[owner])
     first_piece = np.searchsorted(owner, np.arange(assembly.n_blocks))
@@ -261,7 +287,7 @@ def lmgc90_path(
                 force -= on_first[np.isin(pairs[:, 1], moving)].sum(axis=0)
         moved = np.array(state.bodies)[:, [0, 2]] - start
         clock = (sample + 1) * per_sample * time_step - REST
-        displacement = float(moved[moving[0]] @ direction)
+        displacement = float(moved[moving[0]] @ drive.direction)
         yield Sample(
             clock, displacement, assembly.centroids + moved[first_piece], force * thickness / (depth * per_sample)
         )
@@ -279,8 +305,7 @@ def _report(pipe: multiprocessing.connection.Connection, name: str, given: tuple
 def in_a_process(
     name: str,
     assembly: solver.Assembly,
-    direction: tuple[float, float] | np.ndarray,
-    speed: float,
+    drive: Drive,
     time_step: float,
     friction: float,
     *,
@@ -294,7 +319,7 @@ def in_a_process(
     """
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
-    given = (assembly, direction, speed, time_step, friction)
+    given = (assembly, drive, time_step, friction)
     child = context.Process(target=_report, args=(there, name, given, sampling), daemon=True)
     child.start()
     there.close()
@@ -318,7 +343,7 @@ def _corners(assembly: solver.Assembly, block: int) -> np.ndarray:
 
 
 def mujoco_path_in_space(
-    assembly: solver.Assembly, directions: np.ndarray, speed: float, time_step: float, friction: float, sampling: float
+    assembly: solver.Assembly, drive: Drive, time_step: float, friction: float, sampling: float
 ) -> Iterator[Sample]:
     """MuJoCo with free bodies, the convex hulls of the blocks; each support moves along its row of (n_blocks, 3)."""
     import mujoco
@@ -329,7 +354,7 @@ def mujoco_path_in_space(
         meshes.append(f'<mesh name="m{i}" inertia="exact" vertex="{" ".join(f"{c:.17g}" for c in corners)}"/>')
         joints = "<freejoint/>" if assembly.free[i] else ""
         if assembly.moving[i]:
-            axis = " ".join(f"{c:.17g}" for c in directions[i])
+            axis = " ".join(f"{c:.17g}" for c in drive.direction[i])
             joints = f'<joint name="drive{i}" type="slide" axis="{axis}" armature="1e8"/>'
         place = " ".join(f"{c:.17g}" for c in assembly.centroids[i])
         gravity = "" if assembly.free[i] else ' gravcomp="1"'
@@ -343,26 +368,25 @@ def mujoco_path_in_space(
     drives = [model.joint(f"drive{i}") for i in moving]
     ids = np.array([model.body(f"b{i}").id for i in range(assembly.n_blocks)])
     ways = np.zeros((model.nbody, 3))
-    ways[ids[moving]] = directions[moving]
+    ways[ids[moving]] = drive.direction[moving]
     per_sample, wrench = max(1, round(sampling / time_step)), np.zeros(6)
     for sample in range(10**9):
         clock = sample * per_sample * time_step - REST
-        now, work = speed if clock > -1e-9 else 0.0, 0.0
+        work = 0.0
         for step in range(per_sample):
             for joint in drives:
-                data.qpos[joint.qposadr[0]] = now * (max(clock, 0.0) + step * time_step)
-                data.qvel[joint.dofadr[0]] = now
+                data.qpos[joint.qposadr[0]], data.qvel[joint.dofadr[0]] = drive.at(clock + step * time_step)
             mujoco.mj_step(model, data)
             first, second = ways[model.geom_bodyid[data.contact.geom]].transpose(1, 0, 2)
             for k in np.flatnonzero((np.abs(first) + np.abs(second)).any(axis=1)):
                 mujoco.mj_contactForce(model, data, k, wrench)
                 work += float((second[k] - first[k]) @ (data.contact.frame[k].reshape(3, 3).T @ wrench[:3]))
-        displacement = float(data.qpos[drives[0].qposadr[0]])
-        yield Sample(clock + per_sample * time_step, displacement, data.xpos[ids].copy(), np.array([work / per_sample]))
+        clock += per_sample * time_step
+        yield Sample(clock, drive.at(clock)[0], data.xpos[ids].copy(), np.array([work / per_sample]))
 
 
 def lmgc90_path_in_space(
-    assembly: solver.Assembly, directions: np.ndarray, speed: float, time_step: float, friction: float, sampling: float
+    assembly: solver.Assembly, drive: Drive, time_step: float, friction: float, sampling: float
 ) -> Iterator[Sample]:
     """LMGC90 with free polyhedra; each support moves along its row of (n_blocks, 3)."""
     from compas_lmgc90.solver import Solver
@@ -374,14 +398,12 @@ def lmgc90_path_in_space(
     for i in np.flatnonzero(~assembly.free):
         for component in ("Vx", "Vy", "Vz", "Rx", "Ry", "Rz"):
             engine.apply_velocity(int(i), component, 0.0)
-        for component, part in zip(("Vx", "Vy", "Vz"), directions[i], strict=True):
+        for component, part in zip(("Vx", "Vy", "Vz"), drive.direction[i], strict=True):
             if assembly.moving[i] and abs(part) > 1e-12:
-                v = speed * part
-                evolution = [[0.0, REST, REST + time_step, 1e6], [0.0, 0.0, v, v]]
-                engine.apply_velocity(int(i), component, np.array(evolution))
+                engine.apply_velocity(int(i), component, _evolution(drive, part, time_step))
     engine.preprocess()
     start, moving = np.array(engine.init_coor), np.flatnonzero(assembly.moving)
-    ways = np.where(assembly.moving[:, None], directions, 0.0)
+    ways = np.where(assembly.moving[:, None], drive.direction, 0.0)
     per_sample = max(1, round(sampling / time_step))
     for sample in range(10**9):
         work = 0.0
@@ -393,7 +415,7 @@ def lmgc90_path_in_space(
                 work += float((forces * (ways[first] - ways[second])).sum())
         moved = np.array(state.bodies) - start
         clock = (sample + 1) * per_sample * time_step - REST
-        displacement = float(moved[moving[0]] @ directions[moving[0]])
+        displacement = float(moved[moving[0]] @ drive.direction[moving[0]])
         yield Sample(clock, displacement, assembly.centroids + moved, np.array([work / per_sample]))
 
 

@@ -20,7 +20,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from physics_engines import ENGINES, SAMPLING
+from physics_engines import ENGINES, SAMPLING, Drive
 
 import solver
 from blockvis.generators import catalogue
@@ -103,7 +103,7 @@ def beside(name: str, wall: Wall, references: Sequence[tuple[float, ...]], chose
     friction = wall.interfaces.default.friction_coefficient
     direction = wall.direction / np.linalg.norm(wall.direction)
     for engine, time_step in product(chosen.engines, chosen.time_step):
-        given = (wall.assembly, tuple(direction), chosen.speed, time_step, friction)
+        given = (wall.assembly, Drive(tuple(direction), chosen.speed), time_step, friction)
         started = time.process_time()
         seen: list[tuple[float, float]] = []
         for sample in ENGINES[engine](*given, SAMPLING):

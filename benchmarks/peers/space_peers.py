@@ -134,7 +134,9 @@ def spreading_dome(engines: list[str], speeds: list[float], budget: float) -> No
     for name in engines:
         for speed in speeds:
             samples, spent, fallen = [], 0.0, False
-            path = physics_engines.in_a_process(name, stones, ways, speed, TIME_STEP, DOME_FRICTION, budget=budget)
+            path = physics_engines.in_a_process(
+                name, stones, physics_engines.Drive(ways, speed), TIME_STEP, DOME_FRICTION, budget=budget
+            )
             for so_far, sample in path:
                 spent, d = so_far, sample.displacement
                 sunk = stones.centroids[cap, 2] - float(sample.positions[cap, 2])
@@ -178,7 +180,9 @@ def sinking_corner(engines: list[str], budget: float) -> None:
     ways = sink.rate(walls, solver.Pose.initial(walls), 0.0)[:, :3]
     for name in engines:
         samples, spent = [], 0.0
-        path = physics_engines.in_a_process(name, walls, ways, SINKING_SPEED, TIME_STEP, WALL_FRICTION, budget=budget)
+        path = physics_engines.in_a_process(
+            name, walls, physics_engines.Drive(ways, SINKING_SPEED), TIME_STEP, WALL_FRICTION, budget=budget
+        )
         for so_far, sample in path:
             spent = so_far
             samples.append((sample.displacement, float(sample.force[0]) / weight))

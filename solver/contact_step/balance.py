@@ -215,7 +215,8 @@ def nearest_equilibrium(
     best, part = (point.residual, point.forces), 1.0
     for _ in range(ITERATIONS):
         converged = point.residual < BALANCED and point.mean < CONVERGED * max(1.0, float(point.forces[:, 0].max()))
-        if converged or part < 1e-6:
+        # What is out of balance then stays so: a reaction that the forces have only to their own digits.
+        if converged or part < 1e-6 or point.mean == 0.0:
             break
         try:
             point.factorise()

@@ -255,11 +255,13 @@ class Path:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
         place = state.place
         resting = place if self._in_equilibrium(place) else self.fall.relaxed(place)
-        if resting is None:
+        is_far = resting is not None and self.fall.movements(place, resting).max() > JUMP
+        # Blocks that rest far away may have left an equilibrium in a step that was too long.
+        if resting is None or (is_far and state.refine_until < place.s):
             self.state = self._go_back(state, place.s)
             return
         ended = place.s >= self.driver.limit * (1.0 - 1e-12)
-        if self.fall.movements(place, resting).max() > JUMP:
+        if is_far:
             state = self._continue_from(state, resting)
         self.state = state = replace(state, history=(replace(resting, works=place.works),), ended=ended)
         yield self._report(state, self._check(resting, self._reaction(place)))

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "peers" / "peers.py"
+PEERS = Path(__file__).parents[2] / "benchmarks" / "peers"
+SCRIPT = PEERS / "peers.py"
 
 
 def _printed(*options):
@@ -35,3 +36,21 @@ def test_a_peer_that_is_missing_is_named():
     printed, rows = _printed("--questions", "2")
     assert [f"{name}: not installed" for name in missing] == [x for x in printed.splitlines() if "not installed" in x]
     assert len(rows) == 4
+
+
+@pytest.mark.slow
+def test_walls_beside_engines_are_kept_and_tabulated(tmp_path):
+    """What ran is a line of the file, which is not run again; the table has the exact value and how far ours is off."""
+    walls = [sys.executable, str(PEERS / "walls.py"), str(tmp_path / "runs.jsonl")]
+    for _ in range(2):
+        done = subprocess.run(
+            [*walls, "--walls", "flat arch", "--engines"], capture_output=True, text=True, timeout=300, check=True
+        )
+    assert not done.stdout
+    table = subprocess.run([*walls, "--table"], capture_output=True, text=True, timeout=300, check=True).stdout
+    cells = [cell.strip() for cell in table.splitlines()[2].strip("|").split("|")]
+    assert cells[:3] == ["flat arch of two blocks, supports spread", "2", "0.0616 m"]
+    found, apart = cells[3].split(" m (")
+    assert float(found) == pytest.approx(0.0615528, rel=3e-3)
+    assert float(apart.split()[0]) == pytest.approx(0, abs=0.3)
+    assert cells[4:] == ["–", "–", "–"]

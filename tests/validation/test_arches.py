@@ -109,3 +109,15 @@ def test_minimum_thickness_of_the_semicircle(n, thinnest):
 
     assert stands(thinnest * 1.005)
     assert not stands(thinnest * 0.97)
+
+
+@pytest.mark.slow
+def test_pointed_arch_keeps_the_hinge_at_its_apex():
+    """As engines and long increments do; a step that was too long ended on an equilibrium afar, at 0.26 m."""
+    arch = generators.pointed_arch()
+    spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.28)
+    response = solver.settle(arch, spread, friction_coefficient=0.7)
+    assert not response.notes
+    rotations = response.path[-1].pose.rotations[arch.free, 0]
+    assert rotations == pytest.approx(-rotations[::-1], abs=1e-3)
+    assert rotations.min() == pytest.approx(-0.1192, abs=1e-3)
