@@ -309,11 +309,8 @@ class Path:
         refining = enclosing or place.s < state.refine_until
         length = self._length(state, target)
         try:
-            strength = np.inf
-            if length > FIRST_STEP * unit:
-                strength = REFUSED * self.largest_lag * self.stepper.weight
             viscosity = REFINED if refining else 1.0
-            new, motion, error = self.stepper.step(place, length, viscosity=viscosity, strength=strength)
+            new, motion, error = self.stepper.step(place, length, viscosity=viscosity)
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))
         if self._may_be_wedged(new, error):
@@ -322,8 +319,7 @@ class Path:
                 return state, Outcome.LOCKED
             if error.penetration > WEDGED and length > FIRST_STEP * unit:
                 return replace(state, step=length / 3.0), None
-        lag = error.lag + self.stepper.mortar.lost(place, new) / self.stepper.weight
-        measure = max(lag / self.largest_lag, error.turn / self.largest_turn)
+        measure = max(error.lag / self.largest_lag, error.turn / self.largest_turn)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
         if not self._is_on_path(new, error, length, refining):
