@@ -16,10 +16,6 @@ from .state import Bonds, Place
 #: Opening and slip, in block sizes, over which a brittle point loses its strength: small, but no rounding.
 BRITTLE = 1e-6
 
-#: Part of the largest opening or slip of points that break from which on they break first: what they hand on may spare
-#: the others, or break them next.
-FIRST = 0.5
-
 #: Distance, in block sizes, up to which a point takes over the bond of one that has vanished.
 NEAR = 1e-2
 
@@ -65,21 +61,14 @@ class JointPoints:
         """(n,) array [m]: gaps, (n,) array [m], beyond the give of joints under these normal forces."""
         return np.asarray(gaps - self.rest + self.length * (self.give[:, 0] * normal))
 
-    def after(self, moved: np.ndarray) -> JointPoints:
-        """The points after a step in which they opened and slipped, (n, 2) array in block sizes.
+    def after(self, moved: np.ndarray, before: JointPoints) -> JointPoints:
+        """The points once they have opened and slipped, (n, 2) array in block sizes, in a step from those before.
 
         Opening counts beyond the give of the joint at its strength, slip from the start of the step.
         """
         opened, slipped = (moved / self.fracture).T
-        left = np.minimum(self.left - slipped, 1.0 - opened)
+        left = np.minimum(before.left - slipped, 1.0 - opened)
         return replace(self, left=np.clip(left, 0.0, self.left))
-
-    def broken(self, moved: np.ndarray) -> JointPoints | None:
-        """The points without the strength of those that such a step breaks first; None where it breaks none."""
-        breaks, size = (self.left > 0.0) & (self.after(moved).left == 0.0), moved.max(axis=1, initial=0.0)
-        if not breaks.any():
-            return None
-        return replace(self, left=np.where(breaks & (size >= FIRST * size[breaks].max()), 0.0, self.left))
 
 
 class Mortar:

@@ -74,7 +74,8 @@ class StepError:
     Attributes
     ----------
     lag : float
-        Change of the friction bounds of joints at their sliding points, in weights of the structure.
+        Change of the friction bounds of joints at their sliding points, and cohesion that is lost, in weights of the
+        structure.
     turn : float
         Change of the movement against that of the steps before, in block sizes.
     moved : float
@@ -388,10 +389,10 @@ class Stepper:
             number += 1
             if number == LINEARISATIONS or (residual <= 1.0 and control_error <= EXACT):
                 # What breaks hands its forces to the others in the same step, from where they are.
-                weaker = points.joints.broken(points.moved(trial))
-                if weaker is None:
+                left = points.joints.after(points.moved(trial), joints)
+                if not ((left.left == 0.0) & (points.joints.left > 0.0)).any():
                     break
-                points, guess, number = self._with_joints(points, weaker), None, 0
+                points, guess, number = self._with_joints(points, left), None, 0
         if not np.isfinite(motion_so_far).all():
             raise NotSolved("the movement is not finite")
         movement_size = float(np.abs(motion_so_far).max(initial=0.0))
@@ -402,6 +403,7 @@ class Stepper:
         share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
         gap = joints.beyond_give(contacts.gaps, forces[:, 0])
         lag, followed = self._updated_bounds(contacts, gap, forces, points, share)
+        lag += float((joints.cohesion - left.cohesion).sum()) / self.weight
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
         lengths = self.members.after(contacts, forces, place.tie_lengths)
@@ -415,7 +417,7 @@ class Stepper:
             multiplier / (live_size or 1.0),
             velocity,
             tie_lengths=lengths,
-            bonds=self.mortar.bonds(place, start, points.joints.after(points.moved(trial)).left),
+            bonds=self.mortar.bonds(place, start, left.left),
         )
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
