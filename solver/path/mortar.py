@@ -9,9 +9,10 @@ import numpy as np
 from solver.geometry.contacts import Contacts, matched_contacts, successors
 from solver.program.model import Model
 from solver.program.strength import largest_tension
+from solver.results.increment import Bonds
 from solver.tolerances import COMPUTED_GAP
 
-from .state import Bonds, Place
+from .state import Place
 
 #: Opening and slip, in block sizes, over which a brittle point loses its strength: small, but no rounding.
 BRITTLE = 1e-6
@@ -130,12 +131,16 @@ class Mortar:
             length=model.length,
         )
 
-    def intact(self, place: Place, contacts: Contacts) -> np.ndarray:
-        """(n,) array: part of the strength of contact points that is left; empty where none had any."""
+    def told(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) arrays: part of the strength of contact points that is left, and of the joint [m²] that has it.
+
+        Empty where no joint had any.
+        """
         if not any(law.bonds for law in self.model.interfaces.laws):
-            return np.zeros(0)
-        joints = self.points(place, contacts)
-        return np.where(joints.cohesion > 0.0, joints.left, 0.0)
+            return np.zeros(0), np.zeros(0)
+        joints, bonds = self.points(place, contacts), self.renamed(place, contacts).bonds
+        intact, areas = np.where(joints.cohesion > 0.0, joints.left, 0.0), replace(bonds, left=np.ones(len(bonds)))
+        return intact, np.where(intact > 0.0, areas.areas_left(contacts), 0.0)
 
     def renamed(self, place: Place, contacts: Contacts) -> Place:
         """The place with its bonds at these contact points: one that vanishes passes its bond to the nearest ones."""

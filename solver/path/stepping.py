@@ -25,6 +25,7 @@ from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.program.model import Model
 from solver.program.strength import ForceLimits
+from solver.results.increment import Bonds
 from solver.ties import TieForces, is_member
 from solver.tolerances import COMPLIANCE, FRICTION_MEMORY, IMPERFECTION, SHEAR_COMPLIANCE, VELOCITY_MEMORY, VISCOSITY
 
@@ -177,9 +178,12 @@ class Stepper:
             imperfection = model.imperfection * IMPERFECTION
             self.imperfection[:, :d] = imperfection * self.weights[:, :1] * support_motion / size
 
-    def unloaded(self, pose: Pose, phase: int, ties_at: TieForces | None = None) -> Place:
+    def unloaded(
+        self, pose: Pose, phase: int, ties_at: TieForces | None = None, bonds_at: Bonds | None = None
+    ) -> Place:
         """Return the place of a pose without forces, with the members of a phase, from 0, and all joints whole."""
-        return self.whole(self.members.installed(Place.unloaded(pose), phase, ties_at))
+        place = self.members.installed(Place.unloaded(pose), phase, ties_at)
+        return self.whole(place) if bonds_at is None else replace(place, bonds=bonds_at)
 
     def whole(self, place: Place) -> Place:
         """Return the place with mortar in all closed joints."""
