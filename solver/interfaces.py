@@ -209,6 +209,11 @@ class Interfaces:
         if any(law.crushes for law in self.laws):
             raise ValueError(f"crushing along the path of {analysis} is not followed; leave compressive_strength out")
 
+    def refuse_elastic(self, what: str) -> None:
+        """Raise ``ValueError`` for stiffness of joints where only rigid ones are known."""
+        if self.ground or any(law.elastic for law in self.laws):
+            raise ValueError(f"{what} knows rigid joints only; leave normal_stiffness and shear_stiffness out")
+
     def refuse_mortar(self, what: str) -> None:
         """Raise ``ValueError`` for strength or stiffness of joints where only dry rigid ones are known."""
         if self.mortar:

@@ -19,7 +19,7 @@ from .loads import Loads, Settlement, checked_loads, weight_fraction
 from .path.controls import Controls
 from .path.drivers import ControlDisplacement
 from .phases import PhaseChange
-from .results.increment import Increment
+from .results.increment import Bonds, Increment
 from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, Quantity, reaction_to, settlement_in
 from .results.response import Control, Envelope, LimitLoad, Response
 from .ties import Tie, TieForces
@@ -149,6 +149,7 @@ class Structure(Shown):
         controls: Controls | None = None,
         pose: Pose | None = None,
         ties_at: TieForces | None = None,
+        bonds_at: Bonds | None = None,
         on_increment: Callable[[Increment], None] | None = None,
     ) -> Response:
         """Follow the structure under growing displacement from its limit load down to where it carries none.
@@ -163,6 +164,9 @@ class Structure(Shown):
             Where to start, for instance after a settlement; the drawing by default. Displacements count from there.
         ties_at : TieForces, optional
             ``ties`` of the increment that the pose is from; new ones by default.
+        bonds_at : Bonds, optional
+            ``bonds`` of that increment: the strength that joints have left, without which a pose with cohesion is
+            refused.
         on_increment : callable, optional
             Called with every :class:`Increment` as it is found.
 
@@ -193,6 +197,7 @@ class Structure(Shown):
             pose=pose,
             ties=self.ties,
             ties_at=ties_at,
+            bonds_at=bonds_at,
         )
         found = increments.all(on_increment)
         return self._response(increments, found, "pushover", CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, control=control)
@@ -208,6 +213,7 @@ class Structure(Shown):
         overlap_tolerance: float | None = None,
         torsion: str = "points",
         ties_at: TieForces | None = None,
+        bonds_at: Bonds | None = None,
     ) -> LimitLoad:
         """Find the largest multiplier of the live loads at which the structure can be in equilibrium.
 
@@ -237,6 +243,8 @@ class Structure(Shown):
         ties_at : TieForces, optional
             ``ties`` of the increment that the pose is from, which tell what is broken; by default all carry up to
             their strength.
+        bonds_at : Bonds, optional
+            ``bonds`` of that increment: the strength that joints have left; by default closed ones have all of it.
 
         Returns
         -------
@@ -269,6 +277,7 @@ class Structure(Shown):
             torsion=torsion,
             ties=self.ties,
             ties_at=ties_at,
+            bonds_at=bonds_at,
         )
         return replace(found, analysed=(self.assembly, self.interfaces, under.loads, self.ties))
 

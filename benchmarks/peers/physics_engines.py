@@ -12,8 +12,8 @@ import importlib
 import multiprocessing
 import multiprocessing.connection
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from math import cos, inf, sin
 from typing import Any
@@ -80,12 +80,15 @@ class Sample:
         Centroids.
     force : (2,) array [N]
         Of the structure on the moving supports, mean since the last sample.
+    ties : (n_ties,) array [N]
+        Their tension, mean since the last sample.
     """
 
     time: float
     displacement: float
     positions: np.ndarray
     force: np.ndarray
+    ties: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 def pymunk_path(
@@ -136,9 +139,17 @@ def pymunk_path(
 
 
 def mujoco_path(
-    assembly: solver.Assembly, drive: Drive, time_step: float, friction: float, sampling: float
+    assembly: solver.Assembly,
+    drive: Drive,
+    time_step: float,
+    friction: float,
+    sampling: float,
+    ties: Sequence[solver.Tie] = (),
 ) -> Iterator[Sample]:
-    """MuJoCo: convex contact optimisation; prisms whose bodies have the three joints of plane motion."""
+    """MuJoCo: convex contact optimisation; prisms whose bodies have the three joints of plane motion.
+
+    Ties are spatial tendons that pull only; what yields at its strength has its length without force moved on.
+    """
     import mujoco
 
     meshes, bodies = [], []
@@ -164,10 +175,17 @@ def mujoco_path(
         gravity = "" if assembly.free[i] else ' gravcomp="1"'
         bodies.append(
             f'<body name="b{i}" pos="{x:.17g} {y:.17g} 0"{gravity}>{joints}'
-            f'<geom type="mesh" mesh="m{i}" contype="1" conaffinity="{meets}"/></body>'
+            f'<geom type="mesh" mesh="m{i}" contype="1" conaffinity="{meets}"/>{_sites(assembly, ties, i)}</body>'
         )
-    model = _mujoco_model(assembly, meshes, bodies, f"0 {-solver.GRAVITY} 0", time_step, friction)
+    tendons = "".join(
+        f'<spatial stiffness="{tie.stiffness:.17g}" springlength="0 {np.ptp(tie.points, axis=0) @ _along(tie):.17g}">'
+        f'<site site="t{k}a"/><site site="t{k}b"/></spatial>'
+        for k, tie in enumerate(ties)
+    )
+    model = _mujoco_model(assembly, meshes, bodies, f"0 {-solver.GRAVITY} 0", time_step, friction, tendons)
     data = mujoco.MjData(model)
+    stiffness, strength = (np.array([getattr(tie, what) for tie in ties]) for what in ("stiffness", "strength"))
+    pulled = np.zeros(len(ties))
     moving = np.flatnonzero(assembly.moving)
     drives = [] if drive.turns else [model.joint(f"drive{i}") for i in moving]
     ids = np.array([model.body(f"b{i}").id for i in range(assembly.n_blocks)])
@@ -177,12 +195,16 @@ def mujoco_path(
     wrench, force = np.zeros(6), np.zeros(2)
     for sample in range(10**9):
         clock = sample * per_sample * time_step - REST
-        force[:] = 0.0
+        force[:], pulled[:] = 0.0, 0.0
         for step in range(per_sample):
             model.opt.gravity[:2] = drive.gravity(clock + step * time_step)
             for joint in drives:
                 data.qpos[joint.qposadr[0]], data.qvel[joint.dofadr[0]] = drive.at(clock + step * time_step)
             mujoco.mj_step(model, data)
+            if ties:
+                rest = model.tendon_lengthspring[:, 1]
+                pulled += np.clip(stiffness * (data.ten_length - rest), 0.0, strength)
+                rest[:] = np.maximum(rest, data.ten_length - strength / stiffness)
             touching = is_moving[model.geom_bodyid[data.contact.geom]]
             for k in np.flatnonzero(touching.any(axis=1)):
                 mujoco.mj_contactForce(model, data, k, wrench)
@@ -190,11 +212,30 @@ def mujoco_path(
                 on_second = data.contact.frame[k].reshape(3, 3).T @ wrench[:3]
                 force += on_second[:2] if touching[k, 1] else -on_second[:2]
         clock += per_sample * time_step
-        yield Sample(clock, drive.at(clock)[0], data.xpos[ids, :2].copy(), force / per_sample)
+        yield Sample(clock, drive.at(clock)[0], data.xpos[ids, :2].copy(), force / per_sample, pulled / per_sample)
+
+
+def _along(tie: solver.Tie) -> np.ndarray:
+    """(2,) array: absolute parts of the direction of a tie."""
+    span = np.ptp(tie.points, axis=0)
+    return np.asarray(span / np.linalg.norm(span))
+
+
+def _sites(assembly: solver.Assembly, ties: Sequence[solver.Tie], block: int) -> str:
+    """The ends of ties that a block holds."""
+    ends = ((k, end, tie.points[e]) for k, tie in enumerate(ties) for e, end in enumerate("ab") if tie.blocks[e] == block)
+    at = ((k, end, np.asarray(point) - assembly.centroids[block]) for k, end, point in ends)
+    return "".join(f'<site name="t{k}{end}" pos="{x:.17g} {y:.17g} 0"/>' for k, end, (x, y) in at)
 
 
 def _mujoco_model(
-    assembly: solver.Assembly, meshes: list[str], bodies: list[str], gravity: str, time_step: float, friction: float
+    assembly: solver.Assembly,
+    meshes: list[str],
+    bodies: list[str],
+    gravity: str,
+    time_step: float,
+    friction: float,
+    tendons: str = "",
 ) -> Any:
     import mujoco
 
@@ -208,7 +249,8 @@ def _mujoco_model(
           <flag nativeccd="enable"/></option>
         <default><geom condim="3" friction="{friction} 0 0" density="{density}"
                  solref="{2 * time_step} 1" solimp="0.99 0.9999 1e-5"/></default>
-        <asset>{"".join(meshes)}</asset><worldbody>{"".join(bodies)}</worldbody></mujoco>"""
+        <asset>{"".join(meshes)}</asset><worldbody>{"".join(bodies)}</worldbody>
+        <tendon>{tendons}</tendon></mujoco>"""
     )
     # several contact points where faces meet: to be asked for up to some version, the default in later ones
     model.opt.enableflags |= int(getattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD", 0))
@@ -235,9 +277,17 @@ def _evolution(drive: Drive, part: float, time_step: float) -> np.ndarray:
 
 
 def lmgc90_path(
-    assembly: solver.Assembly, drive: Drive, time_step: float, friction: float, sampling: float
+    assembly: solver.Assembly,
+    drive: Drive,
+    time_step: float,
+    friction: float,
+    sampling: float,
+    strength: tuple[float, float] | None = None,
 ) -> Iterator[Sample]:
-    """LMGC90: non-smooth contact dynamics; polyhedra that cannot move out of the plane."""
+    """LMGC90: non-smooth contact dynamics; polyhedra that cannot move out of the plane.
+
+    With a tensile strength and a cohesion [Pa] by its brittle law of Mohr and Coulomb.
+    """
     from compas_lmgc90.solver import Solver
 
     # its search for neighbours ends the process where blocks are much longer than wide: a slice of the wall will do
@@ -261,7 +311,10 @@ def lmgc90_path(
             owners.append(i)
     owner = np.array(owners)
     engine.geometry_from_v_f(blocks)
-    engine.contact_law("IQS_CLB", friction, alert=reach)
+    law, numbers = "IQS_CLB", [friction]
+    if strength is not None:
+        law, numbers = "IQS_MOHR_DS_CLB", [*strength, friction, friction]
+    engine.contact_law(law, numbers, alert=reach)
     for body, i in enumerate(owners):
         # rotations are about the principal axes of a block, in LMGC90's own order: those of free blocks are left alone
         held = ("Vy",) if assembly.free[i] else ("Vx", "Vy", "Vz", "Rx", "Ry", "Rz")
@@ -293,12 +346,18 @@ def lmgc90_path(
         )
 
 
-def _report(pipe: multiprocessing.connection.Connection, name: str, given: tuple[Any, ...], sampling: float) -> None:
+def _report(
+    pipe: multiprocessing.connection.Connection,
+    name: str,
+    given: tuple[Any, ...],
+    sampling: float,
+    options: dict[str, Any],
+) -> None:
     """The child's work: sends (processor time, sample) until somebody ends it."""
     importlib.import_module(name)
     pipe.send((0.0, None))
     started = time.process_time()
-    for sample in (ENGINES if given[0].dimension == 2 else IN_SPACE)[name](*given, sampling):
+    for sample in (ENGINES if given[0].dimension == 2 else IN_SPACE)[name](*given, sampling, **options):
         pipe.send((time.process_time() - started, sample))
 
 
@@ -311,6 +370,7 @@ def in_a_process(
     *,
     budget: float,
     sampling: float = SAMPLING,
+    **options: Any,
 ) -> Iterator[tuple[float, Sample]]:
     """Runs an engine in a process of its own, since LMGC90 ends its process where something is wrong.
 
@@ -320,7 +380,7 @@ def in_a_process(
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
     given = (assembly, drive, time_step, friction)
-    child = context.Process(target=_report, args=(there, name, given, sampling), daemon=True)
+    child = context.Process(target=_report, args=(there, name, given, sampling, options), daemon=True)
     child.start()
     there.close()
     try:

@@ -302,6 +302,16 @@ def needs_no_crushing(case: Case) -> None:
         raise ValueError(f"{case.source}: {error}") from None
 
 
+def needs_rigid_joints(case: Case, what: str) -> None:
+    """Raise ValueError where a joint of a case, or the ground under a support, gives and stays so, or crushes."""
+    interfaces = _interfaces(case)
+    try:
+        interfaces.refuse_elastic(what)
+        interfaces.refuse_crushing(what)
+    except ValueError as error:
+        raise ValueError(f"{case.source}: {error}") from None
+
+
 def needs_dry_joints(case: Case, what: str) -> None:
     """Raise ValueError where a joint of a case has strength but friction, or stiffness."""
     interfaces = _interfaces(case)

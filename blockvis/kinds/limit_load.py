@@ -28,6 +28,7 @@ from .kind import (
     RunInput,
     Steps,
     needs_dry_joints,
+    needs_rigid_joints,
     needs_live_load,
     without_increments,
 )
@@ -141,7 +142,9 @@ class LimitLoadKind(AnalysisKind):
         """Check the keys, and let the last settlement stop where limit loads are wanted."""
         needs_live_load(case)
         if case.settlements:
-            needs_dry_joints(case, "a limit load after a settlement")
+            needs_rigid_joints(case, "a limit load after a settlement")
+            if any(load.positions for load in case.loads):
+                needs_dry_joints(case, "a moving load after a settlement")
         settings: LimitLoadSettings = case.settings
         if settings.displacement is not None and not case.settlements:
             raise _displacement_without_settlement(case)
@@ -462,6 +465,7 @@ def _limit_state(
         limit = solver.Structure(assembly, run.given.interfaces, loads, ties=run.given.ties).limit_load(
             pose=pose,
             ties_at=ties if at is None else at.ties,
+            bonds_at=None if at is None else at.bonds,
             flow=case.settings.flow,
             torsion=case.settings.torsion,
             displacement=_displacement(case, assembly),

@@ -25,6 +25,7 @@ from .kind import (
     Steps,
     needs_live_load,
     needs_no_crushing,
+    needs_rigid_joints,
     without_increments,
 )
 from .settlement import not_reached, settlement_steps
@@ -81,6 +82,8 @@ class PushoverKind(AnalysisKind):
         """Check that the keys of a case fit together."""
         needs_live_load(case)
         needs_no_crushing(case)
+        if case.settlements:
+            needs_rigid_joints(case, "a pushover after a settlement")
         if case.settings is None:
             raise ValueError(
                 f'{case.source}: [control] is missing; a pushover needs the displacement that grows, block = "..." and '
@@ -178,13 +181,13 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
 
 def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechanics.PathState | None) -> Steps:
     case = given.case
-    pose, ties_at = None, None
+    pose, ties_at, bonds_at = None, None, None
     # A pushover that has begun has its settlement behind it.
     steps = settlement_steps(given, whole=True) if resume is None else without_increments()
     for increment in steps:
         if increment.status == solver.Status.FALLING:
             yield replace(increment, parameter=0.0, measured=increment.load_multiplier, phase=0)
-        pose, ties_at = increment.pose, increment.ties
+        pose, ties_at, bonds_at = increment.pose, increment.ties, increment.bonds
     if steps.ending.stop is not solver.Status.LIMIT_REACHED:
         return not_reached(steps.ending, "nothing is left to push over")
     try:
@@ -197,6 +200,7 @@ def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechani
             pose=pose,
             ties=given.ties,
             ties_at=ties_at,
+            bonds_at=bonds_at,
             resume=resume,
             on_step=given.step,
         )

@@ -24,7 +24,7 @@ from solver.program.without_dilatancy import solve_without_dilatancy
 from solver.programs.problem import Unbounded
 from solver.programs.solve import solve_between
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
-from solver.results.increment import State
+from solver.results.increment import Bonds, State
 from solver.results.response import LimitLoad, LimitStatus, limit_state
 from solver.ties import (
     ABSENT,
@@ -75,6 +75,7 @@ def find_limit_load(
     torsion: str = POINTS,
     ties: Sequence[Tie] = (),
     ties_at: TieForces | None = None,
+    bonds_at: Bonds | None = None,
 ) -> LimitLoad:
     """The limit load of a structure; parameters as those of :meth:`solver.Structure.limit_load`.
 
@@ -121,13 +122,17 @@ def find_limit_load(
     _check_options(assembly, flow, torsion, displacement, ties)
     check_blocks(assembly, overlap_tolerance)
     check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
+    if bonds_at is not None:
+        interfaces.refuse_elastic("a limit load with the strength that a settlement has left")
     loads = checked_live(assembly, loads)
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
     loads = replace(loads, dead=loads.dead_at(assembly, pose), fills=())
     states = np.full(len(ties), ELASTIC) if ties_at is None else ties_at.states
-    problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap, displacement, torsion, tuple(ties), states)
+    problem = _Problem.stated(
+        assembly, interfaces, loads, pose, closed_gap, displacement, torsion, tuple(ties), states, bonds_at
+    )
     balanced, status = problem.balanced(with_live=False), LimitStatus.FOUND
     if balanced.falls:
         falling, status = balanced, LimitStatus.HELD
@@ -212,13 +217,15 @@ class _Problem:
         torsion: str,
         ties: tuple[Tie, ...],
         tie_states: np.ndarray,
+        bonds: Bonds | None,
     ) -> _Problem:
         length, free = assembly.block_size, assembly.free
         reach = max(closed_gap, REACH * length) if displacement > 0.0 else closed_gap
         vertices = moved_vertices(assembly, pose)
         contacts = find_contacts(assembly, vertices, reach)
         around = contacts if interfaces.dry else find_contacts(assembly, vertices, max(reach, REACH * length))
-        cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around)
+        bonded = None if bonds is None else bonds.areas_left(contacts)
+        cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around, bonded)
         friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         there = ~np.isin(tie_states, (ABSENT, BROKEN))
         if there.any():

@@ -14,7 +14,7 @@ from solver.path.path import Path
 from solver.path.state import PathState
 from solver.program.model import Model
 from solver.programs.problem import SolveError
-from solver.results.increment import Increment, Status
+from solver.results.increment import Bonds, Increment, Status
 from solver.ties import Tie, TieForces, check_ties
 
 from .increments import Increments, TimedIncrements
@@ -32,6 +32,7 @@ def pushover_increments(
     pose: Pose | None = None,
     ties: Sequence[Tie] = (),
     ties_at: TieForces | None = None,
+    bonds_at: Bonds | None = None,
     resume: PathState | None = None,
     on_step: Callable[[PathState], None] | None = None,
 ) -> Increments:
@@ -41,6 +42,8 @@ def pushover_increments(
     ----------
     ties_at : TieForces, optional
         Of the increment that the pose is from; new ones by default.
+    bonds_at : Bonds, optional
+        Of that increment: the strength that joints have left; joints that have some need it.
     resume : PathState, optional
         Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
         for bit as if the loop had not been interrupted. ``pose`` is not looked at then.
@@ -54,7 +57,12 @@ def pushover_increments(
     check_blocks(assembly, controls.overlap_tolerance)
     interfaces.refuse_crushing("a pushover")
     if pose is not None:
-        interfaces.refuse_mortar("a pushover from a given pose")
+        interfaces.refuse_elastic("a pushover from a given pose")
+    if pose is not None and bonds_at is None and any(law.bonds for law in interfaces.laws):
+        raise ValueError(
+            "joints have cohesion, of which a pose does not tell what is left; give bonds_at, the bonds of the increment "
+            "that the pose is from"
+        )
     loads = checked_live(assembly, loads)
     if not assembly.free[assembly.index(control.block)]:
         raise ValueError(f"control block '{control.block}' is a support; name a free block")
@@ -65,7 +73,7 @@ def pushover_increments(
         )
     check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
     model = model_of(assembly, loads, interfaces, controls, loads.live, tuple(ties))
-    return TimedIncrements(_increments(model, control, controls, pose, ties_at, resume, on_step))
+    return TimedIncrements(_increments(model, control, controls, pose, ties_at, bonds_at, resume, on_step))
 
 
 def _increments(
@@ -74,6 +82,7 @@ def _increments(
     controls: Controls,
     pose: Pose | None,
     ties_at: TieForces | None,
+    bonds_at: Bonds | None,
     resume: PathState | None,
     on_step: Callable[[PathState], None] | None,
 ) -> Generator[Increment, None, Ending]:
@@ -83,7 +92,7 @@ def _increments(
     path = Path(model, ControlledLoad(model.assembly, control, start), 0, controls, on_step)
     at = 0.0
     try:
-        state = path.begin(start, ties_at=ties_at) if resume is None else resume
+        state = path.begin(start, ties_at=ties_at, bonds_at=bonds_at) if resume is None else resume
         at = state.place.s
         return (yield from path.follow(state, resume is not None))
     except SolveError as error:

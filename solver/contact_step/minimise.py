@@ -36,7 +36,6 @@ def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplie
     if len(problem.gap) == 0:
         motion = problem.load / problem.viscosity - problem.motion_so_far
         return StepSolution(motion, problem.forces, problem.forces, multiplier, 0)
-    trial = problem.trial(np.zeros_like(problem.load)) if trial is None else trial
     try:
         solution, iterations = newton(problem, trial, multiplier)
         if solution is None:
@@ -46,11 +45,13 @@ def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplie
     return replace(solution, factorisations=iterations + solution.factorisations)
 
 
-def newton(problem: ContactProblem, trial: np.ndarray, multiplier: float) -> tuple[StepSolution | None, int]:
+def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float) -> tuple[StepSolution | None, int]:
     """Semismooth Newton steps from trial forces: the solution, None where they lead too far, and factorisations."""
     motion = np.zeros_like(problem.load)
     # The first linear problem is that of the given trial forces, at the start.
-    stiffness, start = problem.stiffness(trial), problem.trial(motion)
+    start, from_start = problem.trial(motion), trial is None
+    trial = start if trial is None else trial
+    stiffness = problem.stiffness(trial)
     forces = problem.projected(trial) + np.einsum("nij,nj->ni", stiffness, (start - trial) * problem.compliance)
     unbalanced = problem.unbalanced(motion, forces, multiplier)
     status, is_new, factorisations, part = problem.status(trial), True, 0, 1.0
@@ -59,7 +60,7 @@ def newton(problem: ContactProblem, trial: np.ndarray, multiplier: float) -> tup
             solve = problem.rows.factorised(problem.stiffness(trial), problem.viscosity)
             factorisations += 1
         change, multiplier_change = _direction(problem, solve, unbalanced, motion)
-        if factorisations > 1 or not is_new:
+        if factorisations > 1 or not is_new or from_start:
             part = 1.0 if problem.live is not None else _part(problem, trial, motion, change)
         motion, multiplier = motion + part * change, multiplier + part * multiplier_change
         trial = problem.trial(motion)
@@ -69,7 +70,7 @@ def newton(problem: ContactProblem, trial: np.ndarray, multiplier: float) -> tup
         imbalance = float(np.abs(unbalanced).max())
         if imbalance < BALANCED * max(1.0, abs(multiplier)) and abs(missing) <= 1e-12 + BALANCED * problem.size:
             return StepSolution(motion, forces, trial, multiplier, 0), factorisations
-        if not imbalance <= NEAR:
+        if not (from_start or imbalance <= NEAR):
             break
         before, status = status, problem.status(trial)
         # Where no point has changed, the factors serve once more.

@@ -9,9 +9,10 @@ import numpy as np
 from solver.geometry.contacts import Contacts, matched_contacts, successors
 from solver.program.model import Model
 from solver.program.strength import largest_tension
+from solver.results.increment import Bonds
 from solver.tolerances import COMPUTED_GAP
 
-from .state import Bonds, Place
+from .state import Place
 
 #: Opening and slip, in block sizes, over which a brittle point loses its strength: small, but no rounding.
 BRITTLE = 1e-6
@@ -26,8 +27,12 @@ class JointPoints:
 
     Attributes
     ----------
-    tension, cohesion : (n,) arrays
-        Largest tension and cohesive shear force that are left.
+    strength : (n, 2) array
+        Largest tension and cohesive shear force of a point that has lost nothing.
+    left : (n,) array
+        Part of them that is left.
+    fracture : (n, 2) array
+        Opening and slip, in block sizes, over which they fall to nothing.
     give : (n, d) array
         Elastic compliance, which stays.
     rest : (n,) array [m]
@@ -36,15 +41,35 @@ class JointPoints:
         Unit of the program.
     """
 
-    tension: np.ndarray
-    cohesion: np.ndarray
+    strength: np.ndarray
+    left: np.ndarray
+    fracture: np.ndarray
     give: np.ndarray
     rest: np.ndarray
     length: float
 
+    @property
+    def tension(self) -> np.ndarray:
+        """(n,) array: largest tension that is left."""
+        return np.asarray(self.strength[:, 0] * self.left)
+
+    @property
+    def cohesion(self) -> np.ndarray:
+        """(n,) array: cohesive shear force that is left."""
+        return np.asarray(self.strength[:, 1] * self.left)
+
     def beyond_give(self, gaps: np.ndarray, normal: np.ndarray | float = 0.0) -> np.ndarray:
         """(n,) array [m]: gaps, (n,) array [m], beyond the give of joints under these normal forces."""
         return np.asarray(gaps - self.rest + self.length * (self.give[:, 0] * normal))
+
+    def after(self, moved: np.ndarray, before: JointPoints) -> JointPoints:
+        """The points once they have opened and slipped, (n, 2) array in block sizes, in a step from those before.
+
+        Opening counts beyond the give of the joint at its strength, slip from the start of the step.
+        """
+        opened, slipped = (moved / self.fracture).T
+        left = np.minimum(before.left - slipped, 1.0 - opened)
+        return replace(self, left=np.clip(left, 0.0, self.left))
 
 
 class Mortar:
@@ -81,36 +106,41 @@ class Mortar:
         model, (n, d) = self.model, contacts.points.shape
         if not self.present:
             none = np.zeros(n)
-            return JointPoints(none, none, np.zeros((n, d)), none, model.length)
+            return JointPoints(np.zeros((n, 2)), none, np.ones((n, 2)), np.zeros((n, d)), none, model.length)
         place = self.renamed(place, contacts)
-        names = ("cohesion", "tensile_strength", "normal_stiffness", "shear_stiffness")
         blocks = contacts.block_a, contacts.block_b
-        cohesion, tension, *stiffness = model.interfaces.values(model.assembly, *blocks, *names)
+        names = ("normal_stiffness", "shear_stiffness", "fracture_opening", "fracture_slip")
+        cohesion, tension, *of_joints = model.interfaces.values(
+            model.assembly, *blocks, "cohesion", "tensile_strength", *names
+        )
         number, bonded = self._matched(contacts, place.bonds)
         area = np.where(bonded, self._of(place.bonds.areas, number), contacts.areas)
-        strong = np.where(bonded, self._of(place.bonds.left, number), 0.0) * area / model.force
         friction = model.interfaces.friction(model.assembly, *blocks)
         # Corners alone, and points of members, have no area.
         across, along = (
             np.divide(model.force, k * area * model.length, out=np.zeros(n), where=k * area > 0.0)
-            for k in (np.where(np.isfinite(k), k, 0.0) for k in stiffness)
+            for k in (np.where(np.isfinite(k), k, 0.0) for k in of_joints[:2])
         )
+        strength = np.column_stack([largest_tension(tension, cohesion, friction), cohesion])
         return JointPoints(
-            tension=largest_tension(tension, cohesion, friction) * strong,
-            cohesion=cohesion * strong,
+            strength=strength * np.where(bonded, area / model.force, 0.0)[:, None],
+            left=np.where(bonded, self._of(place.bonds.left, number), 0.0),
+            fracture=np.maximum(np.column_stack(of_joints[2:]) / model.length, BRITTLE),
             give=np.column_stack([across] + [along] * (d - 1)),
             rest=np.where(bonded, self._of(place.bonds.rest, number), 0.0),
             length=model.length,
         )
 
-    def intact(self, place: Place, contacts: Contacts) -> np.ndarray:
-        """(n,) array: part of the strength of contact points that is left; empty where none had any."""
+    def told(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) arrays: part of the strength of contact points that is left, and of the joint [m²] that has it.
+
+        Empty where no joint had any.
+        """
         if not any(law.bonds for law in self.model.interfaces.laws):
-            return np.zeros(0)
-        strong = self.points(place, contacts).cohesion > 0.0
-        place = self.renamed(place, contacts)
-        number, _ = self._matched(contacts, place.bonds)
-        return np.where(strong, self._of(place.bonds.left, number), 0.0)
+            return np.zeros(0), np.zeros(0)
+        joints, bonds = self.points(place, contacts), self.renamed(place, contacts).bonds
+        intact, areas = np.where(joints.cohesion > 0.0, joints.left, 0.0), replace(bonds, left=np.ones(len(bonds)))
+        return intact, np.where(intact > 0.0, areas.areas_left(contacts), 0.0)
 
     def renamed(self, place: Place, contacts: Contacts) -> Place:
         """The place with its bonds at these contact points: one that vanishes passes its bond to the nearest ones."""
@@ -135,40 +165,14 @@ class Mortar:
         rest = np.bincount(which, part * bonds.rest[old]) / np.bincount(which, part)
         return replace(place, bonds=Bonds(features, np.bincount(which, part * bonds.areas[old]), left, rest))
 
-    def after(self, place: Place, contacts: Contacts, opening: np.ndarray, slipped: np.ndarray) -> Bonds:
-        """The bonds after a step in which points of a place opened, and slipped, in block sizes.
-
-        Parameters
-        ----------
-        opening : (n,) array
-            Beyond the give of the joint at its strength.
-        slipped : (n,) array
-            In this step.
-        """
-        model, bonds = self.model, place.bonds
-        number, bonded = self._matched(contacts, bonds)
-        blocks = contacts.block_a[bonded], contacts.block_b[bonded]
-        open_at, slip_at = model.interfaces.values(model.assembly, *blocks, "fracture_opening", "fracture_slip")
-        open_at, slip_at = (np.maximum(length / model.length, BRITTLE) for length in (open_at, slip_at))
-        number, left = number[bonded], bonds.left.copy()
-        lost = np.minimum(left[number] - slipped[bonded] / slip_at, 1.0 - opening[bonded] / open_at)
-        left[number] = np.clip(lost, 0.0, left[number])
-        return replace(bonds, left=left)
-
-    def lost(self, before: Place, after: Place) -> float:
-        """Strength along the joints that a step has taken, in units of the program."""
+    def bonds(self, place: Place, contacts: Contacts, left: np.ndarray) -> Bonds:
+        """The bonds of a place of whose strength contact points have this part left, (n,) array."""
         if not self.present:
-            return 0.0
-        whole, left = (
-            0.0 if place.contacts is None else float(self.points(place, place.contacts).cohesion.sum())
-            for place in (before, after)
-        )
-        return whole - left
-
-    def broken(self, before: Bonds, after: Bonds) -> bool:
-        """Whether some point of a joint with strength has lost all that it had left."""
-        bonds = any(law.bonds for law in self.model.interfaces.laws)
-        return bonds and bool(((before.left > 0.0) & (after.left == 0.0)).any())
+            return place.bonds
+        number, bonded = self._matched(contacts, place.bonds)
+        of_bonds = place.bonds.left.copy()
+        of_bonds[number[bonded]] = left[bonded]
+        return replace(place.bonds, left=of_bonds)
 
     @staticmethod
     def _matched(contacts: Contacts, bonds: Bonds) -> tuple[np.ndarray, np.ndarray]:

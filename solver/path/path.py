@@ -13,7 +13,7 @@ from solver.equilibrium import wrench_matrix
 from solver.kinematics import Pose
 from solver.loads import GRAVITY
 from solver.program.model import Model
-from solver.results.increment import Increment, Status
+from solver.results.increment import Bonds, Increment, Status
 from solver.ties import TieForces, is_member
 from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, JUMP
 
@@ -109,7 +109,13 @@ class Path:
 
     # The start ---------------------------------------------------------------------------------------------------
 
-    def begin(self, start: Pose, before: PathState | None = None, ties_at: TieForces | None = None) -> PathState:
+    def begin(
+        self,
+        start: Pose,
+        before: PathState | None = None,
+        ties_at: TieForces | None = None,
+        bonds_at: Bonds | None = None,
+    ) -> PathState:
         """The state at the start of the phase: of the drawing at rest, or after the phase before."""
         fell_at = np.zeros(0)
         if before is not None:
@@ -118,14 +124,17 @@ class Path:
             self._remove_blocks(fell_at)
             place = self.stepper.members.installed(place, self.number)
         else:
-            place = self.stepper.unloaded(start, self.number, ties_at)
+            place = self.stepper.unloaded(start, self.number, ties_at, bonds_at)
             resting = self._at_rest(place)
             if resting is None:
                 # Joints that the drawing leaves open close.
                 closed = self.fall.relaxed(place, JUMP)
                 resting = None
                 if closed is not None:
-                    resting = self._at_rest(self.stepper.whole(replace(closed, contacts=None, velocity=None)))
+                    # Those that have mortar are the ones that are closed then, or a settlement before has left.
+                    closed = self.stepper.mortar.renamed(closed, self.stepper.contacts(closed.pose))
+                    closed = replace(closed, contacts=None, velocity=None)
+                    resting = self._at_rest(self.stepper.whole(closed) if bonds_at is None else closed)
             place = resting or place
         return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
 
@@ -308,11 +317,8 @@ class Path:
         refining = enclosing or place.s < state.refine_until
         length = self._length(state, target)
         try:
-            strength = np.inf
-            if length > FIRST_STEP * unit:
-                strength = REFUSED * self.largest_lag * self.stepper.weight
             viscosity = REFINED if refining else 1.0
-            new, motion, error = self.stepper.step(place, length, viscosity=viscosity, strength=strength)
+            new, motion, error = self.stepper.step(place, length, viscosity=viscosity)
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))
         if self._may_be_wedged(new, error):
@@ -321,8 +327,7 @@ class Path:
                 return state, Outcome.LOCKED
             if error.penetration > WEDGED and length > FIRST_STEP * unit:
                 return replace(state, step=length / 3.0), None
-        lag = error.lag + self.stepper.mortar.lost(place, new) / self.stepper.weight
-        measure = max(lag / self.largest_lag, error.turn / self.largest_turn)
+        measure = max(error.lag / self.largest_lag, error.turn / self.largest_turn)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
         if not self._is_on_path(new, error, length, refining):

@@ -68,7 +68,8 @@ class Reports:
         notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
         self.notes = []
         state = self._state(place.pose, contacts, forces, friction, velocity, support_forces, ties)
-        state = replace(state, intact=self.stepper.mortar.intact(place, contacts))
+        intact, bonded = self.stepper.mortar.told(place, contacts)
+        state = replace(state, intact=intact, bonded=bonded)
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
         return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
 

@@ -9,32 +9,7 @@ import numpy as np
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.program.admissible import EquilibriumBounds
-
-
-@dataclass(frozen=True)
-class Bonds:
-    """The points of joints with mortar or stiffness that were closed at rest: a point that is not among them has none.
-
-    Attributes
-    ----------
-    features : (n, 3) int array
-        That name the contact points.
-    areas : (n,) array [m²]
-        At rest.
-    left : (n,) array
-        Part of the cohesion and the tensile strength that is left.
-    rest : (n,) array [m]
-        Gap without force, of elastic joints: positive where the drawing has them compressed.
-    """
-
-    features: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
-    areas: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    left: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
-
-    def __len__(self) -> int:
-        """Count the points."""
-        return len(self.features)
+from solver.results.increment import Bonds
 
 
 @dataclass(frozen=True)

@@ -25,13 +25,14 @@ from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.program.model import Model
 from solver.program.strength import ForceLimits
+from solver.results.increment import Bonds
 from solver.ties import TieForces, is_member
 from solver.tolerances import COMPLIANCE, FRICTION_MEMORY, IMPERFECTION, SHEAR_COMPLIANCE, VELOCITY_MEMORY, VISCOSITY
 
 from .drivers import Driver
 from .members import Members, with_members
 from .mortar import JointPoints, Mortar
-from .state import Bonds, Place
+from .state import Place
 
 #: Linearisations of a step at most.
 LINEARISATIONS = 6
@@ -74,7 +75,8 @@ class StepError:
     Attributes
     ----------
     lag : float
-        Change of the friction bounds of joints at their sliding points, in weights of the structure.
+        Change of the friction bounds of joints at their sliding points, and cohesion that is lost, in weights of the
+        structure.
     turn : float
         Change of the movement against that of the steps before, in block sizes.
     moved : float
@@ -137,6 +139,11 @@ class _StepPoints:
     kept: np.ndarray
     pulled: np.ndarray
 
+    def moved(self, trial: np.ndarray) -> np.ndarray:
+        """(n, 2) array: opening beyond the largest tension and slip beyond the bound that trial forces say."""
+        beyond = np.column_stack([-trial[:, 0], np.linalg.norm(trial[:, 1:], axis=1) - self.bound])
+        return np.maximum(beyond * self.compliance[:, :2], 0.0)
+
 
 class Stepper:
     """Steps from one place to another under a driver.
@@ -171,9 +178,12 @@ class Stepper:
             imperfection = model.imperfection * IMPERFECTION
             self.imperfection[:, :d] = imperfection * self.weights[:, :1] * support_motion / size
 
-    def unloaded(self, pose: Pose, phase: int, ties_at: TieForces | None = None) -> Place:
+    def unloaded(
+        self, pose: Pose, phase: int, ties_at: TieForces | None = None, bonds_at: Bonds | None = None
+    ) -> Place:
         """Return the place of a pose without forces, with the members of a phase, from 0, and all joints whole."""
-        return self.whole(self.members.installed(Place.unloaded(pose), phase, ties_at))
+        place = self.members.installed(Place.unloaded(pose), phase, ties_at)
+        return self.whole(place) if bonds_at is None else replace(place, bonds=bonds_at)
 
     def whole(self, place: Place) -> Place:
         """Return the place with mortar in all closed joints."""
@@ -297,8 +307,6 @@ class Stepper:
         in_time: bool = False,
         viscosity: float = 1.0,
         candidates: Contacts | None = None,
-        strength: float = np.inf,
-        guess: np.ndarray | None = None,
     ) -> tuple[Place, np.ndarray, StepError]:
         """Take one step of the driver, or one in time with the supports at rest.
 
@@ -313,10 +321,6 @@ class Stepper:
             Times the model's; and the imperfection times the model's.
         candidates : Contacts, optional
             Contact points of the step; by default those at the place.
-        strength : float
-            Of joints along themselves, in units of the program, that may be lost.
-        guess : (n, d) array, optional
-            Trial forces to start from; by default those of the place.
 
         Returns
         -------
@@ -336,8 +340,8 @@ class Stepper:
         supports, start = driver.supports(s), self.contacts_at(place) if candidates is None else candidates
         place = self.mortar.renamed(place, start)
         points = self._points(place, start)
-        forces, pulled, joints = points.forces, points.pulled, points.joints
-        trial = points.trial if guess is None else guess
+        forces, joints = points.forces, points.joints
+        guess: np.ndarray | None = points.trial
         resisting, before = self._resistance(place, length, in_time, viscosity)
         closed = np.inf if in_time or viscosity == 1.0 else EXACT
         live, live_size = model.scaled_live
@@ -345,8 +349,10 @@ class Stepper:
         motion_so_far, before_step = np.zeros_like(before), np.column_stack([points.kept * forces[:, 0], forces[:, 1:]])
         pose = self._with_supports(place.pose, supports)
         contacts = self.measured(start, pose, place.tie_lengths)
-        for number in range(LINEARISATIONS):
-            rows = ContactRows(wrench_matrix(contacts, pose, model.length), free)
+        number, rows = 0, ContactRows(wrench_matrix(contacts, pose, model.length), free)
+        while number < LINEARISATIONS:
+            if number:
+                rows = ContactRows(wrench_matrix(contacts, pose, model.length), free)
             control = driver.control(pose) if model.live is not None else None
             load = self._load(pose, 0.0 if in_time else viscosity)
             problem = ContactProblem(
@@ -354,11 +360,11 @@ class Stepper:
                 gap=joints.beyond_give(contacts.gaps) / model.length,
                 slip=(contacts.slip - start.slip) / model.length,
                 # Gaps are absolute, so that the give across a joint is taken back; slip counts from the step's start.
-                forces=before_step + pulled,
+                forces=before_step + points.pulled,
                 bound=points.bound,
                 compliance=points.compliance,
                 most=self.members.largest_forces(start),
-                load=load + resisting * before - rows.resultant(pulled),
+                load=load + resisting * before - rows.resultant(points.pulled),
                 viscosity=resisting,
                 motion_so_far=motion_so_far,
                 size=size,
@@ -367,8 +373,9 @@ class Stepper:
                 control_target=0.0 if control is None else (s - driver.control_displacement(pose)) / model.length,
             )
             self.programs += 1
-            solution = minimise(problem, trial, multiplier)
-            forces, trial, multiplier = solution.forces - pulled, solution.trial, solution.multiplier
+            solution = minimise(problem, guess, multiplier)
+            forces, trial, multiplier = solution.forces - points.pulled, solution.trial, solution.multiplier
+            guess = trial
             # A linearised rotation makes blocks grow: the first linearisation's forces are not kept.
             if number:
                 before_step[:, 0] = points.kept * forces[:, 0]
@@ -383,26 +390,24 @@ class Stepper:
                 self._largest(self._load(pose, 0.0 if in_time else viscosity) - load) / SAME_LOAD,
             )
             control_error = 0.0 if control is None else abs(s - driver.control_displacement(pose)) / model.length
-            if residual <= 1.0 and control_error <= EXACT:
-                break
+            number += 1
+            if number == LINEARISATIONS or (residual <= 1.0 and control_error <= EXACT):
+                # What breaks hands its forces to the others in the same step, from where they are.
+                left = points.joints.after(points.moved(trial), joints)
+                if not ((left.left == 0.0) & (points.joints.left > 0.0)).any():
+                    break
+                points, guess, number = self._with_joints(points, left), None, 0
         if not np.isfinite(motion_so_far).all():
             raise NotSolved("the movement is not finite")
         movement_size = float(np.abs(motion_so_far).max(initial=0.0))
-        left, again, strength = self._after_breaks(place, points, trial, pose, movement_size, strength)
-        if again is not None:
-            return self.step(
-                left,
-                length,
-                in_time=in_time,
-                viscosity=viscosity,
-                candidates=again,
-                strength=strength,
-                guess=trial if len(again) == len(start) else None,
-            )
+        all_points = self._with_missed(start, place, pose, movement_size)
+        if len(all_points) > len(start):
+            return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=all_points)
         # A larger share alternates where the normal force falls as the bound grows.
         share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
         gap = joints.beyond_give(contacts.gaps, forces[:, 0])
         lag, followed = self._updated_bounds(contacts, gap, forces, points, share)
+        lag += float((joints.cohesion - left.cohesion).sum()) / self.weight
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
         lengths = self.members.after(contacts, forces, place.tie_lengths)
@@ -416,7 +421,7 @@ class Stepper:
             multiplier / (live_size or 1.0),
             velocity,
             tie_lengths=lengths,
-            bonds=left.bonds,
+            bonds=self.mortar.bonds(place, start, left.left),
         )
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
@@ -440,48 +445,22 @@ class Stepper:
         """The contact points of a step from a place."""
         forces, trial, followed, is_new = self.transferred(place, start)
         joints, friction = self.mortar.points(place, start), self.friction(start)
-        compliance, pulled = self.compliance(start, joints), np.zeros_like(forces)
-        pulled[:, 0] = joints.tension
-        bound = friction * followed
-        if self.mortar.present:
-            # Lost strength takes with it the tension that friction still followed.
-            bound = np.maximum(friction * np.maximum(followed, -joints.tension) + joints.cohesion, 0.0)
+        compliance, none = self.compliance(start, joints), np.zeros(len(start))
         # The give of elastic joints and members stays.
         kept = np.where(is_member(start), 0.0, 1.0 - joints.give[:, 0] / compliance[:, 0])
-        return _StepPoints(start, forces, trial, followed, is_new, friction, compliance, joints, bound, kept, pulled)
+        points = _StepPoints(
+            start, forces, trial, followed, is_new, friction, compliance, joints, none, kept, np.zeros_like(forces)
+        )
+        return self._with_joints(points, joints)
 
-    def _after_breaks(
-        self,
-        place: Place,
-        points: _StepPoints,
-        trial: np.ndarray,
-        pose: Pose,
-        movement_size: float,
-        strength: float,
-    ) -> tuple[Place, Contacts | None, float]:
-        """The place with the bonds that a step leaves; contact points to solve it with again, if any; strength to lose.
-
-        What breaks hands its forces to the others in the same step.
-        """
-        bonds = self._bonds_after(place, points, trial)
-        left = replace(place, bonds=bonds)
-        if self.mortar.broken(place.bonds, bonds):
-            strength -= self.mortar.lost(place, left)
-            if strength < 0.0:
-                raise NotSolved("much strength is lost")
-            return left, points.start, strength
-        all_points = self._with_missed(points.start, place, pose, movement_size)
-        if len(all_points) > len(points.start):
-            return place, all_points, strength
-        return left, None, strength
-
-    def _bonds_after(self, place: Place, points: _StepPoints, trial: np.ndarray) -> Bonds:
-        """The bonds after a step: what opens under its largest tension, or slips at its bound, loses strength."""
-        if not self.mortar.present:
-            return place.bonds
-        beyond = np.column_stack([-trial[:, 0], np.linalg.norm(trial[:, 1:], axis=1) - points.bound])
-        opening, slipped = np.maximum(beyond * points.compliance[:, :2], 0.0).T
-        return self.mortar.after(place, points.start, opening, slipped)
+    def _with_joints(self, points: _StepPoints, joints: JointPoints) -> _StepPoints:
+        """The contact points of a step with what is left of their joints."""
+        bound, pulled = points.friction * points.followed, np.zeros_like(points.forces)
+        pulled[:, 0] = joints.tension
+        if self.mortar.present:
+            # Lost strength takes with it the tension that friction still followed.
+            bound = np.maximum(points.friction * np.maximum(points.followed, -joints.tension) + joints.cohesion, 0.0)
+        return replace(points, joints=joints, bound=bound, pulled=pulled)
 
     @staticmethod
     def _largest(values: np.ndarray) -> float:

@@ -14,7 +14,11 @@ from solver.interfaces import Interfaces
 
 
 def point_strength(
-    assembly: Assembly, interfaces: Interfaces, contacts: Contacts, around: Contacts
+    assembly: Assembly,
+    interfaces: Interfaces,
+    contacts: Contacts,
+    around: Contacts,
+    bonded: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cohesive shear force, largest normal force and largest tension of each contact point.
 
@@ -25,6 +29,8 @@ def point_strength(
     contacts : Contacts
     around : Contacts
         At the same geometry, with the open ones, which measure the faces.
+    bonded : (n_contacts,) array, optional [m²]
+        Parts of the faces that have cohesion and tension; by default all of them.
 
     Returns
     -------
@@ -41,7 +47,8 @@ def point_strength(
     finite = np.isfinite(strength)
     crushing[finite] = strength[finite] * area[finite]
     friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-    return cohesion * area, crushing, largest_tension(tension, cohesion, friction) * area
+    bonded = area if bonded is None else bonded
+    return cohesion * bonded, crushing, largest_tension(tension, cohesion, friction) * bonded
 
 
 def largest_tension(tension: np.ndarray, cohesion: np.ndarray, friction: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from solver.geometry.contacts import Contacts
+from solver.geometry.contacts import Contacts, matched_contacts
 from solver.kinematics import Pose
 from solver.ties import TieForces
 from solver.tolerances import DILATANCY_SLACK, SMALLEST_FORCE, SMALLEST_RATE, USED_UP
@@ -78,6 +78,39 @@ def at_rest(velocity: np.ndarray, slow: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
+class Bonds:
+    """The points of joints with mortar or stiffness that were closed at rest: a point that is not among them has none.
+
+    Attributes
+    ----------
+    features : (n, 3) int array
+        That name the contact points.
+    areas : (n,) array [m²]
+        At rest.
+    left : (n,) array
+        Part of the cohesion and the tensile strength that is left.
+    rest : (n,) array [m]
+        Gap without force, of elastic joints: positive where the drawing has them compressed.
+    """
+
+    features: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    areas: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    left: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        """Count the points."""
+        return len(self.features)
+
+    def areas_left(self, contacts: Contacts) -> np.ndarray:
+        """(n,) array [m²]: part of the joint of each contact point whose strength is left."""
+        if not len(self) or not len(contacts):
+            return np.zeros(len(contacts))
+        number, bonded = matched_contacts(contacts, self)
+        return np.where(bonded, (self.areas * self.left)[number], 0.0)
+
+
+@dataclass(frozen=True)
 class State:
     """The arrays of an increment: pose, contact points, their forces, and the motion that follows.
 
@@ -103,6 +136,8 @@ class State:
         Empty where there are none.
     intact : (n_contacts,) array
         Part of its cohesion and tensile strength that each contact point has left; empty for dry joints.
+    bonded : (n_contacts,) array [m²]
+        Part of the joint, at rest, that its mortar stands for; empty for dry joints.
     """
 
     pose: Pose
@@ -115,6 +150,7 @@ class State:
     fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
     ties: TieForces = field(default_factory=TieForces)
     intact: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    bonded: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class StoredState(Protocol):
@@ -151,6 +187,14 @@ class HasState:
     def ties(self) -> TieForces:
         """What ties, props and bars do."""
         return self.state.ties
+
+    @property
+    def bonds(self) -> Bonds | None:
+        """The strength that rigid joints have left; None where they are dry."""
+        intact = self.state.intact
+        if not len(intact):
+            return None
+        return Bonds(self.contacts.features[:, :3], self.state.bonded, intact, np.zeros(len(intact)))
 
     @property
     def contacts(self) -> Contacts:

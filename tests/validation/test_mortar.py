@@ -122,6 +122,73 @@ def test_a_pulled_couplet_has_its_weight_and_tension_as_limit_load():
         assert found.forces[:, 0] == pytest.approx([-2e4 * 0.12] * 2, rel=1e-6)
 
 
+def wedge_on_a_slope(cohesion, slope=np.radians(20.0), friction=0.6):
+    """A wedge with its apex over the middle of a base of 1 m, its live load its weight out of the slope; A and W."""
+    middle = np.array([np.cos(slope), np.sin(slope)]) / 2.0
+    wedge = [np.zeros(2), 2.0 * middle, middle + [0.0, 0.5]]
+    ground = [(-1.0, -1.0), (2.0, -1.0), 4.0 * middle, -2.0 * middle]
+    assembly = solver.Assembly.from_outlines(
+        [np.array(wedge), np.array(ground)], roles=["free", "fixed"], names=["wedge", "ground"], thickness=THICKNESS
+    )
+    dead, live = solver.self_weight(assembly).dead, solver.weight_fraction(assembly, (-1.0, 0.0), assembly.free)
+    law = solver.InterfaceLaw(friction, cohesion)
+    structure = solver.Structure(assembly, solver.Interfaces(law), solver.Loads(dead, live))
+    return structure, THICKNESS, mechanics.total_weight(assembly)
+
+
+@pytest.mark.parametrize("cohesion", [0.0, 2e3, 2e4])
+def test_a_wedge_on_a_slope_has_the_limit_load_of_limit_equilibrium(cohesion):
+    """Plane failure: α W cos ψ + W sin ψ = c A + μ (W cos ψ - α W sin ψ).
+
+    Hoek & Bray (1981), Rock Slope Engineering, 3rd ed., chapter 7, without water; α along the horizontal.
+    """
+    slope, friction = np.radians(20.0), 0.6
+    structure, area, weight = wedge_on_a_slope(cohesion, slope, friction)
+    resists = cohesion * area / weight + friction * np.cos(slope) - np.sin(slope)
+    expected = resists / (np.cos(slope) + friction * np.sin(slope))
+    for flow in ("associative", "non-associative"):
+        assert structure.limit_load(flow=flow).multiplier == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_wedge_that_has_slipped_on_its_slope_keeps_friction():
+    slope, cohesion = np.radians(20.0), 2e3
+    structure, area, weight = wedge_on_a_slope(cohesion, slope)
+    down = (-np.cos(slope), -np.sin(slope))
+    response = structure.pushover(solver.ControlDisplacement("wedge", down, limit=0.002, increment=0.001))
+    found = [increment.load_multiplier for increment in response.increments]
+    along = np.cos(slope) + 0.6 * np.sin(slope)
+    dry = (0.6 * np.cos(slope) - np.sin(slope)) / along
+    assert found[0] == pytest.approx(dry + cohesion * area / weight / along, rel=1e-6)
+    assert found[1:3] == pytest.approx([dry, dry], rel=1e-6)
+
+
+def test_what_a_settlement_has_torn_off_is_missing_from_limit_load_and_pushover():
+    """A block on a bed and glued to a wall at its side, which sinks: pulled off it, μ W + c A of the bed is left."""
+    cohesion, tension, friction = 2e4, 1e4, 0.6
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(0.0, 0.0, 0.5, 0.25), rectangle(-0.5, -0.5, 0.5, 0.0), rectangle(0.5, 0.0, 0.7, 0.25)],
+        roles=["free", "fixed", "moving"], names=["block", "ground", "wall"], thickness=0.4,
+    )  # fmt: skip
+    weight = mechanics.total_weight(assembly)
+    interfaces = solver.Interfaces(solver.InterfaceLaw(friction, cohesion, tensile_strength=tension))
+    bed, side = 0.5 * 0.4, 0.25 * 0.4
+    live = solver.point_load(assembly, 0, (-weight, 0.0), point=(0.0, 0.0))
+    structure = solver.Structure(assembly, interfaces, solver.Loads(solver.self_weight(assembly).dead, live))
+    sunk = structure.settle(solver.Settlement(direction=(0.0, -1.0), increment=1e-3, limit=1e-3)).increments[-1]
+    left = friction + cohesion * bed / weight
+    # As drawn the wall holds it, too; the lower end of its side more than the upper one, on which the block turns.
+    assert structure.limit_load().multiplier > left + 0.5 * tension * side / weight
+    found = structure.limit_load(pose=sunk.pose, bonds_at=sunk.bonds)
+    assert found.multiplier == pytest.approx(left, rel=1e-5)
+    control = solver.ControlDisplacement("block", (-1.0, 0.0), limit=1e-3, increment=1e-3)
+    with pytest.raises(ValueError, match="of which a pose does not tell what is left; give bonds_at"):
+        structure.pushover(control, pose=sunk.pose)
+    pushed = structure.pushover(control, pose=sunk.pose, bonds_at=sunk.bonds)
+    assert pushed.values[0] == pytest.approx(left, rel=1e-5)
+    assert pushed.values[1] == pytest.approx(friction, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("law", "message"),
     [
