@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .contacts import Contacts
+from .entering import Movement, Place, entered
 from .outlines import Outlines, overlap_depths
-from .planar_contacts import find_points, measured_points
+from .planar_contacts import features_of, find_points, measured_points
+from solver.tolerances import PENETRATION_FRACTION
 
 
 @dataclass(frozen=True)
@@ -49,3 +51,18 @@ class Polygons(Outlines):
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pairs of blocks that overlap by more than ``tolerance`` [m]; see :func:`overlap_depths`."""
         return overlap_depths(vertices, self.offsets, tolerance)
+
+    def entered(self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float) -> Contacts:
+        """Contact points that would have kept apart what overlaps by more than ``tolerance`` [m] after a movement."""
+        i, j, _ = overlap_depths(after, self.offsets, tolerance)
+        chosen = useful[i] | useful[j]
+        i, j = i[chosen], j[chosen]
+        places = []
+        for corners in (before, after):
+            along = corners[self.next_vertex] - corners
+            normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / self.edge_lengths[:, None]
+            places.append(Place(corners, normals, corners))
+        none = np.zeros((0, 2), dtype=np.int64), np.zeros(len(self) + 1, dtype=np.int64)
+        deepest = PENETRATION_FRACTION * np.minimum(self.widths[i], self.widths[j])
+        found = entered(Movement(*places, self.offsets, self.offsets, *none), i, j, tolerance, deepest)
+        return measured_points(self, before, features_of(found.corner, found.face, np.full(len(found.face), -1)))

@@ -77,8 +77,7 @@ def edge_separations(
     own, other : (n,) int arrays
         The edges.
     """
-    once = np.flatnonzero(np.arange(len(solids.corners)) < solids.twins)
-    first = np.searchsorted(once, solids.face_offsets[solids.faces_of_block])
+    once, _, first = solids.whole_edges
     count = np.diff(first)
     apart = np.full(len(i), -np.inf)
     edge_i, edge_j = np.zeros((2, len(i)), dtype=np.int64)

@@ -58,3 +58,9 @@ class Shapes(Protocol):
 
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pairs of blocks that overlap by more than ``tolerance`` [m]: two (n_pairs,) int arrays, and the depths."""
+
+    def entered(self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float) -> Contacts:
+        """Contact points that would have kept apart what overlaps by more than ``tolerance`` [m] after a movement.
+
+        Measured before it; of corners (n_vertices, d) [m] before and after, of pairs one of which is useful.
+        """

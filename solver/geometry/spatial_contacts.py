@@ -16,6 +16,7 @@ from .clipping import ClippedCorners, clipped_faces
 from .contacts import STEEPEST_LANDING, Contacts, joined_contacts
 from .convex_parts import ConvexParts
 from .cut_points import without_points_of_cuts
+from .entering import Movement, Place, entered
 from .facing import FacingParts, facing_parts, near_parts
 from .separations import edge_separations, outward
 from .solids import Faces, Solids, cross, dot, unit
@@ -282,11 +283,57 @@ def _crossed_edges(
     # By more than rounding, in widths.
     k = np.flatnonzero((apart > pairs.apart + 1e-4 * pairs.width) & (apart <= reach))
     own, other = own[k], other[k]
+    on_a, on_b = _crossings(solids, vertices, own, other)
+    inside = (on_a > 0.0) & (on_a < 1.0) & (on_b > 0.0) & (on_b < 1.0)
+    places = places_of(on_a[inside], on_b[inside], np.zeros(np.count_nonzero(inside), dtype=bool))
+    return feature_rows(ACROSS, own[inside], other[inside], places), np.zeros(len(places))
+
+
+def _crossings(
+    solids: Solids, vertices: np.ndarray, own: np.ndarray, other: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where along two edges, as parts of them, their lines are nearest to each other, two (n,) arrays."""
     a, b = vertices[solids.corners[own]], vertices[solids.corners[other]]
     along_a = vertices[solids.corners[solids.next_corner[own]]] - a
     along_b = vertices[solids.corners[solids.next_corner[other]]] - b
     area = cross(along_a, along_b)
     on_a, on_b = (dot(cross(b - a, along), area) / dot(area, area) for along in (along_b, along_a))
-    inside = (on_a > 0.0) & (on_a < 1.0) & (on_b > 0.0) & (on_b < 1.0)
-    places = places_of(on_a[inside], on_b[inside], np.zeros(np.count_nonzero(inside), dtype=bool))
-    return feature_rows(ACROSS, own[inside], other[inside], places), np.zeros(len(places))
+    return on_a, on_b
+
+
+def entered_points(
+    parts: ConvexParts,
+    widths: np.ndarray,
+    before: np.ndarray,
+    after: np.ndarray,
+    useful: np.ndarray,
+    tolerance: float,
+) -> Contacts:
+    """Find the points that would have kept apart blocks that overlap after a movement, measured before it.
+
+    Parameters
+    ----------
+    parts : ConvexParts
+    widths : (n_blocks,) array [m]
+    before, after : (n_vertices, 3) arrays [m]
+        Corners of the blocks.
+    useful : (n_blocks,) bool array
+        One of two blocks that overlap must be of these.
+    tolerance : float [m]
+        Least overlap.
+    """
+    solids, block_of_part = parts.solids, parts.block_of_part
+    before, after = parts.placed(before), parts.placed(after)
+    i, j = near_parts(solids, block_of_part, after, -tolerance, useful)
+    places = []
+    for corners in (before, after):
+        faces = solids.faces(corners)
+        places.append(Place(corners, faces.normals, faces.middles))
+    once, edges, edges_of = solids.whole_edges
+    deepest = PENETRATION_FRACTION * np.minimum(widths[block_of_part[i]], widths[block_of_part[j]])
+    movement = Movement(*places, solids.offsets, solids.faces_of_block, edges, edges_of)
+    corner, face, own, other = entered(movement, i, j, tolerance, deepest)
+    own, other = once[own], once[other]
+    places = places_of(*_crossings(solids, after, own, other), np.zeros(len(own), dtype=bool))
+    features = np.concatenate([feature_rows(ON_FACE, corner, face, -1), feature_rows(ACROSS, own, other, places)])
+    return measured_points(solids, block_of_part, before, features, np.zeros(len(features)))
