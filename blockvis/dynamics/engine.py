@@ -176,9 +176,8 @@ class Engine:
 
     def _entered(self, corners: np.ndarray, contacts: mechanics.Contacts) -> mechanics.Contacts:
         """Contact points, where they are before a step, that are not among those given and that it has passed."""
-        found = self.assembly.shapes.entered(self.corners, corners, self.free, DEEP * self.length)
-        known = mechanics.matched_contacts(found, contacts)[1] if len(contacts) and len(found) else np.zeros(len(found), bool)
-        return found[~(self.removed[found.block_a] | self.removed[found.block_b] | known)]
+        found = self.assembly.shapes.entered(self.corners, corners, self.free, DEEP * self.length, contacts)
+        return found[~(self.removed[found.block_a] | self.removed[found.block_b])]
 
     def _flight(self, h: float) -> tuple[np.ndarray, np.ndarray]:
         """Movement and velocity after a step without loads and contact, (n_blocks, n_dof) arrays."""

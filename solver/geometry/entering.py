@@ -9,7 +9,7 @@ import numpy as np
 
 from .broad_phase import expand_ranges
 from .portions import alike
-from .solids import cross, dot
+from .solids import cross, dot, unit
 
 #: How much an overlap before the movement, along an axis, counts against one after it.
 BEFORE = 10.0
@@ -47,6 +47,8 @@ class Movement:
         Shape i owns corners and faces from entry i to entry i + 1.
     edges : (n_edges, 2) int array
         Corners at the ends of each edge, once; in the plane none.
+    edge_faces : (n_edges, 2) int array
+        The faces at each edge.
     edges_of : (n + 1,) int array
     """
 
@@ -55,6 +57,7 @@ class Movement:
     offsets: np.ndarray
     faces_of: np.ndarray
     edges: np.ndarray
+    edge_faces: np.ndarray
     edges_of: np.ndarray
 
 
@@ -67,12 +70,18 @@ class Entered(NamedTuple):
         Corners that are to stay before faces.
     own, other : (m,) int arrays
         Numbers of edges that are to stay before each other, the first of the shape with the lower number.
+    edge : (k,) int array
+        The number of the two edges, among these,
+    at_edge : (k,) int array
+        and corners of the first shape that have come behind the plane across them, which rides on the second.
     """
 
     corner: np.ndarray
     face: np.ndarray
     own: np.ndarray
     other: np.ndarray
+    edge: np.ndarray
+    at_edge: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -141,8 +150,14 @@ def entered(movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, 
         chosen = height < 0.5 * axes.after[owner]
         corners.append(corner[chosen])
         faces.append(face[chosen])
-    crossed = kinds[2][best == 2]
-    return Entered(np.concatenate(corners), np.concatenate(faces), crossed.first, crossed.second)
+    k = np.flatnonzero(best == 2)
+    own, other, depth = kinds[2].first[k], kinds[2].second[k], kinds[2].after[k]
+    ridden = carried(movement, across(movement, movement.before, own, other), other)
+    owner, position = expand_ranges(np.diff(movement.offsets)[i[k]])
+    corner, on_plane = movement.offsets[i[k]][owner] + position, movement.edges[other[owner], 0]
+    height = dot(movement.after.corners[corner] - movement.after.corners[on_plane], ridden[owner])
+    chosen = height < 0.5 * depth[owner]
+    return Entered(np.concatenate(corners), np.concatenate(faces), own, other, owner[chosen], corner[chosen])
 
 
 def _score(before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -172,10 +187,10 @@ def _of_faces(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
 
 
 def _of_edges(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
-    """Give the axes across an edge of shapes i and an edge of shapes j; those are scored whose edges are foremost."""
-    edges, edges_of, offsets = movement.edges, movement.edges_of, movement.offsets
+    """Give the axes across an edge of shapes i and an edge of shapes j, those of planes that ride on shapes j."""
+    edges_of, offsets = movement.edges_of, movement.offsets
     n_own, n_other, n_i, n_j = (np.diff(of)[k] for of in (edges_of, offsets) for k in (i, j))
-    start, after, apart = np.full((3, len(i)), -np.inf)
+    before, after, apart = np.full((3, len(i)), -np.inf)
     first, second = np.zeros((2, len(i)), dtype=np.int64)
     for k in alike(n_own * n_other, n_i + n_j, n_own, n_i):
         own = edges_of[i[k]][:, None] + np.arange(n_own[k[0]])
@@ -184,41 +199,62 @@ def _of_edges(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
         corners = [offsets[of[k]][:, None] + np.arange(n[k[0]]) for of, n in ((i, n_i), (j, n_j))]
         if own.size == 0:
             continue
-        gaps, foremost = _across(movement.before, edges, own, other, corners)
-        gaps_after, _ = _across(movement.after, edges, own, other, corners)
-        along = gaps[0] >= gaps[1]
-        before, same = np.where(along, *gaps), np.where(along, *gaps_after)
-        scores = np.where(np.where(along, *foremost), _score(before, same), -np.inf)
+        normals = across(movement, movement.before, own, other)
+        gaps, foremost = _gaps(movement, movement.before, normals, own, other, corners)
+        apart[k] = _gaps(movement, movement.after, across(movement, movement.after, own, other), own, other, corners)[0].max(axis=1)
+        ridden = carried(movement, normals, other)
+        then = _gaps(movement, movement.after, ridden, own, other, corners)[0]
+        scores = np.where(foremost, _score(gaps, then), -np.inf)
         best, row = scores.argmax(axis=1), np.arange(len(k))
         scored = np.isfinite(scores[row, best])
-        start[k], after[k] = (np.where(scored, gap[row, best], -np.inf) for gap in (before, same))
-        first[k], second[k], apart[k] = own[row, best], other[row, best], gaps_after.max(axis=(0, 2))
-    return _Axes(first, second, start, after, apart)
+        before[k], after[k] = (np.where(scored, gap[row, best], -np.inf) for gap in (gaps, then))
+        first[k], second[k] = own[row, best], other[row, best]
+    return _Axes(first, second, before, after, apart)
 
 
-def _across(
-    place: Place, edges: np.ndarray, own: np.ndarray, other: np.ndarray, corners: list[np.ndarray]
+def across(movement: Movement, place: Place, own: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(..., 3) array: unit normals to two edges, out of the second shape; zero where they are parallel."""
+    edges, faces = movement.edges, movement.edge_faces
+    along = [place.corners[edges[of, 1]] - place.corners[edges[of, 0]] for of in (own, other)]
+    normal = cross(*along)
+    size = np.sqrt(dot(normal, normal))
+    outward = dot(normal, place.normals[faces[other, 0]] + place.normals[faces[other, 1]])
+    scale = np.where(size > PARALLEL * np.sqrt(dot(along[0], along[0]) * dot(along[1], along[1])), np.sign(outward), 0.0)
+    return normal * (scale / np.maximum(size, 1e-300))[..., None]
+
+
+def carried(movement: Movement, normals: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(..., 3) array: directions that ride on the shapes of edges, after the movement."""
+    axes = []
+    for place in (movement.before, movement.after):
+        along = unit(place.corners[movement.edges[other, 1]] - place.corners[movement.edges[other, 0]])
+        normal = place.normals[movement.edge_faces[other, 0]]
+        axes.append((along, normal, cross(along, normal)))
+    return sum(dot(normals, old)[..., None] * new for old, new in zip(*axes, strict=True))
+
+
+def _gaps(
+    movement: Movement,
+    place: Place,
+    normals: np.ndarray,
+    own: np.ndarray,
+    other: np.ndarray,
+    corners: list[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Separate shapes along normals to two edges.
+    """Separations of shapes along normals to two edges.
 
     Returns
     -------
-    gaps : (2, n_pairs, n_axes) array [m]
-        Separation with the first shape farther along the normal, and with the second.
-    foremost : (2, n_pairs, n_axes) bool array
+    gaps : (n_pairs, n_axes) array [m]
+        Minus infinity where there is no normal.
+    foremost : (n_pairs, n_axes) bool array
         Whether both edges would be the first to meet.
     """
     origin = place.corners[corners[0][:, :1]]
-    starts = [place.corners[edges[of, 0]] - origin for of in (own, other)]
-    along = [place.corners[edges[of, 1]] - place.corners[edges[of, 0]] for of in (own, other)]
-    normal = cross(*along)
-    lengths = [np.sqrt(dot(a, a)) for a in along]
-    size = np.sqrt(dot(normal, normal))
-    normal = normal / np.maximum(size, 1e-300)[..., None]
-    heights = [normal @ (place.corners[of] - origin).transpose(0, 2, 1) for of in corners]
-    (low_i, low_j), (high_i, high_j) = ([h.min(axis=2) for h in heights], [h.max(axis=2) for h in heights])
-    gaps = np.stack([low_i - high_j, low_j - high_i])
-    at_i, at_j = (dot(normal, start) for start in starts)
-    behind = np.stack([np.maximum(at_i - low_i, high_j - at_j), np.maximum(high_i - at_i, at_j - low_j)])
-    gaps = np.where(size > PARALLEL * lengths[0] * lengths[1], gaps, -np.inf)
-    return gaps, behind <= FOREMOST * np.minimum(*lengths)
+    starts = [place.corners[movement.edges[of, 0]] - origin for of in (own, other)]
+    at_i, at_j = (dot(normals, start) for start in starts)
+    low = (normals @ (place.corners[corners[0]] - origin).transpose(0, 2, 1)).min(axis=2)
+    high = (normals @ (place.corners[corners[1]] - origin).transpose(0, 2, 1)).max(axis=2)
+    along = place.corners[movement.edges[own, 1]] - place.corners[movement.edges[own, 0]]
+    foremost = np.maximum(at_i - low, high - at_j) <= FOREMOST * np.sqrt(dot(along, along))
+    return np.where(dot(normals, normals) > 0.5, low - high, -np.inf), foremost

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .contacts import Contacts
+from .contacts import Contacts, without_known
 from .entering import Movement, Place, entered
 from .outlines import Outlines, overlap_depths
 from .planar_contacts import features_of, find_points, measured_points
@@ -52,8 +52,10 @@ class Polygons(Outlines):
         """Pairs of blocks that overlap by more than ``tolerance`` [m]; see :func:`overlap_depths`."""
         return overlap_depths(vertices, self.offsets, tolerance)
 
-    def entered(self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float) -> Contacts:
-        """Contact points that would have kept apart what overlaps by more than ``tolerance`` [m] after a movement."""
+    def entered(
+        self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
+    ) -> Contacts:
+        """Contact points that would have kept blocks apart: see :class:`Shapes`."""
         i, j, _ = overlap_depths(after, self.offsets, tolerance)
         chosen = useful[i] | useful[j]
         i, j = i[chosen], j[chosen]
@@ -62,7 +64,9 @@ class Polygons(Outlines):
             along = corners[self.next_vertex] - corners
             normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / self.edge_lengths[:, None]
             places.append(Place(corners, normals, corners))
-        none = np.zeros((0, 2), dtype=np.int64), np.zeros(len(self) + 1, dtype=np.int64)
+        none, no_edges = np.zeros((0, 2), dtype=np.int64), np.zeros(len(self) + 1, dtype=np.int64)
         deepest = PENETRATION_FRACTION * np.minimum(self.widths[i], self.widths[j])
-        found = entered(Movement(*places, self.offsets, self.offsets, *none), i, j, tolerance, deepest)
-        return measured_points(self, before, features_of(found.corner, found.face, np.full(len(found.face), -1)))
+        movement = Movement(*places, self.offsets, self.offsets, none, none, no_edges)
+        found = entered(movement, i, j, tolerance, deepest)
+        features = features_of(found.corner, found.face, np.full(len(found.face), -1))
+        return without_known(measured_points(self, before, features), contacts)

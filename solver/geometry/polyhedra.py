@@ -58,6 +58,8 @@ class Polyhedra(Solids):
         parts = self.parts
         return overlap_depths_in_space(parts.solids, parts.block_of_part, parts.placed(vertices), tolerance)
 
-    def entered(self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float) -> Contacts:
-        """Contact points that would have kept apart what overlaps by more than ``tolerance`` [m] after a movement."""
-        return entered_points(self.parts, self.widths, before, after, useful, tolerance)
+    def entered(
+        self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
+    ) -> Contacts:
+        """Contact points that would have kept blocks apart: see :class:`Shapes`."""
+        return entered_points(self.parts, self.widths, before, after, useful, tolerance, contacts)

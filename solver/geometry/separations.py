@@ -77,7 +77,7 @@ def edge_separations(
     own, other : (n,) int arrays
         The edges.
     """
-    once, _, first = solids.whole_edges
+    once, first = solids.whole_edges
     count = np.diff(first)
     apart = np.full(len(i), -np.inf)
     edge_i, edge_j = np.zeros((2, len(i)), dtype=np.int64)

@@ -142,11 +142,10 @@ class Solids:
         return order[np.searchsorted((start * n + end)[order], end * n + start)]
 
     @cached_property
-    def whole_edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Every edge once: its corner, the vertices at its ends (n_edges, 2), and (n + 1,) where each solid's begin."""
+    def whole_edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Every edge once, by its corner, and (n + 1,) where those of each solid begin."""
         once = np.flatnonzero(np.arange(len(self.corners)) < self.twins)
-        ends = np.stack([self.corners[once], self.corners[self.next_corner[once]]], axis=1)
-        return once, ends, np.searchsorted(once, self.face_offsets[self.faces_of_block])
+        return once, np.searchsorted(once, self.face_offsets[self.faces_of_block])
 
     @cached_property
     def edge_lengths(self) -> np.ndarray:

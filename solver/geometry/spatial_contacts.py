@@ -13,14 +13,14 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import expand_ranges
 from .clipping import ClippedCorners, clipped_faces
-from .contacts import STEEPEST_LANDING, Contacts, joined_contacts
+from .contacts import STEEPEST_LANDING, Contacts, joined_contacts, matched_contacts, without_known
 from .convex_parts import ConvexParts
 from .cut_points import without_points_of_cuts
-from .entering import Movement, Place, entered
+from .entering import Movement, Place, across, entered
 from .facing import FacingParts, facing_parts, near_parts
 from .separations import edge_separations, outward
 from .solids import Faces, Solids, cross, dot, unit
-from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
+from .spatial_features import ACROSS, BEFORE_EDGE, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
 
 #: Width of a sliver at a cut, as a part of both faces, and its area, as a part of that in which the two blocks touch.
 SLIVER = 0.005
@@ -308,6 +308,7 @@ def entered_points(
     after: np.ndarray,
     useful: np.ndarray,
     tolerance: float,
+    contacts: Contacts,
 ) -> Contacts:
     """Find the points that would have kept apart blocks that overlap after a movement, measured before it.
 
@@ -321,6 +322,13 @@ def entered_points(
         One of two blocks that overlap must be of these.
     tolerance : float [m]
         Least overlap.
+    contacts : Contacts
+        What is known.
+
+    Notes
+    -----
+    Edges touch where they cross. Where that is known and does not help, as one turns, corners are to stay before the
+    plane that separated the two.
     """
     solids, block_of_part = parts.solids, parts.block_of_part
     before, after = parts.placed(before), parts.placed(after)
@@ -329,11 +337,36 @@ def entered_points(
     for corners in (before, after):
         faces = solids.faces(corners)
         places.append(Place(corners, faces.normals, faces.middles))
-    once, edges, edges_of = solids.whole_edges
+    once, edges_of = solids.whole_edges
+    ends = np.stack([solids.corners[once], solids.corners[solids.next_corner[once]]], axis=1)
+    edge_faces = solids.face_of_corner[np.stack([once, solids.twins[once]], axis=1)]
+    movement = Movement(*places, solids.offsets, solids.faces_of_block, ends, edge_faces, edges_of)
     deepest = PENETRATION_FRACTION * np.minimum(widths[block_of_part[i]], widths[block_of_part[j]])
-    movement = Movement(*places, solids.offsets, solids.faces_of_block, edges, edges_of)
-    corner, face, own, other = entered(movement, i, j, tolerance, deepest)
-    own, other = once[own], once[other]
-    places = places_of(*_crossings(solids, after, own, other), np.zeros(len(own), dtype=bool))
-    features = np.concatenate([feature_rows(ON_FACE, corner, face, -1), feature_rows(ACROSS, own, other, places)])
-    return measured_points(solids, block_of_part, before, features, np.zeros(len(features)))
+    found = entered(movement, i, j, tolerance, deepest)
+    own, other = once[found.own], once[found.other]
+    crossing = _crossings(solids, after, own, other)
+    places_on = places_of(*crossing, np.zeros(len(own), dtype=bool))
+    crossed = feature_rows(ACROSS, own, other, places_on)
+    crossing_points = measured_points(solids, block_of_part, before, crossed, np.zeros(len(own)))
+    known = np.zeros(len(own), dtype=bool)
+    if len(contacts) and len(own):
+        known = matched_contacts(crossing_points, contacts)[1]
+    on_face = feature_rows(ON_FACE, found.corner, found.face, -1)
+    corners_on_faces = measured_points(solids, block_of_part, before, on_face, np.zeros(len(on_face)))
+    k = known[found.edge]
+    edge, corner = found.edge[k], found.at_edge[k]
+    normals = across(movement, movement.before, found.own[edge], found.other[edge])
+    along = unit(before[ends[found.other[edge], 1]] - before[ends[found.other[edge], 0]])
+    apart = before[corner] - before[ends[found.other[edge], 0]]
+    n = len(edge)
+    planes = Contacts(
+        features=feature_rows(BEFORE_EDGE, corner, other[edge], -1),
+        block_a=block_of_part[solids.block_of_vertex[corner]],
+        block_b=block_of_part[solids.block_of_face[solids.face_of_corner[other[edge]]]],
+        points=before[corner],
+        frames=np.stack([normals, along, cross(normals, along)], axis=1),
+        gaps=dot(apart, normals),
+        slip=np.zeros((n, 2)),
+        areas=np.zeros(n),
+    )
+    return without_known(joined_contacts([corners_on_faces, crossing_points[~known], planes]), contacts)
