@@ -160,7 +160,9 @@ class Engine:
                 break
             if linearisation + 1 < LINEARISATIONS and len(entered):
                 contacts = mechanics.joined_contacts([contacts, entered])
-                before, trial = (np.concatenate([old, new]) for old, new in zip((before, trial), self._transferred(entered), strict=True))
+                before = np.concatenate([before, np.zeros((len(entered), self.d))])
+                # As if closed: open ones would be found in each other by forces too large for Newton's method.
+                trial = np.concatenate([trial, np.tile(np.eye(self.d)[0], (len(entered), 1))])
         if len(entered) and h > SHORTEST_STEP:
             return False
         energies = self.energies
