@@ -102,13 +102,13 @@ def matched_contacts(contacts: Named, before: Named) -> tuple[np.ndarray, np.nda
     return place, earlier_keys[place] == keys
 
 
-def without_known(contacts: Contacts, known: Contacts) -> Contacts:
-    """Leave out contact points that are among those known, with the same normal."""
+def are_known(contacts: Contacts, known: Contacts, same_normal: bool = True) -> np.ndarray:
+    """(n,) bool array: whether contact points are among those known, by their names and normals or names alone."""
     if len(known) == 0 or len(contacts) == 0:
-        return contacts
+        return np.zeros(len(contacts), dtype=bool)
     number, same = matched_contacts(contacts, known)
     along = np.einsum("ni,ni->n", contacts.frames[:, 0], known.frames[number, 0])
-    return contacts[~(same & (along > SAME_NORMAL))]
+    return same & ((along > SAME_NORMAL) | (not same_normal))
 
 
 def successors(

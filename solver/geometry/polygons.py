@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .contacts import Contacts, without_known
+from solver.tolerances import PENETRATION_FRACTION
+
+from .contacts import Contacts, are_known
 from .entering import Movement, Place, entered
 from .outlines import Outlines, overlap_depths
 from .planar_contacts import features_of, find_points, measured_points
-from solver.tolerances import PENETRATION_FRACTION
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,9 @@ class Polygons(Outlines):
             along = corners[self.next_vertex] - corners
             normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / self.edge_lengths[:, None]
             places.append(Place(corners, normals, corners))
-        none, no_edges = np.zeros((0, 2), dtype=np.int64), np.zeros(len(self) + 1, dtype=np.int64)
+        no_edges, none = np.zeros(len(self) + 1, dtype=np.int64), np.zeros((0, 2), dtype=np.int64)
         deepest = PENETRATION_FRACTION * np.minimum(self.widths[i], self.widths[j])
-        movement = Movement(*places, self.offsets, self.offsets, none, none, no_edges)
+        movement = Movement(*places, self.offsets, self.offsets, no_edges, none, none)
         found = entered(movement, i, j, tolerance, deepest)
-        features = features_of(found.corner, found.face, np.full(len(found.face), -1))
-        return without_known(measured_points(self, before, features), contacts)
+        points = measured_points(self, before, features_of(found.corner, found.face, np.full(len(found.face), -1)))
+        return points[~are_known(points, contacts)]

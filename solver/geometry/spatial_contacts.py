@@ -13,7 +13,7 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import expand_ranges
 from .clipping import ClippedCorners, clipped_faces
-from .contacts import STEEPEST_LANDING, Contacts, joined_contacts, matched_contacts, without_known
+from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts
 from .convex_parts import ConvexParts
 from .cut_points import without_points_of_cuts
 from .entering import Movement, Place, across, entered
@@ -332,41 +332,38 @@ def entered_points(
     """
     solids, block_of_part = parts.solids, parts.block_of_part
     before, after = parts.placed(before), parts.placed(after)
-    i, j = near_parts(solids, block_of_part, after, -tolerance, useful)
-    places = []
-    for corners in (before, after):
-        faces = solids.faces(corners)
-        places.append(Place(corners, faces.normals, faces.middles))
+    places = [Place(at, faces.normals, faces.middles) for at in (before, after) for faces in (solids.faces(at),)]
     once, edges_of = solids.whole_edges
-    ends = np.stack([solids.corners[once], solids.corners[solids.next_corner[once]]], axis=1)
+    ends = solids.corners[np.stack([once, solids.next_corner[once]], axis=1)]
     edge_faces = solids.face_of_corner[np.stack([once, solids.twins[once]], axis=1)]
-    movement = Movement(*places, solids.offsets, solids.faces_of_block, ends, edge_faces, edges_of)
+    movement = Movement(*places, solids.offsets, solids.faces_of_block, edges_of, ends, edge_faces)
+    i, j = near_parts(solids, block_of_part, after, -tolerance, useful)
     deepest = PENETRATION_FRACTION * np.minimum(widths[block_of_part[i]], widths[block_of_part[j]])
     found = entered(movement, i, j, tolerance, deepest)
     own, other = once[found.own], once[found.other]
-    crossing = _crossings(solids, after, own, other)
-    places_on = places_of(*crossing, np.zeros(len(own), dtype=bool))
-    crossed = feature_rows(ACROSS, own, other, places_on)
-    crossing_points = measured_points(solids, block_of_part, before, crossed, np.zeros(len(own)))
-    known = np.zeros(len(own), dtype=bool)
-    if len(contacts) and len(own):
-        known = matched_contacts(crossing_points, contacts)[1]
-    on_face = feature_rows(ON_FACE, found.corner, found.face, -1)
-    corners_on_faces = measured_points(solids, block_of_part, before, on_face, np.zeros(len(on_face)))
-    k = known[found.edge]
-    edge, corner = found.edge[k], found.at_edge[k]
-    normals = across(movement, movement.before, found.own[edge], found.other[edge])
-    along = unit(before[ends[found.other[edge], 1]] - before[ends[found.other[edge], 0]])
-    apart = before[corner] - before[ends[found.other[edge], 0]]
-    n = len(edge)
+    crossings = places_of(*_crossings(solids, after, own, other), np.zeros(len(own), dtype=bool))
+    on_face, crossed = (
+        measured_points(solids, block_of_part, before, features, np.zeros(len(features)))
+        for features in (
+            feature_rows(ON_FACE, found.corner, found.face, -1),
+            feature_rows(ACROSS, own, other, crossings),
+        )
+    )
+    known = are_known(crossed, contacts, same_normal=False)
+    k = np.flatnonzero(known[found.at_edges])
+    corner, pair = found.edge_corner[k], found.at_edges[k]
+    normals = across(movement, movement.before, found.own[pair], found.other[pair])
+    start, end = before[ends[found.other[pair]].T]
+    along, apart = unit(end - start), before[corner] - start
     planes = Contacts(
-        features=feature_rows(BEFORE_EDGE, corner, other[edge], -1),
+        features=feature_rows(BEFORE_EDGE, corner, other[pair], -1),
         block_a=block_of_part[solids.block_of_vertex[corner]],
-        block_b=block_of_part[solids.block_of_face[solids.face_of_corner[other[edge]]]],
+        block_b=crossed.block_b[pair],
         points=before[corner],
         frames=np.stack([normals, along, cross(normals, along)], axis=1),
         gaps=dot(apart, normals),
-        slip=np.zeros((n, 2)),
-        areas=np.zeros(n),
+        slip=np.stack([dot(apart, along), dot(apart, cross(normals, along))], axis=1),
+        areas=np.zeros(len(corner)),
     )
-    return without_known(joined_contacts([corners_on_faces, crossing_points[~known], planes]), contacts)
+    points = joined_contacts([on_face, crossed[~known], planes])
+    return points[~are_known(points, contacts)]
