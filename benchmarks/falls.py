@@ -3,10 +3,10 @@
     python benchmarks/falls.py [arch portal wall corner barrel "cross vault" dome "dome of 281"]
 
 Each structure is followed to its collapse and falls from its last equilibrium, in a process of its own on one thread.
-Seconds are processor time of the fall, of all pushes that are tried. Overlaps and gaps are in sizes of the smaller stone:
-the edge of the cube, in the plane of the square, as large as it. The gap is that of the stone at rest which is farthest
-from all others, to the nearest of them. "Energy grows" is the most that it does from one of 25 poses a second to the
-next, as a part of what is lost in the fall.
+Seconds are processor time of the fall, of all pushes that are tried. Overlaps and gaps are in sizes of the smaller
+stone: the edge of the cube, in the plane of the square, as large as it. The gap is that of the stone at rest which is
+farthest from all others, to the nearest of them. "Energy grows" is the most that it does from one of 25 poses a second
+to the next, as a part of what is lost in the fall.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from solver import mechanics
 from .spin import axes_at, free_spin, principal_inertia
 
 #: Longest and shortest step, in √(block size / g), and how far a corner moves in a step at most, in block sizes.
-LONGEST_STEP, SHORTEST_STEP, STRIDE = 0.1, 1e-3, 0.2
+LONGEST_STEP, SHORTEST_STEP, STRIDE = 0.17, 1e-3, 0.3
 
 #: Give of a contact point, normal and tangential: block sizes under the mean weight of a block.
 GIVE, SHEAR_GIVE = 1e-6, 5e-6

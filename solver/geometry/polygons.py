@@ -6,12 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.tolerances import PENETRATION_FRACTION
-
 from .contacts import Contacts, are_known
-from .entering import Movement, Place, entered
 from .outlines import Outlines, overlap_depths
-from .planar_contacts import features_of, find_points, measured_points
+from .planar_contacts import features_of, find_points, measured_points, passed_edges
 
 
 @dataclass(frozen=True)
@@ -59,15 +56,6 @@ class Polygons(Outlines):
         """Contact points that would have kept blocks apart: see :class:`Shapes`."""
         i, j, _ = overlap_depths(after, self.offsets, tolerance)
         chosen = useful[i] | useful[j]
-        i, j = i[chosen], j[chosen]
-        places = []
-        for corners in (before, after):
-            along = corners[self.next_vertex] - corners
-            normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / self.edge_lengths[:, None]
-            places.append(Place(corners, normals, corners))
-        no_edges, none = np.zeros(len(self) + 1, dtype=np.int64), np.zeros((0, 2), dtype=np.int64)
-        deepest = PENETRATION_FRACTION * np.minimum(self.widths[i], self.widths[j])
-        movement = Movement(*places, self.offsets, self.offsets, no_edges, none, none)
-        found = entered(movement, i, j, tolerance, deepest)
-        points = measured_points(self, before, features_of(found.corner, found.face, np.full(len(found.face), -1)))
+        vertex, edge = passed_edges(self, before, after, i[chosen], j[chosen])
+        points = measured_points(self, before, features_of(vertex, edge, np.full(len(edge), -1)))
         return points[~are_known(points, contacts)]
