@@ -5,7 +5,8 @@ A step of time h minimises over the movement v of all blocks, with their movemen
     1/2 (v - u)ᵀ M/h² (v - u) + what contact points ask for (mechanics.ContactProblem)
 
 It is implicit and without restitution. Rotations are counted about the principal axes of each block, in which its
-inertia is diagonal. A contact point is a point of one block before a plane that rides on the other.
+inertia is diagonal. A contact point is a point of one block before a plane that rides on the other. Where a step ends
+with a block in another, what has come behind a plane that was between the two is added, and the program solved again.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ DEEP = 2e-4
 #: Force from which on a contact point counts, in block weights.
 FORCE = 1e-3
 
-#: Error of predicted gaps above which a step is linearised again, in block sizes, and linearisations at most.
+#: Error of predicted gaps above which a step is linearised again, in block sizes, and linearisations at most; where
+#: contact points have to be added in the last one, the step is halved.
 EXACT, LINEARISATIONS = 1e-4, 6
 
 
@@ -135,8 +137,8 @@ class Engine:
         contacts = self._near(h)
         before, trial = self._transferred(contacts)
         axes = axes_at(self.pose, self.drawn_axes)
-        motion, measured = flight, contacts
-        for linearisation in range(LINEARISATIONS):
+        motion = flight
+        for left in range(LINEARISATIONS, 0, -1):
             pose = mechanics.moved(self.pose, motion * self.scales)
             measured = self._carried(contacts, pose)
             problem = self._problem(h, contacts, measured, before, pose, motion - flight, axes)
@@ -158,7 +160,7 @@ class Engine:
             entered = self._entered(corners, contacts)
             if off < EXACT * self.length and len(entered) == 0:
                 break
-            if linearisation + 1 < LINEARISATIONS and len(entered):
+            if left > 1 and len(entered):
                 contacts = mechanics.joined_contacts([contacts, entered])
                 before = np.concatenate([before, np.zeros((len(entered), self.d))])
                 # As if closed: open ones would be found in each other by forces too large for Newton's method.
@@ -177,7 +179,7 @@ class Engine:
         return True
 
     def _entered(self, corners: np.ndarray, contacts: mechanics.Contacts) -> mechanics.Contacts:
-        """Contact points, where they are before a step, that are not among those given and that it has passed."""
+        """Contact points, as they are before a step, beside those given that it has passed."""
         found = self.assembly.shapes.entered(self.corners, corners, self.free, DEEP * self.length, contacts)
         return found[~(self.removed[found.block_a] | self.removed[found.block_b])]
 

@@ -180,8 +180,13 @@ def passed_edges(
     came = shapes.convex_vertex[vertex] & (heights[1] < 0.0) & (heights[0] > heights[1])
     came &= heights[0] >= -PENETRATION_FRACTION * width
     part = np.clip(heights[0] / np.where(came, heights[0] - heights[1], 1.0), 0.0, 1.0)
-    along, end = places[0] + part * (places[1] - places[0]), CORNER_TOLERANCE * width
-    k = np.flatnonzero(came & (along >= -end) & (along <= shapes.edge_lengths[edge] + end))
+    along = places[0] + part * (places[1] - places[0])
+    # Past a re-entrant corner is still the block.
+    start, end = (
+        np.where(shapes.convex_vertex[corner], CORNER_TOLERANCE, PENETRATION_FRACTION) * width
+        for corner in (edge, following[edge])
+    )
+    k = np.flatnonzero(came & (along >= -start) & (along <= shapes.edge_lengths[edge] + end))
     # Those it was behind before come last.
     order = k[np.lexsort((np.minimum(heights[0][k], 0.0) / width[k] + part[k], vertex[k], owner[k]))]
     last = np.append((np.diff(owner[order]) != 0) | (np.diff(vertex[order]) != 0), True)[: len(order)]
