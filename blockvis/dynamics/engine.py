@@ -38,7 +38,7 @@ DEEP = 2e-4
 FORCE = 1e-3
 
 #: Error of predicted gaps above which a step is linearised again, in block sizes, and linearisations at most; where
-#: contact points have to be added in the last one, the step is halved.
+#: the last one leaves blocks in each other, the step is halved.
 EXACT, LINEARISATIONS = 1e-4, 6
 
 
@@ -156,16 +156,18 @@ class Engine:
             motion = motion + self._along(change, axes)
             pose = mechanics.moved(self.pose, motion * self.scales)
             corners = mechanics.moved_vertices(self.assembly, pose)
-            off = np.abs(self._carried(contacts, pose).gaps - predicted)[forces[:, 0] > FORCE].max(initial=0.0)
+            gaps = self._carried(contacts, pose).gaps
+            counts = (forces[:, 0] > FORCE) | (gaps < -DEEP * self.length)
             entered = self._entered(corners, contacts)
-            if off < EXACT * self.length and len(entered) == 0:
+            if np.abs(gaps - predicted)[counts].max(initial=0.0) < EXACT * self.length and len(entered) == 0:
                 break
             if left > 1 and len(entered):
                 contacts = mechanics.joined_contacts([contacts, entered])
                 before = np.concatenate([before, np.zeros((len(entered), self.d))])
                 # As if closed: open ones would be found in each other by forces too large for Newton's method.
                 trial = np.concatenate([trial, np.tile(np.eye(self.d)[0], (len(entered), 1))])
-        if len(entered) and h > SHORTEST_STEP:
+        deeper = gaps < np.minimum(contacts.gaps, 0.0) - DEEP * self.length
+        if (len(entered) or deeper.any()) and h > SHORTEST_STEP:
             return False
         energies = self.energies
         self.contacts, self.forces, self.trial = contacts, forces, trial
