@@ -49,7 +49,9 @@ def example(name: str) -> solver.Response:
     """Follow an example to its collapse."""
     case = blockvis.read_case(EXAMPLES / f"{name}.toml")
     assembly = case_assembly(case)
-    settlements = [replace(given, tolerance=1e-3, limit=0.6) for given in case_settlements(case, assembly)]
+    settlements = [
+        replace(given, tolerance=1e-3, limit=max(given.limit, 0.6)) for given in case_settlements(case, assembly)
+    ]
     return solver.settle(
         assembly, settlements, interfaces=case_interfaces(case), loads=case_loads(case, assembly), controls=SHORT
     )
