@@ -332,11 +332,12 @@ def entered_points(
     """
     solids, block_of_part = parts.solids, parts.block_of_part
     before, after = parts.placed(before), parts.placed(after)
-    places = [Place(at, faces.normals, faces.middles) for at in (before, after) for faces in (solids.faces(at),)]
+    faces, faces_after = solids.faces(before), solids.faces(after)
+    start, end = Place(before, faces.normals, faces.middles), Place(after, faces_after.normals, faces_after.middles)
     once, edges_of = solids.whole_edges
     ends = solids.corners[np.stack([once, solids.next_corner[once]], axis=1)]
     edge_faces = solids.face_of_corner[np.stack([once, solids.twins[once]], axis=1)]
-    movement = Movement(*places, solids.offsets, solids.faces_of_block, edges_of, ends, edge_faces)
+    movement = Movement(start, end, solids.offsets, solids.faces_of_block, edges_of, ends, edge_faces)
     i, j = near_parts(solids, block_of_part, after, -tolerance, useful)
     deepest = PENETRATION_FRACTION * np.minimum(widths[block_of_part[i]], widths[block_of_part[j]])
     found = entered(movement, i, j, tolerance, deepest)
@@ -353,8 +354,8 @@ def entered_points(
     k = np.flatnonzero(known[found.at_edges])
     corner, pair = found.edge_corner[k], found.at_edges[k]
     normals = across(movement, movement.before, found.own[pair], found.other[pair])
-    start, end = before[ends[found.other[pair]].T]
-    along, apart = unit(end - start), before[corner] - start
+    first, second = before[ends[found.other[pair]].T]
+    along, apart = unit(second - first), before[corner] - first
     planes = Contacts(
         features=feature_rows(BEFORE_EDGE, corner, other[pair], -1),
         block_a=block_of_part[solids.block_of_vertex[corner]],
