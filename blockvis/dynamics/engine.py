@@ -5,7 +5,8 @@ A step of time h minimises over the movement v of all blocks, with their movemen
     1/2 (v - u)ᵀ M/h² (v - u) + what contact points ask for (mechanics.ContactProblem)
 
 It is implicit and without restitution. Rotations are counted about the principal axes of each block, in which its
-inertia is diagonal. A contact point is a point of one block before a plane that rides on the other.
+inertia is diagonal. A contact point is a point of one block before a plane that rides on the other. Where a step ends
+with a block in another, what has come behind a plane that was between the two is added, and the program solved again.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from solver import mechanics
 from .spin import axes_at, free_spin, principal_inertia
 
 #: Longest and shortest step, in √(block size / g), and how far a corner moves in a step at most, in block sizes.
-LONGEST_STEP, SHORTEST_STEP, STRIDE = 0.1, 1e-3, 0.2
+LONGEST_STEP, SHORTEST_STEP, STRIDE = 0.17, 1e-3, 0.3
 
 #: Give of a contact point, normal and tangential: block sizes under the mean weight of a block.
 GIVE, SHEAR_GIVE = 1e-6, 5e-6
@@ -30,17 +31,15 @@ GIVE, SHEAR_GIVE = 1e-6, 5e-6
 #: Part of an overlap that a step pushes out: all of it at once would throw the blocks.
 PUSHED_OUT = 0.2
 
-#: Overlap that a step may add before it is repeated in two halves, in block sizes.
-DEEP = 2e-3
+#: Overlap above which the contact points that would have prevented it are added, in block sizes.
+DEEP = 2e-4
 
 #: Force from which on a contact point counts, in block weights.
 FORCE = 1e-3
 
-#: Kind of the contact points that a search before the step has not found.
-MISSED = 9
-
-#: Error of predicted gaps above which a step is linearised again, in block sizes, and linearisations at most.
-EXACT, LINEARISATIONS = 1e-4, 3
+#: Error of predicted gaps above which a step is linearised again, in block sizes, and linearisations at most; where
+#: the last one leaves blocks in each other, the step is halved.
+EXACT, LINEARISATIONS = 1e-4, 6
 
 
 class Engine:
@@ -94,7 +93,6 @@ class Engine:
         self.contacts: mechanics.Contacts | None = None
         self.forces = self.trial = np.zeros((0, self.d))
         self.corners = mechanics.moved_vertices(assembly, pose)
-        self.deep = self._deep(self.corners)
         self.flies = np.zeros(assembly.n_blocks, dtype=bool)
         #: Length of the last step.
         self.step_length = 0.2 * LONGEST_STEP
@@ -133,24 +131,16 @@ class Engine:
                 h /= 2.0
             self.step_length, left = h, left - h
 
-    def _step(self, h: float, missed: mechanics.Contacts | None = None) -> bool:
-        """Take a step, with contact points beside those found; false where it has to be shorter."""
+    def _step(self, h: float) -> bool:
+        """Take a step; false where it has to be shorter."""
         flight, velocity = self._flight(h)
         contacts = self._near(h)
-        if missed is not None:
-            contacts = mechanics.joined_contacts([contacts, missed])
         before, trial = self._transferred(contacts)
         axes = axes_at(self.pose, self.drawn_axes)
-        forces, motion, predicted = before, flight, None
-        for _ in range(LINEARISATIONS):
+        motion = flight
+        for left in range(LINEARISATIONS, 0, -1):
             pose = mechanics.moved(self.pose, motion * self.scales)
             measured = self._carried(contacts, pose)
-            carries = forces[:, 0] > FORCE
-            if (
-                predicted is not None
-                and np.abs(measured.gaps - predicted)[carries].max(initial=0.0) < EXACT * self.length
-            ):
-                break
             problem = self._problem(h, contacts, measured, before, pose, motion - flight, axes)
             try:
                 solution = mechanics.minimise(problem, trial)
@@ -164,14 +154,22 @@ class Engine:
             change = np.zeros_like(motion)
             change[self.free] = solution.motion.reshape(-1, motion.shape[1])
             motion = motion + self._along(change, axes)
-        pose = mechanics.moved(self.pose, motion * self.scales)
-        corners = mechanics.moved_vertices(self.assembly, pose)
-        deep = self._deep(corners)
-        new = [pair for pair in deep if deep[pair] > self.deep.get(pair, 0.0) + DEEP * self.length]
-        if new and h > SHORTEST_STEP:
-            added = self._missed(new, corners) if missed is None else None
-            return added is not None and self._step(h, added)
-        self.deep, energies = deep, self.energies
+            pose = mechanics.moved(self.pose, motion * self.scales)
+            corners = mechanics.moved_vertices(self.assembly, pose)
+            gaps = self._carried(contacts, pose).gaps
+            counts = (forces[:, 0] > FORCE) | (gaps < -DEEP * self.length)
+            entered = self._entered(corners, contacts)
+            if np.abs(gaps - predicted)[counts].max(initial=0.0) < EXACT * self.length and len(entered) == 0:
+                break
+            if left > 1 and len(entered):
+                contacts = mechanics.joined_contacts([contacts, entered])
+                before = np.concatenate([before, np.zeros((len(entered), self.d))])
+                # As if closed: open ones would be found in each other by forces too large for Newton's method.
+                trial = np.concatenate([trial, np.tile(np.eye(self.d)[0], (len(entered), 1))])
+        deeper = gaps < np.minimum(contacts.gaps, 0.0) - DEEP * self.length
+        if (len(entered) or deeper.any()) and h > SHORTEST_STEP:
+            return False
+        energies = self.energies
         self.contacts, self.forces, self.trial = contacts, forces, trial
         self.velocity = np.where(self.free[:, None], velocity + (motion - flight) / h, 0.0)
         self.pose, self.corners = pose, corners
@@ -181,6 +179,11 @@ class Engine:
         self._lose(energies)
         self.steps += 1
         return True
+
+    def _entered(self, corners: np.ndarray, contacts: mechanics.Contacts) -> mechanics.Contacts:
+        """Contact points, as they are before a step, beside those given that it has passed."""
+        found = self.assembly.shapes.entered(self.corners, corners, self.free, DEEP * self.length, contacts)
+        return found[~(self.removed[found.block_a] | self.removed[found.block_b])]
 
     def _flight(self, h: float) -> tuple[np.ndarray, np.ndarray]:
         """Movement and velocity after a step without loads and contact, (n_blocks, n_dof) arrays."""
@@ -263,59 +266,6 @@ class Engine:
         if self.d == 2:
             return motion
         return np.concatenate([motion[:, :3], np.einsum("nij,nj->ni", axes, motion[:, 3:])], axis=1)
-
-    def _deep(self, corners: np.ndarray) -> dict[tuple[int, int], float]:
-        """Pairs of blocks, one of them free, that overlap by more than is let pass, and how deep they do [m]."""
-        i, j, depth = self.assembly.shapes.overlaps(corners, DEEP * self.length)
-        return {(a, b): d for a, b, d in zip(i.tolist(), j.tolist(), depth.tolist(), strict=True) if self._moves(a, b)}
-
-    def _moves(self, a: int, b: int) -> bool:
-        return bool((self.free[a] or self.free[b]) and not (self.removed[a] or self.removed[b]))
-
-    def _missed(self, pairs: list[tuple[int, int]], corners: np.ndarray) -> mechanics.Contacts | None:
-        """Contact points, where they were before a step, of pairs that the step has put into each other.
-
-        A face that was between the two, and the corner that came through it farthest.
-        """
-        rows = []
-        normals, middles, block_of_face = self._faces(self.corners)
-        for pair in pairs:
-            best = (-DEEP * self.length, -1, -1)
-            for a, b in (pair, pair[::-1]):
-                faces, own = np.flatnonzero(block_of_face == b), np.flatnonzero(self.assembly.block_of_vertex == a)
-                heights = ((self.corners[own][None] - middles[faces][:, None]) * normals[faces][:, None]).sum(axis=2)
-                face = int(heights.min(axis=1).argmax())
-                came = ((corners[own] - self.corners[own]) * normals[faces[face]]).sum(axis=1) + heights[face]
-                best = max(best, (float(heights.min(axis=1)[face]), int(faces[face]), int(own[came.argmin()])))
-            if best[1] >= 0:
-                rows.append(best[1:])
-        if not rows:
-            return None
-        face, vertex = np.array(rows).T
-        normal, point, n = normals[face], self.corners[vertex], len(face)
-        frames = np.linalg.qr(np.concatenate([normal[:, :, None], np.tile(np.eye(self.d), (n, 1, 1))], axis=2))[0]
-        frames = frames.transpose(0, 2, 1)
-        frames[:, 0] = normal
-        return mechanics.Contacts(
-            features=np.stack([np.full(n, MISSED), vertex, face, np.full(n, -1)], axis=1),
-            block_a=self.assembly.block_of_vertex[vertex],
-            block_b=block_of_face[face],
-            points=point,
-            frames=frames,
-            gaps=((point - middles[face]) * normal).sum(axis=1),
-            slip=np.zeros((n, self.d - 1)),
-            areas=np.zeros(n),
-        )
-
-    def _faces(self, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Give normals and points of all faces, in the plane edges, (n, d) arrays, and the block of each."""
-        if self.d == 3:
-            solids = self.assembly.polyhedra
-            faces = solids.faces(corners)
-            return faces.normals, faces.middles, solids.block_of_face
-        along = corners[self.assembly.next_vertex] - corners
-        normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / self.assembly.edge_lengths[:, None]
-        return normals, corners, self.assembly.block_of_vertex
 
     def _kinetic(self, velocity: np.ndarray, axes: np.ndarray) -> np.ndarray:
         turned = self._along(velocity, axes.transpose(0, 2, 1))

@@ -79,7 +79,11 @@ class Fall:
         return solver.Pose(places, mechanics.swung(before, t * turn).rotations)
 
 
-def fall_of(response: solver.Response, progress: Callable[[float], None] | None = None) -> Fall | None:
+def fall_of(
+    response: solver.Response,
+    progress: Callable[[float], None] | None = None,
+    watch: Callable[[Engine], None] | None = None,
+) -> Fall | None:
     """Let a collapsed structure fall from its last equilibrium until all blocks rest.
 
     Parameters
@@ -87,6 +91,8 @@ def fall_of(response: solver.Response, progress: Callable[[float], None] | None 
     response : solver.Response
     progress : callable, optional
         Called with the seconds [s] of the fall that are worked out.
+    watch : callable, optional
+        Called with the engine at the start and at each pose that is kept, anew for each push that is tried.
 
     Returns
     -------
@@ -102,7 +108,7 @@ def fall_of(response: solver.Response, progress: Callable[[float], None] | None 
     enough = 0.0 if assembly.dimension == 2 else MOST * _falling_mass(response)
     best, most = None, 0.0
     for _ in range(DOUBLINGS + 1):
-        fall = _followed(response, push, progress)
+        fall = _followed(response, push, progress, watch)
         fallen = np.linalg.norm(fall.positions[-1] - fall.positions[0], axis=1) > FALLEN * assembly.block_size
         mass = float(assembly.masses[fallen].sum())
         # No more falls by a larger push: the mechanism takes blocks with it that come to rest.
@@ -124,10 +130,17 @@ def _falling_mass(response: solver.Response) -> float:
     return float(response.assembly.masses[takes & response.assembly.free].sum())
 
 
-def _followed(response: solver.Response, push: float, progress: Callable[[float], None] | None) -> Fall:
+def _followed(
+    response: solver.Response,
+    push: float,
+    progress: Callable[[float], None] | None,
+    watch: Callable[[Engine], None] | None,
+) -> Fall:
     """Follow the blocks until all rest or the time is over."""
     engine, ground = engine_of(response, push)
     poses, calm, still = [engine.pose], 0, STILL * float(np.sqrt(solver.GRAVITY * response.assembly.block_size))
+    if watch is not None:
+        watch(engine)
     for number in range(1, round(LONGEST * RATE) + 1):
         try:
             engine.advance(1.0 / RATE)
@@ -137,6 +150,8 @@ def _followed(response: solver.Response, push: float, progress: Callable[[float]
         poses.append(engine.pose)
         if progress is not None:
             progress(number / RATE)
+        if watch is not None:
+            watch(engine)
         calm = calm + 1 if engine.fastest < still else 0
         if calm >= RESTING * RATE:
             break

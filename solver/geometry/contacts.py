@@ -11,6 +11,9 @@ import numpy as np
 #: Faces that cover each other on a strip may touch if its gap is at most this part of its width; others slide past.
 STEEPEST_LANDING = 0.25
 
+#: Cosine from which on two normals are the same.
+SAME_NORMAL = 1.0 - 1e-6
+
 
 @dataclass(frozen=True)
 class Contacts:
@@ -97,6 +100,15 @@ def matched_contacts(contacts: Named, before: Named) -> tuple[np.ndarray, np.nda
     order = np.argsort(earlier_keys, kind="stable")
     place = order[np.minimum(np.searchsorted(earlier_keys[order], keys), len(earlier_keys) - 1)]
     return place, earlier_keys[place] == keys
+
+
+def are_known(contacts: Contacts, known: Contacts, same_normal: bool = True) -> np.ndarray:
+    """(n,) bool array: whether contact points are among those known, by their names and normals or names alone."""
+    if len(known) == 0 or len(contacts) == 0:
+        return np.zeros(len(contacts), dtype=bool)
+    number, same = matched_contacts(contacts, known)
+    along = np.einsum("ni,ni->n", contacts.frames[:, 0], known.frames[number, 0])
+    return same & ((along > SAME_NORMAL) | (not same_normal))
 
 
 def successors(

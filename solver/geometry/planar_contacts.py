@@ -149,6 +149,50 @@ def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np
     return measured_points(shapes, vertices, features_of(vertex[order], edge[order], corner[order]))
 
 
+def passed_edges(
+    shapes: Outlines, before: np.ndarray, after: np.ndarray, i: np.ndarray, j: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find the corners of blocks that have gone through edges of others in a movement.
+
+    Parameters
+    ----------
+    shapes : Outlines
+    before, after : (n_vertices, 2) arrays [m]
+    i, j : (n_pairs,) int arrays
+        Blocks that overlap after it.
+
+    Returns
+    -------
+    vertex, edge : (n,) int arrays
+        Of several edges the one that the corner went through last, seen from the block that has the edge.
+    """
+    offsets, following, counts = shapes.offsets, shapes.next_vertex, np.diff(shapes.offsets)
+    a, b = np.concatenate([i, j]), np.concatenate([j, i])
+    owner, position = expand_ranges(counts[a] * counts[b])
+    vertex, edge = offsets[a][owner] + position // counts[b][owner], offsets[b][owner] + position % counts[b][owner]
+    heights, places = [], []
+    for corners in (before, after):
+        tangent = _unit(corners[following[edge]] - corners[edge])
+        offset = corners[vertex] - corners[edge]
+        heights.append(offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0])
+        places.append(_dot(offset, tangent))
+    width = np.minimum(shapes.widths[a], shapes.widths[b])[owner]
+    came = shapes.convex_vertex[vertex] & (heights[1] < 0.0) & (heights[0] > heights[1])
+    came &= heights[0] >= -PENETRATION_FRACTION * width
+    part = np.clip(heights[0] / np.where(came, heights[0] - heights[1], 1.0), 0.0, 1.0)
+    along = places[0] + part * (places[1] - places[0])
+    # Past a re-entrant corner is still the block.
+    start, end = (
+        np.where(shapes.convex_vertex[corner], CORNER_TOLERANCE, PENETRATION_FRACTION) * width
+        for corner in (edge, following[edge])
+    )
+    k = np.flatnonzero(came & (along >= -start) & (along <= shapes.edge_lengths[edge] + end))
+    # Those it was behind before come last.
+    order = k[np.lexsort((np.minimum(heights[0][k], 0.0) / width[k] + part[k], vertex[k], owner[k]))]
+    last = np.append((np.diff(owner[order]) != 0) | (np.diff(vertex[order]) != 0), True)[: len(order)]
+    return vertex[order[last]], edge[order[last]]
+
+
 def _near_blocks(
     shapes: Outlines, vertices: np.ndarray, reach: float, useful: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

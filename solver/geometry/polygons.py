@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .contacts import Contacts
+from .contacts import Contacts, are_known
 from .outlines import Outlines, overlap_depths
-from .planar_contacts import find_points, measured_points
+from .planar_contacts import features_of, find_points, measured_points, passed_edges
 
 
 @dataclass(frozen=True)
@@ -49,3 +49,13 @@ class Polygons(Outlines):
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pairs of blocks that overlap by more than ``tolerance`` [m]; see :func:`overlap_depths`."""
         return overlap_depths(vertices, self.offsets, tolerance)
+
+    def entered(
+        self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
+    ) -> Contacts:
+        """Contact points that would have kept blocks apart: see :class:`Shapes`."""
+        i, j, _ = overlap_depths(after, self.offsets, tolerance)
+        chosen = useful[i] | useful[j]
+        vertex, edge = passed_edges(self, before, after, i[chosen], j[chosen])
+        points = measured_points(self, before, features_of(vertex, edge, np.full(len(edge), -1)))
+        return points[~are_known(points, contacts)]

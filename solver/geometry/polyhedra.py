@@ -10,7 +10,7 @@ import numpy as np
 from .contacts import Contacts
 from .convex_parts import ConvexParts, convex_parts
 from .solids import Solids
-from .spatial_contacts import find_points, measured_points
+from .spatial_contacts import entered_points, find_points, measured_points
 from .spatial_overlaps import overlap_depths_in_space
 
 
@@ -57,3 +57,9 @@ class Polyhedra(Solids):
         """Pairs of blocks that overlap by more than ``tolerance`` [m]; see :func:`overlap_depths_in_space`."""
         parts = self.parts
         return overlap_depths_in_space(parts.solids, parts.block_of_part, parts.placed(vertices), tolerance)
+
+    def entered(
+        self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
+    ) -> Contacts:
+        """Contact points that would have kept blocks apart: see :class:`Shapes`."""
+        return entered_points(self.parts, self.widths, before, after, useful, tolerance, contacts)

@@ -57,7 +57,12 @@ def face_separations(
 
 
 def edge_separations(
-    solids: Solids, faces: Faces, vertices: np.ndarray, i: np.ndarray, j: np.ndarray
+    solids: Solids,
+    faces: Faces,
+    vertices: np.ndarray,
+    i: np.ndarray,
+    j: np.ndarray,
+    smallest_sine: float = SMALLEST_SINE,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Largest separation of two convex parts by two edges.
 
@@ -68,6 +73,8 @@ def edge_separations(
     vertices : (n_vertices, 3) array [m]
     i, j : (n,) int arrays
         Parts.
+    smallest_sine : float
+        Of the angle between the edges.
 
     Returns
     -------
@@ -77,8 +84,7 @@ def edge_separations(
     own, other : (n,) int arrays
         The edges.
     """
-    once = np.flatnonzero(np.arange(len(solids.corners)) < solids.twins)
-    first = np.searchsorted(once, solids.face_offsets[solids.faces_of_block])
+    once, first = solids.whole_edges
     count = np.diff(first)
     apart = np.full(len(i), -np.inf)
     edge_i, edge_j = np.zeros((2, len(i)), dtype=np.int64)
@@ -89,7 +95,7 @@ def edge_separations(
         along_a = unit(vertices[solids.corners[solids.next_corner[own]]] - a)
         along_b = unit(vertices[solids.corners[solids.next_corner[other]]] - b)
         normal = cross(along_a[:, :, None], along_b[:, None])
-        separates = dot(normal, normal) > SMALLEST_SINE**2
+        separates = dot(normal, normal) > smallest_sine**2
         sides = outward(solids, faces, other)[:, None] - outward(solids, faces, own)[:, :, None]
         sense = np.sign(dot(normal, sides))
         normal, separates = unit(normal) * sense[..., None], separates & (sense != 0.0)

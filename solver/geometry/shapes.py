@@ -58,3 +58,12 @@ class Shapes(Protocol):
 
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pairs of blocks that overlap by more than ``tolerance`` [m]: two (n_pairs,) int arrays, and the depths."""
+
+    def entered(
+        self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
+    ) -> Contacts:
+        """Contact points beside those given that would have kept apart what a movement has put into each other.
+
+        Measured before it, of corners (n_vertices, d) [m] before and after, of overlaps of more than ``tolerance`` [m]
+        with useful blocks.
+        """

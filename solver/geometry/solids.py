@@ -142,6 +142,12 @@ class Solids:
         return order[np.searchsorted((start * n + end)[order], end * n + start)]
 
     @cached_property
+    def whole_edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Every edge once, by its corner, and (n + 1,) where those of each solid begin."""
+        once = np.flatnonzero(np.arange(len(self.corners)) < self.twins)
+        return once, np.searchsorted(once, self.face_offsets[self.faces_of_block])
+
+    @cached_property
     def edge_lengths(self) -> np.ndarray:
         """(n_corners,) array [m]: length of the edge that starts at each corner."""
         along = self.vertices[self.corners[self.next_corner]] - self.vertices[self.corners]

@@ -13,13 +13,14 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import expand_ranges
 from .clipping import ClippedCorners, clipped_faces
-from .contacts import STEEPEST_LANDING, Contacts, joined_contacts
+from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts
 from .convex_parts import ConvexParts
 from .cut_points import without_points_of_cuts
+from .entering import Movement, Place, across, entered
 from .facing import FacingParts, facing_parts, near_parts
 from .separations import edge_separations, outward
 from .solids import Faces, Solids, cross, dot, unit
-from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
+from .spatial_features import ACROSS, BEFORE_EDGE, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
 
 #: Width of a sliver at a cut, as a part of both faces, and its area, as a part of that in which the two blocks touch.
 SLIVER = 0.005
@@ -282,11 +283,88 @@ def _crossed_edges(
     # By more than rounding, in widths.
     k = np.flatnonzero((apart > pairs.apart + 1e-4 * pairs.width) & (apart <= reach))
     own, other = own[k], other[k]
+    on_a, on_b = _crossings(solids, vertices, own, other)
+    inside = (on_a > 0.0) & (on_a < 1.0) & (on_b > 0.0) & (on_b < 1.0)
+    places = places_of(on_a[inside], on_b[inside], np.zeros(np.count_nonzero(inside), dtype=bool))
+    return feature_rows(ACROSS, own[inside], other[inside], places), np.zeros(len(places))
+
+
+def _crossings(
+    solids: Solids, vertices: np.ndarray, own: np.ndarray, other: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where along two edges, as parts of them, their lines are nearest to each other, two (n,) arrays."""
     a, b = vertices[solids.corners[own]], vertices[solids.corners[other]]
     along_a = vertices[solids.corners[solids.next_corner[own]]] - a
     along_b = vertices[solids.corners[solids.next_corner[other]]] - b
     area = cross(along_a, along_b)
     on_a, on_b = (dot(cross(b - a, along), area) / dot(area, area) for along in (along_b, along_a))
-    inside = (on_a > 0.0) & (on_a < 1.0) & (on_b > 0.0) & (on_b < 1.0)
-    places = places_of(on_a[inside], on_b[inside], np.zeros(np.count_nonzero(inside), dtype=bool))
-    return feature_rows(ACROSS, own[inside], other[inside], places), np.zeros(len(places))
+    return on_a, on_b
+
+
+def entered_points(
+    parts: ConvexParts,
+    widths: np.ndarray,
+    before: np.ndarray,
+    after: np.ndarray,
+    useful: np.ndarray,
+    tolerance: float,
+    contacts: Contacts,
+) -> Contacts:
+    """Find the points that would have kept apart blocks that overlap after a movement, measured before it.
+
+    Parameters
+    ----------
+    parts : ConvexParts
+    widths : (n_blocks,) array [m]
+    before, after : (n_vertices, 3) arrays [m]
+        Corners of the blocks.
+    useful : (n_blocks,) bool array
+        One of two blocks that overlap must be of these.
+    tolerance : float [m]
+        Least overlap.
+    contacts : Contacts
+        What is known.
+
+    Notes
+    -----
+    Edges touch where they cross. Where that is known and does not help, as one turns, corners are to stay before the
+    plane that separated the two.
+    """
+    solids, block_of_part = parts.solids, parts.block_of_part
+    before, after = parts.placed(before), parts.placed(after)
+    faces, faces_after = solids.faces(before), solids.faces(after)
+    start, end = Place(before, faces.normals, faces.middles), Place(after, faces_after.normals, faces_after.middles)
+    once, edges_of = solids.whole_edges
+    ends = solids.corners[np.stack([once, solids.next_corner[once]], axis=1)]
+    edge_faces = solids.face_of_corner[np.stack([once, solids.twins[once]], axis=1)]
+    movement = Movement(start, end, solids.offsets, solids.faces_of_block, edges_of, ends, edge_faces)
+    i, j = near_parts(solids, block_of_part, after, -tolerance, useful)
+    deepest = PENETRATION_FRACTION * np.minimum(widths[block_of_part[i]], widths[block_of_part[j]])
+    found = entered(movement, i, j, tolerance, deepest)
+    own, other = once[found.own], once[found.other]
+    crossings = places_of(*_crossings(solids, after, own, other), np.zeros(len(own), dtype=bool))
+    on_face, crossed = (
+        measured_points(solids, block_of_part, before, features, np.zeros(len(features)))
+        for features in (
+            feature_rows(ON_FACE, found.corner, found.face, -1),
+            feature_rows(ACROSS, own, other, crossings),
+        )
+    )
+    known = are_known(crossed, contacts, same_normal=False)
+    k = np.flatnonzero(known[found.at_edges])
+    corner, pair = found.edge_corner[k], found.at_edges[k]
+    normals = across(movement, movement.before, found.own[pair], found.other[pair])
+    first, second = before[ends[found.other[pair]].T]
+    along, apart = unit(second - first), before[corner] - first
+    planes = Contacts(
+        features=feature_rows(BEFORE_EDGE, corner, other[pair], -1),
+        block_a=block_of_part[solids.block_of_vertex[corner]],
+        block_b=crossed.block_b[pair],
+        points=before[corner],
+        frames=np.stack([normals, along, cross(normals, along)], axis=1),
+        gaps=dot(apart, normals),
+        slip=np.stack([dot(apart, along), dot(apart, cross(normals, along))], axis=1),
+        areas=np.zeros(len(corner)),
+    )
+    points = joined_contacts([on_face, crossed[~known], planes])
+    return points[~are_known(points, contacts)]

@@ -8,7 +8,8 @@ import numpy as np
 #: ``block_b``), and -1, or where the vertex is on the boundary of the face the edge there and the edge of ``block_a``
 #: that crosses it. A corner on a corner: both corners, each a vertex and a face, -1. An edge across an edge: both, each
 #: named by the corner it starts at, and where along them.
-ON_FACE, ON_CORNER, ACROSS = 0, 1, 2
+#: A corner before a plane across an edge, both named, is a contact point of one movement.
+ON_FACE, ON_CORNER, ACROSS, BEFORE_EDGE = 0, 1, 2, 3
 
 #: Places along edges are kept as multiples of this part of them, which is far below what a geometry is exact to.
 GRAIN = 2.0**-29

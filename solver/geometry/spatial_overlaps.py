@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .broad_phase import box_pairs, boxes
+from .entering import PARALLEL
 from .separations import edge_separations, face_separations
 from .solids import Solids
 
@@ -46,7 +47,7 @@ def overlap_depths_in_space(
     apart = np.maximum(apart, face_separations(solids, faces, vertices, j, i, none)[0])
     deep = np.flatnonzero(apart < -tolerance)
     i, j, apart = i[deep], j[deep], apart[deep]
-    apart = np.maximum(apart, edge_separations(solids, faces, vertices, i, j)[0])
+    apart = np.maximum(apart, edge_separations(solids, faces, vertices, i, j, PARALLEL)[0])
     deep = apart < -tolerance
     blocks = np.sort(np.stack([block_of_part[i[deep]], block_of_part[j[deep]]], axis=1), axis=1)
     pairs, pair_of = np.unique(blocks, axis=0, return_inverse=True)

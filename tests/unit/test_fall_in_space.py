@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from structures import box
 
 import blockvis
 import solver
@@ -11,11 +12,6 @@ from blockvis.dynamics.engine import Engine
 from blockvis.dynamics.fall import fall_of
 from blockvis.dynamics.ground import ground_below, on_ground
 from solver import mechanics
-
-
-def box(low, high):
-    corners = [[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)]
-    return corners, [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
 
 
 @cache
@@ -96,6 +92,32 @@ def test_a_box_that_spins_freely_flips_about_its_middle_axis_and_keeps_angular_m
     np.testing.assert_allclose(momenta, np.tile(momenta[0], (40, 1)), atol=1e-9 * np.linalg.norm(momenta[0]))
     np.testing.assert_allclose(energies, energies[0], rtol=1e-9)
     assert min(middle) < -0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_a_heap_of_thrown_stones_comes_to_rest_without_overlaps_and_loses_energy_only(seed):
+    rng = np.random.default_rng(seed)
+    stones = [box(-s / 2.0, s / 2.0) for s in rng.uniform(0.2, 0.6, (8, 3))]
+    assembly = solver.Assembly.from_solids(stones, roles=["free"] * 8)
+    places = np.column_stack([rng.uniform(-0.3, 0.3, (8, 2)), 0.5 + 0.8 * np.arange(8)])
+    whole, pose = on_ground(assembly, solver.Pose(places, rng.uniform(-2.0, 2.0, (8, 3))), 0.0)
+    weight = np.append(solver.self_weight(assembly).dead, np.zeros((1, 6)), axis=0)
+    velocity = np.append(rng.uniform(-2.0, 2.0, (8, 6)), np.zeros((1, 6)), axis=0)
+    engine = Engine(whole, weight, solver.Interfaces(solver.InterfaceLaw(0.6)), pose, velocity)
+    sizes, energies = np.where(whole.free, whole.shapes.sizes, np.inf), [engine.energies.sum()]
+    for _ in range(100):
+        engine.advance(0.04)
+        energies.append(engine.energies.sum())
+        i, j, depth = whole.shapes.overlaps(engine.corners, 0.0)
+        assert (depth < 1e-3 * np.minimum(sizes[i], sizes[j])).all()
+        if engine.fastest < 1e-3:
+            break
+    assert engine.fastest < 1e-3
+    assert (np.diff(energies) < 1e-6 * (energies[0] - energies[-1])).all()
+    contacts = mechanics.find_contacts(whole, engine.corners, 1e-3)
+    touches = np.bincount(np.concatenate([contacts.block_a, contacts.block_b]), minlength=9)
+    assert (touches[whole.free] > 0).all()
 
 
 @pytest.mark.slow
