@@ -141,7 +141,7 @@ def solve_program(
 
     Raises
     ------
-    Wedged
+    SupportsLocked
         Where the static form has no minimum: no displacements of the blocks are compatible with those of the supports.
     SolveError
         If no method gives a solution that passes its check.
@@ -210,8 +210,7 @@ def joint_errors(contacts: Contacts, solution: ProgramSolution) -> tuple[float, 
     ----------
     contacts : Contacts
         After the motion.
-    solution : Solution
-        Of the program.
+    solution : ProgramSolution
 
     Returns
     -------

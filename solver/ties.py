@@ -103,7 +103,7 @@ class TieForces:
     rest : (n_ties,) array [m]
         Lengths without force; nan where a member is absent or broken.
     states : (n_ties,) int array
-        Numbers of :data:`STATES`.
+        From ``ABSENT`` to ``BROKEN``.
     ends : (n_ties, 2, d) array [m]
     """
 

@@ -119,7 +119,7 @@ def find_limit_load(
     it was loaded, and may fall below this one. Its two values agree where it has converged, but are no bounds.
     Convergence is not proved either; "not converged" says so and gives the program that came nearest.
     """
-    _check_options(assembly, flow, torsion, displacement, ties)
+    _check_options(assembly, flow, torsion, ties)
     check_blocks(assembly, overlap_tolerance)
     check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
     if bonds_at is not None:
@@ -129,6 +129,8 @@ def find_limit_load(
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
     loads = replace(loads, dead=loads.dead_at(assembly, pose), fills=())
+    if not (np.isfinite(displacement) and displacement >= 0.0):
+        raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
     states = np.full(len(ties), ELASTIC) if ties_at is None else ties_at.states
     problem = _Problem.stated(
         assembly, interfaces, loads, pose, closed_gap, displacement, torsion, tuple(ties), states, bonds_at
@@ -147,7 +149,7 @@ def find_limit_load(
         return problem.result(balanced, LimitStatus.UNBOUNDED, flow, 2)
 
 
-def _check_options(assembly: Assembly, flow: str, torsion: str, displacement: float, ties: Sequence[Tie]) -> None:
+def _check_options(assembly: Assembly, flow: str, torsion: str, ties: Sequence[Tie]) -> None:
     """Refuses unknown words, and what does not go together."""
     if flow not in ("associative", "non-associative"):
         raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
@@ -157,8 +159,6 @@ def _check_options(assembly: Assembly, flow: str, torsion: str, displacement: fl
         raise ValueError("torsion is 'uniform', but faces of blocks in the plane have none; leave it out")
     if torsion == UNIFORM and ties:
         raise ValueError(f"torsion = 'uniform' knows no ties ('{ties[0].name}'); take torsion = 'points'")
-    if not (np.isfinite(displacement) and displacement >= 0.0):
-        raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,7 @@ class EquilibriumCheck:
         In equilibrium where one exists; otherwise those of the path.
     measured : float
         Reaction [N or N·m] or multiplier of the live load.
-    bounds : Admissible
+    bounds : EquilibriumBounds
     """
 
     place: Place
