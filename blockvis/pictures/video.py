@@ -102,6 +102,7 @@ def write_film(
         )
     if size[0] % 2 or size[1] % 2:
         raise ValueError(f"an animation of {size[0]} × {size[1]} pixels cannot be encoded; both must be even")
+    _open_for_writing(path)
     with atomic_file(path) as partial:
         try:
             _encode(frames, partial, min(fps, FASTEST_GIF) if suffix == ".gif" else fps)
@@ -110,6 +111,16 @@ def write_film(
         if partial.is_file() and not _reaches_its_end(partial):
             raise _not_written(path, None)
     return path
+
+
+def _open_for_writing(path: Path) -> None:
+    """Refuse a place that cannot be written before the first frame is drawn: the encoder would not say why."""
+    try:
+        make_folder(path.parent)
+        if path.is_file() or not path.exists():
+            partial_of(path).open("wb").close()
+    except OSError as error:
+        raise OSError(f"'{path}' cannot be written ({error.strerror}); choose another place for the film") from None
 
 
 def _write_pictures(frames: Iterable[Image.Image], folder: Path) -> Path:

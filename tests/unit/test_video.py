@@ -85,6 +85,15 @@ def test_what_fails_while_drawing_leaves_no_half_film(tmp_path, suffix):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_place_that_cannot_be_written_is_told_before_anything_is_drawn(tmp_path):
+    (tmp_path / "file").write_text("kept", encoding="utf-8")
+    drawn = []
+    with pytest.raises(OSError, match=r"film\.mp4' cannot be written \(.+\); choose another place for the film"):
+        write_film(map(drawn.append, frames()), tmp_path / "file" / "film.mp4", size=SIZE, fps=10.0)
+    assert not drawn
+    assert [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()] == ["kept"]
+
+
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_the_rate_is_constant(tmp_path, suffix):
     path = write_film(frames(), tmp_path / f"film{suffix}", size=SIZE, fps=10.0)
