@@ -12,8 +12,8 @@ import solver
 #: Distance of hatch lines, in extents of the fill.
 SPACING = 0.02
 
-#: Width of a joint that parts no body in space, in extents of the fill.
-GAPING = 0.02
+#: Width of a joint that parts no body, in space and in the plane, in extents of the fill.
+GAPING, GAPING_IN_PLANE = 0.02, 0.05
 
 #: Pieces this near to each other in plan, in extents of the fill, are one body.
 SAME_BODY = 1e-6
@@ -43,8 +43,16 @@ class FillBodies:
 
     @property
     def columns(self) -> np.ndarray:
-        """(n, 4, 2) array [m]: in the plane, the outline of each column."""
-        return np.concatenate([self.feet, self.heads[:, ::-1]], axis=1)
+        """(m, 4, 2) array [m]: in the plane, the outline of each column, and of those over joints that gape."""
+        columns = np.concatenate([self.feet, self.heads[:, ::-1]], axis=1)
+        # Pieces run from the right to the left.
+        order = np.argsort(self.feet[:, 1, 0], kind="stable")
+        left, right = order[:-1], order[1:]
+        width = self.feet[right, 1, 0] - self.feet[left, 0, 0]
+        over = (width > 0.0) & (width < GAPING_IN_PLANE * self._extent) & (self.tops[left] == self.tops[right])
+        left, right = left[over], right[over]
+        bridges = [self.feet[right, 1], self.feet[left, 0], self.heads[left, 0], self.heads[right, 1]]
+        return np.concatenate([columns, np.stack(bridges, axis=1)])
 
     def hatch(self) -> np.ndarray:
         """(m, 2, 2) array [m]: in the plane, lines that fall to the right across the fill."""
@@ -63,7 +71,7 @@ class FillBodies:
     def rims(self) -> np.ndarray:
         """(m, 2, d) array [m]: edges of the bodies, in the surface and in space up to it from the extrados."""
         if self.feet.shape[2] == 2:
-            return self.heads
+            return self.columns[:, 2:]
         lines = [np.zeros((0, 2, 3))]
         for top in np.unique(self.tops):
             feet = self.feet[self.tops == top]

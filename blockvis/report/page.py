@@ -19,7 +19,7 @@ import solver
 from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures import palette
-from blockvis.pictures.backfill import fill_bodies
+from blockvis.pictures.backfill import GAPING_IN_PLANE, fill_bodies
 from blockvis.pictures.captions import (
     FALL_BADGE,
     badge_of,
@@ -352,6 +352,7 @@ def _fill(
         # Blocks that have left take the fill over them along.
         "gone": [np.flatnonzero(increment.fallen).tolist() for increment in shown],
         "scale": longest / (largest or 1.0),
+        "gaping": GAPING_IN_PLANE * float(np.ptp(np.concatenate([fill.pieces for fill in fills]), axis=(0, 1)).max()),
         "words": f"load of the fill, {force_text(largest)} on a block at most",
         "colours": [palette.hexadecimal(c) for c in (palette.FILL, palette.FILL_HATCH, palette.FILL_RIM)],
     }

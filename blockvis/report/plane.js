@@ -122,6 +122,12 @@
   function drawFill(pen, k) {
     const [paper, , rim] = model.fill.colours, pieces = fillPieces(k);
     pen.fillStyle = pen instanceof SvgPen ? paper : hatched;
+    // Over a joint that gapes the fill is one body; pieces run from the right to the left.
+    const sorted = [...pieces].sort((one, other) => one.r[0] - other.r[0]);
+    sorted.slice(1).forEach((right, i) => {
+      const left = sorted[i], wide = right.r[0] - left.p[0];
+      if (wide > 0 && wide < model.fill.gaping && left.surface === right.surface) pieces.push({ p: right.r, r: left.p, surface: left.surface });
+    });
     for (const { p, r, surface } of pieces) { ring(pen, [p, r, [r[0], surface], [p[0], surface]]); pen.fill(); }
     pen.strokeStyle = rim; pen.lineWidth = 1.5;
     lineBetween(pen, pieces.map(({ p, r, surface }) => [p[0], surface, r[0], surface]));

@@ -23,6 +23,9 @@ TIES = "ties.npz"
 #: Words of the states, in the order of ``solver.mechanics.TieForces.states``.
 STATE_WORDS = ("absent", "slack", "elastic", "yielding", "broken")
 
+#: Part of the largest force of a joint, or of a tie, below which a tie is told to carry nothing: rounding.
+NEGLIGIBLE = 1e-6
+
 #: Ties whose force is drawn over the settlement: more would not be told apart.
 MOST_CURVES = 6
 
@@ -169,6 +172,7 @@ class TieCourses:
         if not self.ties or increment.status != solver.Status.EQUILIBRIUM:
             return
         found, at = increment.ties, float(increment.parameter)
+        largest = float(np.abs(increment.forces).max(initial=0.0))
         if not self._found:
             self._found = [
                 TieCourse(t.name, t.kind, 0.0, at, increment.phase + 1, None, None, 0.0, "") for t in self.ties
@@ -178,7 +182,7 @@ class TieCourses:
             if state == mechanics.BROKEN and before.breaks_at is None:
                 # It has carried its strength since the last increment.
                 force = -tie.strength if tie.kind == mechanics.PROP else tie.strength
-            elif state not in (mechanics.ELASTIC, mechanics.YIELDING):
+            elif abs(force) < NEGLIGIBLE * largest:
                 force = 0.0
             larger = abs(force) > abs(before.force)
             self._found[k] = TieCourse(
@@ -236,7 +240,7 @@ def tie_force_curves(response: solver.Response) -> TieForceCurves | None:
     forces = np.where(np.isin(states, (mechanics.ELASTIC, mechanics.YIELDING)), forces, 0.0)
     forces[states == mechanics.ABSENT] = np.nan
     largest = np.nan_to_num(np.abs(forces)).max(axis=0)
-    told = (largest > 0.0) | (states == mechanics.BROKEN).any(axis=0)
+    told = (largest > NEGLIGIBLE * largest.max()) | (states == mechanics.BROKEN).any(axis=0)
     chosen = [k for k in np.argsort(-largest, kind="stable").tolist() if told[k]][:MOST_CURVES]
     if not chosen:
         return None

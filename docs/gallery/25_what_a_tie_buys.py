@@ -30,7 +30,7 @@ def spread(strength, fills=()):
 # %%
 # How far the pier may move out.
 
-strengths = [0.0, 1000.0, 2000.0, 4000.0]
+strengths = [0.0, 2000.0, 4000.0]
 bare = [spread(strength) for strength in strengths]
 filled = [spread(strength, (fill,)) for strength in strengths]
 for strength, one, other in zip(strengths, bare, filled, strict=True):
