@@ -1,8 +1,8 @@
 """Every block of the README and of the manual does what its page says.
 
 Blocks of a page run one after another in a folder that has ``examples`` and ``assets`` of a clone: commands, Python,
-and TOML that is read as a case. A block of text is what the commands or the Python before it print. A comment on the line
-before a block says otherwise:
+and TOML that is read as a case. A block of text is what the commands or the Python before it print. A comment on the
+line before a block says otherwise:
 
 - ``<!-- file: NAME -->``: the block is that file; one that comes with blockvis holds the same, another is written.
 - ``<!-- ci: NAME -->``: ``.ci/run`` runs the block, in a new environment; here what follows ``pip install`` is run.
