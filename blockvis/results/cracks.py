@@ -220,8 +220,9 @@ def _main_course(meeting: np.ndarray, apart: np.ndarray, area: np.ndarray, membe
     what has moved nearly as far as anything here, and from both its ends on along what has moved less.
     """
     n = len(members)
-    place = np.full(len(apart), -1)
-    place[members] = np.arange(n)
+    # minimum_spanning_tree of scipy 1.15 takes no longer integers.
+    place = np.full(len(apart), -1, dtype=np.int32)
+    place[members] = np.arange(n, dtype=np.int32)
     one, other = place[meeting]
     pairs = (one >= 0) & (other >= 0) & (one < other)
     one, other = one[pairs], other[pairs]

@@ -1,8 +1,8 @@
 """Every block of the README and of the manual does what its page says.
 
 Blocks of a page run one after another in a folder that has ``examples`` and ``assets`` of a clone: commands, Python,
-and TOML that is read as a case. A block of text is what the commands or the Python before it print. A comment on the line
-before a block says otherwise:
+and TOML that is read as a case. A block of text is what the commands or the Python before it print. A comment on the
+line before a block says otherwise:
 
 - ``<!-- file: NAME -->``: the block is that file; one that comes with blockvis holds the same, another is written.
 - ``<!-- ci: NAME -->``: ``.ci/run`` runs the block, in a new environment; here what follows ``pip install`` is run.
@@ -38,7 +38,7 @@ SHARED, ROUNDING = 1e-3, 1e-6
 
 #: What a table of keys lacks to be a case.
 GEOMETRY = '[geometry]\nlayout = "arch"\n'
-MOTION = "[settlement]\ndirection = [1.0, 0.0]\nincrement = 0.01\nlimit = 0.1\n"
+MOTION = "[[settlement]]\ndirection = [1.0, 0.0]\nincrement = 0.01\nlimit = 0.1\n"
 
 
 def blocks_of(page):
@@ -94,12 +94,12 @@ def ran(command, capsys):
 
 
 def read_case(text, folder):
-    """Keys of a page, read as a case, with an arch and a settlement where they have none."""
+    """Keys of a page, read as a case, with an arch and as many settlements as it counts where they have none."""
     tables = tomllib.loads(text)
     if not {"file", "layout"} & tables.get("geometry", {}).keys():
         text = GEOMETRY + text.replace("[geometry]\n", "")
     if not {"settlement", "analysis", "control"} & tables.keys():
-        text += MOTION
+        text += MOTION * max(int(phase) for phase in ["1", *re.findall(r"^phase = (\d+)", text, re.MULTILINE)])
     (folder / "keys-of-the-page.toml").write_text(text, encoding="utf-8")
     blockvis.read_case(folder / "keys-of-the-page.toml")
 
