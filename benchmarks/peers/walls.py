@@ -123,7 +123,7 @@ WALLS = {
     "flat arch of two blocks, supports spread": Wall(
         flat_arch, 2.0, SPREADS, 0.01, 0.2, 0.01, exact=2.0 * (math.sqrt(1.0 + 0.25**2) - 1.0)
     ),
-    "pointed arch, supports spread": Wall(generators.pointed_arch, 0.7, SPREADS, 0.05, 2.0, 0.2),
+    "pointed arch, supports spread": Wall(generators.pointed_arch, 0.7, SPREADS, 0.05, 2.0, 0.08),
     "portal, a pier moves out": Wall(generators.portal, 0.6, SPREADS, 0.02, 2.0, 0.2),
     "column of 5 blocks on ground that tilts": Wall(
         lambda: generators.column(width=0.5, block_height=0.25), 0.7, TILTS, 0.02, 1.0, 0.05, exact=math.atan(0.4)
