@@ -110,7 +110,7 @@ def ties(chosen: Sequence[str], steps: Sequence[float], budget: float) -> None:
         "elastic": (solver.Tie("rod", held, ends, ELASTIC),),
         "iron": (solver.Tie("iron", held, ends, iron, strength=YIELDS),),
     }
-    print("\n| tie | by | R [N] at " + " / ".join(f"{s:g}" for s in ARCH_AT) + " m | tie [N] | falls at [m] | seconds |")
+    print(f"\n| tie | by | R [N] at {' / '.join(map(str, ARCH_AT))} m | tie [N] | falls at [m] | seconds |")
     for kind in chosen:
         given = kinds[kind]
         started = time.process_time()
