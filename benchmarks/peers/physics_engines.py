@@ -173,7 +173,9 @@ def mujoco_path(
             if ties:
                 rest = model.tendon_lengthspring[:, 1]
                 pulled += np.clip(stiffness * (data.ten_length - rest), 0.0, strength)
-                rest[:] = np.maximum(rest, data.ten_length - strength / stiffness)
+                # Lengths are those at the start of the step.
+                ends = data.ten_length + time_step * data.ten_velocity
+                rest[:] = np.maximum(rest, ends - strength / stiffness)
             touching = is_moving[model.geom_bodyid[data.contact.geom]]
             for k in np.flatnonzero(touching.any(axis=1)):
                 mujoco.mj_contactForce(model, data, k, wrench)
