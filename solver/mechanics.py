@@ -28,7 +28,7 @@ from .path.controls import INCREMENTS, Ending
 from .path.state import PathState, Place
 from .path.stepping import NotSolved, Stepper
 from .results.certificate import worst_of
-from .results.increment import ContactState, State, StoredState
+from .results.increment import Bonds, ContactState, State, StoredState
 from .results.mechanism import Mechanism, mechanism_of, rigid_parts, with_motion
 from .results.quantities import (
     CONTROL_DISPLACEMENT,
@@ -64,6 +64,7 @@ __all__ = [
     "TIE",
     "TIE_KINDS",
     "YIELDING",
+    "Bonds",
     "ContactProblem",
     "ContactRows",
     "ContactState",

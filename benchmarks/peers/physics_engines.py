@@ -204,7 +204,9 @@ def mujoco_path(
             if ties:
                 rest = model.tendon_lengthspring[:, 1]
                 pulled += np.clip(stiffness * (data.ten_length - rest), 0.0, strength)
-                rest[:] = np.maximum(rest, data.ten_length - strength / stiffness)
+                # Lengths are those at the start of the step.
+                ends = data.ten_length + time_step * data.ten_velocity
+                rest[:] = np.maximum(rest, ends - strength / stiffness)
             touching = is_moving[model.geom_bodyid[data.contact.geom]]
             for k in np.flatnonzero(touching.any(axis=1)):
                 mujoco.mj_contactForce(model, data, k, wrench)
@@ -223,9 +225,9 @@ def _along(tie: solver.Tie) -> np.ndarray:
 
 def _sites(assembly: solver.Assembly, ties: Sequence[solver.Tie], block: int) -> str:
     """The ends of ties that a block holds."""
-    ends = ((k, end, tie.points[e]) for k, tie in enumerate(ties) for e, end in enumerate("ab") if tie.blocks[e] == block)
-    at = ((k, end, np.asarray(point) - assembly.centroids[block]) for k, end, point in ends)
-    return "".join(f'<site name="t{k}{end}" pos="{x:.17g} {y:.17g} 0"/>' for k, end, (x, y) in at)
+    held = ((k, e) for k, tie in enumerate(ties) for e in (0, 1) if tie.blocks[e] == block)
+    at = ((f"t{k}{'ab'[e]}", np.asarray(ties[k].points[e]) - assembly.centroids[block]) for k, e in held)
+    return "".join(f'<site name="{name}" pos="{x:.17g} {y:.17g} 0"/>' for name, (x, y) in at)
 
 
 def _mujoco_model(
@@ -276,6 +278,11 @@ def _evolution(drive: Drive, part: float, time_step: float) -> np.ndarray:
     return np.array([times, [0.0, 0.0, fast, fast, slow, slow]])
 
 
+def _lmgc90_law(friction: float, strength: tuple[float, float] | None) -> tuple[str, list[float]]:
+    """Name and numbers of a contact law: tensile strength and cohesion [Pa], static and dynamic friction."""
+    return ("IQS_CLB", [friction]) if strength is None else ("IQS_MOHR_DS_CLB", [*strength, friction, friction])
+
+
 def lmgc90_path(
     assembly: solver.Assembly,
     drive: Drive,
@@ -311,10 +318,7 @@ def lmgc90_path(
             owners.append(i)
     owner = np.array(owners)
     engine.geometry_from_v_f(blocks)
-    law, numbers = "IQS_CLB", [friction]
-    if strength is not None:
-        law, numbers = "IQS_MOHR_DS_CLB", [*strength, friction, friction]
-    engine.contact_law(law, numbers, alert=reach)
+    engine.contact_law(*_lmgc90_law(friction, strength), alert=reach)
     for body, i in enumerate(owners):
         # rotations are about the principal axes of a block, in LMGC90's own order: those of free blocks are left alone
         held = ("Vy",) if assembly.free[i] else ("Vx", "Vy", "Vz", "Rx", "Ry", "Rz")

@@ -110,7 +110,7 @@ def ties(chosen: Sequence[str], steps: Sequence[float], budget: float) -> None:
         "elastic": (solver.Tie("rod", held, ends, ELASTIC),),
         "iron": (solver.Tie("iron", held, ends, iron, strength=YIELDS),),
     }
-    print("\n| tie | by | R [N] at " + " / ".join(f"{s:g}" for s in ARCH_AT) + " m | tie [N] | falls at [m] | seconds |")
+    print(f"\n| tie | by | R [N] at {' / '.join(map(str, ARCH_AT))} m | tie [N] | falls at [m] | seconds |")
     for kind in chosen:
         given = kinds[kind]
         started = time.process_time()
@@ -127,7 +127,7 @@ def ties(chosen: Sequence[str], steps: Sequence[float], budget: float) -> None:
         )
         for time_step in steps if loaded("mujoco") else ():
             found, falls, seconds = engine("mujoco", assembly, (1.0, 0.0), ARCH_AT, time_step, budget, ties=given)
-            reaction = cell([-one[0] for one in found], 0)
+            reaction = cell([one[0] for one in found], 0)
             pull = cell([float(one[1:].sum()) for one in found], 0)
             print(
                 f"| {kind} | MuJoCo {1e3 * time_step:g} ms | {reaction} | {pull} | {falls:.4f} | {seconds:.1f} |",

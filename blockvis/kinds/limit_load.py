@@ -28,8 +28,8 @@ from .kind import (
     RunInput,
     Steps,
     needs_dry_joints,
-    needs_rigid_joints,
     needs_live_load,
+    needs_rigid_joints,
     without_increments,
 )
 from .settlement import not_reached, settlement_course, settlement_steps, stored_settlements

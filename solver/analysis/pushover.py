@@ -60,8 +60,8 @@ def pushover_increments(
         interfaces.refuse_elastic("a pushover from a given pose")
     if pose is not None and bonds_at is None and any(law.bonds for law in interfaces.laws):
         raise ValueError(
-            "joints have cohesion, of which a pose does not tell what is left; give bonds_at, the bonds of the increment "
-            "that the pose is from"
+            "joints have cohesion, of which a pose does not tell what is left; give bonds_at, the bonds of the "
+            "increment that the pose is from"
         )
     loads = checked_live(assembly, loads)
     if not assembly.free[assembly.index(control.block)]:

@@ -333,28 +333,62 @@ class Stepper:
         ------
         NotSolved
         """
-        model, assembly, driver, free = self.model, self.model.assembly, self.driver, self.free
-        scales, n_dof = model.lengths, len(model.lengths)
+        model, free = self.model, self.free
         # A step in time is solved to a small part of such a movement.
         s, size = (place.s, 1e-3) if in_time else (place.s + length, length / self.unit)
-        supports, start = driver.supports(s), self.contacts_at(place) if candidates is None else candidates
+        start = self.contacts_at(place) if candidates is None else candidates
         place = self.mortar.renamed(place, start)
         points = self._points(place, start)
-        forces, joints = points.forces, points.joints
-        guess: np.ndarray | None = points.trial
+        joints, loads = points.joints, 0.0 if in_time else viscosity
         resisting, before = self._resistance(place, length, in_time, viscosity)
         closed = np.inf if in_time or viscosity == 1.0 else EXACT
+        new, points, left, motion_so_far = self._solved(place, points, s, size, loads, resisting, before, closed)
+        if not np.isfinite(motion_so_far).all():
+            raise NotSolved("the movement is not finite")
+        movement_size = float(np.abs(motion_so_far).max(initial=0.0))
+        all_points = self._with_missed(start, place, new.pose, movement_size)
+        if len(all_points) > len(start):
+            return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=all_points)
+        motion = np.where(free[:, None], self._of_blocks(motion_so_far), place.pose.movement_to(new.pose))
+        velocity = motion / length if in_time else self._velocity(place, motion, length)
+        # A larger share alternates where the normal force falls as the bound grows.
+        share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
+        lag, new = self._arrived(place, replace(new, velocity=velocity), points, left, share)
+        lag += float((joints.cohesion - left.cohesion).sum()) / self.weight
+        # The first step has no earlier movement to compare with.
+        turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
+        touching = self._penetration(points, new), self._slides(start, new.forces, points.bound)
+        return new, motion / model.lengths, StepError(lag, turn, movement_size, *touching)
+
+    def _solved(
+        self,
+        place: Place,
+        points: _StepPoints,
+        s: float,
+        size: float,
+        loads: float,
+        resisting: np.ndarray,
+        before: np.ndarray,
+        closed: float,
+    ) -> tuple[Place, _StepPoints, JointPoints, np.ndarray]:
+        """The place at the end of a step, before joints and members have given, and the movement (n_dof,) to it.
+
+        Also its contact points with the joints by which it is solved, and these joints after it.
+        """
+        model, driver, free, start, joints = self.model, self.driver, self.free, points.start, points.joints
+        forces, supports = points.forces, driver.supports(s)
+        guess: np.ndarray | None = points.trial
         live, live_size = model.scaled_live
         multiplier = place.multiplier * live_size
         motion_so_far, before_step = np.zeros_like(before), np.column_stack([points.kept * forces[:, 0], forces[:, 1:]])
         pose = self._with_supports(place.pose, supports)
         contacts = self.measured(start, pose, place.tie_lengths)
         number, rows = 0, ContactRows(wrench_matrix(contacts, pose, model.length), free)
-        while number < LINEARISATIONS:
+        while True:
             if number:
                 rows = ContactRows(wrench_matrix(contacts, pose, model.length), free)
             control = driver.control(pose) if model.live is not None else None
-            load = self._load(pose, 0.0 if in_time else viscosity)
+            load = self._load(pose, loads)
             problem = ContactProblem(
                 rows=rows,
                 gap=joints.beyond_give(contacts.gaps) / model.length,
@@ -369,73 +403,63 @@ class Stepper:
                 motion_so_far=motion_so_far,
                 size=size,
                 live=live[free].ravel() if control is not None else None,
-                control=None if control is None else (control * scales / model.length)[free].ravel(),
+                control=None if control is None else (control * model.lengths / model.length)[free].ravel(),
                 control_target=0.0 if control is None else (s - driver.control_displacement(pose)) / model.length,
             )
             self.programs += 1
             solution = minimise(problem, guess, multiplier)
-            forces, trial, multiplier = solution.forces - points.pulled, solution.trial, solution.multiplier
-            guess = trial
+            forces, multiplier = solution.forces - points.pulled, solution.multiplier
+            guess = trial = solution.trial
             # A linearised rotation makes blocks grow: the first linearisation's forces are not kept.
             if number:
                 before_step[:, 0] = points.kept * forces[:, 0]
             motion_so_far = motion_so_far + solution.motion
-            full = np.zeros((assembly.n_blocks, n_dof))
-            full[free] = motion_so_far.reshape(-1, n_dof) * scales
-            pose = self._with_supports(moved(place.pose, full), supports)
+            pose = self._with_supports(moved(place.pose, self._of_blocks(motion_so_far)), supports)
             predicted = problem.gap + rows.relative(solution.motion)[:, 0]
             contacts = self.measured(start, pose, place.tie_lengths)
             residual = max(
                 self._linearisation_error(contacts, predicted, forces, points, closed),
-                self._largest(self._load(pose, 0.0 if in_time else viscosity) - load) / SAME_LOAD,
+                self._largest(self._load(pose, loads) - load) / SAME_LOAD,
+                0.0 if control is None else abs(s - driver.control_displacement(pose)) / model.length / EXACT,
             )
-            control_error = 0.0 if control is None else abs(s - driver.control_displacement(pose)) / model.length
             number += 1
-            if number == LINEARISATIONS or (residual <= 1.0 and control_error <= EXACT):
-                # What breaks hands its forces to the others in the same step, from where they are.
-                left = points.joints.after(points.moved(trial), joints)
-                if not ((left.left == 0.0) & (points.joints.left > 0.0)).any():
-                    break
-                points, guess, number = self._with_joints(points, left), None, 0
-        if not np.isfinite(motion_so_far).all():
-            raise NotSolved("the movement is not finite")
-        movement_size = float(np.abs(motion_so_far).max(initial=0.0))
-        all_points = self._with_missed(start, place, pose, movement_size)
-        if len(all_points) > len(start):
-            return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=all_points)
-        # A larger share alternates where the normal force falls as the bound grows.
-        share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
-        gap = joints.beyond_give(contacts.gaps, forces[:, 0])
+            if number < LINEARISATIONS and residual > 1.0:
+                continue
+            # What breaks hands its forces to the others in the same step, from where they are.
+            left = points.joints.after(points.moved(trial), joints)
+            if not ((left.left == 0.0) & (points.joints.left > 0.0)).any():
+                new = Place(s, pose, contacts, forces, trial, points.followed, multiplier / (live_size or 1.0))
+                return new, points, left, motion_so_far
+            points, guess, number = self._with_joints(points, left), None, 0
+
+    def _of_blocks(self, motion: np.ndarray) -> np.ndarray:
+        """(n_blocks, n_dof) array [m or rad]: a movement (n_dof,) of the free blocks in units of the program."""
+        full = np.zeros_like(self.model.load)
+        full[self.free] = motion.reshape(-1, full.shape[1]) * self.model.lengths
+        return full
+
+    def _arrived(
+        self, place: Place, new: Place, points: _StepPoints, left: JointPoints, share: float
+    ) -> tuple[float, Place]:
+        """Change of the friction bounds, and the new place with what its points, joints and members have become."""
+        contacts, forces = new.contacts, new.forces
+        assert contacts is not None
+        gap = left.beyond_give(contacts.gaps, forces[:, 0])
         lag, followed = self._updated_bounds(contacts, gap, forces, points, share)
-        lag += float((joints.cohesion - left.cohesion).sum()) / self.weight
-        motion = np.where(free[:, None], full, place.pose.movement_to(pose))
-        velocity = motion / length if in_time else self._velocity(place, motion, length)
         lengths = self.members.after(contacts, forces, place.tie_lengths)
-        new = Place(
-            s,
-            pose,
-            contacts,
-            forces,
-            trial,
-            followed,
-            multiplier / (live_size or 1.0),
-            velocity,
-            tie_lengths=lengths,
-            bonds=self.mortar.bonds(place, start, left.left),
-        )
-        # The first step has no earlier movement to compare with.
-        turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
-        touching = self._penetration(contacts, gap, forces), self._slides(contacts, forces, points.bound)
-        return new, motion / scales, StepError(lag, turn, movement_size, *touching)
+        bonds = self.mortar.bonds(place, points.start, left.left)
+        return lag, replace(new, followed=followed, tie_lengths=lengths, bonds=bonds)
 
     @staticmethod
     def _touches(contacts: Contacts, forces: np.ndarray) -> np.ndarray:
         """Which contact points between blocks carry, (n,) bool array."""
         return (forces[:, 0] > CARRIES) & ~is_member(contacts)
 
-    def _penetration(self, contacts: Contacts, gap: np.ndarray, forces: np.ndarray) -> float:
+    def _penetration(self, points: _StepPoints, new: Place) -> float:
         """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""
-        return -float(gap[self._touches(contacts, forces)].min(initial=0.0)) / self.model.length
+        assert new.contacts is not None
+        gap = points.joints.beyond_give(new.contacts.gaps, new.forces[:, 0])
+        return -float(gap[self._touches(new.contacts, new.forces)].min(initial=0.0)) / self.model.length
 
     def _slides(self, contacts: Contacts, forces: np.ndarray, bound: np.ndarray) -> bool:
         touches = self._touches(contacts, forces)

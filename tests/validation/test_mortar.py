@@ -122,10 +122,10 @@ def test_a_pulled_couplet_has_its_weight_and_tension_as_limit_load():
         assert found.forces[:, 0] == pytest.approx([-2e4 * 0.12] * 2, rel=1e-6)
 
 
-def wedge_on_a_slope(cohesion, slope=np.radians(20.0), friction=0.6):
+def wedge_on_a_slope(cohesion, slope, friction=0.6):
     """A wedge with its apex over the middle of a base of 1 m, its live load its weight out of the slope; A and W."""
     middle = np.array([np.cos(slope), np.sin(slope)]) / 2.0
-    wedge = [np.zeros(2), 2.0 * middle, middle + [0.0, 0.5]]
+    wedge = [np.zeros(2), 2.0 * middle, np.add(middle, (0.0, 0.5))]
     ground = [(-1.0, -1.0), (2.0, -1.0), 4.0 * middle, -2.0 * middle]
     assembly = solver.Assembly.from_outlines(
         [np.array(wedge), np.array(ground)], roles=["free", "fixed"], names=["wedge", "ground"], thickness=THICKNESS
@@ -136,7 +136,7 @@ def wedge_on_a_slope(cohesion, slope=np.radians(20.0), friction=0.6):
     return structure, THICKNESS, mechanics.total_weight(assembly)
 
 
-@pytest.mark.parametrize("cohesion", [0.0, 2e3, 2e4])
+@pytest.mark.parametrize("cohesion", [0.0, 4e3])
 def test_a_wedge_on_a_slope_has_the_limit_load_of_limit_equilibrium(cohesion):
     """Plane failure: α W cos ψ + W sin ψ = c A + μ (W cos ψ - α W sin ψ).
 
@@ -163,6 +163,7 @@ def test_a_wedge_that_has_slipped_on_its_slope_keeps_friction():
     assert found[1:3] == pytest.approx([dry, dry], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_what_a_settlement_has_torn_off_is_missing_from_limit_load_and_pushover():
     """A block on a bed and glued to a wall at its side, which sinks: pulled off it, μ W + c A of the bed is left."""
     cohesion, tension, friction = 2e4, 1e4, 0.6
