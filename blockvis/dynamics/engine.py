@@ -94,8 +94,8 @@ class Engine:
         self.forces = self.trial = np.zeros((0, self.d))
         self.corners = mechanics.moved_vertices(assembly, pose)
         self.flies = np.zeros(assembly.n_blocks, dtype=bool)
-        #: Length of the last step.
-        self.step_length = 0.2 * LONGEST_STEP
+        #: Length of the last step. The first are short, so that they follow the push: implicit steps fall too far.
+        self.step_length = 0.05 * LONGEST_STEP
         self.steps = self.programs = 0
 
     @property
