@@ -40,7 +40,7 @@ def gaps_after(points, before, after):
 
 
 @pytest.mark.parametrize("d", [2, 3])
-@settings(max_examples=40)
+@settings(max_examples=12)
 @given(seed=st.integers(0, 100_000))
 def test_what_overlaps_after_a_movement_has_come_through_a_plane_that_was_between(d, seed):
     assembly, before, after = moved_pair(np.random.default_rng(seed), d)
