@@ -231,7 +231,7 @@ def plastic_forces(
     contacts : Contacts
     forces : (n_contacts, d) array [N]
     before : (n_ties,) int array
-        Numbers of :data:`STATES`: what is absent or broken stays it.
+        Numbers as in :class:`TieForces`: what is absent or broken stays it.
     """
     if not ties:
         return TieForces()

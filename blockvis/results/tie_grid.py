@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from vtkmodules.vtkCommonDataModel import VTK_LINE, vtkUnstructuredGrid
@@ -12,10 +13,13 @@ import solver
 from .datasets import add_arrays, describe, give_shape, grid_of_cells, state_units, strings
 from .ties import STATE_WORDS, ties_at
 
+if TYPE_CHECKING:
+    import pyvista as pv
 
-def tie_grid(
+
+def tie_dataset(
     ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
-) -> vtkUnstructuredGrid:
+) -> pv.UnstructuredGrid:
     """Make a dataset of the ties, props and bars of one increment: a line for each, from end to end.
 
     Parameters
@@ -28,10 +32,19 @@ def tie_grid(
 
     Returns
     -------
-    vtkUnstructuredGrid
+    pyvista.UnstructuredGrid
         Cell arrays ``force`` [N], tension positive, ``elongation`` [m], ``state`` (number), ``name``, ``kind``; point
         and field arrays as those of the blocks, and ``state_names``. In frames of a fall there are no forces.
     """
+    import pyvista
+
+    return pyvista.UnstructuredGrid(tie_grid(ties, assembly, increment, shape=shape))
+
+
+def tie_grid(
+    ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
+) -> vtkUnstructuredGrid:
+    """Make what :func:`tie_dataset` wraps."""
     found, d = ties_at(ties, assembly, increment), assembly.dimension
     grid = grid_of_cells(found.ends.reshape(-1, d), 2 * np.arange(len(ties) + 1), VTK_LINE)
     give_shape(grid, np.array([tie.points for tie in ties]).reshape(-1, d), shape, None)
