@@ -93,7 +93,7 @@ def test_results_reach_meshio_as_the_manual_says(response, tmp_path, monkeypatch
     """Numbers, cells and, beside them, names: of polygons and of polyhedra, which meshio sorts by their corners."""
     pytest.importorskip("meshio")
     manual = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(import meshio.*?)```", manual, re.S)
+    (code,) = re.findall(r"```python\n(import meshio\nimport pyvista.*?)```", manual, re.S)
     assembly, increment = response().assembly, response().path[-1]
     monkeypatch.chdir(tmp_path)
     write_vtu(block_dataset(assembly, increment), tmp_path / "out" / "increments" / "blocks_00000.vtu")
