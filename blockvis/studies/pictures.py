@@ -25,7 +25,7 @@ from .fragility import CONFIDENCE, Fragility, fragility_of
 from .sensitivity import Swing, first_order, outcome, swings
 from .study_file import Study
 from .study_folder import NO_RESULT, StudyFolder
-from .summary import classes_of, curve_name, independent_rows
+from .summary import classes_of, curve_name, independent_rows, is_sample
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +59,9 @@ def draw_study(records: StudyFolder, table: pd.DataFrame) -> list[Path]:
     study, folder = records.study, records.folder
     drawn = []
     if (~table["status"].isin(NO_RESULT)).any():
-        drawn.append(draw_fragility(study, table, folder / "fragility.png"))
+        # Five strengths that somebody chose are no sample: their share means nothing, and the scatter shows them.
+        if is_sample(study):
+            drawn.append(draw_fragility(study, table, folder / "fragility.png"))
         if swings(study, table):
             drawn.append(draw_sensitivity(study, table, folder / "sensitivity.png"))
     if classes_of(table):

@@ -40,6 +40,11 @@ def classes_of(table: pd.DataFrame) -> dict[str, int]:
     return {str(k): int(v) for k, v in sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))}
 
 
+def is_sample(study: Study) -> bool:
+    """Whether chance has a part in the runs of a study: the values of a grid are chosen by hand."""
+    return any(p.distribution is not None for p in study.parameters) or study.method != "grid" or study.n_seeded > 0
+
+
 def curve_name(study: Study) -> str:
     """Name the fragility curve of a study, which is no probability if the values were chosen by hand."""
     drawn = any(p.distribution is not None for p in study.parameters) or study.method != "grid"
