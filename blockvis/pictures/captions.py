@@ -238,9 +238,7 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
     magnification : float
         Of the displacements.
     """
-    parts = [_state(response, increment)]
-    if len(response.settlements) > 1:
-        parts.append(f"phase {increment.phase + 1} of {len(response.settlements)}")
+    parts = [_state(response, increment), *phase_words(response, increment)]
     # A mechanism that swings out of a limit state has no scale.
     if not (response.swings and increment.status == solver.Status.FALLING):
         parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")
@@ -250,6 +248,12 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
         if count and increment.status != solver.Status.FALLING:
             parts.append(f"{count} block{'s' if count != 1 else ''} {fate}")
     return state_text(increment, response), "   ·   ".join(parts)
+
+
+def phase_words(response: solver.Response, increment: solver.Increment) -> list[str]:
+    """Say to which of several settlements an increment belongs: its parameter counts from their beginning."""
+    several = len(response.settlements) > 1
+    return [f"phase {increment.phase + 1} of {len(response.settlements)}"] if several else []
 
 
 def _state(response: solver.Response, increment: solver.Increment) -> str:

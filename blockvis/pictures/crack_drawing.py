@@ -19,7 +19,7 @@ from blockvis.system.atomic_files import atomic_file
 from blockvis.text import width_text
 
 from . import palette
-from .captions import state_text
+from .captions import phase_words, state_text
 from .flat_scene import FlatScene
 from .frame import Key, Sheet, framed, write_labels
 from .render import STILL_SIZE, seen_from
@@ -88,7 +88,9 @@ def draw_cracks(
         picture = drawing.image(main, _numbers(main, cracks))
         keys, pixel = drawing.keys, drawing.pixel
     none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
-    counted = f"{len(cracks)} crack{'s' if len(cracks) != 1 else ''}"
+    counted = "   ·   ".join(
+        [f"{len(cracks)} crack{'s' if len(cracks) != 1 else ''}", *phase_words(response, increment)]
+    )
     page = sheet.composed(
         picture,
         title=f"Cracks   ·   {state_text(increment, response)}",

@@ -290,7 +290,8 @@ def _draw_line(
         above = values[0] > values[1]
         axes.annotate(
             "at rest", (total[0], values[0]), xytext=(8, 4 if above else -4), textcoords="offset points",
-            va="bottom" if above else "top", fontsize=0.9 * text,
+            va="bottom" if above else "top", fontsize=0.9 * text, zorder=4,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )  # fmt: skip
 
 

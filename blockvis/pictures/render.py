@@ -16,6 +16,7 @@ from blockvis.layout.sights import Cut, Sight, read_cut, read_sight
 from blockvis.results.about import loss_of
 from blockvis.system.atomic_files import atomic_file
 
+from .captions import phase_words
 from .drawer import Drawer, Look
 from .film import film_of, poster_of
 from .swing import MOST_PARTS, shown_increments, swing_of
@@ -150,7 +151,7 @@ def draw_mechanism(
     drawer = Drawer(response, look, size, (swing.increment,), extra=extra, underlay=underlay, still=True)
     if swing.moves:
         drawer.show_motion(swing)
-    note = _mechanism_note(response, swing.parts)
+    note = "   ·   ".join([_mechanism_note(response, swing.parts), *phase_words(response, swing.increment)])
     return _save(drawer.picture(swing.increment, note=note, widths=True), path)
 
 

@@ -42,6 +42,9 @@ DASH, STUB = 22.0, 0.42
 #: Width of what stands for the ground at an end that it holds, in pixels of a picture 1080 high.
 EARTH = 3.0
 
+#: What a tie carries at rest is, below this part of the largest force, how the joints give and no number to tell.
+SMALLEST_TOLD = 1e-4
+
 #: Most ties that are named in a picture: those with the largest forces.
 MOST_NAMED = 6
 
@@ -137,7 +140,7 @@ class DrawnTies:
         """Give middles (n, d) [m], words and colours of the labels of an increment, the largest force first."""
         states = self._states(increment)
         middles = mechanics.tie_ends(self._ties, self._assembly, shown).mean(axis=1)
-        sizes = np.abs(increment.ties.forces) if len(increment.ties.forces) else np.zeros(len(states))
+        sizes = _told_forces(increment) if len(increment.ties.forces) else np.zeros(len(states))
         order = [k for k in np.argsort(-sizes, kind="stable").tolist() if states[k] != mechanics.ABSENT][:MOST_NAMED]
         words = [self._words(k, float(sizes[k]), int(states[k])) for k in order]
         return middles[order], words, [COLOURS[int(states[k])] for k in order]
@@ -148,7 +151,7 @@ class DrawnTies:
         Ends, lines and ends that the ground holds [m]; words beside it and in the legend, colour, width [pixel], dash.
         """
         states, ends = self._states(increment), mechanics.tie_ends(self._ties, self._assembly, increment.pose)
-        told = []
+        told, sizes = [], _told_forces(increment)
         for k in np.flatnonzero(states != mechanics.ABSENT).tolist():
             state = int(states[k])
             lines = _stubs(ends[[k]]) if state == mechanics.BROKEN else ends[[k]]
@@ -157,7 +160,7 @@ class DrawnTies:
                     "ends": np.round(ends[k], 5).tolist(),
                     "lines": np.round(lines, 5).tolist(),
                     "ground": self._grounded[k].astype(int).tolist(),
-                    "words": self._words(k, abs(float(increment.ties.forces[k])), state),
+                    "words": self._words(k, float(sizes[k]), state),
                     "key": _legend_words(state, [self._ties[k].kind]),
                     "colour": palette.hexadecimal(COLOURS[state]),
                     "width": 0.6 * WIDTHS[state] * (PROPS if self._props[k] else 1.0),
@@ -188,6 +191,13 @@ class DrawnTies:
         if increment.status == solver.Status.FALLING or len(states) != len(self._ties):
             return np.full(len(self._ties), mechanics.ABSENT)
         return np.where((states == mechanics.ELASTIC) & (increment.ties.forces < 0.0), PRESSED, states)
+
+
+def _told_forces(increment: solver.Increment) -> np.ndarray:
+    """(n_ties,) array [N]: what ties carry, and 0 where resultants so small are not drawn."""
+    sizes = np.abs(increment.ties.forces)
+    largest = max(float(np.abs(increment.forces).max(initial=0.0)), float(sizes.max(initial=0.0)))
+    return np.asarray(np.where(sizes > SMALLEST_TOLD * largest, sizes, 0.0))
 
 
 def _legend_words(state: int, kinds: Sequence[str]) -> str:

@@ -182,8 +182,9 @@
     const was = `${model.space ? "thin" : "dashed"}: where the support was`;
     if (layers.start && model.arrows.length) add("line", falling ? was : `settlement; ${was}`, falling ? model.colours.hatch : model.colours.settlement);
     if (marked) for (const told of new Set(model.ties[k].map((tie) => JSON.stringify([tie.key, tie.colour])))) add("line", ...JSON.parse(told));
-    if (model.fill && !falling) add("area", "fill", model.fill.colours[1]);
-    if (model.fill && marked && layers.forces && !falling) add("line", model.fill.words, model.fill.colours[2]);
+    if (model.fill && !falling && !model.space) add("area", "fill", model.fill.colours[1]);
+    if (model.fill && !falling && model.space && marked) add("line", "edges of the fill", model.fill.colours[2]);
+    if (model.fill && model.fill.words && marked && layers.forces && !falling) add("line", model.fill.words, model.fill.colours[2]);
     if (marked && model.live_words) add("line", model.live_words, model.colours.live);
     if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.moving]);
     if (state.colours === "displacement") add("ramp", `displacement, 0 to ${+(1000 * model.largest_displacement).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.ramp.join(",")})`);

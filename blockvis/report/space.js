@@ -246,6 +246,7 @@
       drawLines(rim, w, h, 3e-4);
     }
     if (layers.start && !falling) drawArrows(near, w, h);
+    if (model.fill && !falling && state.magnify === 1) drawLines(model.fill.edges[near].map((e) => [e.slice(0, 3), e.slice(3), rgb(model.fill.colours[2]), 1.6, 1.6]), w, h, 0);
     if (state.magnify !== 1 || Math.abs(state.frame - near) >= 0.5) return;
     if (layers.sliding) drawLines(slidingEdges(near), w, h, 3e-4);
     if (layers.hinges) {

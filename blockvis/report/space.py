@@ -8,6 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.pictures import palette
+from blockvis.pictures.backfill import FillBodies, fill_bodies
 from blockvis.pictures.solid_view import chosen_view
 from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import Swing
@@ -35,6 +36,8 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
     view = chosen_view(response, swing.displaced.positions - swing.increment.pose.positions)
     joints = initial_joints(assembly)
     frame, largest, widest = surveyed(assembly, joints, shown)
+    bodies = [fill_bodies(response, increment.pose, increment.fallen) for increment in shown]
+    frame = frame.holding(np.concatenate([fill.heads.reshape(-1, 3) for fill in bodies]))
     model = model_of_frames(response, joints, shown, frame, largest)
     triangles, _ = triangles_of(shapes)
     edges, rings = sharp_edges(shapes), joints.rings
@@ -43,6 +46,7 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
         "view": np.radians([view.around, view.above]).tolist(),
         "cracks": hexadecimals(palette.CRACKS.astype(int)),
         "widest_crack": widest,
+        "fill": _fill(bodies, np.array(model["origin"])) if response.loads.fills else None,
         "packed": model["packed"]
         | {
             "offsets": deflated(shapes.offsets, len(shapes.offsets)),
@@ -52,4 +56,13 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
             "ring_points": deflated(corners, len(rings.points)),
             "ring_normals": deflated(rounded(joints.normals, DIRECTION_UNIT), len(joints)),
         },
+    }
+
+
+def _fill(bodies: list[FillBodies], origin: np.ndarray) -> dict[str, Any]:
+    """Give the edges of the bodies of fill, frame after frame: both ends of each [m]."""
+    return {
+        "edges": [np.round(fill.rims() - origin, 4).reshape(-1, 6).tolist() for fill in bodies],
+        "words": "",
+        "colours": [palette.hexadecimal(c) for c in (palette.FILL, palette.FILL_RIM, palette.FILL_RIM)],
     }

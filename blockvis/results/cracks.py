@@ -168,11 +168,17 @@ def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
         words = f"{width_text(crack.width)} at {crack.widest}; {size}, {crack.inclination:.0f}°, "
         words += f"from {first} to {last} m"
         if set(crack.places) - {"", "inside"}:
-            words += f": {' to '.join(crack.places)}"
+            first, last = crack.places
+            words += f": {first} to {last}" if first != last else f": at {first}"
         rows.append((f"crack {number}", words))
     if len(cracks) > most:
-        rows.append(("and", f"{len(cracks) - most} narrower ones"))
+        rows.append(("and", narrower_text(len(cracks) - most)))
     return rows
+
+
+def narrower_text(number: int) -> str:
+    """Count the cracks that a table leaves out."""
+    return f"{number} narrower one{'' if number == 1 else 's'}"
 
 
 def _groups(meeting: np.ndarray, members: np.ndarray) -> list[np.ndarray]:

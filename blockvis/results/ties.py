@@ -184,7 +184,8 @@ class TieCourses:
                 force = -tie.strength if tie.kind == mechanics.PROP else tie.strength
             elif abs(force) < NEGLIGIBLE * largest:
                 force = 0.0
-            larger = abs(force) > abs(before.force)
+            # A tie that yields has carried the same, up to rounding, since it began to.
+            larger = abs(force) - abs(before.force) > NEGLIGIBLE * largest
             self._found[k] = TieCourse(
                 before.name,
                 before.kind,

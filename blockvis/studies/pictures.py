@@ -25,7 +25,7 @@ from .fragility import CONFIDENCE, Fragility, fragility_of
 from .sensitivity import Swing, first_order, outcome, swings
 from .study_file import Study
 from .study_folder import NO_RESULT, StudyFolder
-from .summary import classes_of, curve_name, independent_rows
+from .summary import classes_of, curve_name, independent_rows, is_sample, is_single
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,8 +59,10 @@ def draw_study(records: StudyFolder, table: pd.DataFrame) -> list[Path]:
     study, folder = records.study, records.folder
     drawn = []
     if (~table["status"].isin(NO_RESULT)).any():
-        drawn.append(draw_fragility(study, table, folder / "fragility.png"))
-        if swings(study, table):
+        # Five strengths that somebody chose are no sample: their share means nothing, and the scatter shows them.
+        if is_sample(study):
+            drawn.append(draw_fragility(study, table, folder / "fragility.png"))
+        if swings(study, table) and not is_single(study):
             drawn.append(draw_sensitivity(study, table, folder / "sensitivity.png"))
     if classes_of(table):
         drawn.append(draw_scatter(study, table, folder / "scatter.png"))
@@ -187,6 +189,9 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
         for k, one in enumerate(shown):
             here = (kind == one) & np.isfinite(y)
             axes.scatter(x[here], y[here], s=24, color=CLASSES[k], marker=MARKS[k], alpha=0.85, linewidth=0, zorder=3)
+        if is_single(study):
+            order = np.argsort(x)
+            axes.plot(x[order], y[order], color="#b5b5b5", linewidth=1.2, zorder=1)
         axes.scatter(x[stood], y[stood], s=26, facecolor="none", edgecolor="#333333", marker="^", zorder=3)
         axes.set_xlabel(name, fontsize=TEXT)
         _plain_frame(axes)
@@ -222,7 +227,7 @@ def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path)
         _draw_shape(axes, shape, low, high)
         median = factor * float(table.loc[table["mechanism_class"] == one, "collapse_displacement"].median())
         number, part = classes[one], 100 * classes[one] / sum(classes.values())
-        runs = f"{number} run{'' if number == 1 else 's'}, {part:.3g} %"
+        runs = f"{number} run{'' if number == 1 else 's'}" + (f", {part:.3g} %" if is_sample(records.study) else "")
         share = float(table.loc[table["mechanism_class"] == one, "falling_share"].median())
         title = f"{place + 1}: {runs}; median {median:.3g} {unit}"
         if not np.isnan(share):

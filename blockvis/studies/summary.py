@@ -40,6 +40,16 @@ def classes_of(table: pd.DataFrame) -> dict[str, int]:
     return {str(k): int(v) for k, v in sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))}
 
 
+def is_sample(study: Study) -> bool:
+    """Whether chance has a part in the runs of a study: the values of a grid are chosen by hand."""
+    return any(p.distribution is not None for p in study.parameters) or study.method != "grid" or study.n_seeded > 0
+
+
+def is_single(study: Study) -> bool:
+    """Whether one parameter over chosen values is all that a study varies: its outcome is a line, without shares."""
+    return len(study.parameters) == 1 and not is_sample(study)
+
+
 def curve_name(study: Study) -> str:
     """Name the fragility curve of a study, which is no probability if the values were chosen by hand."""
     drawn = any(p.distribution is not None for p in study.parameters) or study.method != "grid"
@@ -73,7 +83,7 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
         "quantiles": {str(p): curve.quantile(p) for p in (0.05, 0.5, 0.95)},
         "probability_at_the_end": float(curve.probability[-1]) if len(curve.probability) else 0.0,
         "furthest_settlement": curve.furthest,
-        "first_order_indices": {k: list(v) for k, v in first_order(study, table).items()},
+        "first_order_indices": {} if is_single(study) else {k: list(v) for k, v in first_order(study, table).items()},
         "swings": [
             {"parameter": s.name, "at": [s.low_value, s.high_value], "mean": [s.low, s.high]}
             for s in swings(study, table)

@@ -17,7 +17,7 @@ from blockvis.studies.pictures import counted
 from blockvis.studies.sampling import METHODS, designed
 from blockvis.studies.sensitivity import IMPERFECTIONS, first_order, swings
 from blockvis.studies.study_file import read_study
-from blockvis.studies.summary import in_words, summary_of
+from blockvis.studies.summary import in_words, is_sample, is_single, summary_of
 
 CASE = """
 [geometry]
@@ -371,6 +371,15 @@ def test_title_and_words_count_what_collapsed_and_what_never_stood_apart():
     assert "1 of the collapses is a local loss: a few blocks fall, the structure stands" in in_words(summary)
     title = counted(fragility_of(table), table, 1e3, "mm")
     assert title.startswith("7 runs, 4 collapsed (1 of a few blocks only), 2 never stood, 1 stood")
+
+
+def test_values_chosen_by_hand_are_no_sample():
+    study = _study("grid", parameters={"material.friction_coefficient": {"name": "a", "values": [0.4, 0.5]}})
+    assert is_single(study)
+    assert not is_sample(study)
+    assert is_sample(_study())
+    summary = summary_of(study, _table(study, [0.1, 0.2]))
+    assert summary["first_order_indices"] == {}, "one value per run explains all of the variance"
 
 
 def test_first_order_indices_of_a_linear_function():
