@@ -65,6 +65,8 @@ class Engine:
         Ties, props and bars; the last block of the assembly stands for the ground that holds their ends.
     rest : (n_ties,) array, optional [m]
         Their lengths without force; nan for those that are absent or broken.
+    tensions : (n_ties,) array, optional [N]
+        Their forces at the start, which are only told; by default zero.
 
     Attributes
     ----------
@@ -89,6 +91,7 @@ class Engine:
         removed: np.ndarray | None = None,
         ties: Sequence[solver.Tie] = (),
         rest: np.ndarray | None = None,
+        tensions: np.ndarray | None = None,
     ) -> None:
         self.removed = np.zeros(assembly.n_blocks, dtype=bool) if removed is None else removed
         self.assembly, self.interfaces, self.pose = assembly, replace(interfaces, scatter=None), pose
@@ -102,8 +105,8 @@ class Engine:
         moments, self.drawn_axes = principal_inertia(assembly)
         masses = np.repeat(assembly.masses[:, None], self.d, axis=1)
         force = self.mass * solver.GRAVITY
-        self.ties, self.rest = tuple(ties), np.zeros(0) if rest is None else np.array(rest, dtype=float)
-        self.tensions = np.zeros(len(self.ties))
+        self.ties, self.rest = tuple(ties), np.zeros(0) if rest is None else rest
+        self.tensions = np.zeros(len(self.ties)) if tensions is None else tensions
         self.strength = np.array([tie.strength for tie in self.ties]) / force
         # No stiffer than contact points, which the length of a step is made for.
         self.give = np.array([max(force / (tie.stiffness * self.length), GIVE) for tie in self.ties])
@@ -312,15 +315,16 @@ class Engine:
         assert self.contacts is not None
         if not self.ties:
             return
-        self.tensions = mechanics.member_forces(self.contacts, self.forces, len(self.ties))
-        self.tensions *= self.mass * solver.GRAVITY
         members = self._members(self.pose)
         number, pushes = members.features[:, 1], members.features[:, 2] == 1
         beyond = np.maximum(-members.gaps - (self.strength * self.give)[number] * self.length, 0.0)
+        self.rest = self.rest.copy()
         # Of a bar one of two contact points at most is stretched.
         np.add.at(self.rest, number, np.where(pushes, -1.0, 1.0) * beyond)
         brittle = np.array([tie.brittle for tie in self.ties], dtype=bool)
         self.rest[number[(beyond > 0.0) & brittle[number]]] = np.nan
+        tensions = mechanics.member_forces(self.contacts, self.forces, len(self.ties)) * self.mass * solver.GRAVITY
+        self.tensions = np.where(np.isnan(self.rest), 0.0, tensions)
 
     def _along(self, motion: np.ndarray, axes: np.ndarray) -> np.ndarray:
         """(n_blocks, n_dof) array: in space rotations times axes."""

@@ -50,22 +50,20 @@ def write_fall(
     make_folder(folder / "fall")
     entries, falls = [], falling_in(response)
     for k, time in enumerate(fall.times):
-        grid = fall_grid(response, fall.pose(k), float(time), vtu.shape, falls)
+        grid = fall_grid(response, fall, float(time), vtu.shape, falls)
         entries.append((float(time), f"fall/blocks_{k:05d}.vtu"))
         write_vtu(grid, folder / entries[-1][1], strings=vtu.strings, durable=False)
     write_pvd(folder / FALL_LIST, entries, last=False)
     write_atomic(folder / FALL_POSES, compressed(flat(fall)))
 
 
-def fall_grid(
-    response: solver.Response, pose: solver.Pose, time: float, shape: str, falls: np.ndarray
-) -> vtkUnstructuredGrid:
+def fall_grid(response: solver.Response, fall: Fall, time: float, shape: str, falls: np.ndarray) -> vtkUnstructuredGrid:
     """Make a grid of the blocks at a time [s] of a fall.
 
     Parameters
     ----------
     response : solver.Response
-    pose : solver.Pose
+    fall : Fall
     time : float [s]
     shape : {"moved", "undeformed"}
     falls : (n_blocks,) bool array
@@ -73,7 +71,7 @@ def fall_grid(
     """
     from .datasets import add_arrays, block_grid
 
-    grid = block_grid(response.assembly, falling_increment(response, pose), shape=shape, falls=falls)
+    grid = block_grid(response.assembly, falling_increment(response, fall, time), shape=shape, falls=falls)
     # There is no equilibrium here: numbers of the static path would mislead.
     for name in ("settlement", "load_multiplier", "reaction"):
         grid.GetFieldData().RemoveArray(name)
