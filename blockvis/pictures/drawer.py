@@ -328,6 +328,9 @@ class Drawer:
                 if number in seen.sampled:
                     seen.forces.append(sizes)
             yield magnified(self.assembly, increment.pose, look.magnification)
+        if self.fall is not None and self.fall.tie_rest.size:
+            for time in self.fall.times.tolist():
+                self.ties.survey(falling_increment(self.response, self.fall, time))
 
     def picture(
         self,

@@ -122,6 +122,10 @@ def stored_fall(folder: Path) -> Fall | None:
         shapes = (fall.times.shape, fall.positions.shape)
         if n == 0 or shapes != ((n,), (n, blocks, 3 if turns else 2)) or not np.isfinite(fall.positions).all():
             raise ValueError(f"positions have the shape {fall.positions.shape}, rotations {fall.rotations.shape}")
+        if fall.tie_forces.shape != fall.tie_rest.shape or len(fall.tie_rest) not in (0, n):
+            raise ValueError(
+                f"forces of ties have the shape {fall.tie_forces.shape}, their lengths {fall.tie_rest.shape}"
+            )
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"'{file}' cannot be read ({error}); remove it and draw again") from None
     return fall
