@@ -351,4 +351,3 @@ def test_piers_stay_joined_by_their_tie_when_the_arch_between_them_falls():
     alone = fall_of(replace(response, ties=()))
     apart = [mechanics.tie_lengths(mechanics.tie_ends([tie], arch, alone.pose(k)))[0] for k in range(len(alone))]
     assert max(apart) - apart[0] > 0.03
-    print(max(apart) - apart[0], rest[-1] - rest[0])
