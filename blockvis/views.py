@@ -92,7 +92,7 @@ def fall(response: solver.Response, time: float, shape: str) -> pv.UnstructuredG
             f"nothing falls here ({response.stop}): fall(t) is of what collapses; mesh(-1) is the last equilibrium"
         )
     time = min(max(float(time), 0.0), float(found.times[-1]))
-    return pv.UnstructuredGrid(fall_grid(response, found.at(time), time, shape, falling_in(response)))
+    return pv.UnstructuredGrid(fall_grid(response, found, time, shape, falling_in(response)))
 
 
 def animate(response: solver.Response, path: str | os.PathLike[str], **options: Any) -> Path:

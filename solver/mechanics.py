@@ -41,7 +41,24 @@ from .results.quantities import (
     settlement_in,
 )
 from .results.response import Control, path_parameters, total_weight
-from .ties import ABSENT, BAR, BROKEN, ELASTIC, PROP, SLACK, TIE, YIELDING, TieForces, tie_ends
+from .ties import (
+    ABSENT,
+    BAR,
+    BROKEN,
+    ELASTIC,
+    PROP,
+    SLACK,
+    TIE,
+    YIELDING,
+    TieForces,
+    is_member,
+    member_contacts,
+    member_forces,
+    member_states,
+    present_members,
+    tie_ends,
+    tie_lengths,
+)
 from .ties import KINDS as TIE_KINDS
 
 __all__ = [
@@ -91,10 +108,14 @@ __all__ = [
     "corners_and_edges",
     "features_of",
     "find_contacts",
+    "is_member",
     "joined_contacts",
     "matched_contacts",
     "measure_contacts",
     "mechanism_of",
+    "member_contacts",
+    "member_forces",
+    "member_states",
     "minimise",
     "model_of",
     "motion_size",
@@ -103,6 +124,7 @@ __all__ = [
     "overlap_depths",
     "path_parameters",
     "point_velocities",
+    "present_members",
     "pushover_increments",
     "reaction_to",
     "rigid_parts",
@@ -110,6 +132,7 @@ __all__ = [
     "settlement_increments",
     "swung",
     "tie_ends",
+    "tie_lengths",
     "total_weight",
     "turned",
     "with_motion",

@@ -7,10 +7,12 @@ A step of time h minimises over the movement v of all blocks, with their movemen
 It is implicit and without restitution. Rotations are counted about the principal axes of each block, in which its
 inertia is diagonal. A contact point is a point of one block before a plane that rides on the other. Where a step ends
 with a block in another, what has come behind a plane that was between the two is added, and the program solved again.
+Ties, props and bars are contact points without friction, as along the path: elastic up to their strength.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +43,9 @@ FORCE = 1e-3
 #: the last one leaves blocks in each other, the step is halved.
 EXACT, LINEARISATIONS = 1e-4, 6
 
+#: Part of that error that the length of a tie may have: nothing pushes it out later, and stiff ones store energy by it.
+EXACT_TIES = 1e-2
+
 
 class Engine:
     """Blocks that move by inertia, loads and contact; supports stand still.
@@ -56,12 +61,22 @@ class Engine:
         At the start.
     removed : (n_blocks,) bool array, optional
         Supports that nothing meets: blocks that were taken away before.
+    ties : sequence of solver.Tie
+        Ties, props and bars; the last block of the assembly stands for the ground that holds their ends.
+    rest : (n_ties,) array, optional [m]
+        Their lengths without force; nan for those that are absent or broken.
+    tensions : (n_ties,) array, optional [N]
+        Their forces at the start, which are only told; by default zero.
 
     Attributes
     ----------
     pose : solver.Pose
     velocity : (n_blocks, n_dof) array
         In block sizes, radians and √(block size / g).
+    rest : (n_ties,) array [m]
+        Changed by what yields, nan from where a tie breaks.
+    tensions : (n_ties,) array [N]
+        Forces of the ties in the last step.
     steps, programs : int
         Taken and solved.
     """
@@ -74,6 +89,9 @@ class Engine:
         pose: solver.Pose,
         velocity: np.ndarray,
         removed: np.ndarray | None = None,
+        ties: Sequence[solver.Tie] = (),
+        rest: np.ndarray | None = None,
+        tensions: np.ndarray | None = None,
     ) -> None:
         self.removed = np.zeros(assembly.n_blocks, dtype=bool) if removed is None else removed
         self.assembly, self.interfaces, self.pose = assembly, replace(interfaces, scatter=None), pose
@@ -86,6 +104,12 @@ class Engine:
         self.velocity = np.where(self.free[:, None], velocity * self.unit / self.scales, 0.0)
         moments, self.drawn_axes = principal_inertia(assembly)
         masses = np.repeat(assembly.masses[:, None], self.d, axis=1)
+        force = self.mass * solver.GRAVITY
+        self.ties, self.rest = tuple(ties), np.zeros(0) if rest is None else rest
+        self.tensions = np.zeros(len(self.ties)) if tensions is None else tensions
+        self.strength = np.array([tie.strength for tie in self.ties]) / force
+        # No stiffer than contact points, which the length of a step is made for.
+        self.give = np.array([max(force / (tie.stiffness * self.length), GIVE) for tie in self.ties])
         self.weights = np.concatenate([masses, moments / self.length**2], axis=1) / self.mass
         arms = assembly.vertices - assembly.centroids[assembly.block_of_vertex]
         self.radii = np.zeros(assembly.n_blocks)
@@ -111,10 +135,17 @@ class Engine:
 
     @property
     def energies(self) -> np.ndarray:
-        """(n_blocks,) array [J]: potential and kinetic energy of the free blocks."""
+        """(n_blocks,) array [J]: potential and kinetic energy of the free blocks, and of what holds on to them."""
         height = (self.loads[:, : self.d] * self.pose.positions).sum(axis=1) / self.length
         kinetic = self._kinetic(self.velocity, axes_at(self.pose, self.drawn_axes))
-        return np.where(self.free, kinetic - height, 0.0) * self.mass * solver.GRAVITY * self.length
+        energies = kinetic - height
+        if self.ties:
+            members = self._members(self.pose)
+            stored = 0.5 * np.minimum(members.gaps / self.length, 0.0) ** 2 / self.give[members.features[:, 1]]
+            # Of a tie from a support all is its block's.
+            for one, other in ((members.block_a, members.block_b), (members.block_b, members.block_a)):
+                np.add.at(energies, one, np.where(self.free[other], 0.5, 1.0) * stored)
+        return np.where(self.free, energies, 0.0) * self.mass * solver.GRAVITY * self.length
 
     def advance(self, seconds: float) -> None:
         """Follow the blocks for so many seconds.
@@ -157,16 +188,18 @@ class Engine:
             pose = mechanics.moved(self.pose, motion * self.scales)
             corners = mechanics.moved_vertices(self.assembly, pose)
             gaps = self._carried(contacts, pose).gaps
+            members = mechanics.is_member(contacts)
             counts = (forces[:, 0] > FORCE) | (gaps < -DEEP * self.length)
             entered = self._entered(corners, contacts)
-            if np.abs(gaps - predicted)[counts].max(initial=0.0) < EXACT * self.length and len(entered) == 0:
+            error = np.abs(gaps - predicted) / np.where(members, EXACT_TIES, 1.0)
+            if error[counts].max(initial=0.0) < EXACT * self.length and len(entered) == 0:
                 break
             if left > 1 and len(entered):
                 contacts = mechanics.joined_contacts([contacts, entered])
                 before = np.concatenate([before, np.zeros((len(entered), self.d))])
                 # As if closed: open ones would be found in each other by forces too large for Newton's method.
                 trial = np.concatenate([trial, np.tile(np.eye(self.d)[0], (len(entered), 1))])
-        deeper = gaps < np.minimum(contacts.gaps, 0.0) - DEEP * self.length
+        deeper = ~members & (gaps < np.minimum(contacts.gaps, 0.0) - DEEP * self.length)
         if (len(entered) or deeper.any()) and h > SHORTEST_STEP:
             return False
         energies = self.energies
@@ -176,6 +209,7 @@ class Engine:
         self.flies = self.free.copy()
         carries = forces[:, 0] > FORCE
         self.flies[contacts.block_a[carries]] = self.flies[contacts.block_b[carries]] = False
+        self._yield()
         self._lose(energies)
         self.steps += 1
         return True
@@ -206,10 +240,21 @@ class Engine:
         reach = float(2.0 * way.max()) + 1e-3
         found = mechanics.find_contacts(self.assembly, self.corners, reach * self.length)
         met = ~(self.removed[found.block_a] | self.removed[found.block_b])
-        return found[met & (found.gaps <= (way[found.block_a] + way[found.block_b] + 1e-4) * self.length)]
+        found = found[met & (found.gaps <= (way[found.block_a] + way[found.block_b] + 1e-4) * self.length)]
+        return mechanics.joined_contacts([self._members(self.pose), found]) if self.ties else found
+
+    def _members(self, pose: solver.Pose, features: np.ndarray | None = None) -> mechanics.Contacts:
+        """Contact points of the ties that are there, or of those with these features, at a pose."""
+        if features is None:
+            features = mechanics.present_members(self.ties, self.rest)
+        return mechanics.member_contacts(self.ties, self.assembly, pose, self.rest, features)
 
     def _carried(self, contacts: mechanics.Contacts, pose: solver.Pose) -> mechanics.Contacts:
         """Measure the same contact points at another pose."""
+        if (members := mechanics.is_member(contacts)).any():
+            # They come first.
+            bound = self._members(pose, contacts.features[members])
+            return mechanics.joined_contacts([bound, self._carried(contacts[~members], pose)])
         a, b = contacts.block_a, contacts.block_b
         on_plane = contacts.points - contacts.gaps[:, None] * contacts.frames[:, 0]
         point = mechanics.carried(contacts.points, a, self.pose, pose)
@@ -243,9 +288,13 @@ class Engine:
             for block, first in ((start.block_a, 3), (start.block_b, 9)):
                 rows.blocks[:, :, first : first + 3] = rows.blocks[:, :, first : first + 3] @ axes[block]
             loads, beside_flight = (self._along(of, axes.transpose(0, 2, 1)) for of in (loads, beside_flight))
+        members = mechanics.is_member(start)
         # What has come into another block is pushed out over some steps.
-        gaps = measured.gaps - (1.0 - PUSHED_OUT) * np.minimum(start.gaps, 0.0)
-        friction = self.interfaces.friction(self.assembly, start.block_a, start.block_b)
+        gaps = measured.gaps - (1.0 - PUSHED_OUT) * np.where(members, 0.0, np.minimum(start.gaps, 0.0))
+        friction = np.where(members, 0.0, self.interfaces.friction(self.assembly, start.block_a, start.block_b))
+        compliance, most = np.tile([GIVE] + [SHEAR_GIVE] * (self.d - 1), (len(start), 1)), np.full(len(start), np.inf)
+        number = start.features[members, 1]
+        compliance[members, 0], most[members] = self.give[number], self.strength[number]
         return mechanics.ContactProblem(
             rows=rows,
             gap=gaps / self.length,
@@ -253,13 +302,29 @@ class Engine:
             # Gaps are absolute, slip counts from the start of the step.
             forces=np.column_stack([np.zeros(len(start)), before[:, 1:]]),
             bound=friction * before[:, 0],
-            compliance=np.tile([GIVE] + [SHEAR_GIVE] * (self.d - 1), (len(start), 1)),
-            most=np.full(len(start), np.inf),
+            compliance=compliance,
+            most=most,
             load=loads[self.free].ravel(),
             viscosity=(self.weights / h**2)[self.free].ravel(),
             motion_so_far=beside_flight[self.free].ravel(),
             size=1.0,
         )
+
+    def _yield(self) -> None:
+        """Give the ties that are stretched beyond their strength another length without force, or none."""
+        assert self.contacts is not None
+        if not self.ties:
+            return
+        members = self._members(self.pose)
+        number, pushes = members.features[:, 1], members.features[:, 2] == 1
+        beyond = np.maximum(-members.gaps - (self.strength * self.give)[number] * self.length, 0.0)
+        self.rest = self.rest.copy()
+        # Of a bar one of two contact points at most is stretched.
+        np.add.at(self.rest, number, np.where(pushes, -1.0, 1.0) * beyond)
+        brittle = np.array([tie.brittle for tie in self.ties], dtype=bool)
+        self.rest[number[(beyond > 0.0) & brittle[number]]] = np.nan
+        tensions = mechanics.member_forces(self.contacts, self.forces, len(self.ties)) * self.mass * solver.GRAVITY
+        self.tensions = np.where(np.isnan(self.rest), 0.0, tensions)
 
     def _along(self, motion: np.ndarray, axes: np.ndarray) -> np.ndarray:
         """(n_blocks, n_dof) array: in space rotations times axes."""
@@ -274,7 +339,7 @@ class Engine:
     def _lose(self, before: np.ndarray) -> None:
         """Slow the blocks that touch each other where their energy has grown: by rotations within the step."""
         assert self.contacts is not None
-        n, carries = len(self.free), self.forces[:, 0] > FORCE
+        n, carries = len(self.free), (self.forces[:, 0] > FORCE) | mechanics.is_member(self.contacts)
         a, b = self.contacts.block_a[carries], self.contacts.block_b[carries]
         both = self.free[a] & self.free[b]
         links = sp.coo_array((np.ones(int(both.sum())), (a[both], b[both])), shape=(n, n))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -50,12 +50,18 @@ class Fall:
     rotations : (n, n_blocks) array, in space (n, n_blocks, 3) [rad]
     ground : float [m]
         Height of the ground line.
+    tie_forces : (n, n_ties) array [N]
+        Of ties, props and bars, tension positive.
+    tie_rest : (n, n_ties) array [m]
+        Their lengths without force; nan for those that are absent or broken.
     """
 
     times: np.ndarray
     positions: np.ndarray
     rotations: np.ndarray
     ground: float
+    tie_forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    tie_rest: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __len__(self) -> int:
         """Count the poses."""
@@ -68,15 +74,37 @@ class Fall:
 
     def at(self, time: float) -> solver.Pose:
         """Return the pose at a time [s], in between those kept."""
-        k = int(np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self) - 2)) if len(self) > 1 else 0
-        if len(self) == 1 or time >= self.times[-1]:
-            return self.pose(len(self) - 1)
+        k = self._before(time)
+        if k == len(self) - 1:
+            return self.pose(k)
         t = (time - self.times[k]) / (self.times[k + 1] - self.times[k])
         before, after = self.pose(k), self.pose(k + 1)
         turn = before.movement_to(after)
         turn[:, : before.positions.shape[1]] = 0.0
         places = before.positions + t * (after.positions - before.positions)
         return solver.Pose(places, mechanics.swung(before, t * turn).rotations)
+
+    def ties_at(self, time: float, response: solver.Response) -> mechanics.TieForces:
+        """Return what ties, props and bars of its response do at a time [s], as at the pose that is kept before it."""
+        ties, last = response.ties, response.path[-1].ties
+        if not self.tie_rest.size:
+            return mechanics.TieForces()
+        k = self._before(time)
+        forces, rest, ends = (
+            self.tie_forces[k],
+            self.tie_rest[k],
+            mechanics.tie_ends(ties, response.assembly, self.at(time)),
+        )
+        strength = np.array([tie.strength for tie in ties])
+        states = mechanics.member_states(np.abs(forces), strength, response.total_weight)
+        states = np.where(np.isnan(rest), mechanics.BROKEN, states)
+        states = np.where(last.states == mechanics.ABSENT, mechanics.ABSENT, states)
+        stretched = mechanics.tie_lengths(ends) - (mechanics.tie_lengths(last.ends) - last.elongations)
+        return mechanics.TieForces(forces, stretched, rest, states, ends)
+
+    def _before(self, time: float) -> int:
+        """Return the number of the last pose that is kept until a time [s]."""
+        return int(np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self) - 1))
 
 
 def fall_of(
@@ -138,7 +166,8 @@ def _followed(
 ) -> Fall:
     """Follow the blocks until all rest or the time is over."""
     engine, ground = engine_of(response, push)
-    poses, calm, still = [engine.pose], 0, STILL * float(np.sqrt(solver.GRAVITY * response.assembly.block_size))
+    poses, tied = [engine.pose], [(engine.tensions, engine.rest)]
+    calm, still = 0, STILL * float(np.sqrt(solver.GRAVITY * response.assembly.block_size))
     if watch is not None:
         watch(engine)
     for number in range(1, round(LONGEST * RATE) + 1):
@@ -148,6 +177,7 @@ def _followed(
             warnings.warn(f"the fall is followed for {(number - 1) / RATE:g} s only: {failure}", stacklevel=2)
             break
         poses.append(engine.pose)
+        tied.append((engine.tensions, engine.rest))
         if progress is not None:
             progress(number / RATE)
         if watch is not None:
@@ -162,6 +192,8 @@ def _followed(
         np.stack([pose.positions[:n] for pose in poses]),
         rotations[:, :, 0] if rotations.shape[2] == 1 else rotations,
         ground,
+        np.stack([forces for forces, _ in tied]),
+        np.stack([rest for _, rest in tied]),
     )
 
 
@@ -182,18 +214,22 @@ def engine_of(response: solver.Response, push: float) -> tuple[Engine, float]:
     still = np.zeros((1, response.loads.dead.shape[1]))
     loads = np.append(response.dead_at(end, last), still, axis=0)
     velocity = np.append(push * response.collapse.mechanism, still, axis=0)
-    return Engine(whole, loads, response.interfaces, pose, velocity, np.append(end.removed, False)), ground
+    removed, tied = np.append(end.removed, False), response.path[-1].ties
+    gone = np.isin(tied.states, (mechanics.ABSENT, mechanics.BROKEN))
+    rest, ties = np.where(gone, np.nan, tied.rest), response.ties
+    return Engine(whole, loads, response.interfaces, pose, velocity, removed, ties, rest, tied.forces), ground
 
 
-def falling_increment(response: solver.Response, pose: solver.Pose) -> solver.Increment:
-    """Make what pictures, pages and files show of a fall at one pose: blocks alone, no joints and no forces.
+def falling_increment(response: solver.Response, fall: Fall, time: float) -> solver.Increment:
+    """Make what pictures, pages and files show of a fall at a time: blocks and ties alone, no joints and no forces.
 
     Parameters
     ----------
     response : solver.Response
-    pose : solver.Pose
+    fall : Fall
+    time : float [s]
     """
-    last = response.path[-1]
+    last, pose = response.path[-1], fall.at(time)
     nothing = np.zeros((0, last.forces.shape[1]))
     return replace(last, status=solver.Status.FALLING, checkpoint=None).with_arrays(
         pose=pose,
@@ -204,4 +240,5 @@ def falling_increment(response: solver.Response, pose: solver.Pose) -> solver.In
         velocity=np.zeros_like(last.velocity),
         support_forces=np.zeros_like(last.support_forces),
         fell_at=response.increments[-1].state.fell_at,
+        ties=fall.ties_at(time, response),
     )

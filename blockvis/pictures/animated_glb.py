@@ -50,7 +50,7 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     -----
     The path takes six seconds in proportion to its parameter. Between two poses glTF turns each block about its
     centroid, and no corner takes a short cut. Blocks in the plane are extruded by their thickness. Ties are rods from
-    end to end; one that is broken, or not there yet, and all in a fall have no size.
+    end to end; one that is broken, or not there yet, has no size.
 
     Raises
     ------
@@ -59,8 +59,8 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     """
     if not response.increments:
         raise ValueError(f"there is no motion to write to '{path}': {response.message or response.stop}")
-    times, poses, shown = _played(response, fall)
     ties = known_ties(response)
+    times, poses, tied = _played(response, fall)
     moves = [_as_gltf(pose, response.assembly.dimension) for pose in poses]
     places, turns = np.array([place for place, _ in moves]), np.array([turn for _, turn in moves])
     # Of the two quaternions of a rotation the one next to the last: players go the short way.
@@ -80,7 +80,7 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
             kind = "VEC3" if what == "translation" else "VEC4"
             channels.append({"sampler": len(samplers), "target": {"node": numbers[name], "path": what}})
             samplers.append({"input": clock, "output": buffer.added(values, kind), "interpolation": "LINEAR"})
-    rods = _rods(response, ties, poses, shown)
+    rods = _rods(response, ties, poses, tied)
     for k, tie in enumerate(ties):
         for what, values, kind in zip(
             ("translation", "rotation", "scale"), rods, ("VEC3", "VEC4", "VEC3"), strict=True
@@ -96,37 +96,42 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     return write_atomic(path, buffer.packed())
 
 
-def _played(response: solver.Response, fall: Fall | None) -> tuple[np.ndarray, list[solver.Pose], list[int]]:
-    """Seconds, (n,), at which the blocks are at which poses, and the increments of these, -1 in a fall."""
+def _played(
+    response: solver.Response, fall: Fall | None
+) -> tuple[np.ndarray, list[solver.Pose], list[mechanics.TieForces]]:
+    """Seconds, (n,), at which the blocks are at which poses, and what ties do then."""
     path, along = response.path, response.parameters
     initial = solver.Pose.initial(response.assembly)
     poses = [increment.pose for increment in path] or [initial]
-    numbers = list(range(len(path)))
+    tied = [increment.ties for increment in path] or [mechanics.TieForces()]
     reach = float(along[-1]) if len(along) else 0.0
     times = list(PATH * along / reach) if reach > 0.0 else [0.1 * k for k in range(len(poses))]
     start = times[-1] + STANDS
     if fall is not None:
         times += [start + float(time) for time in fall.times]
         poses += [fall.pose(k) for k in range(len(fall))]
+        tied += [fall.ties_at(float(time), response) for time in fall.times]
     else:
-        frames = [i.pose for i in response.increments if i.status == solver.Status.FALLING]
+        frames = [i for i in response.increments if i.status == solver.Status.FALLING]
         if frames:
-            times, poses, numbers = [*times, start], [*poses, poses[-1]], [*numbers, len(path) - 1]
+            times, poses, tied = [*times, start], [*poses, poses[-1]], [*tied, tied[-1]]
         times += [start + FRAME * (k + 1) for k in range(len(frames))]
-        poses += frames
-    times, poses = [*times, times[-1] + STANDS], [*poses, poses[-1]]
-    numbers = [*numbers, *[-1] * (len(poses) - 1 - len(numbers))]
-    numbers.append(numbers[-1])
+        poses += [frame.pose for frame in frames]
+        tied += [frame.ties for frame in frames]
+    times, poses, tied = [*times, times[-1] + STANDS], [*poses, poses[-1]], [*tied, tied[-1]]
     kept = np.flatnonzero(np.diff(np.array(times), prepend=-1.0) > 1e-6)
-    return np.array(times)[kept], [poses[k] for k in kept.tolist()], [numbers[k] for k in kept.tolist()]
+    return np.array(times)[kept], [poses[k] for k in kept.tolist()], [tied[k] for k in kept.tolist()]
 
 
 def _rods(
-    response: solver.Response, ties: Sequence[solver.Tie], poses: Sequence[solver.Pose], shown: Sequence[int]
+    response: solver.Response,
+    ties: Sequence[solver.Tie],
+    poses: Sequence[solver.Pose],
+    tied: Sequence[mechanics.TieForces],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places (n, n_ties, 3), quaternions (n, n_ties, 4) and scales (n, n_ties, 3) of rods along z.
 
-    ``shown`` (n,) are numbers of the increments that the poses are of, -1 in a fall.
+    ``tied`` (n,) is what they do at the poses, or nothing.
     """
     assembly = response.assembly
     ends = np.array([mechanics.tie_ends(ties, assembly, pose) for pose in poses]).reshape(
@@ -144,9 +149,9 @@ def _rods(
     midway /= np.linalg.norm(midway, axis=2, keepdims=True)
     turns = np.concatenate([midway, np.zeros_like(length)], axis=2)
     there = np.zeros((len(poses), len(ties), 1))
-    for k, number in enumerate(shown):
-        if ties and number >= 0:
-            there[k, :, 0] = ~np.isin(response.path[number].ties.states, (mechanics.ABSENT, mechanics.BROKEN))
+    for k, found in enumerate(tied):
+        if len(found.states) == len(ties):
+            there[k, :, 0] = ~np.isin(found.states, (mechanics.ABSENT, mechanics.BROKEN))
     radius = np.full((*length.shape[:2], 2), TIE_RADIUS * assembly.block_size)
     return ends.mean(axis=2), turns, there * np.concatenate([radius, length], axis=2)
 

@@ -203,9 +203,8 @@ def badge_of(response: solver.Response) -> str:
 
 def fall_text(response: solver.Response) -> str:
     """Say how a fall was followed, and without what."""
-    ties = ["ties let go"] if response.ties else []
     fill = ["fill weighs on, not shown"] if response.loads.fills else []
-    return "   ·   ".join([CAPTION, *ties, *fill])
+    return "   ·   ".join([CAPTION, *fill])
 
 
 def lost_text(response: solver.Response) -> str:

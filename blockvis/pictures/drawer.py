@@ -328,6 +328,9 @@ class Drawer:
                 if number in seen.sampled:
                     seen.forces.append(sizes)
             yield magnified(self.assembly, increment.pose, look.magnification)
+        if self.fall is not None and self.fall.tie_rest.size:
+            for time in self.fall.times.tolist():
+                self.ties.survey(falling_increment(self.response, self.fall, time))
 
     def picture(
         self,
@@ -391,7 +394,7 @@ class Drawer:
         """Draw the fall at a time [s] after the last equilibrium."""
         assert self.fall is not None
         return self.picture(
-            falling_increment(self.response, self.fall.at(time)),
+            falling_increment(self.response, self.fall, time),
             title=f"Fall   ·   {time:.2f} s after the last equilibrium",
             note=f"{fall_text(self.response)}   ·   true scale",
             badge=FALL_BADGE if self._moves(time) else "",

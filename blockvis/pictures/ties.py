@@ -106,7 +106,7 @@ class DrawnTies:
         return np.concatenate([np.zeros((0, self._assembly.dimension)), *found])
 
     def strands(self, increment: solver.Increment, shown: solver.Pose, dash: float) -> list[Strands]:
-        """List what is drawn of an increment, back to front; nothing in a fall, where they are not followed.
+        """List what is drawn of an increment, back to front; in a fall no stubs of what has broken.
 
         Parameters
         ----------
@@ -142,7 +142,9 @@ class DrawnTies:
         middles = mechanics.tie_ends(self._ties, self._assembly, shown).mean(axis=1)
         sizes = _told_forces(increment) if len(increment.ties.forces) else np.zeros(len(states))
         order = [k for k in np.argsort(-sizes, kind="stable").tolist() if states[k] != mechanics.ABSENT][:MOST_NAMED]
-        words = [self._words(k, float(sizes[k]), int(states[k])) for k in order]
+        # In a fall forces change from frame to frame.
+        told = increment.status != solver.Status.FALLING
+        words = [self._words(k, float(sizes[k]) if told else None, int(states[k])) for k in order]
         return middles[order], words, [COLOURS[int(states[k])] for k in order]
 
     def told(self, increment: solver.Increment) -> list[dict[str, Any]]:
@@ -151,7 +153,8 @@ class DrawnTies:
         Ends, lines and ends that the ground holds [m]; words beside it and in the legend, colour, width [pixel], dash.
         """
         states, ends = self._states(increment), mechanics.tie_ends(self._ties, self._assembly, increment.pose)
-        told, sizes = [], _told_forces(increment)
+        told: list[dict[str, Any]] = []
+        sizes, falling = _told_forces(increment), increment.status == solver.Status.FALLING
         for k in np.flatnonzero(states != mechanics.ABSENT).tolist():
             state = int(states[k])
             lines = _stubs(ends[[k]]) if state == mechanics.BROKEN else ends[[k]]
@@ -160,7 +163,7 @@ class DrawnTies:
                     "ends": np.round(ends[k], 5).tolist(),
                     "lines": np.round(lines, 5).tolist(),
                     "ground": self._grounded[k].astype(int).tolist(),
-                    "words": self._words(k, float(sizes[k]), state),
+                    "words": self._words(k, None if falling else float(sizes[k]), state),
                     "key": _legend_words(state, [self._ties[k].kind]),
                     "colour": palette.hexadecimal(COLOURS[state]),
                     "width": 0.6 * WIDTHS[state] * (PROPS if self._props[k] else 1.0),
@@ -179,17 +182,21 @@ class DrawnTies:
                 found.append(Key(shape, _legend_words(state, kinds), COLOURS[state], layers=(f"tie {WORDS[state]}",)))
         return found
 
-    def _words(self, k: int, size: float, state: int) -> str:
+    def _words(self, k: int, size: float | None, state: int) -> str:
         tie = self._ties[k]
         if state in (mechanics.SLACK, mechanics.BROKEN):
             return f"{tie.name} {WORDS[state]}"
         sense = "" if tie.kind != mechanics.BAR else " compression" if state == PRESSED else " tension"
-        return f"{tie.name} {force_text(size)}{', yielding' if state == mechanics.YIELDING else sense}"
+        force = "" if size is None else f" {force_text(size)}"
+        return f"{tie.name}{force}{', yielding' if state == mechanics.YIELDING else sense}"
 
     def _states(self, increment: solver.Increment) -> np.ndarray:
         states = increment.ties.states
-        if increment.status == solver.Status.FALLING or len(states) != len(self._ties):
+        if len(states) != len(self._ties):
             return np.full(len(self._ties), mechanics.ABSENT)
+        if increment.status == solver.Status.FALLING:
+            # Their ends go far apart.
+            states = np.where(states == mechanics.BROKEN, mechanics.ABSENT, states)
         return np.where((states == mechanics.ELASTIC) & (increment.ties.forces < 0.0), PRESSED, states)
 
 

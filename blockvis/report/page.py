@@ -257,7 +257,8 @@ def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> li
     n = min(len(fall) - 1, most // 2)
     chosen = np.linspace(len(fall) - 1, 1, n).round().astype(int)[::-1]
     falling = [
-        _Frame(falling_increment(response, fall.pose(k)), len(path), float(fall.times[k])) for k in chosen.tolist()
+        _Frame(falling_increment(response, fall, float(fall.times[k])), len(path), float(fall.times[k]))
+        for k in chosen.tolist()
     ]
     return [*map(framed_at, _thinned(path, most - n)), *falling]
 

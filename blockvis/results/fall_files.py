@@ -20,8 +20,8 @@ from .viewer_files import MOVED, ViewerFormat
 if TYPE_CHECKING:
     from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
 
-#: List of the VTU files, and the poses.
-FALL_LIST, FALL_POSES = "fall.pvd", "fall.npz"
+#: Lists of the VTU files of blocks and of ties, and the poses.
+FALL_LIST, TIE_LIST, FALL_POSES = "fall.pvd", "fall_ties.pvd", "fall.npz"
 
 #: Falls by the id of their response, as long as it lives: to work one out takes seconds.
 _known: dict[int, Fall | None] = {}
@@ -48,32 +48,49 @@ def write_fall(
     from blockvis.system.vtk_files import write_pvd, write_vtu
 
     make_folder(folder / "fall")
-    entries, falls = [], falling_in(response)
-    for k, time in enumerate(fall.times):
-        grid = fall_grid(response, fall.pose(k), float(time), vtu.shape, falls)
-        entries.append((float(time), f"fall/blocks_{k:05d}.vtu"))
-        write_vtu(grid, folder / entries[-1][1], strings=vtu.strings, durable=False)
-    write_pvd(folder / FALL_LIST, entries, last=False)
+    falls, times = falling_in(response), fall.times.tolist()
+    grids = {FALL_LIST: ("blocks", lambda time: fall_grid(response, fall, time, vtu.shape, falls))}
+    if response.ties:
+        grids[TIE_LIST] = ("ties", lambda time: tie_fall_grid(response, fall, time, vtu.shape))
+    for listed, (kind, grid_at) in grids.items():
+        files = [f"fall/{kind}_{k:05d}.vtu" for k in range(len(times))]
+        for time, file in zip(times, files, strict=True):
+            write_vtu(grid_at(time), folder / file, strings=vtu.strings, durable=False)
+        write_pvd(folder / listed, list(zip(times, files, strict=True)), last=False)
     write_atomic(folder / FALL_POSES, compressed(flat(fall)))
 
 
-def fall_grid(
-    response: solver.Response, pose: solver.Pose, time: float, shape: str, falls: np.ndarray
-) -> vtkUnstructuredGrid:
+def fall_grid(response: solver.Response, fall: Fall, time: float, shape: str, falls: np.ndarray) -> vtkUnstructuredGrid:
     """Make a grid of the blocks at a time [s] of a fall.
 
     Parameters
     ----------
     response : solver.Response
-    pose : solver.Pose
+    fall : Fall
     time : float [s]
     shape : {"moved", "undeformed"}
     falls : (n_blocks,) bool array
         Blocks that the collapse takes.
     """
-    from .datasets import add_arrays, block_grid
+    from .datasets import block_grid
 
-    grid = block_grid(response.assembly, falling_increment(response, pose), shape=shape, falls=falls)
+    grid = block_grid(response.assembly, falling_increment(response, fall, time), shape=shape, falls=falls)
+    return _timed(grid, time)
+
+
+def tie_fall_grid(response: solver.Response, fall: Fall, time: float, shape: str) -> vtkUnstructuredGrid:
+    """Make a grid of the ties at a time [s] of a fall."""
+    from .tie_grid import tie_grid
+
+    return _timed(
+        tie_grid(response.ties, response.assembly, falling_increment(response, fall, time), shape=shape), time
+    )
+
+
+def _timed(grid: vtkUnstructuredGrid, time: float) -> vtkUnstructuredGrid:
+    """Give a grid the time [s] for what the static path counts by."""
+    from .datasets import add_arrays
+
     # There is no equilibrium here: numbers of the static path would mislead.
     for name in ("settlement", "load_multiplier", "reaction"):
         grid.GetFieldData().RemoveArray(name)
@@ -99,9 +116,9 @@ def known_fall(response: solver.Response) -> Fall | None:
 
 def remove_fall(folder: Path) -> None:
     """Remove what :func:`write_fall` has written, the list of files first."""
-    for name in (FALL_LIST, FALL_POSES):
+    for name in (FALL_LIST, TIE_LIST, FALL_POSES):
         (folder / name).unlink(missing_ok=True)
-    for old in (folder / "fall").glob("blocks_*.vtu"):
+    for old in (folder / "fall").glob("*_*.vtu"):
         old.unlink()
     if (folder / "fall").is_dir() and not any((folder / "fall").iterdir()):
         (folder / "fall").rmdir()
@@ -124,6 +141,10 @@ def stored_fall(folder: Path) -> Fall | None:
         shapes = (fall.times.shape, fall.positions.shape)
         if n == 0 or shapes != ((n,), (n, blocks, 3 if turns else 2)) or not np.isfinite(fall.positions).all():
             raise ValueError(f"positions have the shape {fall.positions.shape}, rotations {fall.rotations.shape}")
+        if fall.tie_forces.shape != fall.tie_rest.shape or len(fall.tie_rest) not in (0, n):
+            raise ValueError(
+                f"forces of ties have the shape {fall.tie_forces.shape}, their lengths {fall.tie_rest.shape}"
+            )
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"'{file}' cannot be read ({error}); remove it and draw again") from None
     return fall

@@ -434,6 +434,7 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
         stop=solver.Status(summary.get("status", solver.Status.INTERRUPTED)),
         message=summary.get("message", "" if increments else nothing),
         collapse=_collapse_of(summary, increments, assembly),
+        ties=stored_ties(folder),
     )
     return response, summary
 

@@ -34,7 +34,7 @@ def tie_dataset(
     -------
     pyvista.UnstructuredGrid
         Cell arrays ``force`` [N], tension positive, ``elongation`` [m], ``state`` (number), ``name``, ``kind``; point
-        and field arrays as those of the blocks, and ``state_names``. In frames of a fall there are no forces.
+        and field arrays as those of the blocks, and ``state_names``.
     """
     import pyvista
 
@@ -48,9 +48,8 @@ def tie_grid(
     found, d = ties_at(ties, assembly, increment), assembly.dimension
     grid = grid_of_cells(found.ends.reshape(-1, d), 2 * np.arange(len(ties) + 1), VTK_LINE)
     give_shape(grid, np.array([tie.points for tie in ties]).reshape(-1, d), shape, None)
-    balanced = float(increment.status != solver.Status.FALLING)
     cells = {
-        "force": balanced * found.forces,
+        "force": found.forces,
         "elongation": found.elongations,
         "state": found.states.astype(np.int32),
     }

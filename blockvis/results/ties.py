@@ -73,7 +73,7 @@ def known_ties(response: solver.Response) -> tuple[solver.Tie, ...]:
 
 
 def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment) -> mechanics.TieForces:
-    """Give what ties do at an increment; in frames of a fall, where that is not known, where their ends are.
+    """Give what ties do at an increment; where that is not known, where their ends are.
 
     Parameters
     ----------

@@ -203,7 +203,8 @@ class Path:
             if ending is not None:
                 return ending
         while not self.state.ended:
-            state, outcome = self.advance(self.state, self._next_stop(self.state.place.s))
+            # What blocks that drop come to may be at a stop that has not been reported.
+            state, outcome = self.advance(self.state, self._next_stop(self.reported))
             self.state = state
             if outcome is Outcome.REACHED:
                 yield from self._report_reached(state)

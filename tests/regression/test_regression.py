@@ -35,13 +35,14 @@ LOOSER = dict.fromkeys(
     ),
     2e-3,
 ) | {
-    "wall_with_arch": 5e-3,
+    # Before it falls: 4.8e-2 between the kernels, where its own error is told as 7e-2; its collapse differs by 6e-4.
+    "wall_with_arch": 6e-2,
     # Which of brittle joints breaks first may follow from rounding.
     "wall_with_mortar": 1e-2,
     # A brick slips a little earlier with one kernel: 4.7e-3 of the last reaction, within the step tolerance.
     "wall_self_weight": 1e-2,
     "panel_settlement_friction": 2e-3,
-    "facade": 5e-3,
+    "facade": 1e-2,
     "opening_cut": 5e-3,
     # Friction bounds that follow carry rounding on: 5e-9 between the kernels, 3e-8 between two versions.
     "arch_pushed_after_settlement": 1e-6,
@@ -54,7 +55,7 @@ LOOSER = dict.fromkeys(
     "panel_with_tie": 1e-6,
     # In space: 1e-3 between the kernels; 2.3e-2 of the last reaction, after bricks slip, by how programs are solved.
     "corner_of_walls": 3e-2,
-    "cross_vault_corner": 2e-3,
+    "cross_vault_corner": 1e-2,
     "dome_spreading": 1e-4,
     "vault_with_fill": 1e-4,
 }

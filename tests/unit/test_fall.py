@@ -21,6 +21,9 @@ from blockvis.dynamics.ground import on_ground
 from blockvis.results.fall_files import stored_fall, write_fall
 from solver import mechanics
 
+#: Weight of the block [N].
+WEIGHT = 2000.0 * solver.GRAVITY
+
 ARCH = Path(__file__).parents[2] / "assets" / "semicircular_arch.msh"
 
 
@@ -238,3 +241,113 @@ def test_bent_blocks_fall_in_one_piece():
     assert fall.rotations[-1, 0] < -0.5
     end = outlines(assembly, fall.pose(len(fall) - 1))
     assert shapely.bounds(end[0])[1] == pytest.approx(fall.ground, abs=0.01)
+
+
+def hung(tie, rest, at=(0.0, 5.0)):
+    """A block of 1 m, its middle at a place [m], on a tie, above a ground far below."""
+    corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) + at
+    assembly = solver.Assembly.from_outlines([corners], roles=["free"], density=2000.0)
+    whole, pose = on_ground(assembly, solver.Pose.initial(assembly), -20.0)
+    loads = np.append(solver.self_weight(assembly).dead, np.zeros((1, 3)), axis=0)
+    laws = solver.Interfaces(solver.InterfaceLaw(0.5))
+    return Engine(whole, loads, laws, pose, np.zeros((2, 3)), ties=[tie], rest=np.array([rest]))
+
+
+def tie_of(points, **values):
+    return solver.Tie("iron", (None, 0), points, **{"stiffness": 1e7, **values})
+
+
+def length_of(engine):
+    return float(mechanics.tie_lengths(mechanics.tie_ends(engine.ties, engine.assembly, engine.pose))[0])
+
+
+def test_a_block_hangs_on_a_tie_by_its_weight():
+    engine = hung(tie_of(((0.0, 8.0), (0.0, 5.0))), 3.0)
+    engine.advance(1.0)
+    assert length_of(engine) == pytest.approx(3.0 + WEIGHT / 1e7, abs=1e-5)
+    assert engine.tensions[0] == pytest.approx(WEIGHT, rel=1e-3)
+    assert engine.fastest < 1e-3
+
+
+@pytest.mark.parametrize(("brittle", "slower"), [(True, 0.0), (False, 0.6)])
+def test_a_block_falls_freely_from_a_tie_that_breaks_and_slower_from_one_that_yields(brittle, slower):
+    """With a strength of 0.6 of the weight the rest accelerates the block, by 0.4 g."""
+    engine = hung(tie_of(((0.0, 8.0), (0.0, 5.0)), strength=0.6 * WEIGHT, brittle=brittle), 3.0)
+    engine.advance(0.2)
+    before, fallen = engine.velocity[0, 1] / engine.unit * engine.length, length_of(engine)
+    engine.advance(0.2)
+    after = engine.velocity[0, 1] / engine.unit * engine.length
+    assert (after - before) / 0.2 == pytest.approx(-(1.0 - slower) * solver.GRAVITY, rel=1e-6)
+    if brittle:
+        assert np.isnan(engine.rest[0])
+        assert engine.tensions[0] == 0.0
+    else:
+        # What it has given is its length without force from then on.
+        assert engine.rest[0] == pytest.approx(length_of(engine) - 0.6 * WEIGHT / 1e7, abs=1e-9)
+        assert engine.rest[0] > fallen
+        assert engine.tensions[0] == pytest.approx(0.6 * WEIGHT, rel=1e-9)
+
+
+def test_a_block_on_a_stiff_tie_swings_at_its_length_and_energy_only_falls():
+    """Half a period of the pendulum takes it to the other side: 0.59 of that of small swings longer at 90°."""
+    engine = hung(tie_of(((3.0, 5.0), (0.0, 5.0)), stiffness=1e9), 3.0)
+    energies, lengths, places = [engine.energies.sum()], [], []
+    for _ in range(25):
+        engine.advance(0.08)
+        energies.append(engine.energies.sum())
+        lengths.append(length_of(engine))
+        places.append(engine.pose.positions[0, 0])
+    np.testing.assert_allclose(lengths, 3.0, rtol=1e-3)
+    assert (np.diff(energies) <= 0.0).all()
+    assert max(places) > 5.0
+
+
+def test_what_a_soft_tie_has_stored_comes_back_and_no_more():
+    """A block that falls into a tie of 0.1 m give by its weight, 1 m below where it is taut."""
+    engine = hung(tie_of(((0.0, 8.0), (0.0, 6.0)), stiffness=10.0 * WEIGHT), 3.0, at=(0.0, 6.0))
+    energies, heights = [], []
+    for _ in range(60):
+        engine.advance(0.04)
+        energies.append(engine.energies.sum())
+        heights.append(engine.pose.positions[0, 1])
+    lowest = int(np.argmin(heights))
+    # By energy 0.6 m below where the tie is taut, less what implicit steps lose.
+    assert 4.3 < heights[lowest] < 4.9
+    assert max(heights[lowest:]) > heights[lowest] + 0.2
+    assert (np.diff(energies) <= 1e-9 * WEIGHT).all()
+
+
+def test_a_bar_holds_a_block_up_and_a_tie_does_not():
+    """Upright below it, from the ground: pushed aside it falls over on the bar, in a circle."""
+    bar, tie = (hung(tie_of(((0.0, 2.0), (0.0, 5.0)), kind=kind, stiffness=1e9), 3.0) for kind in ("bar", "tie"))
+    for engine in (bar, tie):
+        engine.advance(0.5)
+    assert length_of(bar) == pytest.approx(3.0, rel=1e-3)
+    assert bar.tensions[0] == pytest.approx(-WEIGHT, rel=1e-2)
+    assert length_of(tie) < 2.0
+
+
+@pytest.mark.slow
+def test_piers_stay_joined_by_their_tie_when_the_arch_between_them_falls():
+    arch = blockvis.generators.arch_on_piers(voussoirs=7, pier_width=0.5, pier_blocks=1)
+    piers = arch.names.index("left pier 1"), arch.names.index("right pier 1")
+    tie = solver.Tie("iron", piers, ((-1.3, 1.95), (1.3, 1.95)), stiffness=4e7, strength=3000.0)
+    structure = solver.Structure(arch, friction_coefficient=0.6, ties=[tie])
+    spread = solver.Settlement((1.0, 0.0), increment=0.05, limit=0.6)
+    response = structure.settle(spread, controls=solver.Controls(falling_frames=1))
+    energies = []
+    fall = fall_of(response, watch=lambda engine: energies.append(engine.energies.sum()))
+    assert np.diff(energies).max() < 1e-6 * (energies[0] - energies[-1])
+    told = [fall.ties_at(time, response) for time in fall.times]
+    lengths, rest = (
+        np.array([values[0] for values in of])
+        for of in zip(*((mechanics.tie_lengths(one.ends), one.rest) for one in told), strict=True)
+    )
+    assert (lengths < rest + 3000.0 / 4e7 + 1e-6).all()
+    # It gives a little more: the piers stand and the arch lies between them.
+    assert (np.diff(rest) >= 0.0).all()
+    assert rest[-1] - rest[0] < 0.01
+    # Without it they are pushed apart.
+    alone = fall_of(replace(response, ties=()))
+    apart = [mechanics.tie_lengths(mechanics.tie_ends([tie], arch, alone.pose(k)))[0] for k in range(len(alone))]
+    assert max(apart) - apart[0] > 0.03

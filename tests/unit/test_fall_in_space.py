@@ -136,3 +136,21 @@ def test_a_corner_of_walls_falls_and_its_fall_is_stored(tmp_path):
     assert deepest_overlap(assembly, end) < 1e-3 * assembly.block_size
     lines = (tmp_path / "out" / "fall.pvd").read_text(encoding="utf-8")
     assert lines.count("<DataSet") == len(fall)
+
+
+def test_a_block_in_space_swings_on_a_tie():
+    """Held beside its middle, so that it turns, too."""
+    assembly = solver.Assembly.from_solids([box((-0.5, -0.5, 4.5), (0.5, 0.5, 5.5))], roles=["free"])
+    whole, pose = on_ground(assembly, solver.Pose.initial(assembly), -20.0)
+    loads = np.append(solver.self_weight(assembly).dead, np.zeros((1, 6)), axis=0)
+    tie = solver.Tie("rope", (None, 0), ((3.0, 0.0, 5.5), (0.0, 0.2, 5.5)), stiffness=1e9)
+    rest = mechanics.tie_lengths(mechanics.tie_ends([tie], whole, pose))
+    laws = solver.Interfaces(solver.InterfaceLaw(0.5))
+    engine = Engine(whole, loads, laws, pose, np.zeros((2, 6)), ties=[tie], rest=rest)
+    energies = [engine.energies.sum()]
+    for _ in range(5):
+        engine.advance(0.08)
+        energies.append(engine.energies.sum())
+        assert mechanics.tie_lengths(mechanics.tie_ends([tie], whole, engine.pose)) < 1.001 * rest
+    assert (np.diff(energies) <= 0.0).all()
+    assert np.linalg.norm(engine.pose.rotations[0]) > 0.1
