@@ -54,8 +54,8 @@ LOOSER = dict.fromkeys(
     "portal_frame": 1e-7,
     # Bricks of the panel slide: 2.5e-8 between the kernels.
     "panel_with_tie": 1e-6,
-    # In space: 4.5e-3 of the vault's last reaction between the kernels; 2.3e-2 of the corner's, after bricks slip, by how
-    # programs are solved.
+    # In space: 4.5e-3 of the last reaction of the vault between the kernels; 2.3e-2 of that of the corner, after bricks
+    # slip, by how programs are solved.
     "corner_of_walls": 3e-2,
     "cross_vault_corner": 1e-2,
     "dome_spreading": 1e-4,
