@@ -305,7 +305,7 @@ def test_cracks_apart_are_lines_of_their_own_the_widest_first():
     assert [round(crack.width, 6) for crack in cracks] == [0.03, 0.01]
     words = crack_rows(cracks, 1)
     assert words[0][1].startswith("30 mm at block")
-    assert words[1] == ("and", "1 narrower ones")
+    assert words[1] == ("and", "1 narrower one")
 
 
 def test_the_cracks_of_an_arch_are_its_hinges(tmp_path):
