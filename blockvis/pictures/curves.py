@@ -162,11 +162,7 @@ def _draw(
     values = response.values / factor
     known = values[np.isfinite(values)]
     axes.set_ylabel(value_label(response), fontsize=text)
-    axes.tick_params(labelsize=0.9 * text)
-    # Numbers as they are, without a power of ten or an offset in the corner.
-    axes.ticklabel_format(useOffset=False, style="plain")
-    axes.grid(color="#e4e4e4", linewidth=0.8)
-    axes.spines[["top", "right"]].set_visible(False)
+    _style(axes, text)
     axes.margins(x=0.02, y=0.12)
     if len(known) == 0 and len(path) > 1:
         axes.set_xlim(float(total.min()), float(total.max()))
@@ -230,10 +226,7 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
     axes.axhline(0.0, color=palette.hexadecimal(palette.FAINT), linewidth=0.8)
     axes.set_ylabel(f"force of ties, tension + [{unit}]", fontsize=TEXT)
     axes.set_xlabel(parameter_label(response), fontsize=TEXT)
-    axes.tick_params(labelsize=0.9 * TEXT)
-    axes.ticklabel_format(useOffset=False, style="plain")
-    axes.grid(color="#e4e4e4", linewidth=0.8)
-    axes.spines[["top", "right"]].set_visible(False)
+    _style(axes, TEXT)
     axes.margins(x=0.02, y=0.16)
     axes.legend(loc="best", fontsize=0.9 * TEXT, frameon=False, ncols=min(3, len(ties.names)))
 
@@ -389,3 +382,11 @@ def _counts(response: solver.Response) -> str:
     if mechanism is None or response.collapse is None or response.collapse.lost != "equilibrium":
         return ""
     return f"\n{counts_text(mechanism)}"
+
+
+def _style(axes: Axes, text: float) -> None:
+    """Give a plot a grid, no frame, and numbers as they are, without a power of ten or an offset in the corner."""
+    axes.tick_params(labelsize=0.9 * text)
+    axes.ticklabel_format(useOffset=False, style="plain")
+    axes.grid(color="#e4e4e4", linewidth=0.8)
+    axes.spines[["top", "right"]].set_visible(False)
