@@ -61,7 +61,7 @@ def test_a_window_reads_what_lies_within_it_and_tells_what_it_cuts(tmp_path, cap
     assert "window: 2 outlines beyond it were left out" in said
     assert "left out: 2 outlines across the edge of the window" in said
     assert main(["new", "wall.dxf", "--window", "0", "0", "3", "1"]) == 0
-    assert "window = [0.0, 0.0, 3.0, 1.0]" in (tmp_path / "wall.toml").read_text()
+    assert "window = [0.0, 0.0, 3.0, 1.0]" in (tmp_path / "wall.toml").read_text(encoding="utf-8")
     assert "written for 6 blocks" in capsys.readouterr().out
     assert main(["convert", "wall.dxf", "cut.svg", "--window", "9", "0", "14", "1"]) == 0
     assert "2 blocks written" in capsys.readouterr().out
