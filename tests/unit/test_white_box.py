@@ -33,9 +33,8 @@ WHITE_BOX = {
     "unit/test_crack_drawing.py": 10,
     "unit/test_dimensions.py": 12,
     "unit/test_explanation.py": 21,
-    "unit/test_fall.py": 8,
-    "unit/test_fall_in_space.py": 4,
-    "unit/test_films.py": 7,
+    "unit/test_fall.py": 9,
+    "unit/test_films.py": 10,
     "unit/test_kinds.py": 7,
     "unit/test_labels.py": 13,
     "unit/test_marks.py": 12,
@@ -46,7 +45,6 @@ WHITE_BOX = {
     "unit/test_studies.py": 18,
     "unit/test_ties.py": 5,
     "unit/test_tolerances.py": 1,
-    "unit/test_video.py": 3,
     "unit/test_written_files.py": 12,
 }
 
