@@ -24,7 +24,7 @@ import shapely
 import solver
 from blockvis.layout.layout import layout_of
 
-__all__ = ["ENGINES", "IN_SPACE", "Drive", "Sample", "in_a_process"]
+__all__ = ["ENGINES", "IN_SPACE", "Drive", "Sample", "are_convex", "in_a_process"]
 
 #: Time at rest before the supports move, and between two samples [s]; forces are means between samples.
 REST = 0.3
@@ -99,6 +99,11 @@ def _convex_pieces(outline: np.ndarray) -> list[np.ndarray]:
         return [outline]
     triangles = shapely.constrained_delaunay_triangles(polygon)
     return [np.array(triangle.exterior.coords)[:-1] for triangle in shapely.orient_polygons(triangles).geoms]
+
+
+def are_convex(assembly: solver.Assembly) -> bool:
+    """Whether all blocks of an assembly in the plane are convex."""
+    return all(len(_convex_pieces(assembly.outline(i))) == 1 for i in range(assembly.n_blocks))
 
 
 def pymunk_path(

@@ -18,6 +18,7 @@ from blockvis.cases.key import Key, Section, read_keys
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import loss_of, mechanism_text
 from solver import mechanics
+from solver.mechanics import counted
 
 #: How a kind works its increments out, for :class:`solver.mechanics.Increments`.
 Steps = Generator[solver.Increment, None, mechanics.Ending]
@@ -217,7 +218,7 @@ class AnalysisKind(ABC):
 
     def headline(self, response: solver.Response) -> str:
         """How it ended, for the command line."""
-        return f"{response.stop} after {len(response.path)} increments"
+        return f"{response.stop} after {counted(len(response.path), 'increment')}"
 
     def covers_message(self, response: solver.Response) -> bool:
         """Whether :meth:`lines` say what the message of the response says."""
