@@ -174,7 +174,8 @@ def _note_density(case: Case, sketch: layout.Layout) -> None:
     own = sketch.density[np.isfinite(sketch.density)]
     if len(own) and (own != case.density).any():
         warnings.warn(
-            f"{case.source}: [material] density = {case.density:g} is that of {sketch.n_blocks - len(own)} blocks; "
+            f"{case.source}: [material] density = {case.density:g} is that of "
+            f"{counted(sketch.n_blocks - len(own), 'block')}; "
             f"{len(own)} of {sketch.n_blocks} keep what '{case.file.name}' says, {own.min():g} to {own.max():g} kg/m³; "
             "[materials.NAME] density replaces it",
             stacklevel=3,

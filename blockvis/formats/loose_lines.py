@@ -148,7 +148,7 @@ def joined_ends(points: np.ndarray) -> tuple[np.ndarray, float] | None:
 def joined_note(misses: Sequence[float], size: float) -> list[str]:
     """Say how many outlines did not quite close, where that was more than rounding; ``size`` is that of the drawing."""
     far = [miss for miss in misses if miss > GRID * size]
-    words = f"joined: the ends of {len(far)} outlines, which missed each other by up to {max(far, default=0):.3g} units"
+    words = f"joined: the ends of {counted(len(far), 'outline')}, up to {max(far, default=0):.3g} units apart"
     return [Note(CHANGED, words)] if far else []
 
 

@@ -11,9 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from solver.assembly import Assembly
-from solver.geometry.contacts import Contacts
 from solver.interfaces import Interfaces
-from solver.kinematics import Pose, relative_velocities
+from solver.kinematics import Pose
 from solver.loads import GRAVITY, Loads, Settlement
 from solver.phases import PhaseChange, loads_in
 from solver.ties import Tie
@@ -449,21 +448,6 @@ class LimitLoad(HasState, Shown):
             "" if self.status is LimitStatus.FOUND else f", {self.status}"
         )
         return f"{text}; {self.caveat}" if self.caveat else text
-
-
-def limit_state(
-    pose: Pose, contacts: Contacts, forces: np.ndarray, friction: np.ndarray, mechanism: np.ndarray
-) -> State:
-    """Make the state of a limit load; parameters as the attributes of :class:`LimitLoad`."""
-    return State(
-        pose=pose,
-        contacts=contacts,
-        forces=forces,
-        displacements=relative_velocities(contacts, pose, mechanism),
-        friction=friction,
-        velocity=mechanism,
-        support_forces=np.zeros_like(mechanism),
-    )
 
 
 @dataclass(frozen=True)
