@@ -284,10 +284,6 @@ def needs_live_load(case: Case) -> None:
         )
 
 
-#: Keys of joints that are more than dry ones.
-_NOT_DRY = ("cohesion", "tensile_strength", "compressive_strength", "normal_stiffness", "shear_stiffness")
-
-
 def _interfaces(case: Case) -> solver.Interfaces:
     return solver.Interfaces(case.law, dict(case.interfaces), ground=case.ground)
 
@@ -311,12 +307,3 @@ def needs_rigid_joints(case: Case, what: str) -> None:
         interfaces.refuse_crushing(what)
     except ValueError as error:
         raise ValueError(f"{case.source}: {error}") from None
-
-
-def needs_dry_joints(case: Case, what: str) -> None:
-    """Raise ValueError where a joint of a case has strength but friction, or stiffness."""
-    interfaces = _interfaces(case)
-    if interfaces.mortar or not interfaces.dry:
-        raise ValueError(
-            f"{case.source}: {what} knows dry joints only; leave {', '.join(_NOT_DRY)} and stiffness of supports out"
-        )

@@ -85,7 +85,7 @@ def _refuse_by_program(
     """Refuses what the paper's linear programs do not know."""
     interfaces.refuse_mortar("increments = 'linear program'")
     if ties:
-        raise ValueError(f"increments = 'linear program' knows no ties ('{ties[0].name}'); leave the key out")
+        raise ValueError(f"increments = 'linear program' knows no ties ('{ties[0].name}'); leave increments out")
     if assembly.dimension == 3:
         raise ValueError("increments = 'linear program' is for blocks in the plane; leave it out for blocks in space")
     if loads.fills or changes:
