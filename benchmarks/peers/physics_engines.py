@@ -24,7 +24,7 @@ import shapely
 import solver
 from blockvis.layout.layout import layout_of
 
-__all__ = ["ENGINES", "IN_SPACE", "Drive", "Sample", "are_convex", "in_a_process"]
+__all__ = ["ENGINES", "IN_SPACE", "Drive", "Sample", "are_convex", "convex_pieces", "in_a_process"]
 
 #: Time at rest before the supports move, and between two samples [s]; forces are means between samples.
 REST = 0.3
@@ -92,7 +92,7 @@ class Sample:
     ties: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
-def _convex_pieces(outline: np.ndarray) -> list[np.ndarray]:
+def convex_pieces(outline: np.ndarray) -> list[np.ndarray]:
     """An outline, (n, 2), in triangles where it is not convex: engines take the convex hull of a shape."""
     polygon = shapely.Polygon(outline)
     if np.isclose(polygon.area, polygon.convex_hull.area):
@@ -103,7 +103,7 @@ def _convex_pieces(outline: np.ndarray) -> list[np.ndarray]:
 
 def are_convex(assembly: solver.Assembly) -> bool:
     """Whether all blocks of an assembly in the plane are convex."""
-    return all(len(_convex_pieces(assembly.outline(i))) == 1 for i in range(assembly.n_blocks))
+    return all(len(convex_pieces(assembly.outline(i))) == 1 for i in range(assembly.n_blocks))
 
 
 def pymunk_path(
@@ -126,7 +126,7 @@ def pymunk_path(
         body.position = tuple(map(float, assembly.centroids[i]))
         space.add(body)
         bodies.append(body)
-        for piece in _convex_pieces(assembly.outline(i) - assembly.centroids[i]):
+        for piece in convex_pieces(assembly.outline(i) - assembly.centroids[i]):
             shape = pymunk.Poly(body, piece.tolist(), radius=0.0)
             shape.friction = friction**0.5  # Chipmunk multiplies those of both shapes
             space.add(shape)
@@ -171,7 +171,7 @@ def mujoco_path(
     meshes, bodies = [], []
     half = float(np.max(assembly.thickness)) / 2.0
     for i in range(assembly.n_blocks):
-        pieces = _convex_pieces(assembly.outline(i) - assembly.centroids[i])
+        pieces = convex_pieces(assembly.outline(i) - assembly.centroids[i])
         for k, piece in enumerate(pieces):
             corners = [(x, y, z) for z in (-half, half) for x, y in piece]
             places = " ".join(f"{c:.17g}" for p in corners for c in p)
