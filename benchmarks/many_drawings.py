@@ -3,7 +3,7 @@
     python benchmarks/many_drawings.py OUT.jsonl [DRAWING or FOLDER ...] [--seconds 60]
     python benchmarks/many_drawings.py OUT.jsonl --summary
 
-A case is run, a layout written and then treated like a drawing: ``blockvis new`` proposes a case for it, and that is run.
+A case is run, a layout written and then treated like a drawing: ``blockvis new`` proposes a case for it, which is run.
 Films and the second run that tells the error of the steps are left out. Each is a process of its own that is ended
 after so many seconds of the processor, and a line of OUT.jsonl; what is there already is not run again.
 """

@@ -46,7 +46,17 @@ def test_engines_get_convex_pieces_that_fill_a_brick(monkeypatch):
     """Engines take the convex hull of a shape: four notched bricks of a bay would press into the arch beside them."""
     monkeypatch.syspath_prepend(str(PEERS))
     engines = importlib.import_module("physics_engines")
-    bay = generators.facade(bricks=10, courses=14, storeys=1, windows=1, window_bricks=4, window_courses=6, voussoirs=3)
+    bay = generators.facade(
+        bricks=10,
+        courses=14,
+        storeys=1,
+        windows=1,
+        window_bricks=4,
+        window_courses=6,
+        sill_courses=3,
+        voussoirs=3,
+        rise_courses=1.5,
+    )
     assert not engines.are_convex(bay)
     assert engines.are_convex(generators.arch())
     pieces = [engines.convex_pieces(bay.outline(i)) for i in range(bay.n_blocks)]
