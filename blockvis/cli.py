@@ -22,6 +22,7 @@ import numpy as np
 
 import solver
 from solver import mechanics
+from solver.mechanics import counted
 
 from .generators import LAYOUTS, help_text
 from .layout.sights import SIGHTS
@@ -866,7 +867,7 @@ def _convert(options: argparse.Namespace) -> int:
         write_layout(layout, target)
     else:
         save_layout(assemble(layout, joint_thickness=joint if joint == "auto" else _number(joint)), target)
-    print(f"{layout.n_blocks} blocks written to {target}")
+    print(f"{counted(layout.n_blocks, 'block')} written to {target}")
     return 0
 
 
@@ -885,13 +886,14 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
         from .results.vtkhdf import write_vtkhdf
 
         write_vtkhdf(response, target)
-        print(f"{len(response.path)} increments of {response.assembly.n_blocks} blocks written to {target}")
+        increments, blocks = counted(len(response.path), "increment"), counted(response.assembly.n_blocks, "block")
+        print(f"{increments} of {blocks} written to {target}")
         return 0
     if target.suffix.lower() == ".glb":
         from .pictures.animated_glb import write_animated_glb
 
         write_animated_glb(response, target, known_fall(response))
-        print(f"{response.assembly.n_blocks} blocks that move written to {target}")
+        print(f"{counted(response.assembly.n_blocks, 'block')} that move written to {target}")
         return 0
     from .formats.read import save_layout
 
@@ -900,7 +902,7 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     last = response.path[-1]
     save_layout(response.assembly, target, pose=last.pose)
     where = f"{response.parameter.name} {last.parameter:.6g} {response.parameter.unit}".rstrip()
-    print(f"{response.assembly.n_blocks} blocks written to {target}, as they are at {where}")
+    print(f"{counted(response.assembly.n_blocks, 'block')} written to {target}, as they are at {where}")
     return 0
 
 
@@ -920,7 +922,7 @@ def _bond(options: argparse.Namespace) -> int:
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
     write_layout(layout, target)
-    print(f"{layout.n_blocks} blocks written to {target}")
+    print(f"{counted(layout.n_blocks, 'block')} written to {target}")
     return 0
 
 
@@ -931,7 +933,7 @@ def _layout(options: argparse.Namespace) -> int:
     target = _new_file(options.output, options.force)
     assembly = build(options.name, dict(_parameter(given) for given in options.parameters))
     save_layout(assembly, target)
-    print(f"{assembly.n_blocks} blocks written to {target}")
+    print(f"{counted(assembly.n_blocks, 'block')} written to {target}")
     return 0
 
 
@@ -1090,7 +1092,7 @@ def _in_words(response: solver.Response, folder: Path) -> str:
     across = float(np.linalg.norm(largest[:, None, :] - largest[None, :, :], axis=2).max())
     deep = f"{size[1]:.4g} m deep, " if assembly.dimension == 3 else ""
     lines = [
-        f"{assembly.n_blocks} blocks{' in space' if deep else ''} ({int(assembly.free.sum())} free), "
+        f"{counted(assembly.n_blocks, 'block')}{' in space' if deep else ''} ({int(assembly.free.sum())} free), "
         f"{size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high, weight {weight:.6g} N, "
         f"largest block {across:.3g} m across",
         *(f"fill up to {fill.surface:g} m, weight {fill.weight(assembly):.6g} N" for fill in response.loads.fills),

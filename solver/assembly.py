@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solver.words import counted
+
 from .geometry.contacts import Contacts
 from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
 from .geometry.polygons import Polygons
@@ -162,7 +164,7 @@ class Assembly(Shown):
     def __repr__(self) -> str:
         """One line with the number of blocks by role."""
         kinds = ", ".join(f"{int((self.roles == role).sum())} {role}" for role in ROLES)
-        return f"<Assembly of {self.n_blocks} blocks: {kinds}>"
+        return f"<Assembly of {counted(self.n_blocks, 'block')}: {kinds}>"
 
     @property
     def dimension(self) -> int:
@@ -272,7 +274,9 @@ class Assembly(Shown):
         try:
             return self.names.index(name)
         except ValueError:
-            raise ValueError(f"no block is named '{name}'; the assembly has {self.n_blocks} blocks") from None
+            raise ValueError(
+                f"no block is named '{name}'; the assembly has {counted(self.n_blocks, 'block')}"
+            ) from None
 
     def with_roles(self, roles: Sequence[str] | np.ndarray) -> Assembly:
         """Give the blocks other roles, (n_blocks,) of "free", "fixed" and "moving"."""
@@ -306,7 +310,7 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
     if len(real):
         k = int(real[np.argmax(depth[real])])
         a, b = int(i[k]), int(j[k])
-        more = f" ({len(real) - 1} more pairs overlap)" if len(real) > 1 else ""
+        more = f" ({counted(len(real) - 1, 'more pair overlaps', 'more pairs overlap')})" if len(real) > 1 else ""
         raise ValueError(
             f"block {a} ('{assembly.names[a]}') overlaps block {b} ('{assembly.names[b]}') by {depth[k]:.3g} m{more}; "
             f"move them apart or raise overlap_tolerance ({tolerance:.3g} m)"

@@ -212,7 +212,9 @@ class Interfaces:
     def refuse_elastic(self, what: str) -> None:
         """Raise ``ValueError`` for stiffness of joints where only rigid ones are known."""
         if self.ground or any(law.elastic for law in self.laws):
-            raise ValueError(f"{what} knows rigid joints only; leave normal_stiffness and shear_stiffness out")
+            raise ValueError(
+                f"{what} knows rigid joints only; leave normal_stiffness, shear_stiffness and stiffness of supports out"
+            )
 
     def refuse_mortar(self, what: str) -> None:
         """Raise ``ValueError`` for strength or stiffness of joints where only dry rigid ones are known."""

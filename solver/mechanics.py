@@ -60,6 +60,7 @@ from .ties import (
     tie_lengths,
 )
 from .ties import KINDS as TIE_KINDS
+from .words import counted
 
 __all__ = [
     "ABSENT",
@@ -106,6 +107,7 @@ __all__ = [
     "carried_between",
     "check_settlement",
     "corners_and_edges",
+    "counted",
     "features_of",
     "find_contacts",
     "is_member",

@@ -70,6 +70,7 @@ from solver.tolerances import (
     GEOMETRY_TOLERANCE,
     OVERLAP,
 )
+from solver.words import counted
 
 #: Programs that close the joints after a step.
 LINEARISATIONS = 10
@@ -179,7 +180,9 @@ def solve_program(
         blocks = np.unique(np.concatenate([contacts.block_a[carrying], contacts.block_b[carrying]]))
         names = [f"'{assembly.names[i]}'" for i in blocks if free[i]]
         shown = ", ".join(names[:6]) + (" ..." if len(names) > 6 else "")
-        raise SupportsLocked(f"the supports cannot move on: {len(names)} blocks are wedged ({shown})") from None
+        raise SupportsLocked(
+            f"the supports cannot move on: {counted(len(names), 'block is', 'blocks are')} wedged ({shown})"
+        ) from None
     forces = rays @ solution.x[:n]
     resultant = (wrench @ forces).reshape(-1, 3)
     displacements = np.zeros_like(supports)

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from solver.words import counted
+
 from .analysis.increments import Increments
 from .analysis.limit_load import find_limit_load
 from .analysis.pushover import pushover_increments
@@ -75,7 +77,7 @@ class Structure(Shown):
 
     def __repr__(self) -> str:
         """Say how many blocks it has."""
-        return f"<Structure of {self.assembly.n_blocks} blocks>"
+        return f"<Structure of {counted(self.assembly.n_blocks, 'block')}>"
 
     def with_live(self, live: np.ndarray | None = None, *, acceleration: Sequence[float] | None = None) -> Structure:
         """Put the structure under other live loads.

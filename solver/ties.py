@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from solver.words import counted
+
 from .assembly import Assembly
 from .geometry.contacts import Contacts
 from .kinematics import Pose, carried
@@ -126,7 +128,9 @@ def check_ties(ties: Sequence[Tie], assembly: Assembly, n_phases: int) -> None:
     for tie in ties:
         for block in tie.blocks:
             if block is not None and not 0 <= block < assembly.n_blocks:
-                raise ValueError(f"tie '{tie.name}' ends in block {block}; the assembly has {assembly.n_blocks} blocks")
+                raise ValueError(
+                    f"tie '{tie.name}' ends in block {block}; the assembly has {counted(assembly.n_blocks, 'block')}"
+                )
         if any(len(point) != assembly.dimension for point in tie.points):
             raise ValueError(
                 f"tie '{tie.name}' has points {tie.points}; give {assembly.dimension} coordinates, as the blocks have"

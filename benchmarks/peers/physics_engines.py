@@ -19,11 +19,12 @@ from math import cos, inf, sin
 from typing import Any
 
 import numpy as np
+import shapely
 
 import solver
 from blockvis.layout.layout import layout_of
 
-__all__ = ["ENGINES", "IN_SPACE", "Drive", "Sample", "in_a_process"]
+__all__ = ["ENGINES", "IN_SPACE", "Drive", "Sample", "are_convex", "convex_pieces", "in_a_process"]
 
 #: Time at rest before the supports move, and between two samples [s]; forces are means between samples.
 REST = 0.3
@@ -91,6 +92,20 @@ class Sample:
     ties: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
+def convex_pieces(outline: np.ndarray) -> list[np.ndarray]:
+    """An outline, (n, 2), in triangles where it is not convex: engines take the convex hull of a shape."""
+    polygon = shapely.Polygon(outline)
+    if np.isclose(polygon.area, polygon.convex_hull.area):
+        return [outline]
+    triangles = shapely.constrained_delaunay_triangles(polygon)
+    return [np.array(triangle.exterior.coords)[:-1] for triangle in shapely.orient_polygons(triangles).geoms]
+
+
+def are_convex(assembly: solver.Assembly) -> bool:
+    """Whether all blocks of an assembly in the plane are convex."""
+    return all(len(convex_pieces(assembly.outline(i))) == 1 for i in range(assembly.n_blocks))
+
+
 def pymunk_path(
     assembly: solver.Assembly, drive: Drive, time_step: float, friction: float, sampling: float
 ) -> Iterator[Sample]:
@@ -100,7 +115,7 @@ def pymunk_path(
     space = pymunk.Space()
     space.iterations = 200
     space.collision_slop = 1e-5 * assembly.block_size  # 0.1 by default, made for pixels
-    bodies, shapes = [], []
+    bodies = []
     for i in range(assembly.n_blocks):
         outline = [tuple(map(float, p)) for p in assembly.outline(i) - assembly.centroids[i]]
         if assembly.free[i]:
@@ -109,11 +124,12 @@ def pymunk_path(
         else:
             body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         body.position = tuple(map(float, assembly.centroids[i]))
-        shape = pymunk.Poly(body, outline, radius=0.0)
-        shape.friction = friction**0.5  # Chipmunk multiplies those of both shapes
-        space.add(body, shape)
+        space.add(body)
         bodies.append(body)
-        shapes.append(shape)
+        for piece in convex_pieces(assembly.outline(i) - assembly.centroids[i]):
+            shape = pymunk.Poly(body, piece.tolist(), radius=0.0)
+            shape.friction = friction**0.5  # Chipmunk multiplies those of both shapes
+            space.add(shape)
     moving = np.flatnonzero(assembly.moving)
     impulse = np.zeros(2)
 
@@ -155,11 +171,11 @@ def mujoco_path(
     meshes, bodies = [], []
     half = float(np.max(assembly.thickness)) / 2.0
     for i in range(assembly.n_blocks):
-        outline = assembly.outline(i) - assembly.centroids[i]
-        corners = [(x, y, z) for z in (-half, half) for x, y in outline]
-        meshes.append(
-            f'<mesh name="m{i}" inertia="exact" vertex="{" ".join(f"{c:.17g}" for p in corners for c in p)}"/>'
-        )
+        pieces = convex_pieces(assembly.outline(i) - assembly.centroids[i])
+        for k, piece in enumerate(pieces):
+            corners = [(x, y, z) for z in (-half, half) for x, y in piece]
+            places = " ".join(f"{c:.17g}" for p in corners for c in p)
+            meshes.append(f'<mesh name="m{i}-{k}" inertia="exact" vertex="{places}"/>')
         x, y = assembly.centroids[i]
         joints = ""
         if assembly.free[i]:
@@ -173,9 +189,11 @@ def mujoco_path(
         # supports meet blocks, not each other
         meets = 1 if assembly.free[i] else 0
         gravity = "" if assembly.free[i] else ' gravcomp="1"'
+        geoms = "".join(
+            f'<geom type="mesh" mesh="m{i}-{k}" contype="1" conaffinity="{meets}"/>' for k in range(len(pieces))
+        )
         bodies.append(
-            f'<body name="b{i}" pos="{x:.17g} {y:.17g} 0"{gravity}>{joints}'
-            f'<geom type="mesh" mesh="m{i}" contype="1" conaffinity="{meets}"/>{_sites(assembly, ties, i)}</body>'
+            f'<body name="b{i}" pos="{x:.17g} {y:.17g} 0"{gravity}>{joints}{geoms}{_sites(assembly, ties, i)}</body>'
         )
     tendons = "".join(
         f'<spatial stiffness="{tie.stiffness:.17g}" springlength="0 {np.ptp(tie.points, axis=0) @ _along(tie):.17g}">'

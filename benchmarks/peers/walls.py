@@ -11,7 +11,8 @@ at a tenth of it; the wall has fallen once a block moves faster than ``FALLING``
 where the fastest block last moved at no more than twice its rate in our path and ``CREEPING`` of that speed. What does
 the support carry on the way? Engines tremble: the mean over the last ``MEAN_OVER`` before each look.
 
-Ground that turns stays in engines, and gravity turns the other way; compas_lmgc90 cannot turn gravity.
+Ground that turns stays in engines, and gravity turns the other way; compas_lmgc90 cannot turn gravity, and
+has no blocks that are not convex.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from physics_engines import ENGINES, IN_SPACE, Drive, in_a_process
+from physics_engines import ENGINES, IN_SPACE, Drive, are_convex, in_a_process
 
 import solver
 from blockvis import generators
@@ -312,11 +313,14 @@ def main() -> None:
     for name, wall in WALLS.items():
         if not name.startswith(tuple(given.walls)):
             continue
-        in_space = wall.build().dimension == 3
+        assembly = wall.build()
+        in_space = assembly.dimension == 3
         for tool, step in [("blockvis", 0.0), *product(given.engines, STEPS)]:
             if (name, tool, step) in runs:
                 continue
-            if (in_space and tool not in (*IN_SPACE, "blockvis")) or (wall.turns and tool == "compas_lmgc90"):
+            if in_space and tool not in (*IN_SPACE, "blockvis"):
+                continue
+            if tool == "compas_lmgc90" and (wall.turns or (not in_space and not are_convex(assembly))):
                 continue
             found = (
                 ours(wall)

@@ -20,6 +20,7 @@ from blockvis.layout.notes import UNIT, UNIT_CLASH, kind_of
 from blockvis.layout.units import better_unit
 from blockvis.text import as_key, as_toml, rounded_length
 from solver import mechanics
+from solver.mechanics import counted
 
 #: The first increment, and the limit, as fractions of the median block: steps pass over nothing that a block's movement
 #: changes, and most structures have fallen, or shown that they do not, when a support has moved by a block.
@@ -163,7 +164,10 @@ def _counted(found: Inspection) -> str:
     roles = [f"{len(with_role(found, role))} {role}" for role in mechanics.ROLES if with_role(found, role)]
     deep = f"{size[1]:.4g} m deep, " if len(size) == 3 else ""
     where = " in space" if deep else ""
-    return f"{len(found.kept)} blocks{where}, {', '.join(roles)}; {size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high."
+    return (
+        f"{counted(len(found.kept), 'block')}{where}, {', '.join(roles)}; "
+        f"{size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high."
+    )
 
 
 def _roles(found: Inspection, ground: Ground) -> str:

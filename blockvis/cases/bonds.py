@@ -16,6 +16,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.regions import Choice, Region, regions_of
 from blockvis.layout.selection import sorted_out
+from solver.mechanics import counted
 
 from .key import NOT_NEGATIVE, PAIR, POSITIVE, TEXTS, Key, Section, one_of, whole
 from .toml_table import Table
@@ -145,7 +146,7 @@ def _told(region: Region, openings: int, stones: Layout, pattern: Pattern) -> No
     return Note(
         CHANGED,
         f"bond: an outline of {region.wall.area:.4g} m² {where}{_openings(openings)} was "
-        f"filled with {stones.n_blocks} stones of {wall:.4g} m², {pattern.bond}",
+        f"filled with {counted(stones.n_blocks, 'stone')} of {wall:.4g} m², {pattern.bond}",
     )
 
 

@@ -22,6 +22,7 @@ from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.units import better_unit, doubt
 from blockvis.text import nearest
 from solver import mechanics
+from solver.mechanics import counted
 
 from .backfill import backfills
 from .bonds import bonded
@@ -90,9 +91,8 @@ def case_assembly(case: Case) -> solver.Assembly:
     except DeepOverlap as error:
         chosen = _chosen(case)
         remedy = overlap_remedy(sketch, dimension=case.dimension, **chosen) if case.file is not None else ""
-        if not remedy:
-            raise
-        raise ValueError(f"{error}; {remedy}") from None
+        drawing = f"{case.source}: " + (f"'{case.file.name}': " if case.file is not None else "")
+        raise ValueError(f"{drawing}{error}{remedy and f'; {remedy}'}") from None
     _refuse_unknown_materials(case, assembly)
     if case.settlements and not assembly.moving.any():
         groups = sorted({g for g in sketch.groups if g} | {s["name"] for s in case.supports}) or list(sketch.names[:12])
@@ -160,8 +160,9 @@ def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
     if len(light):
         shown = ", ".join(f"'{assembly.names[i]}'" for i in light[:6].tolist()) + (" ..." if len(light) > 6 else "")
         warnings.warn(
-            f"{source}: {len(light)} blocks weigh less than {LIGHTEST:g} of the whole ({shown}), less than rounding "
-            "errors of the others: they may stay in the air; remove them or check their size and density",
+            f"{source}: {counted(len(light), 'block weighs', 'blocks weigh')} less than {LIGHTEST:g} of the whole "
+            f"({shown}), less than rounding errors of the others, and may stay in the air; "
+            "remove what is so light, or check size and density",
             stacklevel=3,
         )
 
@@ -173,7 +174,8 @@ def _note_density(case: Case, sketch: layout.Layout) -> None:
     own = sketch.density[np.isfinite(sketch.density)]
     if len(own) and (own != case.density).any():
         warnings.warn(
-            f"{case.source}: [material] density = {case.density:g} is that of {sketch.n_blocks - len(own)} blocks; "
+            f"{case.source}: [material] density = {case.density:g} is that of "
+            f"{counted(sketch.n_blocks - len(own), 'block')}; "
             f"{len(own)} of {sketch.n_blocks} keep what '{case.file.name}' says, {own.min():g} to {own.max():g} kg/m³; "
             "[materials.NAME] density replaces it",
             stacklevel=3,

@@ -15,6 +15,7 @@ import shapely
 import solver
 from blockvis.text import nearest
 from solver import mechanics
+from solver.mechanics import counted
 
 from .key import NUMBER, PAIR, POSITIVE, Forms, Key, Section, ValueKind, one_of
 from .toml_table import Table, is_number, shortened
@@ -230,7 +231,7 @@ def with_profiles(
         blocks = np.flatnonzero(settlement.taking_part(assembly)).tolist()
         motions = profile.motions(assembly, blocks, settlement.direction)  # type: ignore[arg-type]
         if not any(any(motion) for motion in motions.values()):
-            raise ValueError(f"{where} moves none of the {len(blocks)} supports; look at its places x")
+            raise ValueError(f"{where} moves none of the {counted(len(blocks), 'support')}; look at its places x")
         found.append(replace(settlement, direction=None, blocks=None, profile=motions))
     return tuple(found)
 

@@ -15,7 +15,7 @@ import solver
 from blockvis.case_files.read import case_file_text, case_of, parsed_toml
 from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cases.contents import Case
-from blockvis.kinds.kind import needs_dry_joints
+from blockvis.kinds.kind import needs_no_crushing
 from blockvis.kinds.kinds import KINDS
 from blockvis.runs.plan import refuse_ties
 from blockvis.runs.progress import StudyProgress
@@ -109,7 +109,7 @@ def explain(
         refuse_ties(case)
         drawn = case_assembly(case)
         _refuse_grounded(case_ties(case, drawn), case)
-        needs_dry_joints(case, "blockvis explain")
+        needs_no_crushing(case)
         mechanics.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
         ground = ground_of(drawn, case.explain, case.source)

@@ -21,6 +21,7 @@ from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
 from blockvis.text import files_like, nearest
+from solver.mechanics import counted
 
 from .observation_keys import COLUMNS, LENGTHS, OBSERVATION
 from .places import corners_of, nearest_block, on_faces, place_text
@@ -446,7 +447,10 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
     lost = [name for i, name in enumerate(assembly.names) if i not in partner and assembly.free[i]]
     if lost:
         shown = ", ".join(f"'{name}'" for name in lost[:6]) + (" ..." if len(lost) > 6 else "")
-        warnings.warn(f"{path}: {len(lost)} blocks of the case are not in it ({shown}) and say nothing", stacklevel=4)
+        missing = counted(
+            len(lost), "block of the case is not in it and says", "blocks of the case are not in it and say"
+        )
+        warnings.warn(f"{path}: {missing} nothing ({shown})", stacklevel=4)
     joints = initial_joints(assembly)
     opening = np.maximum(opening_and_slip(assembly, joints, pose)[:, 0], 0.0)
     known = np.zeros(assembly.n_blocks, dtype=bool)

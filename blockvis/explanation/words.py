@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver.mechanics import counted
+
 from .places import place_text
 
 if TYPE_CHECKING:
@@ -105,7 +107,10 @@ def in_words(found: Explanation) -> str:
     n_open, n = int((found.observations.widths > 0.0).sum()), len(found.observations.widths)
     about = [f"{n_open} open and {n - n_open} closed joints"] if n else []
     about += [f"{len(found.observations.points)} displaced points"] if len(found.observations.points) else []
-    lines = [f"{' and '.join(about)}, {len(found.causes)} causes, {len(found.runs)} runs", verdict(found)]
+    lines = [
+        f"{' and '.join(about)}, {counted(len(found.causes), 'cause')}, {counted(len(found.runs), 'run')}",
+        verdict(found),
+    ]
     for number, cause in enumerate(found.causes[:LISTED], start=1):
         lines.append(f"{number}  {percent(cause.probability):>8}  {range_text(cause):<26}  {cause_text(cause)}")
         if cause.also:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from blockvis.results.folder import ResultsExist
 from blockvis.system.atomic_files import make_folder, write_atomic
+from solver.mechanics import counted
 
 from .forward import LEANING
 from .likelihood import ELSEWHERE, INDEPENDENT
@@ -197,6 +198,7 @@ def _assumed(found: Explanation) -> list[str]:
         f"crack at x, y may be in another joint within {1e3 * trust.place:.3g} mm and, less probably, beyond; an "
         f"observation has another cause with a probability of {100.0 * trust.outliers:.3g} %.",
         f"Observations share the errors of the model: more than {INDEPENDENT} do not count as independent.",
-        f"Coefficients of friction: {', '.join(f'{value:.3g}' for value in frictions) or 'none'}; {len(runs)} runs.",
+        f"Coefficients of friction: {', '.join(f'{value:.3g}' for value in frictions) or 'none'}; "
+        f"{counted(len(runs), 'run')}.",
         "Probabilities are among the causes that were looked at: a cause that is not in the list has none.",
     ]

@@ -15,6 +15,7 @@ from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import UPRIGHT, kind_of
 from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 from solver import mechanics
+from solver.mechanics import counted
 
 from .bodies import Bodies, Body
 from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
@@ -70,15 +71,15 @@ def layout_of_cells(
     if key is not None:
         ids, owner = np.unique(np.asarray(data[key]), return_inverse=True)
         names = [f"block {value}" for value in ids.tolist()]
-        how = f"{len(ids)} blocks, one per value of the cell array '{key}'"
+        how = f"{counted(len(ids), 'block')}, one per value of the cell array '{key}'"
     elif any(len(ring) > 3 for ring in rings):
         owner = np.arange(len(rings))
         names = [f"block {k}" for k in owner]
-        how = f"{len(rings)} blocks, one per cell: no cell array 'block_id' says which cells are one block"
+        how = f"{counted(len(rings), 'block')}, one per cell: no cell array 'block_id' says which cells are one block"
     else:
         owner = components(rings, len(points))
         names = [f"block {k}" for k in range(int(owner.max()) + 1)]
-        how = f"{len(names)} blocks, one per connected piece: no cell array 'block_id' says which cells are one block"
+        how = f"{counted(len(names), 'block')}, one per connected piece: no cell array 'block_id' says which are one"
     unusable: dict[int, LeftOut] = {}
     outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     first = np.unique(owner, return_index=True)[1]
@@ -113,7 +114,7 @@ def _enclosed(
         row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, closed.owners.tolist(), strict=True)
     ]
     how = f"one per value of the cell array '{key}'" if key else "one per closed surface"
-    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {how}", *closed.notes))
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}", *closed.notes))
 
 
 def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, Any]:

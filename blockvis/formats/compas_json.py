@@ -21,6 +21,7 @@ from blockvis.layout.notes import Note
 from blockvis.layout.outlines import FLAT, spread_of
 from blockvis.layout.solids import fans
 from solver import mechanics
+from solver.mechanics import counted
 
 from .bodies import Bodies
 from .cells import layout_of_cells
@@ -105,7 +106,7 @@ def _layout_of(meshes: list[_Mesh], path: Path, reading: Reading) -> Layout | Bo
         {**{key: value for key, value in meshes[k].row.items() if key != "key"}, "name": body.name}
         for body, k in zip(bodies, closed.owners.tolist(), strict=True)
     ]
-    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} blocks of COMPAS", *notes))
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'block')} of COMPAS", *notes))
 
 
 def _without_volume(planes: Sequence[_Mesh]) -> Note:

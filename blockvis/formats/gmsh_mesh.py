@@ -17,6 +17,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 from blockvis.layout.triangulation import cells_of_ring
+from solver.mechanics import counted
 
 from .bodies import Bodies
 from .closed_surfaces import OpenSurface, bodies_of_surfaces
@@ -127,7 +128,10 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
     flat, note = flattened(mesh.coordinates, f"'{path}'", reading.view)
     unusable: dict[int, LeftOut] = {}
     outlines = outlines_of_cells(flat, rings, owner, names, unusable)
-    notes = [f"{len(tags)} blocks, one per meshed surface; a surface in no physical group may be missing from the file"]
+    notes = [
+        f"{counted(len(tags), 'block')}, one per meshed surface; "
+        "a surface in no physical group may be missing from the file"
+    ]
     if "" in groups:
         notes.append(f"{groups.count('')} of {len(tags)} surfaces are in no physical group")
     notes += [note] if note else []
@@ -160,7 +164,7 @@ def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Pat
     for body, whose in zip(closed.bodies, closed.owners.tolist(), strict=True):
         group = str(named[whose]) if len(names) > 1 else ""
         rows.append({"name": body.name, **({"group": group, "material": group} if group else {})})
-    notes = (f"{len(closed.bodies)} bodies, one per closed surface", *closed.notes)
+    notes = (f"{counted(len(closed.bodies), 'body', 'bodies')}, one per closed surface", *closed.notes)
     return Bodies(tuple(closed.bodies), tuple(rows), notes=notes)
 
 
@@ -185,7 +189,10 @@ def _bodies(mesh: _Mesh, path: Path) -> Bodies:
     for body, whose in zip(bodies, owners.tolist(), strict=True):
         group = {"group": groups[whose], "material": groups[whose]} if groups[whose] else {}
         rows.append({"name": body.name, **group})
-    notes = [f"{len(bodies)} bodies, one per meshed volume; a volume in no physical group may be missing from the file"]
+    notes = [
+        f"{counted(len(bodies), 'body', 'bodies')}, one per meshed volume; "
+        "a volume in no physical group may be missing from the file"
+    ]
     if len(bodies) > len(tags):
         notes = [f"{len(bodies)} bodies, the pieces of {len(tags)} meshed volumes"]
     if "" in groups:

@@ -11,6 +11,7 @@ import numpy as np
 
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import CHANGED, Note
+from solver.mechanics import counted
 
 #: Lines are intersected on a grid of this fraction of the size of the drawing.
 GRID = 1e-6
@@ -122,7 +123,7 @@ def _cut_outlines(
     if found.pieces:
         n = sum(map(len, found.pieces.values()))
         around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
-        said = f"cut: {len(cutting)} lines within {around} into {n} blocks"
+        said = f"cut: {counted(len(cutting), 'line')} within {around} into {counted(n, 'block')}"
         found.notes.append(Note(CHANGED, f"{said}; leave their layer out (ignore) if they are no joints"))
     return cutting
 
@@ -147,7 +148,7 @@ def joined_ends(points: np.ndarray) -> tuple[np.ndarray, float] | None:
 def joined_note(misses: Sequence[float], size: float) -> list[str]:
     """Say how many outlines did not quite close, where that was more than rounding; ``size`` is that of the drawing."""
     far = [miss for miss in misses if miss > GRID * size]
-    words = f"joined: the ends of {len(far)} outlines, which missed each other by up to {max(far, default=0):.3g} units"
+    words = f"joined: the ends of {counted(len(far), 'outline')}, up to {max(far, default=0):.3g} units apart"
     return [Note(CHANGED, words)] if far else []
 
 
@@ -155,7 +156,8 @@ def faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
     """Say that blocks are what loose lines enclose."""
     return Note(
         CHANGED,
-        f"{len(faces.rings)} blocks are faces between {len(lines)} loose lines; an opening enclosed by lines "
+        f"{counted(len(faces.rings), 'block is a face', 'blocks are faces')} between {len(lines)} loose lines; "
+        "an opening enclosed by lines "
         "counts as a block too: erase it or draw closed outlines",
     )
 
@@ -168,7 +170,7 @@ def nothing_closed(faces: Faces) -> str:
     layers = Counter(item.layer for item in lines)
     listed = ", ".join(f"{n} on layer '{layer}'" if layer else f"{n}" for layer, n in layers.most_common(6))
     ends = np.array([item.points[k] for item in lines for k in (0, -1)])
-    words = f"{len(lines)} lines close nothing ({listed})"
+    words = f"{counted(len(lines), 'line closes', 'lines close')} nothing ({listed})"
     if len(lines) > 1:
         from scipy.spatial import cKDTree
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.layout import Layout
+from solver.mechanics import counted
 
 from .bodies import Bodies
 from .cells import block_array, layout_of_cells, row_of
@@ -81,7 +82,7 @@ def _bodies(points: np.ndarray, cells: list[tuple[Faces, np.ndarray]], data: dic
     first = np.unique(owner, return_index=True)[1]
     rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
     how = f"one per value of the cell array '{key}'" if key else "one per piece that hangs together"
-    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {how}",))
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}",))
 
 
 class _Ending(io.StringIO):

@@ -17,6 +17,7 @@ import numpy as np
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
+from solver.mechanics import counted
 
 from .bodies import Bodies, Body, body_of_polygons, in_dimension
 from .cells import block_array, layout_of_cells, merged, row_of
@@ -367,7 +368,7 @@ def _bodies_of_solids(grid: Any, path: Path | str) -> Bodies:
         raise ValueError(f"'{path}' has a damaged cell ({error}); export it again") from None
     first = np.unique(owner, return_index=True)[1]
     rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
-    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {note}",))
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'body', 'bodies')}, {note}",))
 
 
 def _bodies_by_shape(

@@ -318,9 +318,7 @@ def read(
     except DeepOverlap as error:
         chosen = {"view": view, "only": only, "window": window, "dimension": dimension, "thickness": thickness}
         remedy = overlap_remedy(layout, ignore, **chosen)
-        if not remedy:
-            raise
-        raise ValueError(f"{error}; {remedy}") from None
+        raise ValueError(f"'{path}': {error}{remedy and f'; {remedy}'}") from None
 
 
 def from_compas(model: Any, **options: Any) -> solver.Assembly:

@@ -19,6 +19,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.solids import fans
 from solver import mechanics
+from solver.mechanics import counted
 
 from . import meshio_files
 from .bodies import Bodies, Body
@@ -297,7 +298,7 @@ def _bodies(model: _Model) -> Bodies:
         for body in closed_bodies(name, block.points, fans(block.faces), size, model.path):
             bodies.append(body)
             rows.append(_row(body.name, block, model.names))
-    notes = [f"{len(model.blocks)} blocks of 3DEC; its joints, loads and steps are not read"]
+    notes = [f"{counted(len(model.blocks), 'block')} of 3DEC; its joints, loads and steps are not read"]
     fixed = sum(block.fixed for block in model.blocks)
     notes += [f"fixed, as the file says: {fixed} of them"] if fixed else []
     if model.passed.total():

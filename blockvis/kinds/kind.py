@@ -18,6 +18,7 @@ from blockvis.cases.key import Key, Section, read_keys
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import loss_of, mechanism_text
 from solver import mechanics
+from solver.mechanics import counted
 
 #: How a kind works its increments out, for :class:`solver.mechanics.Increments`.
 Steps = Generator[solver.Increment, None, mechanics.Ending]
@@ -217,7 +218,7 @@ class AnalysisKind(ABC):
 
     def headline(self, response: solver.Response) -> str:
         """How it ended, for the command line."""
-        return f"{response.stop} after {len(response.path)} increments"
+        return f"{response.stop} after {counted(len(response.path), 'increment')}"
 
     def covers_message(self, response: solver.Response) -> bool:
         """Whether :meth:`lines` say what the message of the response says."""
@@ -283,10 +284,6 @@ def needs_live_load(case: Case) -> None:
         )
 
 
-#: Keys of joints that are more than dry ones.
-_NOT_DRY = ("cohesion", "tensile_strength", "compressive_strength", "normal_stiffness", "shear_stiffness")
-
-
 def _interfaces(case: Case) -> solver.Interfaces:
     return solver.Interfaces(case.law, dict(case.interfaces), ground=case.ground)
 
@@ -310,12 +307,3 @@ def needs_rigid_joints(case: Case, what: str) -> None:
         interfaces.refuse_crushing(what)
     except ValueError as error:
         raise ValueError(f"{case.source}: {error}") from None
-
-
-def needs_dry_joints(case: Case, what: str) -> None:
-    """Raise ValueError where a joint of a case has strength but friction, or stiffness."""
-    interfaces = _interfaces(case)
-    if interfaces.mortar or not interfaces.dry:
-        raise ValueError(
-            f"{case.source}: {what} knows dry joints only; leave {', '.join(_NOT_DRY)} and stiffness of supports out"
-        )

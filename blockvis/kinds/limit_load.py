@@ -27,7 +27,6 @@ from .kind import (
     Course,
     RunInput,
     Steps,
-    needs_dry_joints,
     needs_live_load,
     needs_rigid_joints,
     without_increments,
@@ -91,12 +90,15 @@ class LimitLoadCheckpoint:
         Where the settlement ended that comes before the places of a load.
     ties : solver.mechanics.TieForces, optional
         What ties did there.
+    bonds : solver.mechanics.Bonds, optional
+        The mortar that was left there.
     """
 
     limits: tuple[solver.LimitLoad, ...]
     settlement: mechanics.PathState | None = None
     pose: solver.Pose | None = None
     ties: mechanics.TieForces | None = None
+    bonds: mechanics.Bonds | None = None
 
 
 class LimitLoadKind(AnalysisKind):
@@ -143,8 +145,6 @@ class LimitLoadKind(AnalysisKind):
         needs_live_load(case)
         if case.settlements:
             needs_rigid_joints(case, "a limit load after a settlement")
-            if any(load.positions for load in case.loads):
-                needs_dry_joints(case, "a moving load after a settlement")
         settings: LimitLoadSettings = case.settings
         if settings.displacement is not None and not case.settlements:
             raise _displacement_without_settlement(case)
@@ -394,11 +394,11 @@ def _over_places(
 ) -> Steps:
     """Limit states for each place of a moving load at the end of the settlements; then the mechanism of the lowest."""
     standing, programs = run.given.loads, 0
-    pose, ties = (None, None) if resume is None else (resume.pose, resume.ties)
+    pose, ties, bonds = (None, None, None) if resume is None else (resume.pose, resume.ties, resume.bonds)
     steps = settlement_steps(run.given, whole=True) if resume is None else without_increments()
     for increment in steps:
         programs += increment.programs
-        pose, ties = increment.pose, increment.ties
+        pose, ties, bonds = increment.pose, increment.ties, increment.bonds
         if increment.status == solver.Status.FALLING:
             yield _read_for_multipliers(increment)
     if steps.ending.stop is not solver.Status.LIMIT_REACHED:
@@ -412,13 +412,13 @@ def _over_places(
             break
         else:
             loads = replace(standing, live=standing.live + live(number))
-            state = replace(_limit_state(run, loads, pose, None, programs, ties), parameter=float(x))
+            state = replace(_limit_state(run, loads, pose, None, programs, ties, bonds), parameter=float(x))
             programs = 0
         multiplier = float(np.nan_to_num(state.load_multiplier, nan=-np.inf, posinf=np.inf))
         if shown is None or multiplier < least:
             chosen, shown, least = number, state, multiplier
         if number >= len(found):
-            yield replace(state, checkpoint=_checkpoint(run, pose=pose, ties=ties))
+            yield replace(state, checkpoint=_checkpoint(run, pose=pose, ties=ties, bonds=bonds))
     # A load that moves is kept at the place that governs.
     run.given = replace(run.given, loads=replace(standing, live=standing.live + live(chosen)))
     assert shown is not None
@@ -437,9 +437,10 @@ def _checkpoint(
     settlement: mechanics.PathState | None = None,
     pose: solver.Pose | None = None,
     ties: mechanics.TieForces | None = None,
+    bonds: mechanics.Bonds | None = None,
 ) -> LimitLoadCheckpoint:
     limits = tuple(replace(limit, held=None, analysed=None) for limit in run.limits)
-    return LimitLoadCheckpoint(limits, settlement, pose, ties)
+    return LimitLoadCheckpoint(limits, settlement, pose, ties, bonds)
 
 
 def _wanted(case: Case, increment: solver.Increment) -> bool:
@@ -458,6 +459,7 @@ def _limit_state(
     at: solver.Increment | None,
     programs: int,
     ties: mechanics.TieForces | None = None,
+    bonds: mechanics.Bonds | None = None,
 ) -> solver.Increment:
     case, assembly = run.given.case, run.given.assembly
     started = time.perf_counter()
@@ -465,7 +467,7 @@ def _limit_state(
         limit = solver.Structure(assembly, run.given.interfaces, loads, ties=run.given.ties).limit_load(
             pose=pose,
             ties_at=ties if at is None else at.ties,
-            bonds_at=None if at is None else at.bonds,
+            bonds_at=bonds if at is None else at.bonds,
             flow=case.settings.flow,
             torsion=case.settings.torsion,
             displacement=_displacement(case, assembly),

@@ -11,6 +11,7 @@ import numpy as np
 
 import solver
 from solver import mechanics
+from solver.mechanics import counted
 
 from .facing import faced, facing_tolerance
 from .inspect import inspected
@@ -133,9 +134,9 @@ def _left_overlaps(assembly: solver.Assembly, accepted: float) -> str:
         return ""
     i, j, depth = found[0]
     return (
-        f"{len(found)} pairs of blocks overlap by up to {depth:.3g} m ('{assembly.names[i]}' and "
-        f"'{assembly.names[j]}') and are taken as in contact; lower overlap_tolerance ({accepted:.3g} m) to have them "
-        "refused"
+        f"{counted(len(found), 'pair of blocks overlaps', 'pairs of blocks overlap')} by up to {depth:.3g} m "
+        f"('{assembly.names[i]}' and '{assembly.names[j]}'), taken as in contact; lower overlap_tolerance "
+        f"({accepted:.3g} m) to have that refused"
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import solver
+from solver.mechanics import counted
 
 from .faces import ROUNDING, flattened
 from .linked import linked
@@ -129,13 +130,16 @@ def faced(
     worst = int(np.abs(apart).argmax())
     n = int(rough.sum())
     a, b = names[faces.block[one[worst]]], names[faces.block[other[worst]]]
-    what = "overlapped" if apart[worst] < 0 else "were open"
+    what = "overlapping" if apart[worst] < 0 else "open"
+    rough_joints = counted(n, "joint between faces was", "joints between faces were")
     note = (
-        f"{n} joints between faces were not plane: they {what} by up to {abs(apart[worst]):.3g} m ('{a}' and '{b}'); "
+        f"{rough_joints} not plane, {what} by up to {abs(apart[worst]):.3g} m ('{a}' and '{b}'); "
         "their faces were moved into one plane each"
     )
     if kept:
-        note += f"; {len(kept)} blocks stay as drawn, which overlap less so ('{names[kept[0]]}')"
+        note += (
+            f"; {counted(len(kept), 'block stays', 'blocks stay')} as drawn, which overlap less so ('{names[kept[0]]}')"
+        )
     return Facing(moved, n, float(abs(apart[worst])), note)
 
 

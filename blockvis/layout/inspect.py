@@ -12,6 +12,7 @@ import numpy as np
 
 import solver
 from solver import mechanics
+from solver.mechanics import counted
 
 from .facing import Facing as FacedJoints
 from .facing import faced, facing_tolerance
@@ -102,7 +103,7 @@ class Inspection:
         size = " × ".join(f"{length:.4g} m" for length in self.high - self.low)
         corner = ", ".join(f"{x:.6g}" for x in self.low)
         unit = "m³" if in_space else "m²"
-        copies = f", {len(self.twins)} of them duplicates: {len(self.kept)} blocks" if self.twins else ""
+        copies = f", {len(self.twins)} of them duplicates: {counted(len(self.kept), 'block')}" if self.twins else ""
         names = [layout.names[i] for i in self.kept]
         rows = [
             ("blocks in space" if in_space else "outlines", f"{layout.n_blocks}{copies}"),
@@ -148,7 +149,7 @@ class Inspection:
     def _overlap_rows(self) -> list[Row]:
         if not self.overlapping:
             return [] if self.refused else [("overlaps", "none")]
-        rows = [("overlaps", f"{len(self.overlapping)} pairs, up to {self.overlapping[0][2]:.3g} m deep")]
+        rows = [("overlaps", f"{counted(len(self.overlapping), 'pair')}, up to {self.overlapping[0][2]:.3g} m deep")]
         for i, j, depth in self.overlapping[:8]:
             resolved = depth <= self.overlap_tolerance
             verdict = (

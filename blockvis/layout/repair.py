@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import solver
+from solver.mechanics import counted
 
 from .joints.close import WAYS, Closing, FoldedOutline, close_joints, proposed
 from .left_out import LeftOut
@@ -89,7 +90,7 @@ def refuse_overlaps(assembly: solver.Assembly, found: Sequence[tuple[int, int, f
     corners = [assembly.vertices[assembly.block_of_vertex == block] for block in (i, j)]
     low, high = np.max([c.min(axis=0) for c in corners], axis=0), np.min([c.max(axis=0) for c in corners], axis=0)
     place = ", ".join(f"{x:.6g}" for x in (low + high) / 2.0)
-    others = f"; {len(deep) - 1} more pairs overlap" if len(deep) > 1 else ""
+    others = f"; {counted(len(deep) - 1, 'more pair overlaps', 'more pairs overlap')}" if len(deep) > 1 else ""
     raise DeepOverlap(
         f"block {i} ('{assembly.names[i]}') overlaps block {j} ('{assembly.names[j]}') by {depth:.3g} m near "
         f"({place}); move them apart or raise overlap_tolerance ({tolerance:.3g} m){others}"

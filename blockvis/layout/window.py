@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.mechanics import counted
+
 from .layout import Layout
 from .left_out import LeftOut
 from .notes import LEFT_OUT, Note
@@ -76,7 +78,7 @@ def within_window(layout: Layout, window: Sequence[float]) -> Layout:
     )
     crossing = {i: LeftOut("edge", layout.outlines[i], "") for i, where in enumerate(of_blocks) if where == "edge"}
     n = of_blocks.count("beyond")
-    said = f"window: {n} outlines beyond it were left out"
+    said = f"window: {counted(n, 'outline')} beyond it {'was' if n == 1 else 'were'} left out"
     layout = replace(layout, left_out=left_out, notes=(*layout.notes, *([Note(LEFT_OUT, said)] if n else [])))
     cut = layout.leaving_out(crossing)
     kept = [k for k, where in enumerate(w for w in of_blocks if w != "edge") if where == "within"]

@@ -90,7 +90,7 @@ def draw_curve(
     if ties is not None:
         _draw_ties(below, response, ties)
         axes.set_xlabel("")
-    name += "" if band is None else f"   ·   band: range of {band.runs.max(initial=0)} runs"
+    name += "" if band is None else f"   ·   band: range of {mechanics.counted(band.runs.max(initial=0), 'run')}"
     axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK))
     with atomic_file(path) as partial:
         figure.savefig(partial, dpi=200)

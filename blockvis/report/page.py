@@ -48,6 +48,7 @@ from blockvis.results.ties import tie_courses, tie_force_curves, tie_texts
 from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text
 from solver import mechanics
+from solver.mechanics import counted
 
 from .frames import model_of_frames, surveyed
 from .packing import TURN_UNIT, deflated, hexadecimals, rounded
@@ -146,7 +147,7 @@ def _error(error: str) -> str:
 
 def range_rows(band: ReactionRange | None) -> list[tuple[str, str]]:
     """Say what the band behind the curve is."""
-    return [] if band is None else [("band behind the curve", f"{band.runs.max(initial=0)} runs: {WORDS}")]
+    return [] if band is None else [("band behind the curve", f"{counted(band.runs.max(initial=0), 'run')}: {WORDS}")]
 
 
 def report_html(

@@ -16,6 +16,7 @@ from blockvis.results.reaction_range import COMPLIANCE, FRICTION, WORDS, Reactio
 from blockvis.system.atomic_files import write_atomic
 from blockvis.system.processes import cores
 from blockvis.text import force_text
+from solver.mechanics import counted
 
 from .once_more import OnceMore, Traced, takes_steps, traced
 from .reopen import open_results
@@ -124,7 +125,7 @@ class PathRange:
             last = self.reaction()
             forces = " to ".join(force_text(float(value), self.moment) for value in (last.low[-1], last.high[-1]))
             where = f"{last.settlements[-1]:.4g} {self.unit}"
-            said = f"range of reaction {forces} at {where}, no collapse in {len(followed)} runs"
+            said = f"range of reaction {forces} at {where}, no collapse in {counted(len(followed), 'run')}"
         elif self.collapse[1] is None:
             said = (
                 f"range of collapse from {self.collapse[0]:.4g} {self.unit} on, {standing} of {len(followed)} runs "
@@ -132,7 +133,8 @@ class PathRange:
             )
         else:
             said = f"range of collapse {self.collapse[0]:.4g} to {self.collapse[1]:.4g} {self.unit}"
-        return f"{said} ({WORDS}{f'; {lost} runs came to nothing' if lost else ''})"
+        nothing = f"; {counted(lost, 'run')} came to nothing" if lost else ""
+        return f"{said} ({WORDS}{nothing})"
 
 
 def wants_range(case: Case) -> bool:
@@ -161,8 +163,8 @@ def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda 
     case, response = stored_case(folder), open_results(folder)
     if not (takes_steps(case) and response.measured.is_force and response.path):
         raise ValueError(
-            f"'{folder}' has no range ({response.analysis}, {len(response.path)} increments); it takes a settlement "
-            "whose increments are of Coulomb friction"
+            f"'{folder}' has no range ({response.analysis}, {counted(len(response.path), 'increment')}); "
+            "it takes a settlement whose increments are of Coulomb friction"
         )
     at_once = min(cores(), len(VARIATIONS))
     waiting(len(VARIATIONS), at_once)

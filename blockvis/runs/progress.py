@@ -13,6 +13,7 @@ import solver
 from blockvis.dynamics.fall import LONGEST
 from blockvis.kinds.kind import Course
 from solver import mechanics
+from solver.mechanics import counted
 
 #: Seconds between two redrawings of the bar.
 REDRAW = 0.1
@@ -141,7 +142,7 @@ class Progress:
             return ""
         speeds = mechanics.motion_size(velocity, self.assembly.block_size)
         moving = int((self.assembly.free & (speeds > 0.01 * speeds.max(initial=0.0))).sum())
-        return f", {moving} blocks moving, '{self.assembly.names[int(speeds.argmax())]}' moves most"
+        return f", {counted(moving, 'block')} moving, '{self.assembly.names[int(speeds.argmax())]}' moves most"
 
     def step(self, state: mechanics.PathState) -> None:
         """Show where an increment is that takes long."""
@@ -164,14 +165,14 @@ class Progress:
             what = "falls"
         if not drivers:
             with self._writing:
-                self._line.write(f"{what}, {self.count} increments")
+                self._line.write(f"{what}, {counted(self.count, 'increment')}")
             return
         driver = drivers[min(increment.phase, len(drivers) - 1)]
         part = min(increment.parameter / driver.limit, 1.0)
         with self._writing:
             self._line.write(
                 f"{parameter.name} {increment.parameter:.4g} of at most {driver.limit:g} {driver.unit}, {what}, "
-                f"{self.count} increments",
+                f"{counted(self.count, 'increment')}",
                 part,
             )
 

@@ -20,6 +20,7 @@ from blockvis.results.about import LOCAL
 from blockvis.system.atomic_files import atomic_file
 from blockvis.text import rounded_text
 from solver import mechanics
+from solver.mechanics import counted
 
 from .fragility import CONFIDENCE, Fragility, fragility_of
 from .sensitivity import Swing, first_order, outcome, swings
@@ -111,7 +112,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     axes.set_ylabel(curve_name(study), fontsize=TEXT)
     _plain_frame(axes)
     axes.legend(loc="upper left", frameon=False, fontsize=0.9 * TEXT)
-    axes.set_title(counted(curve, rows, factor, unit), **HEADING)
+    axes.set_title(runs_counted(curve, rows, factor, unit), **HEADING)
     return _saved(figure, path)
 
 
@@ -242,7 +243,9 @@ def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path)
         axes.axis("off")
     if len(classes) > len(shown):
         rest = sum(classes.values()) - sum(classes[one] for one in shown)
-        figure.supxlabel(f"{len(classes) - len(shown)} more mechanisms in {rest} runs", fontsize=0.9 * TEXT)
+        figure.supxlabel(
+            f"{counted(len(classes) - len(shown), 'more mechanism')} in {counted(rest, 'run')}", fontsize=0.9 * TEXT
+        )
     return _saved(figure, path)
 
 
@@ -311,7 +314,7 @@ def _axis_end(curve: Fragility) -> float:
     return curve.furthest
 
 
-def counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:
+def runs_counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:
     """Count the runs by how they ended: the title of the fragility curve.
 
     Parameters
@@ -327,7 +330,7 @@ def counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> 
     collapsed = status == str(solver.Status.COLLAPSED)
     local = int((collapsed & (table["falling_share"] < LOCAL)).sum())
     words = [
-        f"{curve.n_runs} runs",
+        f"{counted(curve.n_runs, 'run')}",
         f"{int(collapsed.sum())} collapsed" + f" ({local} of a few blocks only)" * (local > 0),
     ]
     never = int((status == str(solver.Status.NO_INITIAL_EQUILIBRIUM)).sum())

@@ -12,10 +12,10 @@ from solver.assembly import Assembly, check_blocks, find_contacts
 from solver.contact_step.balance import nearest_equilibrium
 from solver.contact_step.problem import NotSolved
 from solver.contact_step.stiffness import ContactRows
-from solver.equilibrium import wrench_matrix
+from solver.equilibrium import block_forces, wrench_matrix
 from solver.geometry.contacts import Contacts, joined_contacts
 from solver.interfaces import Interfaces
-from solver.kinematics import Pose, dimension_of, moved_vertices, unit_lengths
+from solver.kinematics import Pose, dimension_of, moved_vertices, relative_velocities, unit_lengths
 from solver.loads import Loads, checked_loads
 from solver.path.stepping import Stepper
 from solver.program.strength import Admissible, point_strength
@@ -25,7 +25,7 @@ from solver.programs.problem import Unbounded
 from solver.programs.solve import solve_between
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Bonds, State
-from solver.results.response import LimitLoad, LimitStatus, limit_state
+from solver.results.response import LimitLoad, LimitStatus
 from solver.ties import (
     ABSENT,
     BROKEN,
@@ -439,10 +439,18 @@ class _Problem:
 
     def _held(self, forces: np.ndarray, mechanism: np.ndarray) -> State:
         """The arrays of a limit load, from forces [N]."""
-        between = ~is_member(self.contacts)
-        state = limit_state(self.pose, self.contacts[between], forces[between], self.friction[between], mechanism)
-        ties = plastic_forces(self.ties, self.assembly, self.pose, self.contacts, forces, self.tie_states)
-        return replace(state, ties=ties)
+        between, on_blocks = ~is_member(self.contacts), block_forces(self.contacts, self.pose, forces)
+        contacts = self.contacts[between]
+        return State(
+            pose=self.pose,
+            contacts=contacts,
+            forces=forces[between],
+            displacements=relative_velocities(contacts, self.pose, mechanism),
+            friction=self.friction[between],
+            velocity=mechanism,
+            support_forces=np.where(self.assembly.free[:, None], 0.0, on_blocks),
+            ties=plastic_forces(self.ties, self.assembly, self.pose, self.contacts, forces, self.tie_states),
+        )
 
 
 def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs: int) -> np.ndarray:

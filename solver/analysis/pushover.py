@@ -16,6 +16,7 @@ from solver.program.model import Model
 from solver.programs.problem import SolveError
 from solver.results.increment import Bonds, Increment, Status
 from solver.ties import Tie, TieForces, check_ties
+from solver.words import counted
 
 from .increments import Increments, TimedIncrements
 from .limit_load import checked_live
@@ -68,8 +69,8 @@ def pushover_increments(
         raise ValueError(f"control block '{control.block}' is a support; name a free block")
     if resume is not None and len(resume.place.pose.rotations) != assembly.n_blocks:
         raise ValueError(
-            f"the checkpoint has {len(resume.place.pose.rotations)} blocks, the assembly {assembly.n_blocks}: it "
-            "belongs to another run"
+            f"the checkpoint has {counted(len(resume.place.pose.rotations), 'block')}, the assembly "
+            f"{assembly.n_blocks}: it belongs to another run"
         )
     check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
     model = model_of(assembly, loads, interfaces, controls, loads.live, tuple(ties))

@@ -23,6 +23,7 @@ from solver.program.model import Model
 from solver.programs.problem import SolveError
 from solver.results.increment import Increment, Status
 from solver.ties import Tie, check_ties
+from solver.words import counted
 
 from .increments import Increments, TimedIncrements
 
@@ -60,8 +61,9 @@ def settlement_increments(
     check_ties(ties, assembly, len(phases))
     if resume is not None and (resume.phase >= len(phases) or len(resume.start.rotations) != assembly.n_blocks):
         raise ValueError(
-            f"the checkpoint is of phase {resume.phase + 1} with {len(resume.start.rotations)} blocks; there are "
-            f"{len(phases)} phases and {assembly.n_blocks} blocks: it belongs to another run"
+            f"the checkpoint is of phase {resume.phase + 1} with {counted(len(resume.start.rotations), 'block')}; "
+            f"there are {counted(len(phases), 'phase')} and {counted(assembly.n_blocks, 'block')}: "
+            "it belongs to another run"
         )
     origin = at_origin(assembly)
     near, local, near_ties = assembly, tuple(phases), tuple(ties)
@@ -83,7 +85,7 @@ def _refuse_by_program(
     """Refuses what the paper's linear programs do not know."""
     interfaces.refuse_mortar("increments = 'linear program'")
     if ties:
-        raise ValueError(f"increments = 'linear program' knows no ties ('{ties[0].name}'); leave the key out")
+        raise ValueError(f"increments = 'linear program' knows no ties ('{ties[0].name}'); leave increments out")
     if assembly.dimension == 3:
         raise ValueError("increments = 'linear program' is for blocks in the plane; leave it out for blocks in space")
     if loads.fills or changes:

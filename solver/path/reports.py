@@ -14,6 +14,7 @@ from solver.loads import GRAVITY
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Increment, State, Status
 from solver.ties import TieForces, is_member
+from solver.words import counted
 
 from .controls import Ending
 from .equilibrium_check import on_supports
@@ -130,7 +131,8 @@ class Reports:
         pressed = normal > 0.1 * normal.max()
         blocks = np.unique(np.concatenate([contacts.block_a[pressed], contacts.block_b[pressed]]))
         blocks = blocks[assembly.free[blocks]]
-        return f"the supports cannot move on: {len(blocks)} blocks are wedged ({self._named(blocks)})"
+        wedged = counted(len(blocks), "block is", "blocks are")
+        return f"the supports cannot move on: {wedged} wedged ({self._named(blocks)})"
 
     def no_step(self, reason: str) -> str:
         """Message of a step that was not solved."""

@@ -11,13 +11,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from solver.assembly import Assembly
-from solver.geometry.contacts import Contacts
 from solver.interfaces import Interfaces
-from solver.kinematics import Pose, relative_velocities
+from solver.kinematics import Pose
 from solver.loads import GRAVITY, Loads, Settlement
 from solver.phases import PhaseChange, loads_in
 from solver.ties import Tie
 from solver.views import Shown, views
+from solver.words import counted
 
 from .certificate import Certificate
 from .increment import HasState, Increment, State, Status, StoredState
@@ -147,8 +147,8 @@ class Response(Shown):
 
     def __repr__(self) -> str:
         """One line: what was analysed, and how it ended."""
-        blocks, increments = self.assembly.n_blocks, len(self.increments)
-        return f"<Response of {blocks} blocks: {self.analysis}, {increments} increments, {self.stop}>"
+        blocks, increments = counted(self.assembly.n_blocks, "block"), counted(len(self.increments), "increment")
+        return f"<Response of {blocks}: {self.analysis}, {increments}, {self.stop}>"
 
     @property
     def path(self) -> tuple[Increment, ...]:
@@ -439,28 +439,15 @@ class LimitLoad(HasState, Shown):
         """Say how large it is, or why there is none."""
         moving = int((np.abs(self.mechanism).max(axis=1) > 0.01).sum())
         if self.status is LimitStatus.NO_EQUILIBRIUM:
-            return f"no equilibrium under the dead load: {moving} blocks fall"
+            return f"no equilibrium under the dead load: {counted(moving, 'block falls', 'blocks fall')}"
         if self.status is LimitStatus.UNBOUNDED:
             return "unbounded: no live load of this pattern brings the structure down"
         law = "" if self.torsion == "points" else f", {self.torsion} torsion"
         text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction{law}, bounds differ by {self.gap:.1e})"
-        text += f", {moving} blocks moving" + ("" if self.status is LimitStatus.FOUND else f", {self.status}")
+        text += f", {counted(moving, 'block')} moving" + (
+            "" if self.status is LimitStatus.FOUND else f", {self.status}"
+        )
         return f"{text}; {self.caveat}" if self.caveat else text
-
-
-def limit_state(
-    pose: Pose, contacts: Contacts, forces: np.ndarray, friction: np.ndarray, mechanism: np.ndarray
-) -> State:
-    """Make the state of a limit load; parameters as the attributes of :class:`LimitLoad`."""
-    return State(
-        pose=pose,
-        contacts=contacts,
-        forces=forces,
-        displacements=relative_velocities(contacts, pose, mechanism),
-        friction=friction,
-        velocity=mechanism,
-        support_forces=np.zeros_like(mechanism),
-    )
 
 
 @dataclass(frozen=True)

@@ -262,5 +262,5 @@ def test_faces_of_lines_are_noted_where_they_are_analysed(tmp_path):
         for start, end in itertools.pairwise(corners):
             space.add_line(start, end)
 
-    with pytest.warns(UserWarning, match="1 blocks are faces between 4 loose lines; an opening enclosed by lines"):
+    with pytest.warns(UserWarning, match="1 block is a face between 4 loose lines; an opening enclosed by lines"):
         read(saved(tmp_path, draw))

@@ -109,7 +109,7 @@ def test_an_outline_whose_ends_miss_by_little_is_closed_with_a_note(tmp_path):
     ring = [(0, 0), (240, 0), (240, 65), (0, 65), (0, 0.01)]
     drawing = read_layout(dxf(tmp_path, lambda space: space.add_lwpolyline(ring)))
     assert drawing.n_blocks == 1
-    assert any("joined: the ends of 1 outlines, which missed each other by up to 0.01" in n for n in drawing.notes)
+    assert any("joined: the ends of 1 outline, up to 0.01" in n for n in drawing.notes)
 
 
 def test_where_nothing_closes_the_message_says_what_there_is(tmp_path):

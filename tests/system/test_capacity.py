@@ -105,6 +105,32 @@ def test_flow_without_dilatancy_reaches_the_solver(tmp_path):
 
 
 @pytest.mark.slow
+def test_envelope_after_a_settlement_has_the_mortar_that_is_left(tmp_path):
+    """Each position is the limit load with the strength that the settlement has left, and a resumed run the same."""
+    settled = '[roles]\n"right springer" = "moving"\n[settlement]\ndirection = [1.0, 0.0]\nincrement = 0.005\n'
+    text = ARCH.replace("coefficient = 2.0", "coefficient = 2.0\ncohesion = 2e4\ntensile_strength = 1e4") + settled
+    text = text.replace("-0.8, 0.8, 5", "-0.4, 0.4, 2") + "limit = 0.01\n"
+    response, _ = solved(text, tmp_path)
+    path = solver.settle(
+        response.assembly,
+        solver.Settlement(direction=(1.0, 0.0), increment=0.005, limit=0.01),
+        interfaces=response.interfaces,
+        loads=solver.self_weight(response.assembly),
+    )
+    last = path.path[-1]
+    assert last.bonds.left.min() == 0.0
+    assert last.bonds.left.max() == 1.0
+    for limit, x in zip(response.limits, (-0.4, 0.4), strict=True):
+        live = solver.load_on_top(response.assembly, x, (0.0, -1000.0))
+        whole = solver.Structure(response.assembly, response.interfaces, replace(path.loads, live=live))
+        close = 1e-3 * response.assembly.block_size
+        expected = whole.limit_load(pose=last.pose, bonds_at=last.bonds, displacement=close)
+        assert limit.multiplier == pytest.approx(expected.multiplier, rel=1e-9)
+        dry = whole.limit_load(pose=last.pose, bonds_at=replace(last.bonds, left=0.0 * last.bonds.left))
+        assert limit.multiplier > 2.0 * dry.multiplier
+
+
+@pytest.mark.slow
 def test_envelope_of_a_load_that_moves_over_an_arch(tmp_path, capsys):
     folder, summary = ran(ARCH, tmp_path)
     rows = table(folder / "envelope.csv")

@@ -95,7 +95,7 @@ def test_the_range_says_how_many_collapse():
     assert one.numbers()["collapse"] == [0.35, None]
     none = PathRange([(Variation(), path(0.5)), (other, path(0.5, factor=1.1)), (other, None)], "m", moment=False)
     assert str(none).startswith("range of reaction 10.5 N to 11.55 N at 0.5 m, no collapse in 2 runs (friction")
-    assert str(none).endswith("× 2; 1 runs came to nothing)")
+    assert str(none).endswith("× 2; 1 run came to nothing)")
     assert none.numbers()["collapse"] is None
 
 
@@ -122,7 +122,7 @@ def test_the_band_of_a_later_phase_lies_behind_those_before():
     assert drawn.get_paths()[0].get_extents().x1 == pytest.approx(100.0)
     assert axes.get_ylim()[1] > drawn.get_paths()[0].get_extents().y1
     assert '"band":[[0.0,' in report_of(response, band=band)
-    assert f"<td>1 runs: {ALL[1:-1]}</td>" in report_of(response, band=band)
+    assert f"<td>1 run: {ALL[1:-1]}</td>" in report_of(response, band=band)
     assert '"band":[]' in report_of(response)
 
 

@@ -1,11 +1,15 @@
 """The comparison with other tools runs without them: our own rows, and a word for each that is missing."""
 
+import importlib
 import importlib.util
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import shapely
+
+from blockvis import generators
 
 PEERS = Path(__file__).parents[2] / "benchmarks" / "peers"
 SCRIPT = PEERS / "peers.py"
@@ -36,6 +40,32 @@ def test_a_peer_that_is_missing_is_named():
     printed, rows = _printed("--questions", "2")
     assert [f"{name}: not installed" for name in missing] == [x for x in printed.splitlines() if "not installed" in x]
     assert len(rows) == 4
+
+
+def test_engines_get_convex_pieces_that_fill_a_brick(monkeypatch):
+    """Engines take the convex hull of a shape: four notched bricks of a bay would press into the arch beside them."""
+    monkeypatch.syspath_prepend(str(PEERS))
+    engines = importlib.import_module("physics_engines")
+    bay = generators.facade(
+        bricks=10,
+        courses=14,
+        storeys=1,
+        windows=1,
+        window_bricks=4,
+        window_courses=6,
+        sill_courses=3,
+        voussoirs=3,
+        rise_courses=1.5,
+    )
+    assert not engines.are_convex(bay)
+    assert engines.are_convex(generators.arch())
+    pieces = [engines.convex_pieces(bay.outline(i)) for i in range(bay.n_blocks)]
+    for brick, parts in enumerate(pieces):
+        outline = shapely.Polygon(bay.outline(brick))
+        shapes = [shapely.Polygon(part) for part in parts]
+        assert shapely.union_all(shapes).symmetric_difference(outline).area < 1e-12
+        assert sum(shape.convex_hull.area for shape in shapes) == pytest.approx(outline.area, rel=1e-9)
+        assert all(shape.exterior.is_ccw for shape in shapes)
 
 
 @pytest.mark.slow

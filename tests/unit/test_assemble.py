@@ -73,7 +73,9 @@ def test_small_overlaps_are_resolved_and_large_ones_name_both_blocks(tmp_path):
     closed = read(pair(0.01))
     assert closed.outline(0)[:, 0].max() == pytest.approx(0.995, abs=1e-12)
     assert closed.outline(1)[:, 0].min() == pytest.approx(0.995, abs=1e-12)
-    with pytest.raises(ValueError, match=r"'left'\) overlaps block 1 \('right'\) by 0.1 m .*raise overlap_tolerance"):
+    with pytest.raises(
+        ValueError, match=r"a.json': block 0 \('left'\) overlaps block 1 \('right'\) by 0.1 m .*raise overlap_tolerance"
+    ):
         read(pair(0.1))
     assert read(pair(0.1), overlap_tolerance=0.2).outline(0)[:, 0].max() == pytest.approx(0.95)
 

@@ -549,7 +549,7 @@ def test_what_is_moved_is_counted_and_named(tmp_path):
     path = drawn(tmp_path / "a.json", stones, ["low", "middle", "high"])
     with pytest.warns(
         UserWarning,
-        match=r"2 joints between faces were not plane: they were open by up to 0.004 m \('low' and 'middle'\)",
+        match=r"2 joints between faces were not plane, open by up to 0.004 m \('low' and 'middle'\)",
     ):
         assembly = read(path)
     tops = [corners_of(assembly, block)[:, 2].max() for block in range(3)]

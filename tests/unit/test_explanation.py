@@ -22,7 +22,17 @@ from blockvis.explanation.candidates import (
     trough,
     twins_of,
 )
-from blockvis.explanation.forward import AS_FAR, ENOUGH, FARTHEST, LEANING, Variant, ordered, reach_of, workers_for
+from blockvis.explanation.forward import (
+    AS_FAR,
+    ENOUGH,
+    FARTHEST,
+    LEANING,
+    Variant,
+    followed,
+    ordered,
+    reach_of,
+    workers_for,
+)
 from blockvis.explanation.likelihood import Comparison, Trust
 from blockvis.explanation.observations import read_observations
 from blockvis.explanation.ranking import ranked
@@ -372,4 +382,30 @@ def test_runs_of_causes_have_the_ties_of_the_case(tmp_path):
     (tmp_path / "case.toml").write_text(layout + grounded, encoding="utf-8")
     (tmp_path / "cracks.csv").write_text("kind,block_a,block_b,width\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"case.toml: \[ties 'iron'\] is held by the ground"):
+        blockvis.explain(tmp_path / "case.toml", tmp_path / "cracks.csv")
+
+
+STRONG = "cohesion = 1e6\ntensile_strength = 1e6\n"
+SOFT = "normal_stiffness = 1e8\nshear_stiffness = 1e8\n"
+
+
+@pytest.mark.slow
+def test_cracks_of_causes_are_those_of_joints_with_mortar_or_that_give():
+    layout = '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 6 }\n[material]\nfriction_coefficient = 0.6\n'
+    _, (one, *_) = candidates(ARCH)
+    widest = {}
+    for name, law in {"dry": "", "glued": STRONG, "soft": SOFT}.items():
+        case = parse_case(layout + law + "[settlement]\ndirection = [0, -1]\n", CASE)
+        run = followed(ordered(case, ARCH, one.motions, Variant(0.6, 0), (0.02, np.inf)))
+        pose = solver.Pose(ARCH.centroids + run.moved[3, :, :2], run.moved[3, :, 2:])
+        widest[name] = np.asarray(structures.posed(ARCH, pose).joints(0).cell_data["opening"]).max()
+    assert widest["soft"] < 0.5 * widest["dry"]
+    assert 0.2 * widest["dry"] < widest["glued"] < 0.8 * widest["dry"]
+
+
+def test_a_case_that_crushes_has_no_causes(tmp_path):
+    layout = '[geometry]\nlayout = "arch"\n[material]\nfriction_coefficient = 0.6\n'
+    (tmp_path / "case.toml").write_text(layout + "compressive_strength = 1e6\n", encoding="utf-8")
+    (tmp_path / "cracks.csv").write_text("kind,block_a,block_b,width\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"crushing along the path .* leave compressive_strength out"):
         blockvis.explain(tmp_path / "case.toml", tmp_path / "cracks.csv")

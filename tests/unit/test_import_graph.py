@@ -59,6 +59,7 @@ ORDER = (
     "solver.geometry",
     "solver.views",
     "solver.tolerances",
+    "solver.words",
 )
 
 #: Beyond the order: rooms that must not know each other although one lies above the other.

@@ -159,14 +159,14 @@ class Terminal(io.StringIO):
 @pytest.mark.parametrize(
     ("analysis", "extra", "line"),
     [
-        ("settlement", "", "settlement 0.05 of at most 0.4 m, reaction 7 N, 1 increments"),
+        ("settlement", "", "settlement 0.05 of at most 0.4 m, reaction 7 N, 1 increment"),
         (
             "settlement",
             "rotation_centre = [0, 0]\n",
             "settlement 0.05 of at most 0.4 rad, reaction 7 N·m, 1 incr",
         ),
-        ("limit load", "", "settlement 0.05 of at most 0.4 m, load multiplier 7, 1 increments"),
-        ("pushover", "", "control displacement 0.05 of at most 1 m, load multiplier 7, 1 increments"),
+        ("limit load", "", "settlement 0.05 of at most 0.4 m, load multiplier 7, 1 increment"),
+        ("pushover", "", "control displacement 0.05 of at most 1 m, load multiplier 7, 1 increment"),
     ],
 )
 def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_path, monkeypatch):
@@ -217,7 +217,7 @@ def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monke
     assert seen == sorted(seen)
     assert len(seen) > 2
     assert re.search(
-        r"settlement 0\.0\d+ of at most 0.4 m, increment 1 in steps of 0\.\d+, 1 blocks moving, '[\w ]+' moves most",
+        r"settlement 0\.0\d+ of at most 0.4 m, increment 1 in steps of 0\.\d+, 1 block moving, '[\w ]+' moves most",
         stream.getvalue(),
     )
 

@@ -34,7 +34,7 @@ def test_a_block_pushed_at_its_top_slides_or_overturns(flow, friction, height, f
     assert limit.bounds[0] == limit.multiplier
     assert limit.bounds[1] == pytest.approx(limit.multiplier, rel=1e-6)
     assert limit.increment.reaction == pytest.approx(limit.multiplier)
-    assert "blocks moving" in str(limit)
+    assert "1 block moving" in str(limit)
     lifts = limit.mechanism[0, 1] / limit.mechanism[0, 0]
     if friction < force + 1e-9:
         assert lifts == pytest.approx(friction if flow == "associative" else 0.0, abs=1e-6)
@@ -67,7 +67,7 @@ def test_what_the_dead_load_brings_down_carries_nothing():
     assert limit.status is solver.LimitStatus.NO_EQUILIBRIUM
     assert np.isnan(limit.multiplier)
     assert limit.mechanism[0, 2] < 0.0
-    assert "1 blocks fall" in str(limit)
+    assert "1 block falls" in str(limit)
 
 
 def test_an_open_joint_carries_nothing():
@@ -194,3 +194,23 @@ def test_a_load_on_top_stands_on_the_surface():
         solver.load_on_top(assembly, 2.5)
     with pytest.raises(ValueError, match="nothing is below"):
         solver.load_on_top(assembly, 9.0)
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_supports_carry_the_loads_of_the_limit_state(dimension, flow):
+    assembly = generators.arch() if dimension == 2 else generators.l_corner(bricks=2, across=2, courses=3)
+    loads = pushed(assembly, solver.weight_fraction(assembly, (1.0, 0.0, 0.0)[:dimension]))
+    limit = limit_load(assembly, loads=loads, friction_coefficient=0.7, flow=flow)
+    free, forces = assembly.free, limit.increment.support_forces
+    carried = (loads.dead + limit.multiplier * loads.live)[free]
+    weight = float(np.abs(carried).sum())
+    assert limit.multiplier > 0.1
+    assert not forces[free].any()
+    assert forces[:, :dimension].sum(axis=0) == pytest.approx(carried[:, :dimension].sum(axis=0), abs=1e-6 * weight)
+    # Moments about the origin.
+    beyond = ((0, 0), (0, 3 - dimension))
+    arms, pushes = (np.pad(rows[:, :dimension], beyond) for rows in (assembly.centroids, np.vstack([forces, carried])))
+    turned = np.cross(arms, pushes[: len(arms)]).sum(axis=0) - np.cross(arms[free], pushes[len(arms) :]).sum(axis=0)
+    own = forces[:, dimension:].sum(axis=0) - carried[:, dimension:].sum(axis=0)
+    assert turned[-len(own) :] == pytest.approx(-own, abs=1e-6 * weight)

@@ -13,7 +13,7 @@ from blockvis.cases.value_paths import parse_path, put
 from blockvis.cli import main
 from blockvis.studies import campaign
 from blockvis.studies.fragility import fragility, fragility_of, wilson
-from blockvis.studies.pictures import counted
+from blockvis.studies.pictures import runs_counted
 from blockvis.studies.sampling import METHODS, designed
 from blockvis.studies.sensitivity import IMPERFECTIONS, first_order, swings
 from blockvis.studies.study_file import read_study
@@ -369,7 +369,7 @@ def test_title_and_words_count_what_collapsed_and_what_never_stood_apart():
     assert (summary["n_collapsed"], summary["n_never_stood"], summary["n_local"]) == (4, 2, 1)
     assert "4 collapsed, 2 no initial equilibrium" in in_words(summary)
     assert "1 of the collapses is a local loss: a few blocks fall, the structure stands" in in_words(summary)
-    title = counted(fragility_of(table), table, 1e3, "mm")
+    title = runs_counted(fragility_of(table), table, 1e3, "mm")
     assert title.startswith("7 runs, 4 collapsed (1 of a few blocks only), 2 never stood, 1 stood")
 
 

@@ -84,7 +84,7 @@ def test_a_unit_in_doubt_stops_a_run_until_the_case_gives_one(tmp_path, capsys):
 def test_density_of_the_file_wins_with_a_note(tmp_path):
     bricks(tmp_path / "a.json", 1.0, density=(2400.0, 2500.0, None))
     text = '[geometry]\nfile = "a.json"\n[material]\ndensity = 1800'
-    with pytest.warns(UserWarning, match=r"density = 1800 is that of 1 blocks; 2 of 3 keep .* 2400 to 2500 kg/m³"):
+    with pytest.warns(UserWarning, match=r"density = 1800 is that of 1 block; 2 of 3 keep .* 2400 to 2500 kg/m³"):
         assembly = assembled(tmp_path, text)
     assert assembly.density[:3].tolist() == [2400.0, 2500.0, 1800.0]
 

@@ -147,7 +147,7 @@ def test_gap_functions_take_the_lift_of_sliding_joints_back(degrees, mu):
 def test_keystone_locked_between_approaching_supports():
     response = settle(keystone(15), 0.6, direction=(-1, 0), increment=0.01, limit=0.1)
     assert response.stop is solver.Status.LOCKED
-    assert "1 blocks are wedged ('block 0')" in response.message
+    assert "1 block is wedged ('block 0')" in response.message
     assert len(response.path) == 1
 
 
