@@ -35,6 +35,12 @@ DIRECTIONS, BESIDE = 36, 2
 #: joints along it do.
 SLIDING = 0.4
 
+#: A course ends where the sides part by less than this part of what they do at its widest joint.
+HAIRLINE = 0.01
+
+#: Strips and gains are alike up to this part: of two courses that gain the same the shorter one is taken.
+EQUAL = 1e-6
+
 #: Most crack lines that a summary lists, the widest first.
 MOST_LISTED = 100
 
@@ -209,7 +215,7 @@ def _courses(
     # What opens across the line, times the length along it; a joint along the line that only slides parts nothing.
     shut = np.maximum(np.abs(slip) - opening, 0.0)[:, None]
     gains = sizes[:, None] * ((normals @ across) * (parted @ across) - SLIDING * shut)
-    apart, half = np.linalg.norm(parted, axis=1), STRIP * block_size
+    apart, half = np.linalg.norm(parted, axis=1), (1.0 + EQUAL) * STRIP * block_size
     beside = half * np.arange(-BESIDE, BESIDE + 1) / (2.0 * BESIDE)
     found, left = [], _groups(meeting, np.arange(len(chosen)))
     while left:
@@ -218,14 +224,17 @@ def _courses(
         away = (middles[members] - middles[widest]) @ across
         inside = np.abs(away[:, :, None] - beside) <= half
         # No course has more than all that adds to one in its strip: the others need not be followed.
-        most = np.einsum("nd,ndb->db", np.maximum(gains[members], 0.0), inside)
-        course, largest = members[:0], -np.inf
+        gained = gains - HAIRLINE * apart[widest] * sizes[:, None]
+        most = np.einsum("nd,ndb->db", np.maximum(gained[members], 0.0), inside)
+        course, largest = np.array([widest]), float(gained[widest].max())
         for direction, line in zip(*np.unravel_index(np.argsort(-most, axis=None), most.shape), strict=True):
-            if most[direction, line] <= largest:
+            margin = EQUAL * abs(largest)
+            if most[direction, line] < largest - margin:
                 break
             strip = members[inside[:, direction, line]]
-            tried, gain = _course_through(widest, strip, meeting, apart, gains[:, direction])
-            if gain > largest:
+            tried, gain = _course_through(widest, strip, meeting, apart, gained[:, direction])
+            shorter = sizes[tried].sum() < (1.0 - EQUAL) * sizes[course].sum()
+            if gain > largest + margin or (gain >= largest - margin and shorter):
                 course, largest = tried, gain
         found.append(chosen[course])
         rest = np.setdiff1d(members, course)
@@ -249,7 +258,9 @@ def _course_through(
     pairs = (one >= 0) & (other >= 0) & (one < other)
     one, other = one[pairs], other[pairs]
     own, gained = apart[members], gains[members]
-    narrow = 2.0 * own.max() - np.minimum(own[one], own[other])
+    # Of three joints that meet the widest lies between the others.
+    joined = np.minimum(own[one], own[other]) + EQUAL * np.maximum(own[one], own[other])
+    narrow = 2.0 * own.max() - joined
     tree = minimum_spanning_tree(sp.coo_array((narrow, (one, other)), shape=(n, n)))
     order, before = breadth_first_order(tree, place[start], directed=False)
     root, total, arm = int(order[0]), np.full(n, -np.inf), np.arange(n)
