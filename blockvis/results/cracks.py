@@ -26,7 +26,7 @@ SMALLEST_OPENING = 1e-3
 MEETING = 0.02
 
 #: A course stays within this of a straight line, in block sizes: the steps of a bond do, a turn does not.
-STRIP = 0.5
+STRIP = 0.75
 
 #: Directions, and lines beside each other to both sides of the widest joint, that a course is tried along.
 DIRECTIONS, BESIDE = 36, 2
@@ -216,7 +216,7 @@ def _courses(
     shut = np.maximum(np.abs(slip) - opening, 0.0)[:, None]
     gains = sizes[:, None] * ((normals @ across) * (parted @ across) - SLIDING * shut)
     apart, half = np.linalg.norm(parted, axis=1), (1.0 + EQUAL) * STRIP * block_size
-    beside = half * np.arange(-BESIDE, BESIDE + 1) / (2.0 * BESIDE)
+    beside = half * np.arange(-BESIDE, BESIDE + 1) / (BESIDE + 0.5)
     found, left = [], _groups(meeting, np.arange(len(chosen)))
     while left:
         members = left.pop()
