@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+#: What stands before a unit of force, and from which number on.
+PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
 
 
 def length_text(length: float) -> str:
@@ -46,6 +50,23 @@ def force_text(force: float, moment: bool = False, *, padded: bool = False) -> s
     size = abs(force)
     factor, unit = next((f, u) for f, u in ((1e6, "MN"), (1e3, "kN"), (1.0, "N")) if size >= f or f == 1.0)
     return f"{_digits(force / factor, 4, padded)} {unit}" + ("·m" if moment else "")
+
+
+def quantity_text(value: float, unit: str = "") -> str:
+    """Write a number with its unit, with k, M or G before one of force.
+
+    Examples
+    --------
+    >>> quantity_text(2.1e11, "Pa"), quantity_text(18000.0, "N/m³"), quantity_text(0.02, "m"), quantity_text(1.5)
+    ('210 GPa', '18 kN/m³', '0.02 m', '1.5')
+    >>> quantity_text(5e7), quantity_text(2000.0, "kg/m³")
+    ('5e7', '2000 kg/m³')
+    """
+    if unit.startswith(("N", "Pa")):
+        factor, prefix = next((f, p) for f, p in PREFIXES if abs(value) >= f or f == 1.0)
+        value, unit = value / factor, prefix + unit
+    digits = re.sub(r"e([+-])0*", lambda found: "e" + found[1].strip("+"), f"{value:.6g}")
+    return f"{digits} {unit}".strip()
 
 
 def padded_text(value: float, digits: int) -> str:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import solver
+from blockvis.case_files.case_keys import SECTIONS
 from blockvis.dynamics.fall import Fall
 from blockvis.pictures.captions import parameter_text
 from blockvis.pictures.film import state_at
@@ -20,7 +23,7 @@ from blockvis.results.fall_files import stored_fall
 from blockvis.results.folder import stored_case
 from blockvis.results.joints import initial_joints
 from blockvis.runs.reopen import open_results
-from blockvis.text import force_text
+from blockvis.text import force_text, quantity_text
 
 #: Cracks that the table lists, the widest first.
 MOST_CRACKS = 10
@@ -239,7 +242,29 @@ def _flat(values: Any, name: str = "") -> Iterator[tuple[str, str]]:
         for number, value in enumerate(values, start=1):
             yield from _flat(value, f"{name} {number}")
     else:
-        yield name, str(values)
+        yield name, _value_text(values, _unit_of(name))
+
+
+def _unit_of(name: str) -> str:
+    """Give the unit of a key of the case, by its name as :func:`_flat` has it; lengths, maybe angles, have none."""
+    *table, key = re.sub(r" [0-9]+(?=\.)", "", name).split(".")
+    sections = (section for section in SECTIONS if fnmatch(".".join(table), section.name))
+    units = (known.unit for section in sections for known in section.keys if known.name == key)
+    unit = next(units, "")
+    return "" if unit == "m" else unit
+
+
+def _value_text(value: Any, unit: str) -> str:
+    """Write a value of a case as people do."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return quantity_text(value, unit)
+    if isinstance(value, list):
+        return ", ".join(_value_text(one, unit) for one in value)
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {_value_text(one, '')}" for key, one in value.items())
+    return str(value)
 
 
 def _cracks_at(side: Side, at: float) -> list[Crack]:

@@ -145,15 +145,17 @@ def _states(response: solver.Response) -> tuple[Sequence[str], list[tuple[str, .
 def _crack_table(cracks: Sequence[Crack]) -> tuple[Sequence[str], list[tuple[str, ...]], Sequence[float]]:
     """Give head, rows and widths [mm] of the table of cracks, the widest first."""
     plane = len(cracks[0].at) == 2
-    head = ("", "widest", "between", "length" if plane else "area", "inclined", "from", "to [m]")
+    head = ("", "widest", "between", "length" if plane else "area", "inclined", "from [m]", "to [m]")
     rows = []
     for number, crack in enumerate(cracks[:MOST_CRACKS], start=1):
         ends = [", ".join(f"{x:.2f}" for x in np.round(end, 2) + 0.0) for end in crack.ends]
+        if set(crack.places) - {"", "inside"}:
+            ends = [f"{place}, at {end}" for place, end in zip(crack.places, ends, strict=True)]
         size = f"{crack.size:.3g} {'m' if plane else 'm²'}"
         rows.append((str(number), width_text(crack.width), crack.widest, size, f"{crack.inclination:.0f}°", *ends))
     if len(cracks) > MOST_CRACKS:
         rows.append(("", "", f"and {narrower_text(len(cracks) - MOST_CRACKS)}", "", "", "", ""))
-    return head, rows, (8.0, 20.0, 56.0, 18.0, 16.0, 28.0, 28.0)
+    return head, rows, (7.0, 17.0, 40.0, 16.0, 16.0, 39.0, 39.0)
 
 
 class _Paper(FPDF):

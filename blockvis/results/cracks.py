@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import shapely
-from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
+from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 from scipy.spatial import ConvexHull
 
 import solver
@@ -25,14 +25,21 @@ SMALLEST_OPENING = 1e-3
 #: Joints meet where they come this near to each other, in block sizes.
 MEETING = 0.02
 
-#: A crack turns where it leaves a straight line by more than this, in block sizes: the steps of a bond do not.
-TURN = 1.5
+#: A course stays within this of a straight line, in block sizes: the steps of a bond do, a turn does not.
+STRIP = 0.75
 
-#: A crack goes first along joints whose blocks have moved apart by this part of the widest, or more.
-CORE = 0.25
+#: Directions, and lines beside each other to both sides of the widest joint, that a course is tried along.
+DIRECTIONS, BESIDE = 36, 2
 
-#: A joint has only slid where it has opened by less than this part of its slip.
-SHUT = 0.05
+#: What has slid and not opened counts against a course by this part: less than the steps of a bond add, more than
+#: joints along it do.
+SLIDING = 0.4
+
+#: A course ends where the sides part by less than this part of what they do at its widest joint.
+HAIRLINE = 0.01
+
+#: Strips and gains are alike up to this part: of two courses that gain the same the shorter one is taken.
+EQUAL = 1e-6
 
 #: Most crack lines that a summary lists, the widest first.
 MOST_LISTED = 100
@@ -117,8 +124,8 @@ def cracks_of(
 ) -> list[Crack]:
     """Trace the cracks of a layout at a pose, the widest first.
 
-    In the plane joints that have parted or slid are followed from end to end along the widest; where cracks fork, the
-    narrower begins anew, and where one turns, another begins.
+    In the plane joints that have parted or slid are followed as far as they stay near a straight line; where cracks
+    fork, the one along which less has parted begins anew, and where one turns, another begins.
 
     Parameters
     ----------
@@ -197,33 +204,51 @@ def _courses(
 ) -> list[np.ndarray]:
     """Part the chosen joints into courses: numbers of joints, one after another from end to end.
 
-    Of joints that meet the course of the largest area of opening comes first; what it leaves is parted again.
+    Of joints that meet the one with the largest area of opening comes first, with the course through it, within a
+    straight strip, along which the two sides have parted most; what it leaves is parted again.
     """
-    middles, sizes = joints.ends[chosen].mean(axis=1), joints.sizes[chosen]
-    # A joint that only slides is part of a course, too.
-    width = np.maximum(moved[:, 0], 0.0) + 1e-9 * block_size
-    # What has opened goes on where blocks have moved as far along each other and nothing opens: up the steps of a bond.
-    slip = np.abs(moved[:, 1])
-    apart = np.where(width < SHUT * slip, slip, width)
+    middles, sizes, normals = joints.ends[chosen].mean(axis=1), joints.sizes[chosen], joints.normals[chosen]
+    opening, slip = np.maximum(moved[:, 0], 0.0), moved[:, 1]
+    parted = opening[:, None] * normals + slip[:, None] * np.stack([-normals[:, 1], normals[:, 0]], axis=1)
+    angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    across = np.stack([-np.sin(angles), np.cos(angles)])
+    # What opens across the line, times the length along it; a joint along the line that only slides parts nothing.
+    shut = np.maximum(np.abs(slip) - opening, 0.0)[:, None]
+    gains = sizes[:, None] * ((normals @ across) * (parted @ across) - SLIDING * shut)
+    apart, half = np.linalg.norm(parted, axis=1), (1.0 + EQUAL) * STRIP * block_size
+    beside = half * np.arange(-BESIDE, BESIDE + 1) / (BESIDE + 0.5)
     found, left = [], _groups(meeting, np.arange(len(chosen)))
     while left:
         members = left.pop()
-        course = _main_course(meeting, apart, width * sizes, members)
-        line = shapely.linestrings(middles[course]) if len(course) > 2 else None
-        turns = [] if line is None else shapely.get_coordinates(shapely.simplify(line, TURN * block_size))[1:-1]
-        cuts = [int(np.linalg.norm(middles[course] - turn, axis=1).argmin()) for turn in turns]
-        found += [chosen[part] for part in np.split(course, cuts)]
+        widest = members[(opening * sizes)[members].argmax()]
+        away = (middles[members] - middles[widest]) @ across
+        inside = np.abs(away[:, :, None] - beside) <= half
+        # No course has more than all that adds to one in its strip: the others need not be followed.
+        gained = gains - HAIRLINE * apart[widest] * sizes[:, None]
+        most = np.einsum("nd,ndb->db", np.maximum(gained[members], 0.0), inside)
+        course, largest = np.array([widest]), float(gained[widest].max())
+        for direction, line in zip(*np.unravel_index(np.argsort(-most, axis=None), most.shape), strict=True):
+            margin = EQUAL * abs(largest)
+            if most[direction, line] < largest - margin:
+                break
+            strip = members[inside[:, direction, line]]
+            tried, gain = _course_through(widest, strip, meeting, apart, gained[:, direction])
+            shorter = sizes[tried].sum() < (1.0 - EQUAL) * sizes[course].sum()
+            if gain > largest + margin or (gain >= largest - margin and shorter):
+                course, largest = tried, gain
+        found.append(chosen[course])
         rest = np.setdiff1d(members, course)
         if len(rest):
             left += _groups(meeting, rest)
     return found
 
 
-def _main_course(meeting: np.ndarray, apart: np.ndarray, area: np.ndarray, members: np.ndarray) -> np.ndarray:
-    """Order the joints of the course with the largest area of opening among some that all meet through each other.
+def _course_through(
+    start: int, members: np.ndarray, meeting: np.ndarray, apart: np.ndarray, gains: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Order the joints of the course through a start that gains most, and sum its gains.
 
-    The course is the longest path of the tree that joins all by those whose blocks have moved most apart: first among
-    what has moved nearly as far as anything here, and from both its ends on along what has moved less.
+    It is a path of the tree that joins the members by those whose blocks have moved most apart.
     """
     n = len(members)
     # minimum_spanning_tree of scipy 1.15 takes no longer integers.
@@ -232,36 +257,26 @@ def _main_course(meeting: np.ndarray, apart: np.ndarray, area: np.ndarray, membe
     one, other = place[meeting]
     pairs = (one >= 0) & (other >= 0) & (one < other)
     one, other = one[pairs], other[pairs]
-    own, area = apart[members], area[members]
-    narrow = 2.0 * own.max() - np.minimum(own[one], own[other])
-    tree = minimum_spanning_tree(sp.coo_array((narrow, (one, other)), shape=(n, n))).tocoo()
-    length = (area[tree.row] + area[tree.col]) / 2.0
-    tree = sp.coo_array((length, (tree.row, tree.col)), shape=(n, n)).tocsr()
-    apart_far = own >= CORE * own.max()
-    core, start = _among(tree, apart_far), int(np.where(apart_far, area, -1.0).argmax())
-    course = _longest_path(core, area, _longest_path(core, area, start)[-1])
-    for _ in range(2):
-        left = np.ones(n, dtype=bool)
-        left[course[:-1]] = False
-        course = course[:-1] + _longest_path(_among(tree, left), area, course[-1])
-        course.reverse()
-    return members[course[::-1]]
+    own, gained = apart[members], gains[members]
+    # Of three joints that meet the widest lies between the others.
+    joined = np.minimum(own[one], own[other]) + EQUAL * np.maximum(own[one], own[other])
+    narrow = 2.0 * own.max() - joined
+    tree = minimum_spanning_tree(sp.coo_array((narrow, (one, other)), shape=(n, n)))
+    order, before = breadth_first_order(tree, place[start], directed=False)
+    root, total, arm = int(order[0]), np.full(n, -np.inf), np.arange(n)
+    total[root] = gained[root]
+    for k in order[1:]:
+        total[k] = total[before[k]] + gained[k]
+        arm[k] = k if before[k] == root else arm[before[k]]
 
+    def back(k: int) -> list[int]:
+        return [] if k == root else [k, *back(int(before[k]))]
 
-def _among(graph: sp.csr_array, chosen: np.ndarray) -> sp.csr_array:
-    """Leave the edges of a graph between chosen nodes, (n,) bool array."""
-    edges = graph.tocoo()
-    both = chosen[edges.row] & chosen[edges.col]
-    return sp.coo_array((edges.data[both], (edges.row[both], edges.col[both])), shape=graph.shape).tocsr()
-
-
-def _longest_path(tree: sp.csr_array, area: np.ndarray, start: int) -> list[int]:
-    """List the nodes from a start to that which is farthest by areas (n,) on the way."""
-    far, before = dijkstra(tree, directed=False, indices=start, return_predecessors=True)
-    path = [int(np.where(np.isfinite(far), far + area / 2.0, -1.0).argmax())]
-    while before[path[-1]] >= 0:
-        path.append(int(before[path[-1]]))
-    return path[::-1]
+    first = back(int(total.argmax()))
+    if first:
+        total[arm == arm[first[0]]] = -np.inf
+    course = [*first, root, *back(int(total.argmax()))[::-1]]
+    return members[course], float(gained[course].sum())
 
 
 def _crack(

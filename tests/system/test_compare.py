@@ -55,13 +55,18 @@ def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_p
 @pytest.mark.slow
 def test_what_the_cases_differ_in_is_told(tmp_path):
     folders = []
-    for friction in ("1.5", "2.0"):
+    for friction, density in (("1.5", "1850.5"), ("2.0", "2000.0")):
         folders.append(tmp_path / friction)
         changes = [f"material.friction_coefficient={friction}", "settlement.limit=0.02", "output.animation=false"]
+        changes.append(f"material.density={density}")
         blockvis.run_case(blockvis.read_case(CASE, changes=changes), folders[-1], outputs=())
     assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
     page = (tmp_path / "both" / "compare.html").read_text(encoding="utf-8")
-    assert table(page, "keys") == {"": ["1.5", "2.0"], "material.friction_coefficient": ["1.5", "2.0"]}
+    assert table(page, "keys") == {
+        "": ["1.5", "2.0"],
+        "material.friction_coefficient": ["1.5", "2"],
+        "material.density": ["1850.5 kg/m³", "2000 kg/m³"],
+    }
 
 
 @pytest.mark.slow

@@ -170,10 +170,4 @@ def test_a_pushover_counts_along_x_by_default(tmp_path):
         encoding="utf-8",
     )
     assert run_command(tmp_path / "case.toml", "--no-pictures", "-o", tmp_path / "out") == 0
-<<<<<<< HEAD
     assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["limit_load_multiplier"] == pytest.approx(0.4)
-=======
-    assert json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))[
-        "limit_load_multiplier"
-    ] == pytest.approx(0.4)
->>>>>>> w40

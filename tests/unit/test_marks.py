@@ -264,7 +264,8 @@ def moved(assembly, **motions):
 
 
 def squares(*corners, size=1.0):
-    outlines = [[[x, y], [x + size, y], [x + size, y + size], [x, y + size]] for x, y in corners]
+    width, height = np.broadcast_to(size, 2)
+    outlines = [[[x, y], [x + width, y], [x + width, y + height], [x, y + height]] for x, y in corners]
     return solver.Assembly.from_outlines(outlines)
 
 
@@ -506,6 +507,27 @@ def test_a_crack_goes_up_the_steps_of_a_bond_not_along_a_hairline_beside_them():
     assert [crack.width for crack in cracks] == pytest.approx([0.03, 0.006])
     # Three beds that open and the joints between their ends, which slide.
     assert cracks[0].mean_width * cracks[0].size == pytest.approx(3 * 0.03)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["as drawn", "mirrored"])
+@pytest.mark.parametrize("apart", [4, 0], ids=["side by side", "from one foot"])
+def test_diagonals_through_a_bond_are_one_crack_each(side, apart):
+    """A wall that parts along a stepped diagonal, and along the zigzag of the head joints over one place."""
+    bricks = [(x + 0.5 * (y % 2), y) for y in range(12) for x in range(14)]
+    wall = squares(*((0.25 * x if side > 0.0 else -0.25 * (x + 1.0), 0.1 * y) for x, y in bricks), size=(0.25, 0.1))
+    motions = {}
+    for k, (x, y) in enumerate(bricks):
+        diagonal, upright = x > 1.9 + apart + 0.5 * y, x > 1.9 + 0.5 * (y % 2)
+        motions[f"block_{k}"] = (side * (0.03 * diagonal + 0.05 * upright), 0.0, 0.0)
+    cracks = cracks_of(wall, moved(wall, **motions))
+    assert len(cracks) == 2
+    flat, steep = sorted(cracks, key=lambda crack: abs(np.sin(np.radians(crack.inclination))))
+    whole = 12 * 0.1 + 11 * 0.125
+    assert steep.size == pytest.approx(whole)
+    assert np.cos(np.radians(steep.inclination)) == pytest.approx(0.0, abs=0.15)
+    # At their foot they have joints in common, which belong to the wider one.
+    assert flat.size == pytest.approx(whole if apart else whole - 0.325)
+    assert np.tan(np.radians(flat.inclination)) == pytest.approx(side * 0.1 / 0.125, rel=0.15)
 
 
 def test_places_are_told_by_openings():

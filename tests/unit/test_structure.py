@@ -63,9 +63,7 @@ def test_limit_load_is_a_response_of_its_own(block, tmp_path):
     picture = blockvis.draw_mechanism(limit, tmp_path / "mechanism.png")
     assert picture.stat().st_size > 10_000
     blockvis.write(response, tmp_path / "out")
-    assert json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))[
-        "limit_load_multiplier"
-    ] == pytest.approx(0.5)
+    assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["limit_load_multiplier"] == pytest.approx(0.5)
 
 
 def test_datasets_of_an_increment():
