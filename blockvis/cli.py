@@ -570,6 +570,8 @@ def _new(options: argparse.Namespace) -> int:
     write_atomic(target, text)
     blocks = f"{len(found.kept)} block{'s' * (len(found.kept) != 1)}"
     print(f"{target} written for {blocks}; run it: blockvis run {target}")
+    if found.layout.dimension == 2 and found.layout.thickness is None:
+        print("the drawing does not say how deep it is: 1 m, unless [geometry] thickness says more")
     _try_new(text, target, drawing=options.outputs is None)
     return 0
 

@@ -87,7 +87,7 @@ def case_text(
         "only": list(only) or None,
         "window": list(window or ()) or None,
         "dimension": 3 if in_space else None,
-        "joint_thickness": "auto" if found.joint_thickness > 0.0 and not walls else None,
+        "joint_thickness": "auto" if found.joint_thickness > 0.0 else None,
         **image,
     }
     hidden = (*(_IN_THE_PLANE if in_space else ()), *(() if any(image.values()) else case_keys.OF_IMAGES))
@@ -179,6 +179,8 @@ def _roles(found: Inspection, ground: Ground) -> str:
     if not said and not ground.roles:
         groups = sorted({word for word in found.layout.groups if word})
         said = [f"{as_key(group)} = {as_toml(mechanics.FIXED)}" for group in groups[:12]]
+    low, right = f"{'xyz'[found.layout.dimension - 1]}={found.low[-1]:.6g}", f'x={found.high[0]:.6g}, role="moving"'
+    lines.append(_comment(f"By their place: below={{{low}}}, touching={{{right}}}."))
     lines += [section.header if ground.roles else f"# {section.header}"]
     lines += [f"{as_key(name)} = {as_toml(role)}" for name, role in ground.roles.items()]
     return "\n".join([*lines, *(f"# {line}" for line in said), ""])

@@ -47,6 +47,9 @@ FARTHEST_BLOCK = 1.5
 #: Metres per unit of a column.
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
+#: Distance from the middle of a joint, as a part of its length, within which a width is given at the middle.
+NEAR_MIDDLE = 0.1
+
 
 @dataclass(frozen=True)
 class Observations:
@@ -250,7 +253,9 @@ def _of_rows(
             raise cells.error("width", 'is missing; give a width, 0 or "closed", or a displacement')
     if not widths and not points:
         raise ValueError(f"{where}: has no observation; give a row for each crack or displaced point")
-    return _observations(widths, points, where, assembly.dimension)
+    found = _observations(widths, points, where, assembly.dimension)
+    _note_middles(found, joints)
+    return found
 
 
 def _observations(
@@ -275,6 +280,25 @@ def _observations(
     if found.largest == 0.0:
         raise ValueError(f"{where}: nothing has opened or moved; there is nothing to explain")
     return found
+
+
+def _note_middles(found: Observations, joints: InitialJoints) -> None:
+    """Warn of widths at the middles of joints: joints.csv has the largest ones, of the edge, beside the middle."""
+    placed = np.flatnonzero(~found.whole & (found.widths > 0.0))
+    if not len(placed):
+        return
+    places = found.places[placed]
+    own = on_faces(places, joints)[0].argmin(axis=1)
+    extent = joints.sizes[own] ** (1.0 / (places.shape[1] - 1))
+    from_middle = np.linalg.norm(places - joints.rings.middles()[own], axis=1)
+    n = int((from_middle < NEAR_MIDDLE * extent).sum())
+    if n > 1 and 2 * n >= len(placed):
+        warnings.warn(
+            f"{found.source}: {n} of {len(placed)} widths are given at the middle of a joint and are taken as those "
+            "there, half of what a joint that gapes to one side has at its edge; where they are the largest ones, name "
+            "the joint instead (columns joint, width) or give the place of the edge",
+            stacklevel=5,
+        )
 
 
 def _number(text: str) -> float | str:
@@ -384,7 +408,7 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
         low, high = assembly.vertices.min(axis=0), assembly.vertices.max(axis=0)
         raise cells.error(
             "x",
-            f"and {_listed(axes[1:])} are {place_text(place, 6)} m, {away:.3g} m from any joint; the blocks lie "
+            f"and {' and '.join(axes[1:])} are {place_text(place, 6)} m, {away:.3g} m from any joint; the blocks lie "
             f"between {place_text(low)} and {place_text(high)} m: check the unit",
         )
     return place, False, False, place_text(place)

@@ -21,6 +21,7 @@ from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.remedies import deep_overlaps, proposed_ignore
 from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.selection import noted, sorted_out, without_ignored
+from blockvis.layout.unfilled import walls_to_fill
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
 from blockvis.layout.window import checked_window, within_window
@@ -397,7 +398,9 @@ def overlap_remedy(layout: Layout, ignore: str | Sequence[str], **chosen: Any) -
 def _remedy(
     layout: Layout, deep: Sequence[tuple[int, int]], ignore: str | Sequence[str], chosen: Mapping[str, Any]
 ) -> str:
-    """Propose what to leave out so that no blocks overlap, having tried it."""
+    """Propose what to leave out so that no blocks overlap, having tried it; "" for walls and openings, to be filled."""
+    if walls_to_fill(layout):
+        return ""
     before = (ignore,) if isinstance(ignore, str) else tuple(ignore)
     chosen = {**chosen, "unit": layout.unit}
     return proposed_ignore(layout, deep, lambda more: read_layout(layout.source, ignore=(*before, *more), **chosen))

@@ -112,6 +112,8 @@ class SettlementKind(AnalysisKind):
             if _rests_elsewhere(response):
                 lines[-1] += "   the least that equilibrium allows"
                 lines.append(f"reaction at rest     {reaction(path[0].reaction, path[0])}   before anything moves")
+            if path[0].reaction < 0.0:
+                lines[-1] += "   against the movement: by itself the structure would push these supports the other way"
         if response.collapse is not None:
             low, high = response.collapse.bracket
             at = response.collapse.displacement

@@ -227,6 +227,12 @@ def _in_space(figure: Any, contents: Contents) -> _Canvas:
     x, y = left + 0.02 * (right - left), bottom + 0.02 * (top - bottom)
     axes.plot([x, x + length], [y, y], color=palette.hexadecimal(palette.INK), linewidth=2.5, solid_capstyle="butt")
     axes.text(x + length / 2.0, y, f"{scale}\n", ha="center", va="bottom", fontsize=8, linespacing=0.4)
+    # At the bar, where x, y and z go: which way is outwards no other line of the picture says.
+    foot, reach = np.array([x + 1.5 * length, y]), 0.04 * (right - left)
+    foot += reach * np.maximum(-view.axes[:2], 0.0).max(axis=1)
+    for name, along in zip("xyz", view.axes[:2].T, strict=True):
+        axes.annotate("", foot + reach * along, foot, arrowprops={"arrowstyle": "-|>", "color": "black", "lw": 1.0})
+        axes.text(*(foot + 1.3 * reach * along), name, ha="center", va="center", fontsize=8)
     names = {k: np.array([places[n] @ view.axes[:2].T, room[n]]) for n, k in enumerate(drawn) if room[n].all()}
     return _Canvas(axes, view.axes[:2], names, WIDTH / (right - left))
 

@@ -79,6 +79,7 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
         "reasons": _reasons(failed["message"].tolist()),
         "status": {str(k): int(v) for k, v in table["status"].value_counts().items()},
         "curve": curve_name(study),
+        "parameter": study.parameters[0].name if len(study.parameters) == 1 else "",
         "unit": units[0] if units else "m",
         "quantiles": {str(p): curve.quantile(p) for p in (0.05, 0.5, 0.95)},
         "probability_at_the_end": float(curve.probability[-1]) if len(curve.probability) else 0.0,
@@ -89,8 +90,15 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
             for s in swings(study, table)
         ],
         "mechanism_classes": classes_of(table),
+        "line": _line(study.parameters[0].name, table) if is_single(study) else [],
         "run_seconds": float(np.nansum(table["seconds"].to_numpy(dtype=float))),
     }
+
+
+def _line(name: str, table: pd.DataFrame) -> list[list[Any]]:
+    """List each value of the only parameter, the displacement where it collapsed, else None, and how the run ended."""
+    rows = zip(table[name].tolist(), table["collapse_displacement"].tolist(), table["status"].tolist(), strict=True)
+    return [[value, at if status == solver.Status.COLLAPSED else None, status] for value, at, status in rows]
 
 
 def _reasons(messages: list[str]) -> dict[str, int]:
@@ -119,7 +127,13 @@ def in_words(summary: dict[str, Any]) -> str:
         number = summary["n_local"]
         words = "is a local loss" if number == 1 else "are local losses"
         lines.append(f"{number} of the collapses {words}: a few blocks fall, the structure stands")
-    if summary["n_collapsed"] or summary["n_never_stood"]:
+    if summary["line"]:
+        ends = [
+            f"{_value(value)} {f'{at:.4g} {unit}' if at is not None else f'no collapse ({status})'}"
+            for value, at, status in summary["line"]
+        ]
+        lines.append(f"collapse with {summary['parameter']}: {', '.join(ends)}")
+    elif summary["n_collapsed"] or summary["n_never_stood"]:
         quantiles = [
             f"{100 * float(p):g} % at {value:.4g} {unit}" if value is not None else f"{100 * float(p):g} % not reached"
             for p, value in summary["quantiles"].items()
@@ -127,7 +141,7 @@ def in_words(summary: dict[str, Any]) -> str:
         lines.append(f"{summary['curve']}: {', '.join(quantiles)}")
     elif summary["n_stood"]:
         lines.append(f"no run collapsed up to {summary['furthest_settlement']:.4g} {unit}")
-    for swing in summary["swings"]:
+    for swing in () if summary["line"] else summary["swings"]:
         (low_at, high_at), (low, high) = swing["at"], swing["mean"]
         index = summary["first_order_indices"].get(swing["parameter"])
         share = f", {100 * index[0]:.0f} ± {100 * index[1]:.0f} % of the variance" if index else ""

@@ -148,3 +148,15 @@ def test_a_drawing_of_something_else_is_refused(tmp_path):
     save_layout(generators.wall(bricks=2, courses=2, brick_length=0.05, brick_height=0.02), tmp_path / "other.json")
     with pytest.raises(ValueError, match="none of its"):
         read_observations(tmp_path / "other.json", generators.arch(radius=30.0))
+
+
+def test_widths_at_the_middles_of_joints_are_noted(tmp_path, recwarn):
+    table(tmp_path, "x,y,width [mm]\n0,1.07,3\n-0.81,0.47,2\n0.5,0.866,closed\n")
+    assert not recwarn.list
+    with pytest.warns(UserWarning, match=r"2 of 3 widths are given at the middle of a joint .* name the joint instead"):
+        table(tmp_path, "x,y,width [mm]\n0,1.0,3\n-0.87,0.5,2\n0.53,0.92,1\n")
+
+
+def test_a_place_far_away_is_told_in_one_sentence(tmp_path):
+    with pytest.raises(ValueError, match=r"line 2: x and y are \(1445, 293\) m, .* from any joint"):
+        table(tmp_path, "x,y,width\n1445,293,0.003\n")
