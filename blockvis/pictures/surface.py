@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from blockvis.layout.triangulation import triangles_of_ring
 from solver import mechanics
 
 #: Edges between faces that differ by less than this cosine are not drawn.
@@ -59,14 +60,8 @@ def _cut(corners: np.ndarray) -> np.ndarray:
     arms = corners - corners[0]
     normal = np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)
     keep = [k for k in range(3) if k != int(np.abs(normal).argmax())]
-    flat = corners[:, keep]
-    pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.Polygon(flat)))
-    rings = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
-    found = np.abs(rings[:, :, None] - flat[None, None]).sum(axis=3).argmin(axis=2)
-    a, b, c = np.moveaxis(corners[found], 1, 0)
-    backwards = (np.cross(b - a, c - a) @ normal) < 0.0
-    found[backwards] = found[backwards][:, ::-1]
-    return np.asarray(found)
+    # A face that folds back on itself, as drawings have, is cut, too.
+    return triangles_of_ring(corners[:, keep])
 
 
 def sharp_edges(shapes: mechanics.Polyhedra) -> np.ndarray:

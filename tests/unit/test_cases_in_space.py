@@ -132,6 +132,18 @@ def test_a_small_overlap_that_facing_leaves_is_a_contact_with_a_note(tmp_path):
         assembly_of(case(text.replace("[roles]", "overlap_tolerance = 0.001\n[roles]") + DOWN, tmp_path))
 
 
+def test_a_face_that_folds_back_on_itself_is_drawn(tmp_path):
+    """As of a stone of `bridge.json` of compas_cra: of its upper edge a part is run along twice."""
+    ring = [(-1.04, 1.53), (-0.96, 1.53), (-2.08, 1.53), (-1.97, 1.45), (-1.45, 1.45), (-1.40, 1.49), (-1.37, 1.46)]
+    n = len(ring)
+    points = np.array([(x, y, z) for y in (0.0, 1.0) for x, z in ring])
+    sides = [[k, n + k, n + (k + 1) % n, (k + 1) % n] for k in range(n)]
+    faces = [list(range(n)), list(range(n, 2 * n))[::-1], *sides]
+    path = drawn(tmp_path / "a.json", [(points, faces), box((-2.0, 0.0, 1.0), (-1.0, 1.0, 1.45))], ("folded", "low"))
+    assert main(["new", str(path), "-o", str(tmp_path / "a.toml")]) == 0
+    assert (tmp_path / "a.supports.png").exists()
+
+
 def test_new_writes_a_case_in_space(tmp_path, capsys):
     bricks = generators.build("L corner", {"bricks": 2, "across": 2, "courses": 2})
     write_layout(layout_of(bricks).chosen(np.flatnonzero(bricks.free)), tmp_path / "corner.obj")
