@@ -57,8 +57,8 @@ def quantity_text(value: float, unit: str = "") -> str:
 
     Examples
     --------
-    >>> quantity_text(2.1e11, "Pa"), quantity_text(18000.0, "N/m³"), quantity_text(0.02, "m"), quantity_text(2000.0, "kg/m³")
-    ('210 GPa', '18 kN/m³', '0.02 m', '2000 kg/m³')
+    >>> quantity_text(2.1e11, "Pa"), quantity_text(18000.0, "N/m³"), quantity_text(2000.0, "kg/m³")
+    ('210 GPa', '18 kN/m³', '2000 kg/m³')
     >>> quantity_text(1.5), quantity_text(5e7)
     ('1.5', '5e7')
     """

@@ -246,7 +246,7 @@ def _flat(values: Any, name: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _unit_of(name: str) -> str:
-    """Unit of a key of the case, by its name as :func:`_flat` has it; lengths, which may be angles, have none."""
+    """Find the unit of a key by its name as :func:`_flat` has it; of lengths, which may be angles, none."""
     *table, key = re.sub(r" [0-9]+(?=\.)", "", name).split(".")
     sections = (section for section in SECTIONS if fnmatch(".".join(table), section.name))
     units = (known.unit for section in sections for known in section.keys if known.name == key)
