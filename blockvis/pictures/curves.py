@@ -284,7 +284,7 @@ def _draw_line(
         # On the side that the curve leaves free.
         above = values[0] > values[1]
         axes.annotate(
-            "at rest", (total[0], values[0]), xytext=(8, 4 if above else -4), textcoords="offset points",
+            "at rest", (total[0], values[0]), xytext=(-4, 6 if above else -6), textcoords="offset points",
             va="bottom" if above else "top", fontsize=0.9 * text, zorder=4,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )  # fmt: skip

@@ -265,6 +265,7 @@ class Drawer:
                 scene.show_ground(self.fall.ground)
             return scene
         # VTK takes seconds to import, and pictures in the plane need none.
+        from .paired_scenes import WORDS, PairedScenes
         from .solid_scene import SolidScene
 
         width, height = self.sheet.inside_size
@@ -275,7 +276,7 @@ class Drawer:
                 self.assembly,
                 view,
                 seen,
-                (width // len(self._views), height),
+                (width // len(self._views), height - round(WORDS * self.sheet.text) * several),
                 self.fill,
                 opacity=1.0 if self.look.forces == "none" else GLASS,
                 fine=self._still,
@@ -291,8 +292,6 @@ class Drawer:
                 solid.show_ground(self.fall.ground)
         if not several:
             return scenes[0]
-        from .paired_scenes import PairedScenes
-
         return PairedScenes(scenes, ("from above", "from below"), self.sheet.text)
 
     def _projected(self, points: np.ndarray) -> np.ndarray:
@@ -504,6 +503,11 @@ class Drawer:
         """Return the legend of the picture that the scene holds; what was left out is told where statics has it."""
         falling = increment.status == solver.Status.FALLING
         untinted = [] if self._acts(increment) else self._keys_of_tints()
+        if falling and self.fall is not None and not self._flat:
+            # A fall shows blocks and ties, nothing of statics.
+            ties = self.ties.keys()
+            drawn = [key for key in self.keys() if key.kind == "area" or key.text in {of.text for of in ties}]
+            return [key for key in drawn if key not in untinted]
         return [
             key
             for key in self.keys()

@@ -38,8 +38,8 @@ SLIDING = 0.4
 #: A course ends where the sides part by less than this part of what they do at its widest joint.
 HAIRLINE = 0.01
 
-#: Joints whose blocks have moved apart by less than the first part of that count by the second in the choice of a strip:
-#: many hairlines are no crack.
+#: Joints whose blocks have moved apart by less than the first part of that count by the second in the choice of a
+#: strip: many hairlines are no crack.
 CORE, BESIDES = 0.25, 0.1
 
 #: Strips and gains are alike up to this part: of two courses that gain the same the shorter one is taken.
