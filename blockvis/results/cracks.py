@@ -26,7 +26,7 @@ SMALLEST_OPENING = 1e-3
 MEETING = 0.02
 
 #: A course stays within this of a straight line, in block sizes: the steps of a bond do, a turn does not.
-STRIP = 0.75
+STRIP = 0.65
 
 #: Directions, and lines beside each other to both sides of the widest joint, that a course is tried along.
 DIRECTIONS, BESIDE = 36, 2
