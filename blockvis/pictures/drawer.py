@@ -50,6 +50,9 @@ VISIBLE, MOMENT = 1.0, 0.12
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
 
+#: Arrows end so far off the middle of a hinge, in heights of the picture: its dot would hide their heads.
+DOT = 1.0 / 70.0
+
 #: Blocks in space are so transparent where forces are drawn inside them.
 GLASS = 0.35
 
@@ -369,7 +372,7 @@ class Drawer:
             self._draw_forces(increment, shown)
             self._draw_bearings(shown)
             self._draw_settlement(increment, shown)
-            self._draw_live_load(increment, shown)
+            self._draw_live_load(increment, shown, dots)
             if self.response.loads.fills:
                 self.scene.backfill(fill_bodies(self.response, shown, increment.fallen))
         self.scene.ties(self.ties.strands(increment, shown, DASH * self.sheet.size[1] / 1080.0 * self.scene.pixel))
@@ -631,10 +634,18 @@ class Drawer:
             lines.append(np.stack(ends, axis=1))
         self.scene.bearings(np.concatenate(lines))
 
-    def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose) -> None:
-        """Draw the live load times its multiplier as arrows to scale that end where it acts."""
-        if self.live.largest > 0.0:
-            self._draw_arrows("live", *self.live.arrows(increment, shown), palette.LIVE)
+    def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose, dots: np.ndarray) -> None:
+        """Draw the live load times its multiplier as arrows to scale that end where it acts, short of a hinge."""
+        if self.live.largest == 0.0:
+            return
+        tails, tips = self.live.arrows(increment, shown)
+        if self._flat and len(dots) and len(tips):
+            clear = DOT * self.sheet.size[1] * self.scene.pixel
+            at_dot = np.linalg.norm(tips[:, None] - dots, axis=2).min(axis=1) < clear
+            along = (tips - tails) / np.maximum(np.linalg.norm(tips - tails, axis=1), 1e-300)[:, None]
+            back = clear * at_dot[:, None] * along
+            tails, tips = tails - back, tips - back
+        self._draw_arrows("live", tails, tips, palette.LIVE)
 
     def _draw_settlement(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if self.response.settlements:
