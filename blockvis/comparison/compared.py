@@ -275,7 +275,7 @@ def _cracks_at(side: Side, at: float) -> list[Crack]:
 
 
 def _shared(crack: Crack, other: Crack, same_layout: bool) -> int:
-    """Count the joints that two cracks have in common; of two layouts 1 where both are widest between the same blocks."""
+    """Count the joints that two cracks share; of two layouts 1 where both are widest between the same blocks."""
     if same_layout:
         return int(np.isin(crack.joints, other.joints).sum())
     return int(set(crack.widest.split(" | ")) == set(other.widest.split(" | ")))
