@@ -178,8 +178,6 @@ def _draw(
         return
     _draw_line(axes, response, total, values, text if events else None)
     axes.set_xlabel(parameter_label(response), fontsize=text)
-    if len({increment.phase for increment in path}) > 1:
-        axes.set_xlabel(f"{response.parameter.name}, all phases added [{parameter_unit(response)[1]}]", fontsize=text)
     axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5, steps=[1, 2, 2.5, 5, 10]))
     if not moment and response.measured.is_force and response.total_weight > 0:
         weight = response.total_weight / factor
