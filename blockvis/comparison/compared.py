@@ -171,14 +171,15 @@ class Comparison:
 
         Notes
         -----
-        Lines of one layout are the same where they share joints, and those of two layouts where they are widest at
+        Lines of one layout are the same that share most joints, and those of two layouts where they are widest at
         the joint of the same two blocks.
         """
         found = [_cracks_at(side, at) for side in self.sides]
         alike = self.same_layout()
         pairs, taken = [], set()
         for crack in found[0]:
-            match = next((k for k, c in enumerate(found[1]) if k not in taken and _is_same(crack, c, alike)), None)
+            shared = [0 if k in taken else _shared(crack, other, alike) for k, other in enumerate(found[1])]
+            match = int(np.argmax(shared)) if any(shared) else None
             if match is not None:
                 taken.add(match)
             width = found[1][match].width if match is not None else 0.0
@@ -246,7 +247,7 @@ def _flat(values: Any, name: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _unit_of(name: str) -> str:
-    """Give the unit of a key of the case, by its name as :func:`_flat` has it; lengths, maybe angles, have none."""
+    """Find the unit of a key by its name as :func:`_flat` has it; of lengths, which may be angles, none."""
     *table, key = re.sub(r" [0-9]+(?=\.)", "", name).split(".")
     sections = (section for section in SECTIONS if fnmatch(".".join(table), section.name))
     units = (known.unit for section in sections for known in section.keys if known.name == key)
@@ -273,7 +274,8 @@ def _cracks_at(side: Side, at: float) -> list[Crack]:
     return cracks_of(assembly, state.pose, initial_joints(assembly), state.fallen)
 
 
-def _is_same(crack: Crack, other: Crack, same_layout: bool) -> bool:
+def _shared(crack: Crack, other: Crack, same_layout: bool) -> int:
+    """Count the joints that two cracks share; of two layouts 1 where both are widest between the same blocks."""
     if same_layout:
-        return bool(np.isin(crack.joints, other.joints).any())
-    return set(crack.widest.split(" | ")) == set(other.widest.split(" | "))
+        return int(np.isin(crack.joints, other.joints).sum())
+    return int(set(crack.widest.split(" | ")) == set(other.widest.split(" | ")))

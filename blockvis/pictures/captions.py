@@ -95,7 +95,8 @@ def parameter_label(response: solver.Response) -> str:
     """Label of the axis of the parameter; empty for a single state, which has no path."""
     parameter = response.parameter
     if parameter.is_path:
-        return f"{parameter.name} [{parameter_unit(response)[1]}]"
+        added = ", all phases added" if len({increment.phase for increment in response.path}) > 1 else ""
+        return f"{parameter.name}{added} [{parameter_unit(response)[1]}]"
     return f"{parameter.name} {parameter.symbol} [{parameter.unit}]" if len(response.path) != 1 else ""
 
 

@@ -17,6 +17,7 @@ from blockvis.text import width_text
 from . import palette
 from .drawer import WHOLE, alike
 from .frame import Key, Sheet, framed, write_labels, write_words
+from .paired_scenes import WORDS
 from .solid_scene import SolidScene
 from .solid_view import hiding_supports, plane_of, views_of
 from .swing import swing_of
@@ -81,7 +82,8 @@ class CracksInSpace:
         plane: np.ndarray | None,
     ) -> list[SolidScene]:
         width, height = self._sheet.inside_size
-        size = width // len(self._views), height
+        below = round(WORDS * self._sheet.text) if len(self._views) > 1 else 0
+        size = width // len(self._views), height - below
         fill = palette.pale(palette.role_colours(assembly), np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
         frames = [
             framed(assembly, [solver.Pose.initial(assembly)], 0.02, 0.3, view.axes[:2], WHOLE, plane)
@@ -119,7 +121,7 @@ class CracksInSpace:
         for scene, words in zip(self._scenes, ("from above", "from below"), strict=False):
             page.paste(scene.image(), (left, 0))
             if len(self._scenes) > 1:
-                place = left + scene.size[0] / 2.0, page.height - 0.6 * text
+                place = left + scene.size[0] / 2.0, page.height - 0.7 * text
                 write_words(page, place, words, text)
             middles = self._pieces.mean(axis=1)
             seen, pixels = scene.sees(middles), scene.at_pixel(middles) + np.array([left, 0])

@@ -188,11 +188,8 @@ def _draw(
         over_weight.tick_params(labelsize=0.9 * text)
     if not response.parameter.is_path:
         _mark_lowest(axes, response, text, events)
-        for place in total[~np.isfinite(values)] if events else ():
-            axes.annotate(
-                "unbounded", (place, 0.88), xycoords=("data", "axes fraction"), ha="center", va="top", rotation=90,
-                fontsize=0.8 * text, color=palette.hexadecimal(palette.FAINT),
-            )  # fmt: skip
+        if events and len(known):
+            _mark_unbounded(axes, total, values, text)
     if events and response.settlements:
         _mark_phases(axes, response, total, text)
     if response.collapse is not None and len(path):
@@ -237,7 +234,7 @@ def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text:
     for k in range(1, len(path)):
         if path[k].phase == path[k - 1].phase:
             continue
-        words = [f"settlement {path[k].phase + 1}"]
+        words = [f"phase {path[k].phase + 1} from here on"]
         taken = int(path[k].removed.sum()) - int(path[k - 1].removed.sum())
         if taken:
             words.append(f"{taken} block{'s' if taken != 1 else ''} taken away")
@@ -282,7 +279,7 @@ def _draw_line(
         # On the side that the curve leaves free.
         above = values[0] > values[1]
         axes.annotate(
-            "at rest", (total[0], values[0]), xytext=(8, 4 if above else -4), textcoords="offset points",
+            "at rest", (total[0], values[0]), xytext=(-4, 6 if above else -6), textcoords="offset points",
             va="bottom" if above else "top", fontsize=0.9 * text, zorder=4,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )  # fmt: skip
@@ -323,6 +320,21 @@ def _draw_single(axes: Axes, response: solver.Response, known: np.ndarray, text:
     axes.annotate(
         f"α = {alpha:.6g}", (0.5 * reach, alpha), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=text
     )
+
+
+def _mark_unbounded(axes: Axes, total: np.ndarray, values: np.ndarray, text: float) -> None:
+    """Shade where no load is too much, as far as the neighbours that have a limit, and say so beside each."""
+    grey, unbounded = palette.hexadecimal(palette.FAINT), ~np.isfinite(values)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], unbounded, [False]]).astype(int)))
+    for first, stop in edges.reshape(-1, 2).tolist():
+        low, high = total[max(first - 1, 0)], total[min(stop, len(total) - 1)]
+        axes.axvspan(low, high, color=grey, alpha=0.15, linewidth=0)
+        right = high < total[0] + 0.75 * (total[-1] - total[0])
+        axes.annotate(
+            "unbounded", (high if right else low, 0.86), xycoords=("data", "axes fraction"),
+            ha="left" if right else "right", va="top", xytext=(6 if right else -6, 0), textcoords="offset points",
+            fontsize=0.9 * text, color=grey,
+        )  # fmt: skip
 
 
 def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool) -> None:

@@ -50,6 +50,9 @@ VISIBLE, MOMENT = 1.0, 0.12
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
 
+#: Arrows end so far off the middle of a hinge, in heights of the picture: its dot would hide their heads.
+DOT = 1.0 / 70.0
+
 #: Blocks in space are so transparent where forces are drawn inside them.
 GLASS = 0.35
 
@@ -265,6 +268,7 @@ class Drawer:
                 scene.show_ground(self.fall.ground)
             return scene
         # VTK takes seconds to import, and pictures in the plane need none.
+        from .paired_scenes import WORDS, PairedScenes
         from .solid_scene import SolidScene
 
         width, height = self.sheet.inside_size
@@ -275,7 +279,7 @@ class Drawer:
                 self.assembly,
                 view,
                 seen,
-                (width // len(self._views), height),
+                (width // len(self._views), height - round(WORDS * self.sheet.text) * several),
                 self.fill,
                 opacity=1.0 if self.look.forces == "none" else GLASS,
                 fine=self._still,
@@ -291,8 +295,6 @@ class Drawer:
                 solid.show_ground(self.fall.ground)
         if not several:
             return scenes[0]
-        from .paired_scenes import PairedScenes
-
         return PairedScenes(scenes, ("from above", "from below"), self.sheet.text)
 
     def _projected(self, points: np.ndarray) -> np.ndarray:
@@ -370,7 +372,7 @@ class Drawer:
             self._draw_forces(increment, shown)
             self._draw_bearings(shown)
             self._draw_settlement(increment, shown)
-            self._draw_live_load(increment, shown)
+            self._draw_live_load(increment, shown, dots)
             if self.response.loads.fills:
                 self.scene.backfill(fill_bodies(self.response, shown, increment.fallen))
         self.scene.ties(self.ties.strands(increment, shown, DASH * self.sheet.size[1] / 1080.0 * self.scene.pixel))
@@ -504,6 +506,11 @@ class Drawer:
         """Return the legend of the picture that the scene holds; what was left out is told where statics has it."""
         falling = increment.status == solver.Status.FALLING
         untinted = [] if self._acts(increment) else self._keys_of_tints()
+        if falling and self.fall is not None and not self._flat:
+            # A fall shows blocks and ties, nothing of statics.
+            ties = self.ties.keys()
+            drawn = [key for key in self.keys() if key.kind == "area" or key.text in {of.text for of in ties}]
+            return [key for key in drawn if key not in untinted]
         return [
             key
             for key in self.keys()
@@ -627,10 +634,18 @@ class Drawer:
             lines.append(np.stack(ends, axis=1))
         self.scene.bearings(np.concatenate(lines))
 
-    def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose) -> None:
-        """Draw the live load times its multiplier as arrows to scale that end where it acts."""
-        if self.live.largest > 0.0:
-            self._draw_arrows("live", *self.live.arrows(increment, shown), palette.LIVE)
+    def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose, dots: np.ndarray) -> None:
+        """Draw the live load times its multiplier as arrows to scale that end where it acts, short of a hinge."""
+        if self.live.largest == 0.0:
+            return
+        tails, tips = self.live.arrows(increment, shown)
+        if self._flat and len(dots) and len(tips):
+            clear = DOT * self.sheet.size[1] * self.scene.pixel
+            at_dot = np.linalg.norm(tips[:, None] - dots, axis=2).min(axis=1) < clear
+            along = (tips - tails) / np.maximum(np.linalg.norm(tips - tails, axis=1), 1e-300)[:, None]
+            back = clear * at_dot[:, None] * along
+            tails, tips = tails - back, tips - back
+        self._draw_arrows("live", tails, tips, palette.LIVE)
 
     def _draw_settlement(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if self.response.settlements:

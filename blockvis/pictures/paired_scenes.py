@@ -17,6 +17,9 @@ from .solid_scene import SolidScene
 from .swing import Swing
 from .ties import Strands
 
+#: Height of the words below each view, in heights of the text.
+WORDS = 1.6
+
 
 class PairedScenes:
     """Scenes of the same blocks at one scale, from left to right; see :class:`blockvis.pictures.scene.Scene`.
@@ -33,7 +36,7 @@ class PairedScenes:
     def __init__(self, scenes: Sequence[SolidScene], words: Sequence[str], text: int) -> None:
         self._scenes, self._words, self._text = tuple(scenes), tuple(words), text
         first = self._scenes[0]
-        self.size = (sum(scene.size[0] for scene in self._scenes), first.size[1])
+        self.size = (sum(scene.size[0] for scene in self._scenes), first.size[1] + round(WORDS * text))
         self.frame, self.pixel = first.frame, first.pixel
 
     def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
@@ -104,7 +107,7 @@ class PairedScenes:
         page, left = Image.new("RGB", self.size, palette.PAPER), 0
         for scene, words in zip(self._scenes, self._words, strict=True):
             page.paste(scene.image(), (left, 0))
-            write_words(page, (left + scene.size[0] / 2.0, self.size[1] - 0.6 * self._text), words, self._text)
+            write_words(page, (left + scene.size[0] / 2.0, self.size[1] - 0.7 * self._text), words, self._text)
             left += scene.size[0]
         return page
 

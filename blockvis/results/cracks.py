@@ -26,7 +26,7 @@ SMALLEST_OPENING = 1e-3
 MEETING = 0.02
 
 #: A course stays within this of a straight line, in block sizes: the steps of a bond do, a turn does not.
-STRIP = 0.75
+STRIP = 0.65
 
 #: Directions, and lines beside each other to both sides of the widest joint, that a course is tried along.
 DIRECTIONS, BESIDE = 36, 2
@@ -37,6 +37,10 @@ SLIDING = 0.4
 
 #: A course ends where the sides part by less than this part of what they do at its widest joint.
 HAIRLINE = 0.01
+
+#: Joints whose blocks have moved apart by less than the first part of that count by the second in the choice of a
+#: strip: many hairlines are no crack.
+CORE, BESIDES = 0.25, 0.1
 
 #: Strips and gains are alike up to this part: of two courses that gain the same the shorter one is taken.
 EQUAL = 1e-6
@@ -225,6 +229,7 @@ def _courses(
         inside = np.abs(away[:, :, None] - beside) <= half
         # No course has more than all that adds to one in its strip: the others need not be followed.
         gained = gains - HAIRLINE * apart[widest] * sizes[:, None]
+        gained = np.where((apart < CORE * apart[widest])[:, None] & (gained > 0.0), BESIDES * gained, gained)
         most = np.einsum("nd,ndb->db", np.maximum(gained[members], 0.0), inside)
         course, largest = np.array([widest]), float(gained[widest].max())
         for direction, line in zip(*np.unravel_index(np.argsort(-most, axis=None), most.shape), strict=True):
