@@ -8,6 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from .broad_phase import expand_ranges
+
 #: Faces that cover each other on a strip may touch if its gap is at most this part of its width; others slide past.
 STEEPEST_LANDING = 0.25
 
@@ -114,7 +116,7 @@ def are_known(contacts: Contacts, known: Contacts, same_normal: bool = True) -> 
 def successors(
     before: Contacts, vanished: np.ndarray, contacts: Contacts, near: float, length: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the contact points that stand where others of the same two blocks have vanished.
+    """Find the contact points that stand where others of the same two blocks have vanished, with the nearest normals.
 
     Parameters
     ----------
@@ -123,20 +125,34 @@ def successors(
         Numbers of those that are not among the contact points any more.
     contacts : Contacts
     near, length : float [m]
-        Difference up to which points are equally near, and largest distance.
+        Difference up to which points are equally near, and largest distance; as far as that is a normal that is turned
+        by 1.
 
     Returns
     -------
     row : (m,) int array
         Numbers in ``vanished``; one that is near to several is there several times.
     successor : (m,) int array
+
+    Notes
+    -----
+    At the end of an edge two blocks may touch in two faces: a force that went over to the other one would lose what
+    that one's friction does not hold.
     """
-    apart = np.linalg.norm(before.points[vanished][:, None] - contacts.points[None], axis=2)
-    one, other = (
-        np.sort(np.stack([c.block_a[k], c.block_b[k]], axis=1), axis=1)
-        for c, k in ((before, vanished), (contacts, slice(None)))
+    count = int(max(c.block_a.max(initial=0) + c.block_b.max(initial=0) for c in (before, contacts))) + 1
+    old, new = (
+        np.minimum(c.block_a, c.block_b).astype(np.int64) * count + np.maximum(c.block_a, c.block_b)
+        for c in (before, contacts)
     )
-    apart = np.where((one[:, None] == other[None]).all(axis=2), apart, np.inf)
-    least = apart.min(axis=1)
-    row, successor = np.nonzero((apart <= least[:, None] + near) & (apart < length))
-    return row, successor
+    order = np.argsort(new, kind="stable")
+    first, last = (np.searchsorted(new[order], old[vanished], side) for side in ("left", "right"))
+    row, position = expand_ranges(last - first)
+    successor, earlier = order[first[row] + position], vanished[row]
+    sense = np.where(before.block_a[earlier] == contacts.block_a[successor], 1.0, -1.0)[:, None]
+    apart = np.linalg.norm(before.points[earlier] - contacts.points[successor], axis=1)
+    turned = np.linalg.norm(sense * before.frames[earlier, 0] - contacts.frames[successor, 0], axis=1)
+    measure = np.where(apart < length, apart + length * turned, np.inf)
+    least = np.full(len(vanished), np.inf)
+    np.minimum.at(least, row, measure)
+    chosen = (measure <= least[row] + near) & (apart < length)
+    return row[chosen], successor[chosen]
