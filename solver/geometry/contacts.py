@@ -67,10 +67,12 @@ class Contacts:
         joint : (n,) int array
             The pair of each contact point.
         """
-        low, high = np.minimum(self.block_a, self.block_b).astype(np.int64), np.maximum(self.block_a, self.block_b)
-        count = int(high.max(initial=0)) + 1
-        keys, joint = np.unique(low * count + high, return_inverse=True)
-        return np.stack([keys // count, keys % count], axis=1), joint.ravel()
+        keys, joint = np.unique(self.pair_keys(), return_inverse=True)
+        return np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1), joint.ravel()
+
+    def pair_keys(self) -> np.ndarray:
+        """(n,) int array: a number for each pair of blocks, that of the lower one first."""
+        return np.minimum(self.block_a, self.block_b).astype(np.int64) << 32 | np.maximum(self.block_a, self.block_b)
 
 
 def joined_contacts(groups: Sequence[Contacts]) -> Contacts:
@@ -96,6 +98,8 @@ def matched_contacts(contacts: Named, before: Named) -> tuple[np.ndarray, np.nda
     same : (n,) bool array
         Whether it was there.
     """
+    if not len(before.features):
+        return np.zeros(len(contacts.features), dtype=np.int64), np.zeros(len(contacts.features), dtype=bool)
     features, old = contacts.features[:, :3].astype(np.int64), before.features[:, :3].astype(np.int64)
     kinds, _, count = np.maximum(features.max(axis=0, initial=0), old.max(axis=0, initial=0)) + 1
     keys, earlier_keys = ((f[:, 1] * kinds + f[:, 0]) * count + f[:, 2] for f in (features, old))
@@ -118,6 +122,8 @@ def successors(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the contact points that stand where others of the same two blocks have vanished, with the nearest normals.
 
+    A force that went over to another face of the two blocks would lose there what that one's friction does not hold.
+
     Parameters
     ----------
     before : Contacts
@@ -125,34 +131,22 @@ def successors(
         Numbers of those that are not among the contact points any more.
     contacts : Contacts
     near, length : float [m]
-        Difference up to which points are equally near, and largest distance; as far as that is a normal that is turned
-        by 1.
+        Difference up to which points are equally near; largest distance, as much as a normal that is turned by 1.
 
     Returns
     -------
     row : (m,) int array
         Numbers in ``vanished``; one that is near to several is there several times.
     successor : (m,) int array
-
-    Notes
-    -----
-    At the end of an edge two blocks may touch in two faces: a force that went over to the other one would lose what
-    that one's friction does not hold.
     """
-    count = int(max(c.block_a.max(initial=0) + c.block_b.max(initial=0) for c in (before, contacts))) + 1
-    old, new = (
-        np.minimum(c.block_a, c.block_b).astype(np.int64) * count + np.maximum(c.block_a, c.block_b)
-        for c in (before, contacts)
-    )
-    order = np.argsort(new, kind="stable")
-    first, last = (np.searchsorted(new[order], old[vanished], side) for side in ("left", "right"))
+    keys, order = before.pair_keys()[vanished], np.argsort(contacts.pair_keys(), kind="stable")
+    first, last = (np.searchsorted(contacts.pair_keys()[order], keys, side) for side in ("left", "right"))
     row, position = expand_ranges(last - first)
     successor, earlier = order[first[row] + position], vanished[row]
     sense = np.where(before.block_a[earlier] == contacts.block_a[successor], 1.0, -1.0)[:, None]
     apart = np.linalg.norm(before.points[earlier] - contacts.points[successor], axis=1)
     turned = np.linalg.norm(sense * before.frames[earlier, 0] - contacts.frames[successor, 0], axis=1)
-    measure = np.where(apart < length, apart + length * turned, np.inf)
-    least = np.full(len(vanished), np.inf)
-    np.minimum.at(least, row, measure)
+    measure, least = apart + length * turned, np.full(len(vanished), np.inf)
+    np.minimum.at(least, row[apart < length], measure[apart < length])
     chosen = (measure <= least[row] + near) & (apart < length)
     return row[chosen], successor[chosen]

@@ -54,7 +54,7 @@ def test_a_factor_that_is_none_is_refused(factors, words):
 def test_a_contact_point_that_vanishes_hands_its_forces_to_the_one_whose_normal_it_has(swapped, nearer):
     one, start = stepper()
     before = one.contacts(start)[:3]
-    # Where the first was there are two now, of other names: one with its normal, and one turned by 0.4, as near or nearer.
+    # Where the first was there are two now, of other names: one with its normal, one turned by 0.4, as near or nearer.
     turn = np.array([[np.cos(0.4), np.sin(0.4)], [-np.sin(0.4), np.cos(0.4)]])
     points = [before.points[0] + nearer * one.model.length, before.points[0]]
     frames = np.stack([before.frames[0], before.frames[0] @ turn])
