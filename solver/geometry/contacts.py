@@ -8,6 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from .broad_phase import expand_ranges
+
 #: Faces that cover each other on a strip may touch if its gap is at most this part of its width; others slide past.
 STEEPEST_LANDING = 0.25
 
@@ -65,10 +67,12 @@ class Contacts:
         joint : (n,) int array
             The pair of each contact point.
         """
-        low, high = np.minimum(self.block_a, self.block_b).astype(np.int64), np.maximum(self.block_a, self.block_b)
-        count = int(high.max(initial=0)) + 1
-        keys, joint = np.unique(low * count + high, return_inverse=True)
-        return np.stack([keys // count, keys % count], axis=1), joint.ravel()
+        keys, joint = np.unique(self.pair_keys(), return_inverse=True)
+        return np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1), joint.ravel()
+
+    def pair_keys(self) -> np.ndarray:
+        """(n,) int array: a number for each pair of blocks, that of the lower one first."""
+        return np.minimum(self.block_a, self.block_b).astype(np.int64) << 32 | np.maximum(self.block_a, self.block_b)
 
 
 def joined_contacts(groups: Sequence[Contacts]) -> Contacts:
@@ -94,6 +98,8 @@ def matched_contacts(contacts: Named, before: Named) -> tuple[np.ndarray, np.nda
     same : (n,) bool array
         Whether it was there.
     """
+    if not len(before.features):
+        return np.zeros(len(contacts.features), dtype=np.int64), np.zeros(len(contacts.features), dtype=bool)
     features, old = contacts.features[:, :3].astype(np.int64), before.features[:, :3].astype(np.int64)
     kinds, _, count = np.maximum(features.max(axis=0, initial=0), old.max(axis=0, initial=0)) + 1
     keys, earlier_keys = ((f[:, 1] * kinds + f[:, 0]) * count + f[:, 2] for f in (features, old))
@@ -114,7 +120,9 @@ def are_known(contacts: Contacts, known: Contacts, same_normal: bool = True) -> 
 def successors(
     before: Contacts, vanished: np.ndarray, contacts: Contacts, near: float, length: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the contact points that stand where others of the same two blocks have vanished.
+    """Find the contact points that stand where others of the same two blocks have vanished, with the nearest normals.
+
+    A force that went over to another face of the two blocks would lose there what that one's friction does not hold.
 
     Parameters
     ----------
@@ -123,7 +131,7 @@ def successors(
         Numbers of those that are not among the contact points any more.
     contacts : Contacts
     near, length : float [m]
-        Difference up to which points are equally near, and largest distance.
+        Difference up to which points are equally near; largest distance, as much as a normal that is turned by 1.
 
     Returns
     -------
@@ -131,12 +139,14 @@ def successors(
         Numbers in ``vanished``; one that is near to several is there several times.
     successor : (m,) int array
     """
-    apart = np.linalg.norm(before.points[vanished][:, None] - contacts.points[None], axis=2)
-    one, other = (
-        np.sort(np.stack([c.block_a[k], c.block_b[k]], axis=1), axis=1)
-        for c, k in ((before, vanished), (contacts, slice(None)))
-    )
-    apart = np.where((one[:, None] == other[None]).all(axis=2), apart, np.inf)
-    least = apart.min(axis=1)
-    row, successor = np.nonzero((apart <= least[:, None] + near) & (apart < length))
-    return row, successor
+    keys, order = before.pair_keys()[vanished], np.argsort(contacts.pair_keys(), kind="stable")
+    first, last = (np.searchsorted(contacts.pair_keys()[order], keys, side) for side in ("left", "right"))
+    row, position = expand_ranges(last - first)
+    successor, earlier = order[first[row] + position], vanished[row]
+    sense = np.where(before.block_a[earlier] == contacts.block_a[successor], 1.0, -1.0)[:, None]
+    apart = np.linalg.norm(before.points[earlier] - contacts.points[successor], axis=1)
+    turned = np.linalg.norm(sense * before.frames[earlier, 0] - contacts.frames[successor, 0], axis=1)
+    measure, least = apart + length * turned, np.full(len(vanished), np.inf)
+    np.minimum.at(least, row[apart < length], measure[apart < length])
+    chosen = (measure <= least[row] + near) & (apart < length)
+    return row[chosen], successor[chosen]

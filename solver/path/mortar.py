@@ -96,7 +96,7 @@ class Mortar:
         """The place with elastic joints compressed by forces in units of the program, as they are drawn."""
         if not self.present:
             return place
-        number, same = self._matched(contacts, place.bonds)
+        number, same = matched_contacts(contacts, place.bonds)
         rest, give = place.bonds.rest.copy(), self.points(place, contacts).give[:, 0]
         rest[number[same]] = (give * forces[:, 0])[same] * self.model.length
         return replace(place, bonds=replace(place.bonds, rest=rest))
@@ -113,7 +113,7 @@ class Mortar:
         cohesion, tension, *of_joints = model.interfaces.values(
             model.assembly, *blocks, "cohesion", "tensile_strength", *names
         )
-        number, bonded = self._matched(contacts, place.bonds)
+        number, bonded = matched_contacts(contacts, place.bonds)
         area = np.where(bonded, self._of(place.bonds.areas, number), contacts.areas)
         friction = model.interfaces.friction(model.assembly, *blocks)
         # Corners alone, and points of members, have no area.
@@ -147,7 +147,7 @@ class Mortar:
         bonds, before = place.bonds, place.contacts
         if not len(bonds) or before is None or not len(contacts) or not len(before):
             return place
-        number, same = self._matched(before, bonds)
+        number, same = matched_contacts(before, bonds)
         _, kept = matched_contacts(before, contacts)
         vanished = np.flatnonzero(same & ~kept)
         if not len(vanished):
@@ -169,17 +169,10 @@ class Mortar:
         """The bonds of a place of whose strength contact points have this part left, (n,) array."""
         if not self.present:
             return place.bonds
-        number, bonded = self._matched(contacts, place.bonds)
+        number, bonded = matched_contacts(contacts, place.bonds)
         of_bonds = place.bonds.left.copy()
         of_bonds[number[bonded]] = left[bonded]
         return replace(place.bonds, left=of_bonds)
-
-    @staticmethod
-    def _matched(contacts: Contacts, bonds: Bonds) -> tuple[np.ndarray, np.ndarray]:
-        """Number of the bond of each contact point, and whether it has one."""
-        if not len(bonds) or not len(contacts):
-            return np.zeros(len(contacts), dtype=np.int64), np.zeros(len(contacts), dtype=bool)
-        return matched_contacts(contacts, bonds)
 
     @staticmethod
     def _of(values: np.ndarray, number: np.ndarray) -> np.ndarray:

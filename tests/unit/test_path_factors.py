@@ -1,5 +1,6 @@
 """Factors of the model's constants that a path is given: compliance of the joints, imperfection."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -46,3 +47,30 @@ def test_a_factor_that_is_none_is_refused(factors, words):
     with pytest.raises(ValueError) as error:
         solver.Controls(**factors)
     assert str(error.value).startswith(words)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("nearer", [0.0, 1e-4])
+def test_a_contact_point_that_vanishes_hands_its_forces_to_the_one_whose_normal_it_has(swapped, nearer):
+    one, start = stepper()
+    before = one.contacts(start)[:3]
+    # Where the first was there are two now, of other names: one with its normal, one turned by 0.4, as near or nearer.
+    turn = np.array([[np.cos(0.4), np.sin(0.4)], [-np.sin(0.4), np.cos(0.4)]])
+    points = [before.points[0] + nearer * one.model.length, before.points[0]]
+    frames = np.stack([before.frames[0], before.frames[0] @ turn])
+    blocks, sense = (before.block_a[[0, 0]], before.block_b[[0, 0]]), -1.0 if swapped else 1.0
+    changed = replace(
+        before[np.array([0, 0])],
+        features=before.features[[0, 0]] + [[0, 0, 1000, 0], [0, 0, 1001, 0]],
+        block_a=blocks[int(swapped)],
+        block_b=blocks[1 - int(swapped)],
+        points=np.array(points),
+        frames=sense * frames,
+    )
+    now = mechanics.joined_contacts([before[1:], changed])
+    forces = np.array([[5.0, 2.0], [1.0, 0.0], [1.0, 0.0]])
+    place = mechanics.Place(0.0, start, before, forces, forces, forces[:, 0])
+    handed, _, followed, is_new = one.transferred(place, now)
+    assert handed == pytest.approx(np.array([[1.0, 0.0], [1.0, 0.0], [5.0, 2.0], [0.0, 0.0]]))
+    assert followed == pytest.approx([1.0, 1.0, 5.0, 0.0])
+    assert is_new.tolist() == [False, False, False, True]
