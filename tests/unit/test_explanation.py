@@ -11,7 +11,6 @@ import structures
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.case_files.read import parse_case
 from blockvis.cases.explain_settings import ExplainSettings
 from blockvis.explanation.candidates import (
     candidates_of,
@@ -298,7 +297,7 @@ def test_runs_go_as_far_as_what_was_seen_asks_for():
 
 def test_stones_lean_to_a_side():
     text = '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [0, -1]\n'
-    case = parse_case(text, CASE)
+    case = structures.case_from(text)
     _, (one, *_) = candidates(ARCH)
     orders = {lean: ordered(case, ARCH, one.motions, Variant(0.6, lean), (0.02, 0.01)) for lean in (-1, 0, 1)}
     ratio = orders[1].given.loads.dead[:, 1] / orders[0].given.loads.dead[:, 1]
@@ -375,7 +374,7 @@ TIED = '[[ties]]\nname = "iron"\nfrom = [-0.9, 0.3]\nto = [0.9, 0.3]\nstiffness 
 
 def test_runs_of_causes_have_the_ties_of_the_case(tmp_path):
     layout = '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 6 }\n'
-    case = parse_case(layout + TIED + "[settlement]\ndirection = [0, -1]\n", CASE)
+    case = structures.case_from(layout + TIED + "[settlement]\ndirection = [0, -1]\n")
     _, (one, *_) = candidates(ARCH)
     assert [tie.name for tie in ordered(case, ARCH, one.motions, Variant(0.6, 0), (0.02, 0.01)).given.ties] == ["iron"]
     grounded = TIED.replace("[0.9, 0.3]", "{ fixed = [2.0, 0.0] }")
@@ -395,7 +394,7 @@ def test_cracks_of_causes_are_those_of_joints_with_mortar_or_that_give():
     _, (one, *_) = candidates(ARCH)
     widest = {}
     for name, law in {"dry": "", "glued": STRONG, "soft": SOFT}.items():
-        case = parse_case(layout + law + "[settlement]\ndirection = [0, -1]\n", CASE)
+        case = structures.case_from(layout + law + "[settlement]\ndirection = [0, -1]\n")
         run = followed(ordered(case, ARCH, one.motions, Variant(0.6, 0), (0.02, np.inf)))
         pose = solver.Pose(ARCH.centroids + run.moved[3, :, :2], run.moved[3, :, 2:])
         widest[name] = np.asarray(structures.posed(ARCH, pose).joints(0).cell_data["opening"]).max()
