@@ -47,3 +47,15 @@ def test_blocks_in_space_are_on_paper_as_they_are_asked_for(tmp_path, monkeypatc
     blockvis.write(response, tmp_path / "out")
     assert main(["report", str(tmp_path / "out"), "--pdf", "--view", "30,20", "--section", "y = 0.2"]) == 0
     assert seen == [({"azimuth": 30, "elevation": 20}, "y = 0.2")] * 3
+
+
+@pytest.mark.slow
+def test_the_table_of_cracks_says_what_they_run_between(arch_results, monkeypatch):
+    tables = {}
+    table = "blockvis.report.pdf._Paper.tabulate"
+    monkeypatch.setattr(table, lambda _, title, head, rows, widths: tables.update({title: (rows, widths)}))
+    assert main(["report", str(arch_results), "--pdf"]) == 0
+    rows, widths = tables["Cracks at the last equilibrium"]
+    assert sum(widths) <= 174.0
+    ends = [end for row in rows for end in row[-2:]]
+    assert any(re.fullmatch(r"the (ground|top), at -?\d+\.\d\d, -?\d+\.\d\d", end) for end in ends), ends
