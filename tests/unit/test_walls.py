@@ -71,7 +71,9 @@ def test_blockvis_uses_only_public_names_of_solver():
 
     for path in (ROOT / "blockvis").rglob("*.py"):
         text = path.read_text(encoding="utf-8")
-        assert not re.search(r"(?m)^\s*(from solver\.|import solver\.)", text), path.name
+        assert not re.search(r"(?m)^\s*(from solver\.(?!mechanics import)|import solver\.)", text), path.name
+        imported = re.findall(r"(?m)^\s*from solver\.mechanics import (.+)$", text)
+        assert {name for names in imported for name in names.split(", ")} <= {*solver.mechanics.__all__}, path.name
         for name in set(re.findall(r"(?<![\w.])solver\.([A-Za-z_]\w*)", text)):
             assert name in {*solver.__all__, "mechanics", "views"}, (path.name, name)
         for name in set(re.findall(r"(?<![\w.])mechanics\.([A-Za-z_]\w*)", text)):
