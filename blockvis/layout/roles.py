@@ -76,8 +76,12 @@ def twins_note(layout: Layout, twins: Sequence[tuple[int, int]], dropped: set[in
 
 
 def _unmatched(key: str, layout: Layout) -> str:
-    labels = [*dict.fromkeys(label for label in (*layout.groups, *layout.materials, *layout.names) if label)]
-    listed = ", ".join(f"'{label}'" for label in by_similarity(key, labels[:2000])[:12])
+    groups = [*dict.fromkeys(label for label in (*layout.groups, *layout.materials) if label)]
+    labels = [*dict.fromkeys((*groups, *(name for name in layout.names if name)))]
+    # Layers are few, and names of blocks that no one gave would hide them.
+    nearest_ones = by_similarity(key, labels[:2000])
+    shown = [*dict.fromkeys((*nearest_ones[:1], *by_similarity(key, groups[:2000])[:6], *nearest_ones))][:12]
+    listed = ", ".join(f"'{label}'" for label in shown)
     more = f" and {len(labels) - 12} more" if len(labels) > 12 else ""
     where = layout.source or "the drawing"
     return f"roles: '{key}' matches no block, group or layer of {where}; it has {listed}{more}; correct the name"
