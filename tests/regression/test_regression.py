@@ -42,8 +42,8 @@ LOOSER = dict.fromkeys(
     # A brick slips a little earlier with one kernel: 4.7e-3 of the last reaction, within the step tolerance.
     "wall_self_weight": 1e-2,
     "panel_settlement_friction": 2e-3,
-    # 3e-3 between the kernels.
-    "facade": 1e-2,
+    # 3e-3 between the kernels where no brick slips meanwhile; 2e-2 where one slips an increment earlier.
+    "facade": 3e-2,
     "opening_cut": 5e-3,
     # Friction bounds that follow carry rounding on: 5e-9 between the kernels, 3e-8 between two versions.
     "arch_pushed_after_settlement": 1e-6,
