@@ -568,8 +568,7 @@ def _new(options: argparse.Namespace) -> int:
         print(f"blockvis: note: {unit_says}", file=sys.stderr)
     text = case_text(found, relative_to(target.parent, drawing), unit_says=unit_says, walls=walls, **choice)
     write_atomic(target, text)
-    blocks = f"{len(found.kept)} block{'s' * (len(found.kept) != 1)}"
-    print(f"{target} written for {blocks}; run it: blockvis run {target}")
+    print(f"{target} written for {counted(len(found.kept), 'block')}; run it: blockvis run {target}")
     if found.layout.dimension == 2 and found.layout.thickness is None:
         print("the drawing does not say how deep it is: 1 m, unless [geometry] thickness says more")
     _try_new(text, target, drawing=options.outputs is None)

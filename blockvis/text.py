@@ -47,9 +47,8 @@ def force_text(force: float, moment: bool = False, *, padded: bool = False) -> s
     >>> force_text(2211.97), force_text(152.3), force_text(3.21e6, moment=True)
     ('2.212 kN', '152.3 N', '3.21 MN·m')
     """
-    size = abs(force)
-    factor, unit = next((f, u) for f, u in ((1e6, "MN"), (1e3, "kN"), (1.0, "N")) if size >= f or f == 1.0)
-    return f"{_digits(force / factor, 4, padded)} {unit}" + ("·m" if moment else "")
+    factor, prefix = _prefix(force)
+    return f"{_digits(force / factor, 4, padded)} {prefix}N" + ("·m" if moment else "")
 
 
 def quantity_text(value: float, unit: str = "") -> str:
@@ -63,7 +62,7 @@ def quantity_text(value: float, unit: str = "") -> str:
     ('1.5', '5e7')
     """
     if unit.startswith(("N", "Pa")):
-        factor, prefix = next((f, p) for f, p in PREFIXES if abs(value) >= f or f == 1.0)
+        factor, prefix = _prefix(value)
         value, unit = value / factor, prefix + unit
     digits = re.sub(r"e([+-])0*", lambda found: "e" + found[1].strip("+"), f"{value:.6g}")
     return f"{digits} {unit}".strip()
@@ -89,6 +88,11 @@ def rounded_text(value: float) -> str:
     ('3000', '0.612', '2.1e+11')
     """
     return f"{float(f'{value:.3g}'):g}"
+
+
+def _prefix(value: float) -> tuple[float, str]:
+    """Choose what stands before the unit of a number, and by what it is divided then."""
+    return next((factor, prefix) for factor, prefix in PREFIXES if abs(value) >= factor or factor == 1.0)
 
 
 def _digits(value: float, digits: int, padded: bool) -> str:

@@ -246,7 +246,7 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
     removed = int(increment.removed.sum())
     for count, fate in ((removed, "taken away"), (int(increment.fallen.sum()) - removed, "lost")):
         if count and increment.status != solver.Status.FALLING:
-            parts.append(f"{count} block{'s' if count != 1 else ''} {fate}")
+            parts.append(f"{mechanics.counted(count, 'block')} {fate}")
     return state_text(increment, response), "   ·   ".join(parts)
 
 

@@ -17,6 +17,7 @@ from blockvis.results.joint_faces import InitialJoints, initial_joints
 from blockvis.results.joints import end_openings
 from blockvis.system.atomic_files import atomic_file
 from blockvis.text import width_text
+from solver import mechanics
 
 from . import palette
 from .captions import phase_words, state_text
@@ -88,9 +89,7 @@ def draw_cracks(
         picture = drawing.image(main, _numbers(main, cracks))
         keys, pixel = drawing.keys, drawing.pixel
     none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
-    counted = "   ·   ".join(
-        [f"{len(cracks)} crack{'s' if len(cracks) != 1 else ''}", *phase_words(response, increment)]
-    )
+    counted = "   ·   ".join([mechanics.counted(len(cracks), "crack"), *phase_words(response, increment)])
     page = sheet.composed(
         picture,
         title=f"Cracks   ·   {state_text(increment, response)}",

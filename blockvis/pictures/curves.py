@@ -237,7 +237,7 @@ def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text:
         words = [f"phase {path[k].phase + 1} from here on"]
         taken = int(path[k].removed.sum()) - int(path[k - 1].removed.sum())
         if taken:
-            words.append(f"{taken} block{'s' if taken != 1 else ''} taken away")
+            words.append(f"{mechanics.counted(taken, 'block')} taken away")
         changes = [change for change in response.changes if change.phase == path[k].phase]
         words += [f"'{name}' taken away" for change in changes for name in change.ties]
         words += ["dead load changed"] * any(change.dead is not None for change in changes)

@@ -110,7 +110,7 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
     in_space = " in space" if layout.dimension == 3 else ""
     return Contents(
         layout=layout,
-        title=f"{_name(layout)}: {len(kept)} block{'s' * (len(kept) != 1)}{in_space}, read in {layout.unit}",
+        title=f"{_name(layout)}: {mechanics.counted(len(kept), 'block')}{in_space}, read in {layout.unit}",
         findings=(*_findings(inspection, deep), *walls.values()),
         kinds=tuple(kinds),
         named=tuple(kept),

@@ -15,6 +15,7 @@ from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.layout.sights import Cut, Sight, read_cut, read_sight
 from blockvis.results.about import loss_of
 from blockvis.system.atomic_files import atomic_file
+from solver import mechanics
 
 from .captions import phase_words
 from .drawer import Drawer, Look
@@ -225,7 +226,7 @@ def animate(
 
 def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
     n = int(parts.max(initial=-1)) + 1
-    bodies = f"{n} moving part{'s' if n != 1 else ''}{', darker where faster' if n > MOST_PARTS else ''}"
+    bodies = f"{mechanics.counted(n, 'moving part')}{', darker where faster' if n > MOST_PARTS else ''}"
     if response.collapse is None and response.limits:
         return f"mechanism at the limit load   ·   {response.limits[-1].flow} friction   ·   {bodies}"
     if response.collapse is None:

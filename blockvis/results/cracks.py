@@ -150,7 +150,6 @@ def cracks_of(
     meeting = _meetings(joints, chosen, MEETING * assembly.block_size)
     if assembly.dimension == 3:
         meeting = meeting[:, _part_alike(carried_faces(assembly, joints, pose), joints, chosen[meeting])]
-    if assembly.dimension == 3:
         found = [_crack(assembly, joints, moved, chosen[group]) for group in _groups(meeting, np.arange(len(chosen)))]
     else:
         courses = _courses(joints, moved[chosen], chosen, meeting, assembly.block_size)

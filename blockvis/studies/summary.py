@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 #: Most mechanisms that the summary lists.
 MOST_MECHANISMS = 6
 
+#: Most values of a single parameter whose outcome is written.
+MOST_VALUES = 12
+
 #: Most reasons of failure that the summary lists.
 MOST_REASONS = 5
 
@@ -129,10 +132,12 @@ def in_words(summary: dict[str, Any]) -> str:
         lines.append(f"{number} of the collapses {words}: a few blocks fall, the structure stands")
     if summary["line"]:
         ends = [
-            f"{_value(value)} {f'{at:.4g} {unit}' if at is not None else f'no collapse ({status})'}"
-            for value, at, status in summary["line"]
+            f"{_value(value)}: {f'{at:.4g} {unit}' if at is not None else f'none ({status})'}"
+            for value, at, status in summary["line"][:MOST_VALUES]
         ]
-        lines.append(f"collapse with {summary['parameter']}: {', '.join(ends)}")
+        if len(summary["line"]) > MOST_VALUES:
+            ends.append(f"{len(summary['line']) - MOST_VALUES} more in table.csv")
+        lines.append(f"collapse by {summary['parameter']}, {'; '.join(ends)}")
     elif summary["n_collapsed"] or summary["n_never_stood"]:
         quantiles = [
             f"{100 * float(p):g} % at {value:.4g} {unit}" if value is not None else f"{100 * float(p):g} % not reached"

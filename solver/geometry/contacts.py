@@ -139,8 +139,9 @@ def successors(
         Numbers in ``vanished``; one that is near to several is there several times.
     successor : (m,) int array
     """
-    keys, order = before.pair_keys()[vanished], np.argsort(contacts.pair_keys(), kind="stable")
-    first, last = (np.searchsorted(contacts.pair_keys()[order], keys, side) for side in ("left", "right"))
+    old, new = before.pair_keys()[vanished], contacts.pair_keys()
+    order = np.argsort(new, kind="stable")
+    first, last = (np.searchsorted(new[order], old, side) for side in ("left", "right"))
     row, position = expand_ranges(last - first)
     successor, earlier = order[first[row] + position], vanished[row]
     sense = np.where(before.block_a[earlier] == contacts.block_a[successor], 1.0, -1.0)[:, None]

@@ -381,7 +381,7 @@ def test_values_chosen_by_hand_are_no_sample():
     summary = summary_of(study, _table(study, [0.1, 0.2]))
     assert summary["first_order_indices"] == {}, "one value per run explains all of the variance"
     summary = summary_of(study, _table(study, [0.0, 0.2], ["no initial equilibrium", "collapsed"]))
-    assert "collapse with a: 0.4 no collapse (no initial equilibrium), 0.5 0.2 m" in in_words(summary)
+    assert "collapse by a, 0.4: none (no initial equilibrium); 0.5: 0.2 m" in in_words(summary)
     assert "share" not in in_words(summary), "each value has its run"
 
 
