@@ -209,17 +209,20 @@ class _StaticProgram:
             objective = np.concatenate([self.rays.T @ (matrix.T @ along), np.zeros(2 * self.rows)])
             self.unit, self.constant = model.force * model.length * speed, float(along @ given)
         self.objective, self.matrix = objective, with_slack(*columns)
-        self.places: np.ndarray | None = np.repeat(pose.positions[blocks], model.n_dof, axis=0)
+        self.places = np.repeat(pose.positions[blocks], model.n_dof, axis=0)
         limited = np.flatnonzero(np.isfinite(most))
         self.reserve = (most - least)[limited]
         if len(limited) or bonded.any():
-            normal = sp.csc_array(sp.csr_array(self.rays)[d * limited])
+            normal, places = sp.csc_array(sp.csr_array(self.rays)[d * limited]), contacts.points[limited]
             if bonded.any():
                 normal = sp.vstack([normal, carried.limits], format="csc")
                 self.reserve = np.append(self.reserve, carried.most)
+                # Limits of single forces: where they are does not matter.
+                places = np.vstack([places, np.zeros((len(carried.most), d))])
             beside = sp.csc_array((len(self.reserve), len(objective) - self.n))
             limits_of = sp.hstack([normal, beside])
-            self.matrix, self.places = sp.csc_array(sp.vstack([self.matrix, limits_of], format="csc")), None
+            self.matrix = sp.csc_array(sp.vstack([self.matrix, limits_of], format="csc"))
+            self.places = np.vstack([self.places, places])
 
     def bound(self, sign: float, *, slack: bool = True) -> Solution | None:
         """Least or, by sign, largest value, or 0 for any; with or without unbalanced forces; None without a bound.

@@ -118,11 +118,11 @@ class Admissible:
         values = np.tile([1.0, -1.0], p)
         shear = sp.csc_array((values, (np.repeat(2 * sticky + 1, 2), np.arange(2 * p))), shape=(2 * n, 2 * p))
         columns = sp.csc_array(sp.hstack([rays, shear], format="csc"))
-        both = sp.csc_array((np.ones(2 * p), (np.repeat(np.arange(p), 2), np.arange(2 * p))), shape=(p, 2 * p))
-        ahead = sp.csc_array((p, 2 * n))
-        normal = sp.csc_array(sp.csr_array(columns)[2 * brittle]) if q else sp.csc_array((0, columns.shape[1]))
-        limits = sp.csc_array(sp.vstack([sp.hstack([ahead, both]), normal], format="csc"))
-        return cls(columns, limits, np.concatenate([cohesion[sticky], crushing[brittle]]), np.zeros(0))
+        # A limit of one coefficient costs nothing, one of both would widen the band of the program.
+        each = sp.eye_array(2 * (n + p), format="csr")[2 * n :]
+        normal = sp.csr_array(columns)[2 * brittle] if q else sp.csr_array((0, columns.shape[1]))
+        limits = sp.csc_array(sp.vstack([each, normal], format="csc"))
+        return cls(columns, limits, np.concatenate([np.repeat(cohesion[sticky], 2), crushing[brittle]]), np.zeros(0))
 
     @classmethod
     def _round(

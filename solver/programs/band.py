@@ -48,11 +48,25 @@ class _Point:
 
 
 class _Band:
-    """A D Aᵀ for a fixed A, its rows in an order that keeps what is not zero near the diagonal; and its factor."""
+    """A D Aᵀ for a fixed A beside an identity, in an order that keeps it near the diagonal; and its factor.
+
+    Rows of one column bound that column. They are eliminated, and widen no band.
+    """
 
     def __init__(self, matrix: sp.csc_array, places: np.ndarray | None) -> None:
-        self.rows = matrix.shape[0]
-        counts = np.diff(matrix.indptr)
+        rows, columns = matrix.shape
+        of_column = np.repeat(np.arange(columns), np.diff(matrix.indptr))
+        alone = np.flatnonzero(np.bincount(matrix.indices)[matrix.indices] == 1)
+        alone = alone[np.unique(of_column[alone], return_index=True)[1]]
+        self.bounding, self.bounded, self.slope = matrix.indices[alone], of_column[alone], matrix.data[alone]
+        self.unit = columns + self.bounding
+        self.kept = np.delete(np.arange(rows), self.bounding)
+        if not len(self.kept):
+            raise NoProgress("every row bounds one column")
+        matrix = sp.csc_array(sp.csr_array(sp.hstack([matrix, sp.eye_array(rows)]))[self.kept])
+        self.beside = matrix[:, self.bounded]
+        places = None if places is None else places[self.kept]
+        self.rows, counts = len(self.kept), np.diff(matrix.indptr)
         # Each column is as wide as it has entries, at least: a load on every block fills the matrix.
         self._refuse_wide(int(counts.max(initial=0)))
         self.order, self.width = narrowest(matrix, places)
@@ -85,6 +99,11 @@ class _Band:
             raise NoProgress(f"{self.rows} rows in a band {width} wide")
 
     def factorise(self, diagonal: np.ndarray) -> None:
+        of_unit, of_bounded = diagonal[self.unit], diagonal[self.bounded]
+        self.pivot = self.slope**2 * of_bounded + of_unit
+        self.share = self.slope * of_bounded / self.pivot
+        diagonal = diagonal.copy()
+        diagonal[self.bounded] = of_bounded * of_unit / self.pivot
         values = np.zeros(self.rows * self.width)
         values[self.filled] = self.sums @ diagonal[self.columns]
         self.factor, failed = lapack.dpbtrf(values.reshape(self.rows, self.width).T, lower=1, overwrite_ab=1)
@@ -92,8 +111,11 @@ class _Band:
             raise NoProgress("the normal equations are singular")
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        solution = np.empty(self.rows)
-        solution[self.order] = lapack.dpbtrs(self.factor, right[self.order], lower=1)[0]
+        alone, solution = right[self.bounding], np.empty(len(right))
+        kept = self.kept[self.order]
+        rest = right[self.kept] - self.beside @ (self.share * alone)
+        solution[kept] = lapack.dpbtrs(self.factor, rest[self.order], lower=1)[0]
+        solution[self.bounding] = alone / self.pivot - self.share * (solution[self.kept] @ self.beside)
         return solution
 
 
@@ -110,7 +132,7 @@ class _Method:
         self.matrix, self.transposed = sp.csr_array(program.matrix), sp.csr_array(program.matrix.T)
         self.x = slice(0, columns)
         self.below, self.above = slice(columns, columns + rows), slice(columns + rows, columns + 2 * rows)
-        self.band = _Band(sp.csc_array(sp.hstack([program.matrix, sp.eye_array(rows)])), program.places)
+        self.band = _Band(program.matrix, program.places)
         self.point = self._start(program.matrix)
         self.short_steps = 0
 

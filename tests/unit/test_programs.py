@@ -544,6 +544,31 @@ def test_an_order_of_the_rows_makes_no_difference_but_the_width():
     assert narrowest(whole, shuffled.places)[1] == 6
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_rows_of_one_column_bound_it_and_widen_no_band(seed):
+    """As mortar does of many joints: some columns are bounded from both sides, or twice."""
+    random, program = np.random.default_rng(seed), chain(seed, 30)
+    columns = random.choice(program.matrix.shape[1] - 180, 40)
+    bounds = sp.csr_array(
+        (random.uniform(-2.0, 2.0, 40), (np.arange(40), columns)), shape=(40, program.matrix.shape[1])
+    )
+    bounded = LinearProgram(
+        program.cost,
+        sp.csc_array(sp.vstack([bounds[:20], program.matrix, bounds[20:]])),
+        np.concatenate([np.full(20, -0.2), program.lower, np.full(20, -0.2)]),
+        np.concatenate([np.full(20, 0.2), program.upper, np.full(20, 0.2)]),
+    )
+    assert len(np.unique(columns)) < 40
+    assert solved(bounded).objective == pytest.approx(scipy_optimum(bounded), rel=1e-6)
+    assert band._Band(bounded.matrix, None).width <= band._Band(program.matrix, None).width + 2
+
+
+def test_a_program_of_bounds_alone_is_left_to_others():
+    program = LinearProgram(np.ones(4), sp.csc_array(np.eye(4)), np.ones(4), np.full(4, 2.0))
+    assert run_band(program) == (None, "every row bounds one column")
+    assert solve_lp(program, (BAND, *ROUTES)).objective == pytest.approx(4.0)
+
+
 def test_what_comes_no_nearer_is_taken_where_the_check_accepts_it(monkeypatch):
     """A tolerance below rounding is never reached; what was nearest passes the check."""
     monkeypatch.setattr(band, "INTERIOR_TOLERANCE", 1e-30)
