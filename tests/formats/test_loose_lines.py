@@ -120,6 +120,7 @@ def test_where_nothing_closes_the_message_says_what_there_is(tmp_path):
         read(path)
 
 
+@pytest.mark.slow
 def test_thousands_of_lines_are_quick(tmp_path):
     n = 25
     across = [((x, y), (x + 1, y)) for x in range(n) for y in range(n + 1)]

@@ -83,6 +83,7 @@ def test_the_process_writes_what_viewers_open_and_says_what_fails(arch, arch_res
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends no signal to one process")
+@pytest.mark.slow
 def test_ctrl_c_is_for_the_first_process_even_before_the_other_has_loaded(arch, arch_results, capfd):
     process = FilmProcess()
     process.follow(arch_results, arch.assembly, film_process.ViewerFormat(), 0)
@@ -189,6 +190,7 @@ def test_a_bar_on_a_terminal_lines_elsewhere(monkeypatch):
     ]
 
 
+@pytest.mark.slow
 def test_the_seconds_of_each_part_are_counted(case, tmp_path):
     run = blockvis.run_case(case, tmp_path / "out", outputs=())
     assert set(run.stages) >= {"read", "solve", "write"}

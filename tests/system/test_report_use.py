@@ -91,6 +91,7 @@ def test_the_failure_of_a_run_is_the_heading():
     assert 'class="failed"' not in report_of(arch_response())
 
 
+@pytest.mark.slow
 def test_the_report_of_an_example_stays_below_a_megabyte(tmp_path):
     response = parted(wall(34, 46), 11, 0)
     assert response.assembly.n_blocks > 1_550

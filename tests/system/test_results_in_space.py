@@ -88,7 +88,9 @@ def test_polyhedra_come_back_through_pyvista(tmp_path):
     assert b'Name="faceoffsets"' in file.read_bytes()
 
 
-@pytest.mark.parametrize("response", [arch_response, vault_response], ids=["plane", "space"])
+@pytest.mark.parametrize(
+    "response", [arch_response, pytest.param(vault_response, marks=pytest.mark.slow)], ids=["plane", "space"]
+)
 def test_results_reach_meshio_as_the_manual_says(response, tmp_path, monkeypatch):
     """Numbers, cells and, beside them, names: of polygons and of polyhedra, which meshio sorts by their corners."""
     pytest.importorskip("meshio")
@@ -277,6 +279,7 @@ def ink_in(picture):
     return np.nonzero((picture < 235).any(axis=2))
 
 
+@pytest.mark.slow
 def test_a_vault_is_seen_from_both_sides_and_fills_the_picture(tmp_path):
     """By default the intrados stands beside the extrados; each view alone has the whole width."""
     both = drawn_vault(tmp_path)

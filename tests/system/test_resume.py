@@ -266,6 +266,7 @@ def test_killed_from_outside_while_it_runs(whole, tmp_path):
     _same_result(whole / "out", out)
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_cleanly_and_the_run_resumes(whole, tmp_path, monkeypatch, capsys):
     count, found = itertools.count(), mechanics.Increments.__next__
 

@@ -106,6 +106,7 @@ def row_of(line):
     return "<tr><td>{}</td><td>{}</td></tr>".format(*line.split(": "))
 
 
+@pytest.mark.slow
 def test_a_report_keeps_its_step_error_when_it_is_drawn_again(tmp_path, capsys):
     assert run_here(tmp_path, SHORT, "--check-steps") == 0
     (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("error of the steps")]
@@ -119,6 +120,7 @@ def test_a_report_keeps_its_step_error_when_it_is_drawn_again(tmp_path, capsys):
     assert report.read_text(encoding="utf-8").count(row_of(line)) == 1
 
 
+@pytest.mark.slow
 def test_no_steps_are_checked_where_none_are_to_be(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "step_check.json").write_text("{}", encoding="utf-8")

@@ -120,6 +120,7 @@ def test_no_closer_is_shorter_than_three_tenths_of_a_brick():
     seed=st.integers(0, 99),
 )
 @settings(max_examples=10, deadline=None)
+@pytest.mark.thorough
 def test_any_wall_is_filled_whatever_its_openings_are(wall, openings, bond, heads, seed):
     width, high, gable = wall
     outline = shapely.Polygon([(0, 0), (width, 0), (width, high), (width / 2, high + gable), (0, high)])
@@ -214,6 +215,7 @@ def test_the_command_writes_the_stones_of_a_drawing(facade, capsys):
     assert "an outline of 15.6 m² on layer 'A-WALL' with 3 openings was filled" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_a_hatch_with_holes_and_faces_between_lines_are_walls_too(tmp_path):
     rest = WALL.area - OPENINGS[1].area
     hatched, lined = ezdxf.new("R2010"), ezdxf.new("R2010")

@@ -193,6 +193,7 @@ def test_every_parameter_of_a_layout_is_described(name):
             assert f"`{default}`" in row
 
 
+@pytest.mark.slow
 def test_the_tool_writes_the_pages(tmp_path):
     tool = ROOT / "tools" / "key_reference.py"
     done = subprocess.run([sys.executable, tool, tmp_path / "new" / "reference"], capture_output=True, text=True)

@@ -132,6 +132,7 @@ def test_a_small_overlap_that_facing_leaves_is_a_contact_with_a_note(tmp_path):
         assembly_of(case(text.replace("[roles]", "overlap_tolerance = 0.001\n[roles]") + DOWN, tmp_path))
 
 
+@pytest.mark.slow
 def test_a_face_that_folds_back_on_itself_is_drawn(tmp_path):
     """As of a stone of `bridge.json` of compas_cra: of its upper edge a part is run along twice."""
     ring = [(-1.04, 1.53), (-0.96, 1.53), (-2.08, 1.53), (-1.97, 1.45), (-1.45, 1.45), (-1.40, 1.49), (-1.37, 1.46)]

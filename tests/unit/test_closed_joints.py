@@ -142,6 +142,7 @@ def test_small_overlap_is_resolved_to_the_midline():
 
 @given(st.lists(st.floats(0.004, 0.012), min_size=5, max_size=11), st.integers(2, 5), st.floats(-3, 3))
 @settings(max_examples=40, deadline=None)
+@pytest.mark.slow
 def test_running_bond_with_joints_of_any_thickness(joints, courses, turn):
     bricks = wall(joints, courses)
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])

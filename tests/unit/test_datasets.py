@@ -137,6 +137,7 @@ def test_contacts_say_how_much_of_their_friction_is_used_up():
     assert not used[~carries].any()
 
 
+@pytest.mark.slow
 def test_the_fall_begins_at_the_last_equilibrium_and_is_found_by_its_seconds():
     response = arch_response()
     start, later = response.fall(0.0), response.fall(0.5)

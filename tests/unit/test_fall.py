@@ -112,6 +112,7 @@ def test_a_free_fall_is_that_of_gravity():
     assert 9.5 - engine.pose.positions[0, 1] == pytest.approx(solver.GRAVITY * 0.5**2 / 2.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_same_bytes_twice(tmp_path):
     response = shipped_arch()
     for name, fall in (("one", fallen(shipped_arch)), ("two", fall_of(response))):
@@ -415,6 +416,7 @@ def test_energy_only_falls_and_all_comes_to_rest_without_overlap():
     )
 
 
+@pytest.mark.slow
 def test_a_box_that_spins_freely_flips_about_its_middle_axis_and_keeps_angular_momentum_and_energy():
     assembly = solver.Assembly.from_solids([box((-0.5, -1.0, -2.0), (0.5, 1.0, 2.0))], roles=["free"])
     law, still = solver.Interfaces(solver.InterfaceLaw(0.5)), np.zeros((1, 6))

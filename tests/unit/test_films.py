@@ -48,6 +48,7 @@ def sideways_block(steps=3):
     return solver.pushover(assembly, control, loads=loads, friction_coefficient=2.0)
 
 
+@pytest.mark.slow
 def test_a_film_tells_what_is_lost_and_goes_on():
     response = dropped_brick(0.05)
     shown = response.path

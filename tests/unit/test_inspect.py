@@ -53,6 +53,7 @@ def test_picture(layout, tmp_path):
 
 
 @pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")
+@pytest.mark.slow
 def test_facade():
     found = inspect(FACADE)
     assert found.layout.n_blocks == 1568

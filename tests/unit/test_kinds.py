@@ -51,6 +51,7 @@ def test_the_search_for_comparisons_finds_them(tmp_path):
 
 
 @pytest.mark.parametrize("package", ["solver", "blockvis"])
+@pytest.mark.slow
 def test_only_the_kinds_know_their_names(package):
     modules = [path for path in sorted((ROOT / package).rglob("*.py")) if path.parent != HOME]
     found = {str(path.relative_to(ROOT)): _compared_names(path) for path in modules}

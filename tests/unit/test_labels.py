@@ -120,6 +120,7 @@ def test_the_legend_lists_what_is_drawn_and_what_is_too_much():
     assert not any("forces" in text for text in keys_of(parted(wall(20, 18), 3, 0), forces="none"))
 
 
+@pytest.mark.slow
 def test_the_legend_of_the_fall_names_no_joints_and_no_forces(words):
     """Dynamics draws the blocks alone; hinges and forces are those of statics."""
     response = arch_response()
@@ -233,6 +234,7 @@ def test_labels_lie_apart_and_tell_by_leaders_where_they_belong():
     assert (pixels == palette.PAPER).all(axis=2).sum() > 5 * 150
 
 
+@pytest.mark.slow
 def test_what_lies_still_has_no_badge_of_falling(words):
     response = arch_response()
     fall = fall_of(response)

@@ -45,6 +45,7 @@ BOTH = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.thorough
 def test_a_pebble_that_tips_leans_on_the_wall_beside():
     assembly = _bench()
     response = solver.settle(assembly, TILT, friction_coefficient=1.0)

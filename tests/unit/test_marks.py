@@ -129,6 +129,7 @@ def test_the_pocket_where_four_cracks_meet_is_air(apart):
     np.testing.assert_allclose(covered.area, 4 * 2.0 * apart, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_joint_that_slides_on_one_point_is_marked_over_a_length():
     response = arch_response()
     last, joints = response.path[-1], initial_joints(response.assembly)

@@ -515,10 +515,12 @@ def with_two_threads():
     ).stdout.splitlines()
 
 
+@pytest.mark.slow
 def test_threads_are_limited_and_given_back(with_two_threads):
     assert with_two_threads[0].split() == ["True", "[1,", "1]"]
 
 
+@pytest.mark.slow
 def test_same_bits_with_any_number_of_threads(with_two_threads):
     program = chain(5, 200)
     assert digest(solved(program)) == with_two_threads[1]

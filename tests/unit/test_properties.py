@@ -154,7 +154,7 @@ def test_units(name, exponent, heavier):
     assert_same(name, scaled.settle(), length, density * length**2)
 
 
-@pytest.mark.parametrize("name", CASES)
+@SLIDING_THOROUGHLY
 def test_mirror_image(name):
     assert_same(name, CASES[name].mapped(np.diag([-1.0, 1.0])).settle())
 
@@ -172,7 +172,7 @@ def test_order_of_the_blocks(name, random):
     assert_same(name, shuffled.settle())
 
 
-@SLIDING_THOROUGHLY
+@ARCHES_THOROUGHLY
 @pytest.mark.parametrize("shift", [(5e5, 5e6), pytest.param((-3e3, 1e4), marks=pytest.mark.thorough)])
 def test_far_from_the_origin(name, shift):
     """In map coordinates, UTM, metres are left with nine digits after the point."""

@@ -103,6 +103,7 @@ def test_a_wall_that_rocks_does_not_depend_on_the_increment():
     assert curves[0][-1] < 0.95 * curves[0][0]
 
 
+@pytest.mark.thorough
 def test_pushed_only_so_far_it_keeps_capacity():
     assembly = block()
     control = solver.ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.01, limit=0.095)
@@ -120,6 +121,7 @@ def test_pushed_only_so_far_it_keeps_capacity():
     assert [i.load_multiplier for i in again.path] == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.thorough
 def test_what_has_fallen_is_marked():
     assembly = block()
     control = solver.ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.05)

@@ -49,6 +49,7 @@ def flat_arch():
 ROLES = {"left abutment": "fixed", "right abutment": "moving"}
 
 
+@pytest.mark.slow
 def test_a_multiblock_settles_and_its_parts_name_the_blocks():
     accessor = flat_arch().blockvis
     response = accessor.settle(

@@ -107,6 +107,7 @@ def test_a_file_without_geometry_is_refused_without_a_picture(tmp_path, capsys):
     assert not (tmp_path / "a.png").exists()
 
 
+@pytest.mark.slow
 def test_a_body_that_is_not_closed_is_marked_with_its_open_edges(tmp_path):
     with pytest.raises(Refused, match="'stone 1' is not closed") as refused:
         read_layout(bodies(tmp_path / "a.obj", BOX, BOX[:5], BOX))

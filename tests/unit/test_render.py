@@ -230,6 +230,7 @@ def frames_of(response, **options):
     return frames, told
 
 
+@pytest.mark.slow
 def test_every_frame_of_the_path_is_new_and_nothing_stands_for_long():
     frames, told = frames_of(parted(wall(6, 5), 4, 3, settlement=0.05))
     # Four seconds of path, half a second before three frames of the fall, and the end.
@@ -242,6 +243,7 @@ def test_every_frame_of_the_path_is_new_and_nothing_stands_for_long():
     assert not any(differs[114:])
 
 
+@pytest.mark.slow
 def test_the_caption_of_a_frame_is_of_the_frame(monkeypatch):
     told = []
     composed = Sheet.composed

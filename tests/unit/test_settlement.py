@@ -245,6 +245,7 @@ def test_rotation_about_a_point_moves_the_support_on_the_arc():
         assert np.hypot(*block) == pytest.approx(np.hypot(*drawn), abs=2e-3)
 
 
+@pytest.mark.thorough
 def test_several_phases():
     """20 mm down, then spreading from there until it collapses."""
     arch = generators.arch()

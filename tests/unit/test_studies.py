@@ -224,6 +224,7 @@ def test_nothing_varied_is_refused(tmp_path):
         read_study({"study": {"case": str(tmp_path / "case.toml")}})
 
 
+@pytest.mark.slow
 def test_an_unreachable_scheduler_is_one_message_and_nothing_started(study_file, capsys, monkeypatch):
     monkeypatch.setattr(campaign, "ANSWER", 0.5)
     out = study_file.parent / "out"

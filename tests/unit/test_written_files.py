@@ -130,6 +130,7 @@ def test_states_are_flushed_before_the_checkpoint_and_the_rest_at_the_end(tmp_pa
     assert [(what, path.name) for what, path in done] == [("flush", name) for name in (*files, "increments")]
 
 
+@pytest.mark.slow
 def test_what_a_power_cut_has_left_of_the_files_of_increments_is_made_again(tmp_path):
     arch, folder = generators.arch(), tmp_path / "out" / "increments"
     results = ResultsFolder(tmp_path / "out", arch, record=Record(case="x"))
@@ -329,6 +330,7 @@ def test_a_case_in_another_encoding_says_what_to_do(tmp_path):
         read_case(tmp_path / "case.toml")
 
 
+@pytest.mark.slow
 def test_names_that_a_console_cannot_show_are_escaped(tmp_path):
     layout = tmp_path / "layout.svg"
     save_layout(generators.portal(), layout)

@@ -17,7 +17,7 @@ THOROUGH = {"marks": pytest.mark.thorough}
 #: embrace [degrees], t/R, n, d_c/R, H/W at the start, H/W at collapse.
 SPREADING = [
     (180, 0.15, 12, 0.14104982, 0.1771150, 0.2420193),
-    (180, 0.15, 13, 0.15910759, 0.1741342, 0.2459914),
+    pytest.param(180, 0.15, 13, 0.15910759, 0.1741342, 0.2459914, **THOROUGH),
     pytest.param(180, 0.15, 24, 0.14034471, 0.175998, 0.240540, **THOROUGH),
     pytest.param(180, 0.20, 16, 0.23555602, 0.153952, 0.278566, **THOROUGH),
     pytest.param(120, 0.10, 12, 0.15286859, 0.302630, 0.556513, **THOROUGH),

@@ -125,6 +125,7 @@ def test_a_keystone_between_equal_halves_slips_the_same_way_in_any_increment():
     assert turned_by[1] == pytest.approx(turned_by[0], rel=0.2)
 
 
+@pytest.mark.thorough
 def test_a_wall_a_thousand_times_as_heavy_ends_alike():
     _, expected = as_drawn("panel")
     response = sinking(described(wall("panel"), density=2e6))

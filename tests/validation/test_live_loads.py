@@ -137,7 +137,8 @@ def test_a_block_that_just_fits_under_a_ceiling(width, friction, multiplier):
     assert limit_load(assembly, loads=loads, friction_coefficient=friction).status is solver.LimitStatus.UNBOUNDED
 
 
-@pytest.mark.parametrize("n", [1, pytest.param(5, marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("n", [1, 5])
 def test_overturning_block_and_stack(n):
     assembly = stack(n)
     control = solver.ControlDisplacement(assembly.names[n - 1], (1, 0), point=(0.2, 1.0), increment=0.01, limit=0.5)

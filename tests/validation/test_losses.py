@@ -53,6 +53,7 @@ def test_the_path_continues_to_the_collapse_of_the_structure(order, mirrored):
 
 
 @pytest.mark.parametrize("local_loss", [0.0, pytest.param(0.02, marks=pytest.mark.thorough)])
+@pytest.mark.slow
 def test_the_first_loss_ends_it_where_that_is_asked_for(local_loss):
     response = tilted(local_loss=local_loss)
     assert response.stop is solver.Status.COLLAPSED
