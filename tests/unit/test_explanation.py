@@ -318,10 +318,9 @@ def test_an_interrupt_does_not_wait_for_runs():
             futures[0].result()
             raise KeyboardInterrupt
 
-    started = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
         interrupted()
-    assert time.perf_counter() - started < 100.0
+    # One that was waited for would have its result.
     with pytest.raises((CancelledError, BrokenExecutor)):
         futures[-1].result(timeout=100.0)
 

@@ -5,7 +5,7 @@ import csv
 import io
 import json
 import re
-import time
+import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -192,11 +192,17 @@ def test_a_single_step_that_takes_long_is_told_too(tmp_path, monkeypatch):
     monkeypatch.setattr("blockvis.runs.progress.BEAT", 0.01)
     monkeypatch.setattr("blockvis.runs.progress.LINES", 0.0)
     text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
-    stream = io.StringIO()
-    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), stream, count=3)
+    told = threading.Event()
+
+    class Stream(io.StringIO):
+        def write(self, words):
+            if "blockvis: increment 4 for 0 s" in words:
+                told.set()
+            return super().write(words)
+
+    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), Stream(), count=3)
     bar.watch()
-    while "blockvis: increment 4 for 0 s" not in stream.getvalue():
-        time.sleep(0.01)
+    assert told.wait(timeout=60)
     bar.done()
 
 
