@@ -36,7 +36,9 @@ def test_named_objects_may_touch(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", ["stl", "ply"])
-@pytest.mark.parametrize("name", ["dome", "T corner", "cross vault"])
+@pytest.mark.parametrize(
+    "name", ["T corner", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("dome", "cross vault"))]
+)
 def test_stones_of_one_mesh_that_touch_are_separate_blocks(tmp_path, name, suffix):
     """The faces in any order, turned inside out or not: around each edge they go together by their insides."""
     layout = generators.build(name, {"courses": 3} if name == "T corner" else None)

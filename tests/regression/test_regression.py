@@ -107,6 +107,7 @@ THOROUGH = {
     "arch_with_fill",
     "arch_with_tie",
     "panel_with_tie",
+    "wall_pushed",
     "opening_cut",
     "panel_with_opening",
     "portal_frame",

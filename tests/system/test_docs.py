@@ -44,7 +44,13 @@ def test_keys_of_the_summary_are_named(arch_results):
     assert missing(keys_of(json.loads((arch_results / "summary.json").read_text(encoding="utf-8")))) == []
 
 
-@pytest.mark.parametrize("kind", ["limit load", "pushover", "moving load", "capacity"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "pushover",
+        *(pytest.param(kind, marks=pytest.mark.thorough) for kind in ("limit load", "moving load", "capacity")),
+    ],
+)
 def test_keys_and_columns_of_other_analyses_are_named(kind, tmp_path):
     live = """
 [[loads]]

@@ -66,6 +66,7 @@ def test_limit_load_is_a_response_of_its_own(block, tmp_path):
     assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["limit_load_multiplier"] == pytest.approx(0.5)
 
 
+@pytest.mark.thorough
 def test_datasets_of_an_increment():
     response = solver.Structure(generators.arch(), friction_coefficient=2.0).settle((1, 0))
     last = response.path[-1]

@@ -45,6 +45,7 @@ def test_semicircular_arch_on_spreading_supports(increment, error):
     assert "hinges at" in response.collapse.words
 
 
+@pytest.mark.thorough
 def test_a_hinge_jumps_to_the_next_joint():
     """At d = 0.12885 a hinge of this arch moves to another joint; it falls at 0.14352524."""
     arch = generators.arch(embrace=120, thickness_ratio=0.10, voussoirs=13)
@@ -60,6 +61,7 @@ def test_arch_on_a_sinking_support():
     assert response.collapse.reaction / response.total_weight == pytest.approx(0.559286, rel=1e-4)
 
 
+@pytest.mark.thorough
 def test_portal_frame():
     """The lintel tilts on its bearings until it slides off; 6/13 W stand on the right foot at first."""
     portal = generators.portal(span=2.0, height=2.4, column_width=0.5, column_blocks=4, lintel_height=0.5)
