@@ -2,12 +2,35 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .assembly import Assembly
+from .words import refuse_text
+
+#: Friction coefficient above which it is probably an angle.
+STEEPEST = 3.0
+
+
+def steep_note(friction: float) -> str:
+    """Say what a friction coefficient too large for masonry may have been meant as; nothing of others."""
+    if friction <= STEEPEST:
+        return ""
+    angle = f"; if it is an angle in degrees, give its tangent, {math.tan(math.radians(friction)):.3g}"
+    slope = math.degrees(math.atan(friction))
+    return f"friction_coefficient = {friction:g} is a slope of {slope:.3g} degrees{angle if friction < 90.0 else ''}"
+
+
+def uniform(friction: float) -> Interfaces:
+    """Give every interface the same friction, with a warning where it is probably an angle."""
+    interfaces = Interfaces(InterfaceLaw(friction))
+    if note := steep_note(friction):
+        warnings.warn(note, stacklevel=3)
+    return interfaces
 
 
 @dataclass(frozen=True)
@@ -41,6 +64,7 @@ class InterfaceLaw:
 
     def __post_init__(self) -> None:
         """Check the values."""
+        refuse_text(self)
         mu = self.friction_coefficient
         if not (np.isfinite(mu) and mu >= 0):
             raise ValueError(f"friction_coefficient is {mu:g}; it must be a finite number of at least 0")

@@ -10,6 +10,7 @@ import numpy as np
 from .assembly import Assembly
 from .backfill import Backfill
 from .kinematics import Pose, composed_rotations, cross_rows, dimension_of, moved, rotation_count, turned
+from .words import refuse_text
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
@@ -109,6 +110,7 @@ class Settlement:
 
     def __post_init__(self) -> None:
         """Check the values; make the direction a unit vector, and the rotation without one a sign."""
+        refuse_text(self)
         if self.profile is not None:
             self._check_profile()
         elif self.direction is None and self.rotation_centre is None and self.radial_from is None:

@@ -14,6 +14,7 @@ from .geometry.planar_contacts import corners_and_edges, features_of
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
 from .geometry.shapes import Shapes
+from .interfaces import steep_note
 from .kinematics import (
     carried,
     carried_between,
@@ -132,6 +133,7 @@ __all__ = [
     "rigid_parts",
     "settlement_in",
     "settlement_increments",
+    "steep_note",
     "swung",
     "tie_ends",
     "tie_lengths",

@@ -15,7 +15,7 @@ from .analysis.limit_load import find_limit_load
 from .analysis.pushover import pushover_increments
 from .analysis.settlement import settlement_increments
 from .assembly import Assembly
-from .interfaces import InterfaceLaw, Interfaces
+from .interfaces import InterfaceLaw, Interfaces, uniform
 from .kinematics import Pose
 from .loads import Loads, Settlement, checked_loads, weight_fraction
 from .path.controls import Controls
@@ -69,7 +69,7 @@ class Structure(Shown):
         if (interfaces is None) == (friction_coefficient is None):
             raise TypeError("a structure needs either a friction_coefficient or interfaces; give one of them")
         if interfaces is None:
-            interfaces = Interfaces(InterfaceLaw(float(friction_coefficient or 0.0)))
+            interfaces = uniform(friction_coefficient or 0.0)
         object.__setattr__(self, "assembly", assembly)
         object.__setattr__(self, "interfaces", interfaces)
         object.__setattr__(self, "loads", checked_loads(assembly, loads))
@@ -359,7 +359,7 @@ def settle(
 
     The friction coefficient is of every interface, where ``interfaces`` are not given.
     """
-    structure = Structure(assembly, interfaces or Interfaces(InterfaceLaw(friction_coefficient)), loads)
+    structure = Structure(assembly, interfaces or uniform(friction_coefficient), loads)
     return structure.settle(settlement, controls=controls, on_increment=on_increment)
 
 
@@ -373,9 +373,7 @@ def pushover(
     **options: Any,
 ) -> Response:
     """Follow blocks under growing displacement: :meth:`Structure.pushover`, with its options, in one call."""
-    return Structure(assembly, interfaces or Interfaces(InterfaceLaw(friction_coefficient)), loads).pushover(
-        control, **options
-    )
+    return Structure(assembly, interfaces or uniform(friction_coefficient), loads).pushover(control, **options)
 
 
 def limit_load(
@@ -387,6 +385,4 @@ def limit_load(
     **options: Any,
 ) -> LimitLoad:
     """Find the largest multiplier of live loads: :meth:`Structure.limit_load`, with its options, in one call."""
-    return Structure(assembly, interfaces or Interfaces(InterfaceLaw(friction_coefficient)), loads).limit_load(
-        **options
-    )
+    return Structure(assembly, interfaces or uniform(friction_coefficient), loads).limit_load(**options)

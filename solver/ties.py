@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.words import counted
+from solver.words import counted, refuse_text
 
 from .assembly import Assembly
 from .geometry.contacts import Contacts
@@ -69,6 +69,7 @@ class Tie:
 
     def __post_init__(self) -> None:
         """Check the values."""
+        refuse_text(self)
         who = f"tie '{self.name}'"
         if self.kind not in KINDS:
             raise ValueError(f"{who} is of kind '{self.kind}'; kinds are {', '.join(KINDS)}")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from typing import Any
+
 
 def counted(number: int, one: str, many: str = "") -> str:
     """Write a number of things: of one in the singular.
@@ -18,3 +21,11 @@ def counted(number: int, one: str, many: str = "") -> str:
     ('1 block', '2 blocks', '0 bodies fall')
     """
     return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+def refuse_text(owner: Any) -> None:
+    """Raise ``TypeError`` for a text where a dataclass has a number, which would fail later without the name."""
+    for part in fields(owner):
+        value = getattr(owner, part.name)
+        if isinstance(value, str) and "float" in str(part.type):
+            raise TypeError(f"{part.name} is the text '{value}'; give a number, without quotation marks")

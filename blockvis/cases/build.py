@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,7 +21,7 @@ from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.units import better_unit, doubt
 from blockvis.text import nearest
 from solver import mechanics
-from solver.mechanics import counted
+from solver.mechanics import counted, steep_note
 
 from .backfill import backfills
 from .bonds import bonded
@@ -38,9 +37,8 @@ from .ties import check_layers, drawn_ties, ties_of, without_tie_lines
 #: The weight of a block lighter than this fraction of the whole may be lost in rounding errors of the other forces.
 LIGHTEST = 1e-14
 
-#: Friction steeper than this (72 degrees) is probably an angle in degrees, and masonry lighter than this [kg/m³]
-#: probably in t/m³ or kN/m³.
-STEEPEST, LIGHTEST_STONE = 3.0, 100.0
+#: Masonry lighter than this [kg/m³] is probably in t/m³ or kN/m³.
+LIGHTEST_STONE = 100.0
 
 #: A settlement of more than this fraction of a block in one step passes over what happens within it.
 LONGEST_STEP = 0.1
@@ -192,12 +190,8 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
     steep = {"[material]": case.friction_coefficient}
     steep |= {f"[[interfaces]] {' and '.join(pair)}": law.friction_coefficient for pair, law in case.interfaces.items()}
     for where, friction in steep.items():
-        if friction > STEEPEST:
-            angle = f"; if it is an angle in degrees, give its tangent, {math.tan(math.radians(friction)):.3g}"
-            notes.append(
-                f"{where} friction_coefficient = {friction:g} is a slope of {math.degrees(math.atan(friction)):.3g} "
-                f"degrees{angle if friction < 90.0 else ''}"
-            )
+        if note := steep_note(friction):
+            notes.append(f"{where} {note}")
     light = float(assembly.density[assembly.free].min(initial=np.inf))
     if light < LIGHTEST_STONE:
         # 2 t/m³ or 20 kN/m³ are those of stone.

@@ -343,9 +343,12 @@ def from_compas(model: Any, **options: Any) -> solver.Assembly:
         For what COMPAS does not write.
     """
     parts = model if isinstance(model, Sequence) else [model]
-    strange = next((part for part in parts if not hasattr(part, "to_jsonstring")), None)
-    if strange is not None:
-        raise TypeError(f"{type(strange).__name__} is no object of COMPAS; give a model, an assembly or meshes")
+    if isinstance(model, str):
+        raise TypeError(f"'{model}' is no object of COMPAS; of a file use blockvis.read, of a model give the object")
+    strange = [type(part).__name__ for part in parts if not hasattr(part, "to_jsonstring")]
+    if strange or not parts:
+        what = strange[0] if strange else "an empty list"
+        raise TypeError(f"{what} is no object of COMPAS; give a model, an assembly or meshes")
     texts = [part.to_jsonstring() for part in parts]
     with TemporaryDirectory() as folder:
         text = f"[{','.join(texts)}]" if isinstance(model, Sequence) else texts[0]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from solver.results.increment import Status
 from solver.results.response import Collapse
+from solver.words import refuse_text
 
 #: Methods to find increments: the path of Coulomb friction, or the linear programs of the paper.
 COULOMB, LINEAR_PROGRAM = "coulomb", "linear program"
@@ -52,6 +53,7 @@ class Controls:
 
     def __post_init__(self) -> None:
         """Refuse an unknown method, and numbers out of their range."""
+        refuse_text(self)
         if self.increments not in (None, *INCREMENTS):
             raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
         if not 0.0 < self.step_tolerance < 1.0:

@@ -108,3 +108,25 @@ def test_direction_counts_as_a_direction_only():
 def test_refused_settlements(given, message):
     with pytest.raises(ValueError, match=message):
         solver.Settlement(**given)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: solver.InterfaceLaw(cohesion="0.6"),
+        lambda: solver.Settlement(direction=(1, 0), limit="0.6"),
+        lambda: solver.Controls(local_loss="0.6"),
+        lambda: solver.Structure(ASSEMBLY, friction_coefficient="0.6"),
+        lambda: solver.settle(ASSEMBLY, solver.Settlement(direction=(1, 0)), friction_coefficient="0.6"),
+    ],
+)
+def test_text_in_place_of_a_number_is_named(make):
+    with pytest.raises(
+        TypeError, match=r"(cohesion|limit|local_loss|friction_coefficient) is the text '0\.6'; give a number"
+    ):
+        make()
+
+
+def test_friction_given_in_degrees_warns():
+    with pytest.warns(UserWarning, match=r"friction_coefficient = 60 is .* give its tangent, 1\.73"):
+        solver.Structure(ASSEMBLY, friction_coefficient=60)

@@ -135,3 +135,16 @@ def test_meshes_of_compas_in_memory_become_blocks():
     ).multiplier == pytest.approx(0.4, rel=1e-4)
     with pytest.raises(TypeError, match="str is no object of COMPAS"):
         blockvis.from_compas([*meshes, "wall"])
+
+
+@pytest.mark.parametrize(
+    ("model", "said"),
+    [
+        (None, "NoneType is no object"),
+        ("wall.json", "'wall.json' is no object .* use blockvis.read"),
+        ([], "an empty list is no"),
+    ],
+)
+def test_what_is_no_model_of_compas_is_named(model, said):
+    with pytest.raises(TypeError, match=said):
+        blockvis.from_compas(model)
