@@ -22,7 +22,7 @@ def other(tmp_path):
     arch = generators.arch()
     settlement = solver.Settlement((1, -0.5), increment=0.02, limit=0.06)
     response = solver.Structure(arch, friction_coefficient=2.0).settle(settlement)
-    return blockvis.write(response, tmp_path / "sinking")
+    return blockvis.write(response, tmp_path / "sinking-results")
 
 
 def table(page, name):

@@ -1,5 +1,6 @@
 """The report on paper, by ``blockvis report OUT --pdf``."""
 
+import json
 import re
 
 import pytest
@@ -59,3 +60,17 @@ def test_the_table_of_cracks_says_what_they_run_between(arch_results, monkeypatc
     assert sum(widths) <= 174.0
     ends = [end for row in rows for end in row[-2:]]
     assert any(re.fullmatch(r"the (ground|top), at -?\d+\.\d\d, -?\d+\.\d\d", end) for end in ends), ends
+
+
+@pytest.mark.slow
+def test_keys_that_are_not_in_use_are_not_on_paper(arch_results, monkeypatch):
+    listed = []
+    monkeypatch.setattr("blockvis.report.pdf._Paper.listing", lambda _, title, text: listed.append(text))
+    case = (
+        '# An arch.\n[geometry]\nfile = "arch#1.msh"\n# [material]\n# density = 2000.0  # kg/m³\n\n\n\n'
+        "[settlement]\ndirection = [1, 0]\nlimit = 0.5  # m\n"
+    )
+    summary = arch_results / "summary.json"
+    summary.write_text(json.dumps(json.loads(summary.read_text(encoding="utf-8")) | {"case": case}), encoding="utf-8")
+    assert main(["report", str(arch_results), "--pdf"]) == 0
+    assert listed == ['[geometry]\nfile = "arch#1.msh"\n\n[settlement]\ndirection = [1, 0]\nlimit = 0.5  # m']
