@@ -6,7 +6,8 @@
 Domes as in ``examples/dome_spreading.toml``, of so many lunes and courses, spread by 0.02 of their radius an increment;
 of cross vaults of so many voussoirs, of stones so long [m], one of four supports sinks by 2 mm an increment. Case files
 are followed for as many of their own increments. Each runs in a process of its own, on one thread; seconds are
-processor time, in all with the bracket of a collapse. "Rest" is the equilibrium of the drawing. Exponents are those of the number of blocks, fitted.
+processor time, in all with the bracket of a collapse. "Rest" is the equilibrium of the drawing. Exponents are those of
+the number of blocks, fitted.
 """
 
 from __future__ import annotations
