@@ -6,7 +6,8 @@
 Domes as in ``examples/dome_spreading.toml``, of so many lunes and courses, spread by 0.02 of their radius an increment;
 of cross vaults of so many voussoirs, of stones so long [m], one of four supports sinks by 2 mm an increment. Case files
 are followed for as many of their own increments. Each runs in a process of its own, on one thread; seconds are
-processor time. "Rest" is the equilibrium of the drawing. Exponents are those of the number of blocks, fitted.
+processor time, in all with the bracket of a collapse. "Rest" is the equilibrium of the drawing. Exponents are those of
+the number of blocks, fitted.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import os
 import resource
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -57,14 +59,16 @@ def one(kind: str, size: str, increments: int) -> dict[str, Any]:
         voussoirs, stone = size.split(",")
         assembly = generators.cross_vault(voussoirs=int(voussoirs), stone=float(stone))
         settlements = [solver.Settlement(direction=(0.0, 0.0, -1.0), increment=0.002, limit=0.002 * increments)]
+    started = time.process_time()
     costs = followed(assembly, settlements, interfaces, loads)
-    response = costs.response
+    total, response = time.process_time() - started, costs.response
     return {
         "blocks": assembly.n_blocks,
         "seconds": costs.seconds,
+        "total": total,
         "programs": costs.programs,
         "share": float(response.reaction[len(response.path) - 1] / response.total_weight),
-        "ending": str(response.stop),
+        "ending": f"{response.stop} at {response.settlement[-1]:.4g} m",
         "MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
 
@@ -72,8 +76,8 @@ def one(kind: str, size: str, increments: int) -> dict[str, Any]:
 def table(kind: str, sizes: Sequence[str], increments: int) -> None:
     """Print the lines of a kind of structure, each as it is measured, and their exponents."""
     later = [f"{k} s" for k in range(2, increments + 1)]
-    row(kind, "blocks", "rest s", "first s", *later, "programs", "R/W last", "MiB", "ending")
-    row(*["---"] * (7 + increments))
+    row(kind, "blocks", "rest s", "first s", *later, "all s", "programs", "R/W last", "MiB", "ending")
+    row(*["---"] * (8 + increments))
     blocks, starts, others = [], [], []
     for size in sizes:
         command = [sys.executable, __file__, "--one", kind, size, str(increments)]
@@ -88,6 +92,7 @@ def table(kind: str, sizes: Sequence[str], increments: int) -> None:
             found["blocks"],
             *seconds,
             *[""] * (increments + 1 - len(seconds)),
+            f"{found['total']:.1f}",
             " + ".join(map(str, found["programs"])),
             f"{found['share']:.4f}",
             f"{found['MiB']:.0f}",
