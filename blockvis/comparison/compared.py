@@ -227,11 +227,17 @@ def _opened(folder: Path, label: str) -> Side:
     return Side(label, folder, response, stored_fall(folder), dict(_flat(tomllib.loads(text))) if text else {})
 
 
+#: What a run adds to the name of its case, if it is told no other folder.
+RESULTS = "-results"
+
+
 def _labels(one: Path, other: Path) -> tuple[str, str]:
     """Name two folders apart as shortly as can be."""
     parts = [folder.resolve().parts for folder in (one, other)]
     depth = next(n for n in range(1, max(map(len, parts)) + 1) if parts[0][-n:] != parts[1][-n:])
-    return "/".join(parts[0][-depth:]), "/".join(parts[1][-depth:])
+    first, second = ("/".join(part[-depth:]) for part in parts)
+    short = first.removesuffix(RESULTS), second.removesuffix(RESULTS)
+    return short if all(short) and short[0] != short[1] else (first, second)
 
 
 def _flat(values: Any, name: str = "") -> Iterator[tuple[str, str]]:

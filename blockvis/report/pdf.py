@@ -120,8 +120,14 @@ def write_pdf(
     for note in dict.fromkeys(response.notes):
         paper.note(note)
     if case_text:
-        paper.listing("Case", case_text)
+        paper.listing("Case: keys in use; its whole text is in summary.json", _keys_in_use(case_text))
     return write_atomic(path, paper.output())
+
+
+def _keys_in_use(case_text: str) -> str:
+    """Leave out lines of comments, which list every key that is not given, and the gaps that they leave."""
+    lines = [line for line in case_text.splitlines() if not line.lstrip().startswith("#")]
+    return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip()
 
 
 def _states(response: solver.Response) -> tuple[Sequence[str], list[tuple[str, ...]], Sequence[float]]:
