@@ -387,7 +387,8 @@ class Drawer:
             detail=note or detail,
             badge=(badge_of(self.response) if falling else FAILED_BADGE if failed else "") if badge is None else badge,
             keys=self._keys_drawn(increment),
-            places=self.keys(),
+            # A fall has few keys, and always the same.
+            places=None if falling and self.fall is not None else self.keys(),
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(increment),
         )
