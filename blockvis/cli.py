@@ -643,8 +643,10 @@ def _example(options: argparse.Namespace) -> int:
         width = max(map(len, cases))
         print("\n".join(f"{name:<{width}}  {first_sentence(case)}" for name, case in cases.items()))
         return 0
-    case, *drawings = copy_case(options.example, overwrite=options.force)
-    print(f"copied {', '.join(str(path) for path in (case, *drawings))}; blockvis run {case} solves it")
+    case, *others = copy_case(options.example, overwrite=options.force)
+    tables = [path for path in others if path.suffix == ".csv"]
+    command = f"explain {case} --observed {tables[0]} finds the cause" if tables else f"run {case} solves it"
+    print(f"copied {', '.join(str(path) for path in (case, *others))}; blockvis {command}")
     return 0
 
 

@@ -16,7 +16,7 @@ _DRAWINGS = "../assets/"
 
 
 def shipped_cases() -> dict[str, Path]:
-    """Return the case files that come with blockvis by their names.
+    """Return the case files that come with blockvis by their names; those to explain begin with ``explain/``.
 
     Returns
     -------
@@ -29,9 +29,10 @@ def shipped_cases() -> dict[str, Path]:
     """
     # The wheel has them inside the package; a clone, also one installed for editing, beside it.
     for root in (_PACKAGE / "shipped", _PACKAGE.parent):
-        found = sorted((root / "examples").glob("*.toml"))
+        examples = root / "examples"
+        found = [*sorted(examples.glob("*.toml")), *sorted(examples.glob("explain/*.toml"))]
         if found:
-            return {path.stem: path for path in found}
+            return {path.relative_to(examples).with_suffix("").as_posix(): path for path in found}
     raise FileNotFoundError(f"{_PACKAGE}: this installation has no shipped cases; install blockvis again")
 
 
@@ -43,7 +44,7 @@ def first_sentence(case: Path) -> str:
 
 
 def copy_case(name: str, folder: str | Path = ".", *, overwrite: bool = False) -> list[Path]:
-    """Copy a shipped case and the drawing that it names into one folder.
+    """Copy a shipped case, and the drawing or the table of cracks that it names, into one folder.
 
     Parameters
     ----------
@@ -72,7 +73,11 @@ def copy_case(name: str, folder: str | Path = ".", *, overwrite: bool = False) -
         raise ValueError(f"there is no example '{name}'{nearest(stem, list(cases))}; there are {', '.join(cases)}")
     source = cases[stem]
     text = source.read_text(encoding="utf-8")
-    contents: dict[str, str | bytes] = {source.name: text.replace(_DRAWINGS, "")}
+    here = re.sub(r"(examples/)?explain/(?=\w)", "", text.replace(_DRAWINGS, ""))
+    contents: dict[str, str | bytes] = {source.name: here}
+    for table in sorted(source.parent.glob("*.csv")):
+        if re.search(rf"(?<!\w){re.escape(table.name)}", text):
+            contents[table.name] = table.read_bytes()
     for quoted in text.split('"')[1::2]:
         if quoted.startswith(_DRAWINGS):
             contents[PurePosixPath(quoted).name] = (source.parent / quoted).read_bytes()

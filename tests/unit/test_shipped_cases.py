@@ -10,7 +10,12 @@ from blockvis.cli import main
 
 ROOT = Path(__file__).parents[2]
 
-CASES = sorted(path.stem for path in (ROOT / "examples").glob("*.toml"))
+EXAMPLES = ROOT / "examples"
+CASES = [
+    path.relative_to(EXAMPLES).with_suffix("").as_posix()
+    for pattern in ("*.toml", "explain/*.toml")
+    for path in sorted(EXAMPLES.glob(pattern))
+]
 
 
 def test_a_copied_case_is_read_where_it_lies(tmp_path, monkeypatch, capsys):
@@ -24,6 +29,16 @@ def test_a_copied_case_is_read_where_it_lies(tmp_path, monkeypatch, capsys):
     assert "semicircular_arch.msh is there already; --force replaces it" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["semicircular_arch.msh"], "nothing is written"
     assert main(["example", "semicircular_arch.toml", "--force"]) == 0
+
+
+@pytest.mark.parametrize(("name", "table"), [("arch", "cracks.csv"), ("vault", "vault_cracks.csv")])
+def test_a_case_to_explain_comes_with_its_cracks(tmp_path, monkeypatch, capsys, name, table):
+    monkeypatch.chdir(tmp_path)
+    assert main(["example", f"explain/{name}"]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {f"{name}.toml", table}
+    command = f"blockvis explain {name}.toml --observed {table}"
+    assert command in capsys.readouterr().out
+    assert command in (tmp_path / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def test_the_list_has_a_line_for_each_case(capsys):
@@ -40,8 +55,8 @@ def test_an_unknown_example_names_the_nearest(capsys):
 
 def test_the_wheel_takes_every_case_and_the_drawings_that_they_name():
     build = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["hatch"]["build"]
-    wanted = set()
-    for case in (ROOT / "examples").glob("*.toml"):
+    wanted = {f"examples/explain/{path.name}" for path in (EXAMPLES / "explain").iterdir()}
+    for case in EXAMPLES.glob("*.toml"):
         drawings = (word for word in case.read_text(encoding="utf-8").split('"')[1::2] if word.startswith("../"))
         wanted |= {f"examples/{case.name}", *(drawing.removeprefix("../") for drawing in drawings)}
     included = build["targets"]["wheel"]["force-include"]
@@ -50,6 +65,6 @@ def test_the_wheel_takes_every_case_and_the_drawings_that_they_name():
 
 @pytest.mark.parametrize("name", CASES)
 def test_drawings_of_a_case_lie_where_copying_looks_for_them(name):
-    text = (ROOT / "examples" / f"{name}.toml").read_text(encoding="utf-8")
+    text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
     words = [word for word in text.split('"')[1::2] if "/" in word and not word.startswith("../assets/")]
     assert words == []
