@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -350,9 +351,19 @@ def from_compas(model: Any, **options: Any) -> solver.Assembly:
         what = strange[0] if strange else "an empty list"
         raise TypeError(f"{what} is no object of COMPAS; give a model, an assembly or meshes")
     texts = [part.to_jsonstring() for part in parts]
-    with TemporaryDirectory() as folder:
-        text = f"[{','.join(texts)}]" if isinstance(model, Sequence) else texts[0]
-        return read(write_atomic(Path(folder) / "model.json", text, durable=False), **options)
+    text = f"[{','.join(texts)}]" if isinstance(model, Sequence) else texts[0]
+    # Messages name the model, not the file by which it comes.
+    with TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        path = write_atomic(Path(folder) / "model.json", text, durable=False)
+        try:
+            assembly = read(path, **options)
+        except ValueError as error:
+            error.args = (str(error).replace(str(path), "the model"), *error.args[1:])
+            raise
+    for note in told:
+        warnings.warn(str(note.message).replace(str(path), "the model"), note.category, stacklevel=2)
+    return assembly
 
 
 def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pose | None = None) -> None:

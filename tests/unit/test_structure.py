@@ -137,6 +137,13 @@ def test_meshes_of_compas_in_memory_become_blocks():
         blockvis.from_compas([*meshes, "wall"])
 
 
+def test_messages_on_a_model_in_memory_name_no_file():
+    with pytest.raises(ValueError, match=r"^.the model.: block .* overlaps block 1"):
+        blockvis.from_compas([_Mesh("ground", 0), _Mesh("block", 0.5)])
+    with pytest.warns(UserWarning, match=r"^the model: 1 overlap"):
+        assert blockvis.from_compas([_Mesh("ground", 0), _Mesh("block", 0.999)]).n_blocks == 2
+
+
 @pytest.mark.parametrize(
     ("model", "said"),
     [
