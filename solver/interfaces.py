@@ -17,7 +17,17 @@ STEEPEST = 3.0
 
 
 def steep_note(friction: float) -> str:
-    """Say what a friction coefficient too large for masonry may have been meant as; nothing of others."""
+    """Say what a friction coefficient too large for masonry may have been meant as.
+
+    Parameters
+    ----------
+    friction : float
+
+    Returns
+    -------
+    str
+        Empty for one of masonry, up to 3.
+    """
     if friction <= STEEPEST:
         return ""
     angle = f"; if it is an angle in degrees, give its tangent, {math.tan(math.radians(friction)):.3g}"
