@@ -217,8 +217,8 @@ class _StaticProgram:
             if bonded.any():
                 normal = sp.vstack([normal, carried.limits], format="csc")
                 self.reserve = np.append(self.reserve, carried.most)
-                # Limits of single forces: where they are does not matter.
-                places = np.vstack([places, np.zeros((len(carried.most), d))])
+                of_each = len(carried.most) // int(bonded.sum())
+                places = np.vstack([places, np.repeat(contacts.points[closed[bonded]], of_each, axis=0)])
             beside = sp.csc_array((len(self.reserve), len(objective) - self.n))
             limits_of = sp.hstack([normal, beside])
             self.matrix = sp.csc_array(sp.vstack([self.matrix, limits_of], format="csc"))
