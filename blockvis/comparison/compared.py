@@ -20,7 +20,7 @@ from blockvis.pictures.film import state_at
 from blockvis.report.page import summary_rows, tie_rows
 from blockvis.results.cracks import Crack, cracks_of
 from blockvis.results.fall_files import stored_fall
-from blockvis.results.folder import stored_case
+from blockvis.results.folder import RESULTS, stored_case
 from blockvis.results.joints import initial_joints
 from blockvis.runs.reopen import open_results
 from blockvis.text import force_text, quantity_text
@@ -225,10 +225,6 @@ def _opened(folder: Path, label: str) -> Side:
         raise ValueError(f"'{folder}' has no equilibrium to compare: {response.message or response.stop}")
     text = stored_case(folder)
     return Side(label, folder, response, stored_fall(folder), dict(_flat(tomllib.loads(text))) if text else {})
-
-
-#: What a run adds to the name of its case, if it is told no other folder.
-RESULTS = "-results"
 
 
 def _labels(one: Path, other: Path) -> tuple[str, str]:

@@ -35,6 +35,9 @@ CHECKPOINT = "checkpoint.npz"
 #: What a run holds locked on Windows.
 LOCK = ".lock"
 
+#: What a run adds to the name of its case, if it is told no other folder.
+RESULTS = "-results"
+
 #: Endings of the films that blockvis writes.
 VIDEO_SUFFIXES = (".mp4", ".gif", ".webp")
 

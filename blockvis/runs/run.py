@@ -19,7 +19,7 @@ from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kind import AnalysisRun
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.fall_files import remove_fall
-from blockvis.results.folder import ResultsFolder, refuse_results
+from blockvis.results.folder import RESULTS, ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
 from blockvis.results.viewer_files import restore_grids, write_end
 from blockvis.system.atomic_files import PARTIAL
@@ -119,7 +119,7 @@ def run_case(
     if not isinstance(case, Case):
         case = read_case(case)
     refuse_increment_seconds(case, increment_seconds)
-    folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
+    folder = Path(f"{case.source.stem}{RESULTS}") if folder is None else Path(folder)
     refuse_results(folder, overwrite)
     outputs = (Drawing(film=film, pictures=pictures),) if outputs is None else outputs
     with _begun(case, outputs):
