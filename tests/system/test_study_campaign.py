@@ -173,7 +173,7 @@ def test_blocks_in_space_are_studied_and_drawn(tmp_path):
 @pytest.mark.slow
 def test_a_study_that_is_killed_and_interrupted_resumes(arches, tmp_path):
     """Killed without warning by SIGKILL, then by Ctrl-C, each time once it has made a run of its own."""
-    runs = 40
+    runs = 20
     arches.write_text(STUDY.replace("runs = 24", f"runs = {runs}"), encoding="utf-8")
     out, command = tmp_path / "out", [sys.executable, "-m", "blockvis", "sweep", "study.toml", "-o", "out"]
 
