@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from .key import FRACTION, NOT_NEGATIVE, NUMBERS, PAIR, POSITIVE, TEXTS, TRUE_OR_FALSE, Key, Section, ValueKind
 from .toml_table import Table, shortened
+
+_RANGE = replace(PAIR, read=lambda table, key: table.pair(key.name, words="[least, largest]"))
 
 #: Directions in which a support may have moved, as the case file names them.
 DIRECTIONS = ("down", "up", "left", "right", "rotation", "front", "back", "outward", "inward")
@@ -99,7 +101,7 @@ EXPLAIN = Section(
             otherwise="five over the width of the structure"),
         Key("inflections", NUMBERS, "Distances from there to where a trough may be steepest", [0.5, 1.0], "m",
             otherwise="a sixth and a third of the width"),
-        Key("friction", PAIR, "Range of the friction coefficient of [material]; others follow in proportion",
+        Key("friction", _RANGE, "Range of the friction coefficient of [material]; others follow in proportion",
             [0.4, 0.7],
             otherwise="from 0.8 to 1.25 times that of the case"),
         Key("limit", POSITIVE, "Largest displacement of a support", 0.1, "m",

@@ -152,8 +152,8 @@ def _observations(found: Explanation) -> str:
         width = "closed" if given.widths[k] == 0.0 else width_text(given.widths[k])
         computed = [width_text(cause.best.widths[cause.at][k]) for cause in best]
         strange = "no candidate" if k in found.made_by_none else "unexplained" if k in found.unexplained else ""
-        rows.append((given.labels[k], width, f"± {1e3 * given.uncertainties[k]:.2g}", *computed, strange))
-    header = ("joint or place", "observed, mm", "", *(f"cause {n}, mm" for n in range(1, len(best) + 1)), "")
+        rows.append((given.labels[k], width, f"{1e3 * given.uncertainties[k]:.2g}", *computed, strange))
+    header = ("joint or place", "observed, mm", "± mm", *(f"cause {n}, mm" for n in range(1, len(best) + 1)), "")
     return "<h2>Widths</h2>" + _table(header, rows)
 
 
