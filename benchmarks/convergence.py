@@ -5,7 +5,8 @@
 
 Sixteen walls and twenty random ones (``convergence_walls.py``), each as it is and
 
-- "tolerance": with an eighth of the tolerance of a step, and with half of it where that is asked for;
+- "tolerance": with an eighth of the tolerance of a step, and with half and a quarter of it where that is asked for:
+  then it is counted how often the error is below twice what ``blockvis run`` tells of it;
 - "increment": with the increment halved and quartered;
 - "description": mirrored, and with its blocks in another order.
 
@@ -31,6 +32,7 @@ import numpy as np
 from convergence_walls import DESCRIPTIONS, WALLS, Wall, random_walls
 
 import solver
+from blockvis.runs.step_check import ERROR_OVER_DIFFERENCE, NOTABLE, SMALLEST
 from solver import mechanics
 
 VARIANTS = ("tolerance", "increment", "description")
@@ -168,7 +170,7 @@ def compared(
     """The runs of one variant, each with its difference from the wall as it is."""
     found = []
     if variant == "tolerance":
-        for factor in ([2.0] if given.half else []) + [given.refinement]:
+        for factor in ([2.0, 4.0] if given.half else []) + [given.refinement]:
             finer = follow(wall, given.tolerance / factor)
             found.append((f"tolerance/{factor:g}", finer, difference(whole, finer)))
     elif variant == "increment":
@@ -223,6 +225,31 @@ def summary(name: str, differences: Sequence[Difference]) -> None:
     )
 
 
+def told_beside_true(half: Difference, quarter: Difference, fine: Difference) -> list[tuple[str, float, float]]:
+    """What a run tells of its errors by the first two, and what they are by the third; of each kind, in parts."""
+    largest = max(half.reactions.max(initial=0.0), half.collapse or 0.0)
+    matters = ERROR_OVER_DIFFERENCE * largest > NOTABLE or not half.same_ending
+    known = [half, quarter] if matters else [half]
+
+    def told(of: Callable[[Difference], float]) -> float:
+        return ERROR_OVER_DIFFERENCE * max(of(one) for one in known)
+
+    reaction, place = (told(lambda one, k=k: getattr(one, k).max(initial=0.0)) for k in ("reactions", "positions"))
+    found = [("reaction at a settlement", reaction, float(off)) for off in fine.reactions]
+    found += [("largest reaction", reaction, float(fine.reactions.max(initial=0.0)))]
+    found += [("position of the worst block", place, float(fine.positions.max(initial=0.0)))]
+    if fine.collapse is not None:
+        found.append(("collapse", told(lambda one: one.collapse or 0.0), fine.collapse))
+    return found
+
+
+def shares_told(found: Sequence[tuple[str, float, float]]) -> None:
+    """How often an error is below twice what is told, or too small to be."""
+    for kind in dict.fromkeys(kind for kind, _, _ in found):
+        good = [true <= max(2.0 * told, SMALLEST) for other, told, true in found if other == kind]
+        print(f"{kind}: below twice what is told {sum(good)} of {len(good)}")
+
+
 def record(wall: str, name: str, run: Run, off: Difference | None) -> dict[str, Any]:
     found: dict[str, Any] = {} if off is None else off.numbers()
     return found | {
@@ -267,7 +294,7 @@ def main() -> None:
     parser.add_argument("--variants", type=variants, default=VARIANTS[:1], help=",".join(VARIANTS))
     parser.add_argument("--tolerance", type=float, default=0.005, help="of a step")
     parser.add_argument("--refinement", type=float, default=8.0, help="parts of the tolerance of the finer run")
-    parser.add_argument("--half", action="store_true", help="half the tolerance, too")
+    parser.add_argument("--half", action="store_true", help="half and a quarter of the tolerance, too")
     parser.add_argument("--seconds", type=float, default=900.0, help="of processor time that a run is given")
     parser.add_argument("--json", type=Path, help="a line per run, appended to")
     given = parser.parse_args()
@@ -282,6 +309,7 @@ def main() -> None:
             with given.json.open("a") as file:
                 file.write(json.dumps(record(wall, name, run, off)) + "\n")
 
+    told: list[tuple[str, float, float]] = []
     row(*HEAD)
     row(*["---"] * len(HEAD))
     for name, make in chosen_walls(given).items():
@@ -292,9 +320,12 @@ def main() -> None:
             for changed, run, off in compared(wall, whole, variant, given, follow):
                 keep(name, changed, run, off)
                 found.setdefault(changed, []).append(off)
+        if given.half and "tolerance" in given.variants:
+            told += told_beside_true(*(of[-1] for name, of in found.items() if name.startswith("tolerance")))
     print()
     for changed, differences in found.items():
         summary(changed, differences)
+    shares_told(told)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""How exact a run is: the same path with half the error that its steps aim for, where they part with a quarter, too."""
+"""How exact a run is: the same path with half the error that its steps aim for; a quarter, too, where steps matter."""
 
 from __future__ import annotations
 
@@ -94,14 +94,14 @@ class StepCheck:
         return f"error of the steps: {', '.join(parts)}"
 
     @property
-    def parts(self) -> bool:
-        """Whether two runs part before they collapse nearer to each other, which may be chance."""
-        return ERROR_OVER_DIFFERENCE * self.difference > NOTABLE and self.collapse < self.difference
+    def matters(self) -> bool:
+        """Whether the steps matter: then two runs may be near each other by chance, and a third is followed."""
+        return self.error > NOTABLE or self.stop != self.stop_of_check
 
     @property
     def warning(self) -> str:
         """What there is to say where the difference matters; nothing where it does not."""
-        if self.error <= NOTABLE and self.stop == self.stop_of_check:
+        if not self.matters:
             return ""
         return (
             f"the steps matter by more than {100.0 * NOTABLE:g} %: take a smaller step_tolerance; where that changes "
@@ -153,13 +153,16 @@ class StepChecking:
         if half is None:
             return None
         check = compared(response, half)
-        if check.parts:
+        if check.matters:
             self.close()
             self._other = OnceMore(_finer(self._case, 0.25), self._folder)
             quarter = None
             with contextlib.suppress(TimeoutError):
                 quarter = self._found(began, patience, lambda: None)
-            check = replace(check, collapse=np.nan) if quarter is None else compared(response, half, quarter)
+            if quarter is not None:
+                check = compared(response, half, quarter)
+            elif check.collapse < check.difference:
+                check = replace(check, collapse=np.nan)
         return _written(Path(folder), check)
 
     def _found(self, began: float, patience: float | None, waiting: Callable[[], None]) -> Traced | None:
@@ -219,7 +222,7 @@ def check_steps(folder: str | Path) -> StepCheck:
         )
     half = followed(_finer(case, 0.5), response.assembly)
     check = compared(response, half)
-    if check.parts:
+    if check.matters:
         check = compared(response, half, followed(_finer(case, 0.25), response.assembly))
     return _written(folder, check)
 

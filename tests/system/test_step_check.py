@@ -218,7 +218,7 @@ class OneAfterAnother:
 
 
 @pytest.mark.parametrize(("reaction", "third", "told"), [(1.3, 0.27, 0.2), (1.3, None, None), (1.001, None, 0.0)])
-def test_where_two_runs_part_a_third_says_by_how_much_collapses_differ(
+def test_where_steps_matter_a_third_run_says_by_how_much_collapses_differ(
     tmp_path, monkeypatch, settled, reaction, third, told
 ):
     fallen = replace(settled, collapse=SimpleNamespace(displacement=0.3))
@@ -231,6 +231,21 @@ def test_where_two_runs_part_a_third_says_by_how_much_collapses_differ(
     check = StepChecking(case_from(SHORT, tmp_path)).compared(tmp_path, fallen, 0.0)
     assert check.step_error["collapse"] == (None if told is None else pytest.approx(told))
     assert check.step_error["reaction"] == pytest.approx(2.0 * (reaction - 1.0))
+
+
+@pytest.mark.parametrize(("half_by", "quarter_by", "told"), [(1.02, 1.3, 0.6), (1.3, 1.1, 0.6), (1.002, 1.3, 0.004)])
+def test_two_runs_may_be_near_each_other_by_chance_where_steps_matter(
+    tmp_path, monkeypatch, settled, half_by, quarter_by, told
+):
+    """A vault of large stones had 1.2 % between the first two, and 20 % to each shorter step."""
+    half, quarter = traced(settled), traced(settled)
+    half.measured[1] *= half_by
+    quarter.measured[1] *= quarter_by
+    monkeypatch.setattr(step_check, "OnceMore", OneAfterAnother)
+    OneAfterAnother.paths = (half, quarter)
+    (tmp_path / "summary.json").write_text("{}", encoding="utf-8")
+    check = StepChecking(case_from(SHORT, tmp_path)).compared(tmp_path, settled, 0.0)
+    assert check.step_error["reaction"] == pytest.approx(told)
 
 
 class Late:
