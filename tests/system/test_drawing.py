@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 from structures import arch_response, parted, wall
@@ -147,7 +146,6 @@ sys.exit(blockvis.cli.main(sys.argv[1:]))
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     assert run.stdout.readline() == "drawing\n"
-    time.sleep(0.5)
     os.killpg(run.pid, signal.SIGINT)
     _, said = run.communicate(timeout=60)
     assert run.returncode == 130
