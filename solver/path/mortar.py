@@ -101,6 +101,17 @@ class Mortar:
         rest[number[same]] = (give * forces[:, 0])[same] * self.model.length
         return replace(place, bonds=replace(place.bonds, rest=rest))
 
+    def kept(self, place: Place, contacts: Contacts, bonds: Bonds) -> Place:
+        """The place without forces with what a path has left of its joints, elastic ones with the force of their gap."""
+        place = replace(place, bonds=bonds)
+        joints = self.points(place, contacts)
+        gives, forces = joints.give[:, 0] > 0.0, np.zeros_like(contacts.points)
+        if not gives.any():
+            return place
+        pressed = -joints.beyond_give(contacts.gaps)[gives] / (joints.length * joints.give[gives, 0])
+        forces[gives, 0] = np.maximum(pressed, -joints.tension[gives])
+        return replace(place, contacts=contacts, forces=forces, trial=forces, followed=forces[:, 0])
+
     def points(self, place: Place, contacts: Contacts) -> JointPoints:
         """What the joints add to contact points at a place."""
         model, (n, d) = self.model, contacts.points.shape
@@ -131,16 +142,19 @@ class Mortar:
             length=model.length,
         )
 
-    def told(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) arrays: part of the strength of contact points that is left, and of the joint [m²] that has it.
-
-        Empty where no joint had any.
-        """
-        if not any(law.bonds for law in self.model.interfaces.laws):
-            return np.zeros(0), np.zeros(0)
+    def told(self, place: Place, contacts: Contacts) -> dict[str, np.ndarray]:
+        """What joints are told of in a :class:`solver.results.increment.State`: its (n,) arrays by their names."""
+        interfaces, found = self.model.interfaces, dict[str, np.ndarray]()
+        if not self.present:
+            return found
         joints, bonds = self.points(place, contacts), self.renamed(place, contacts).bonds
-        intact, areas = np.where(joints.cohesion > 0.0, joints.left, 0.0), replace(bonds, left=np.ones(len(bonds)))
-        return intact, np.where(intact > 0.0, areas.areas_left(contacts), 0.0)
+        number, bonded = matched_contacts(contacts, bonds)
+        found["bonded"] = np.where(bonded, self._of(bonds.areas, number), contacts.areas)
+        if any(law.bonds for law in interfaces.laws):
+            found["intact"] = np.where(joints.cohesion > 0.0, joints.left, 0.0)
+        if interfaces.elastic:
+            found["unloaded"] = joints.rest
+        return found
 
     def renamed(self, place: Place, contacts: Contacts) -> Place:
         """The place with its bonds at these contact points: one that vanishes passes its bond to the nearest ones."""

@@ -183,7 +183,7 @@ class Stepper:
     ) -> Place:
         """Return the place of a pose without forces, with the members of a phase, from 0, and all joints whole."""
         place = self.members.installed(Place.unloaded(pose), phase, ties_at)
-        return self.whole(place) if bonds_at is None else replace(place, bonds=bonds_at)
+        return self.whole(place) if bonds_at is None else self.mortar.kept(place, self.contacts_at(place), bonds_at)
 
     def whole(self, place: Place) -> Place:
         """Return the place with mortar in all closed joints."""
