@@ -9,7 +9,7 @@ import numpy as np
 from solver.geometry.contacts import Contacts, matched_contacts, successors
 from solver.program.model import Model
 from solver.program.strength import largest_tension
-from solver.results.increment import Bonds
+from solver.results.increment import Bonds, State
 from solver.tolerances import COMPUTED_GAP
 
 from .state import Place
@@ -102,7 +102,7 @@ class Mortar:
         return replace(place, bonds=replace(place.bonds, rest=rest))
 
     def kept(self, place: Place, contacts: Contacts, bonds: Bonds) -> Place:
-        """The place without forces with what a path has left of its joints, elastic ones with the force of their gap."""
+        """The place with what a path has left of its joints, elastic ones under the force of their gap."""
         place = replace(place, bonds=bonds)
         joints = self.points(place, contacts)
         gives, forces = joints.give[:, 0] > 0.0, np.zeros_like(contacts.points)
@@ -142,19 +142,20 @@ class Mortar:
             length=model.length,
         )
 
-    def told(self, place: Place, contacts: Contacts) -> dict[str, np.ndarray]:
-        """What joints are told of in a :class:`solver.results.increment.State`: its (n,) arrays by their names."""
-        interfaces, found = self.model.interfaces, dict[str, np.ndarray]()
+    def told(self, state: State, place: Place, contacts: Contacts) -> State:
+        """The arrays of an increment with those that tell of its joints; dry rigid ones have none."""
+        interfaces = self.model.interfaces
         if not self.present:
-            return found
+            return state
         joints, bonds = self.points(place, contacts), self.renamed(place, contacts).bonds
         number, bonded = matched_contacts(contacts, bonds)
-        found["bonded"] = np.where(bonded, self._of(bonds.areas, number), contacts.areas)
-        if any(law.bonds for law in interfaces.laws):
-            found["intact"] = np.where(joints.cohesion > 0.0, joints.left, 0.0)
-        if interfaces.elastic:
-            found["unloaded"] = joints.rest
-        return found
+        left = np.where(joints.cohesion > 0.0, joints.left, 0.0)
+        return replace(
+            state,
+            bonded=np.where(bonded, self._of(bonds.areas, number), contacts.areas),
+            intact=left if any(law.bonds for law in interfaces.laws) else state.intact,
+            unloaded=joints.rest if interfaces.elastic else state.unloaded,
+        )
 
     def renamed(self, place: Place, contacts: Contacts) -> Place:
         """The place with its bonds at these contact points: one that vanishes passes its bond to the nearest ones."""
