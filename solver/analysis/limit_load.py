@@ -97,6 +97,10 @@ def find_limit_load(
     its force at the ends: more than the stress block of a continuous face, so that crushing at a toe is found later
     than it comes. What crushes moves by the same flow rule.
 
+    At the pose of an increment its bonds say what is closed: gaps count from those at which elastic joints have no
+    force, and points with tension left hold at any gap, as in the bounds of a path. The give that the forces of the
+    limit state would add is left out.
+
     With a displacement δ, points that are open by a gap g carry at a price: maximise α - Σ g N / w, where w is δ times
     the sum of the live forces; its dual has N(q) + g ≥ μ |T(q)| and live · q = w. That is the first program of a
     pushover with an increment δ. At closed joints it is the limit load, whatever δ is; the two values then enclose the
