@@ -210,29 +210,37 @@ def block_on_two_springs(interfaces, sunk=5e-4):
     "interfaces",
     [
         solver.Interfaces(solver.InterfaceLaw(2.0, normal_stiffness=5e7, shear_stiffness=2e7)),
+        solver.Interfaces(
+            solver.InterfaceLaw(2.0, 1e4, tensile_strength=5e3, normal_stiffness=5e7, shear_stiffness=2e7)
+        ),
         solver.Interfaces(solver.InterfaceLaw(2.0), ground={"left": 5e7, "right": 5e7}),
     ],
-    ids=["joints", "ground"],
+    ids=["joints", "mortar", "ground"],
 )
 def test_a_block_that_leans_on_springs_tips_about_its_edge(interfaces):
-    """α y = x about the outer edge of the right pad, with the centroid at (-x, y) from it where it has come to rest."""
+    """α W y = W x about the outer edge of the right pad, from which the centroid is at (-x, y) where it has come to rest.
+
+    Mortar adds what pulls at the other three ends of pads: t A/2 each, 0.1, 0.8 and 0.9 m away.
+    """
     structure, sunk = block_on_two_springs(interfaces)
     leaning = -sunk.pose.rotations[0, 0]
     assert 4e-4 < leaning < 7e-4
     x, y = 0.45 - sunk.pose.positions[0, 0], 5e-4 + sunk.pose.positions[0, 1]
+    tension, weight = interfaces.default.tensile_strength, mechanics.total_weight(structure.assembly)
+    expected = (x + tension * 0.025 * 1.8 / weight) / y
     for more in ({}, {"flow": "non-associative"}, {"displacement": 1e-3}):
         found = structure.limit_load(pose=sunk.pose, bonds_at=sunk.bonds, **more)
-        assert found.multiplier == pytest.approx(x / y, rel=1e-6)
+        assert found.multiplier == pytest.approx(expected, rel=1e-6)
         assert holds(found)
     # By its gaps alone the right pad, which carries less than at rest, has let go of the block.
-    rigid = replace(sunk.bonds, rest=0.0 * sunk.bonds.rest)
+    rigid = replace(sunk.bonds, left=0.0 * sunk.bonds.left, rest=0.0 * sunk.bonds.rest)
     assert structure.limit_load(pose=sunk.pose, bonds_at=rigid).status is solver.LimitStatus.NO_EQUILIBRIUM
     control = solver.ControlDisplacement("block", (1.0, 0.0), point=(0.0, 1.5), limit=2e-3, increment=1e-3)
     # The bounds of the path, with the live load for their objective, are the same program.
     pushed = structure.pushover(control, pose=sunk.pose, bonds_at=sunk.bonds)
-    assert pushed.values[0] == pytest.approx(x / y, rel=1e-6)
+    assert pushed.values[0] == pytest.approx(expected, rel=1e-6)
     # Then springs give.
-    assert 0.0 < pushed.values[1] < pushed.values[2] < x / y
+    assert 0.0 < pushed.values[1] < pushed.values[2] < expected
     for analysis in (structure.limit_load, lambda **at: structure.pushover(control, **at)):
         with pytest.raises(ValueError, match="joints are elastic, of which a pose does not tell what compresses them"):
             analysis(pose=sunk.pose)
