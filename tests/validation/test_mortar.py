@@ -218,7 +218,7 @@ def block_on_two_springs(interfaces, sunk=5e-4):
     ids=["joints", "mortar", "ground"],
 )
 def test_a_block_that_leans_on_springs_tips_about_its_edge(interfaces):
-    """α W y = W x about the outer edge of the right pad, from which the centroid is at (-x, y) where it has come to rest.
+    """α W y = W x about the outer edge of the right pad, from which the centroid is at (-x, y) at rest.
 
     Mortar adds what pulls at the other three ends of pads: t A/2 each, 0.1, 0.8 and 0.9 m away.
     """
