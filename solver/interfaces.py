@@ -234,20 +234,26 @@ class Interfaces:
         return not any(law.bonds or law.crushes for law in self.laws)
 
     @property
+    def elastic(self) -> bool:
+        """Whether joints, or the ground under supports, give and stay so."""
+        return bool(self.ground) or any(law.elastic for law in self.laws)
+
+    @property
     def mortar(self) -> bool:
         """Whether an interface has cohesion, tensile strength or stiffness."""
-        return bool(self.ground) or any(law.bonds or law.elastic for law in self.laws)
+        return self.elastic or any(law.bonds for law in self.laws)
 
     def refuse_crushing(self, analysis: str) -> None:
         """Raise ``ValueError`` for compressive strength in an analysis that follows a path."""
         if any(law.crushes for law in self.laws):
             raise ValueError(f"crushing along the path of {analysis} is not followed; leave compressive_strength out")
 
-    def refuse_elastic(self, what: str) -> None:
-        """Raise ``ValueError`` for stiffness of joints where only rigid ones are known."""
-        if self.ground or any(law.elastic for law in self.laws):
+    def refuse_pose_alone(self) -> None:
+        """Raise ``ValueError`` where joints are elastic, whose gaps do not tell which of them carry."""
+        if self.elastic:
             raise ValueError(
-                f"{what} knows rigid joints only; leave normal_stiffness, shear_stiffness and stiffness of supports out"
+                "joints are elastic, of which a pose does not tell what compresses them; give bonds_at, the bonds of "
+                "the increment that the pose is from"
             )
 
     def refuse_mortar(self, what: str) -> None:

@@ -167,8 +167,8 @@ class Structure(Shown):
         ties_at : TieForces, optional
             ``ties`` of the increment that the pose is from; new ones by default.
         bonds_at : Bonds, optional
-            ``bonds`` of that increment: the strength that joints have left, without which a pose with cohesion is
-            refused.
+            ``bonds`` of that increment: the strength that joints have left, and where elastic ones have no force,
+            without which a pose with cohesion or elastic joints is refused.
         on_increment : callable, optional
             Called with every :class:`Increment` as it is found.
 
@@ -246,7 +246,8 @@ class Structure(Shown):
             ``ties`` of the increment that the pose is from, which tell what is broken; by default all carry up to
             their strength.
         bonds_at : Bonds, optional
-            ``bonds`` of that increment: the strength that joints have left; by default closed ones have all of it.
+            ``bonds`` of that increment: the strength that joints have left, by default all of it in closed ones; and
+            where elastic joints have no force, without which a pose with such joints is refused.
 
         Returns
         -------
@@ -291,6 +292,8 @@ class Structure(Shown):
         pose: Pose | None = None,
         flow: str = "associative",
         torsion: str = "points",
+        ties_at: TieForces | None = None,
+        bonds_at: Bonds | None = None,
     ) -> Envelope:
         """Limit loads of a live load that moves over the structure.
 
@@ -299,13 +302,14 @@ class Structure(Shown):
         positions : (n,) sequence
         live : callable
             From a position to the live loads there, an (n_blocks, n_dof) array [N, N·m].
-        pose, flow, torsion
+        pose, flow, torsion, ties_at, bonds_at
             As in :meth:`limit_load`.
         """
         positions = np.asarray(positions, dtype=float)
         if positions.ndim != 1 or len(positions) == 0:
             raise ValueError(f"positions have shape {positions.shape}; give at least one number")
-        limits = (self.with_live(live(float(x))).limit_load(pose=pose, flow=flow, torsion=torsion) for x in positions)
+        given: Any = {"pose": pose, "flow": flow, "torsion": torsion, "ties_at": ties_at, "bonds_at": bonds_at}
+        limits = (self.with_live(live(float(x))).limit_load(**given) for x in positions)
         return Envelope(positions, tuple(limits))
 
     def _response(

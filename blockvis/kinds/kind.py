@@ -288,22 +288,12 @@ def _interfaces(case: Case) -> solver.Interfaces:
     return solver.Interfaces(case.law, dict(case.interfaces), ground=case.ground)
 
 
-def needs_no_crushing(case: Case) -> None:
+def needs_no_crushing(case: Case, when: str = "") -> None:
     """Raise ValueError where a joint of a case has a compressive strength, which no path follows, or too much else."""
     interfaces = _interfaces(case)
     try:
-        interfaces.refuse_crushing(f"a {case.analysis}")
+        interfaces.refuse_crushing(f"a {case.analysis}{when}")
         if case.controls.increments == mechanics.INCREMENTS[1]:
             interfaces.refuse_mortar(f'[analysis] increments = "{case.controls.increments}"')
-    except ValueError as error:
-        raise ValueError(f"{case.source}: {error}") from None
-
-
-def needs_rigid_joints(case: Case, what: str) -> None:
-    """Raise ValueError where a joint of a case, or the ground under a support, gives and stays so, or crushes."""
-    interfaces = _interfaces(case)
-    try:
-        interfaces.refuse_elastic(what)
-        interfaces.refuse_crushing(what)
     except ValueError as error:
         raise ValueError(f"{case.source}: {error}") from None

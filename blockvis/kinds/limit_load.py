@@ -28,7 +28,7 @@ from .kind import (
     RunInput,
     Steps,
     needs_live_load,
-    needs_rigid_joints,
+    needs_no_crushing,
     without_increments,
 )
 from .settlement import not_reached, settlement_course, settlement_steps, stored_settlements
@@ -144,7 +144,7 @@ class LimitLoadKind(AnalysisKind):
         """Check the keys, and let the last settlement stop where limit loads are wanted."""
         needs_live_load(case)
         if case.settlements:
-            needs_rigid_joints(case, "a limit load after a settlement")
+            needs_no_crushing(case, " after a settlement")
         settings: LimitLoadSettings = case.settings
         if settings.displacement is not None and not case.settlements:
             raise _displacement_without_settlement(case)

@@ -25,7 +25,6 @@ from .kind import (
     Steps,
     needs_live_load,
     needs_no_crushing,
-    needs_rigid_joints,
     without_increments,
 )
 from .settlement import not_reached, settlement_steps
@@ -82,8 +81,6 @@ class PushoverKind(AnalysisKind):
         """Check that the keys of a case fit together."""
         needs_live_load(case)
         needs_no_crushing(case)
-        if case.settlements:
-            needs_rigid_joints(case, "a pushover after a settlement")
         if case.settings is None:
             raise ValueError(
                 f'{case.source}: [control] is missing; a pushover needs the displacement that grows, block = "..." and '

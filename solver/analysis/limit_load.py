@@ -97,6 +97,10 @@ def find_limit_load(
     its force at the ends: more than the stress block of a continuous face, so that crushing at a toe is found later
     than it comes. What crushes moves by the same flow rule.
 
+    At the pose of an increment its bonds say what is closed: gaps count from those at which elastic joints have no
+    force, and points with tension left hold at any gap, as in the bounds of a path. The give that the forces of the
+    limit state would add is left out.
+
     With a displacement δ, points that are open by a gap g carry at a price: maximise α - Σ g N / w, where w is δ times
     the sum of the live forces; its dual has N(q) + g ≥ μ |T(q)| and live · q = w. That is the first program of a
     pushover with an increment δ. At closed joints it is the limit load, whatever δ is; the two values then enclose the
@@ -122,8 +126,8 @@ def find_limit_load(
     _check_options(assembly, flow, torsion, ties)
     check_blocks(assembly, overlap_tolerance)
     check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
-    if bonds_at is not None:
-        interfaces.refuse_elastic("a limit load with the strength that a settlement has left")
+    if pose is not None and bonds_at is None:
+        interfaces.refuse_pose_alone()
     loads = checked_live(assembly, loads)
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
@@ -182,12 +186,14 @@ class _State:
 class _Problem:
     """One geometry and its loads in units of block size and mean block load; rows of the free blocks.
 
-    Normal forces are those beyond the largest tension: it is a load of the blocks, in ``dead``.
+    Normal forces are those beyond the largest tension: it is a load of the blocks, in ``dead``. Gaps are those beyond
+    the give of joints, by which they are open or closed.
     """
 
     assembly: Assembly
     pose: Pose
     contacts: Contacts
+    gaps: np.ndarray
     friction: np.ndarray
     length: float
     force: float
@@ -223,9 +229,20 @@ class _Problem:
         reach = max(closed_gap, REACH * length) if displacement > 0.0 else closed_gap
         vertices = moved_vertices(assembly, pose)
         contacts = find_contacts(assembly, vertices, reach)
-        around = contacts if interfaces.dry else find_contacts(assembly, vertices, max(reach, REACH * length))
-        bonded = None if bonds is None else bonds.areas_left(contacts)
+        dry = interfaces.dry and bonds is None
+        around = contacts if dry else find_contacts(assembly, vertices, max(reach, REACH * length))
+        gaps, bonded = contacts.gaps, None
+        if bonds is not None:
+            contacts, bonded = around, bonds.areas_left(around)
         cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around, bonded)
+        is_open = gaps > closed_gap
+        if bonds is not None:
+            # As along the path: closed is what has no gap beyond the give of its joint, or holds by tension.
+            gaps = _beyond_give(assembly, interfaces, contacts, bonds, tension > 0.0)
+            is_open = (gaps > closed_gap) & (tension == 0.0)
+            near = ~is_open | (gaps <= reach)
+            contacts, gaps, is_open = contacts[near], gaps[near], is_open[near]
+            cohesion, crushing, tension = cohesion[near], crushing[near], tension[near]
         friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         there = ~np.isin(tie_states, (ABSENT, BROKEN))
         if there.any():
@@ -235,7 +252,8 @@ class _Problem:
             strength = np.array([ties[i].strength for i in members.features[:, 1]])
             contacts, crushing = joined_contacts([contacts, members]), np.append(crushing, strength)
             none = np.zeros(len(members))
-            cohesion, friction, tension = (np.append(of, none) for of in (cohesion, friction, tension))
+            cohesion, friction, tension, gaps = (np.append(of, none) for of in (cohesion, friction, tension, gaps))
+            is_open = np.append(is_open, none > 0.0)
         n_dof = loads.dead.shape[1]
         d = dimension_of(n_dof)
         units = unit_lengths(n_dof, length)
@@ -248,7 +266,7 @@ class _Problem:
         if faces is not None:
             matrix = face_wrench_matrix(contacts, faces, pose, length)
         # What a unit of normal force costs in multipliers of the scaled live load.
-        price, is_open = np.zeros(len(contacts)), contacts.gaps > closed_gap
+        price = np.zeros(len(contacts))
         cohesion, tension = (np.where(is_open, 0.0, strength) for strength in (cohesion, tension))
         rows = sp.csr_array(matrix)[np.repeat(free, n_dof)]
         dead = (loads.dead[free] / units / force).ravel()
@@ -256,11 +274,12 @@ class _Problem:
         pulled[:, 0] = tension / force
         if displacement > 0.0:
             total = float(_lengths(live[:, :d]).sum() + _lengths(live[:, d:]).sum())
-            price = np.where(is_open, contacts.gaps, 0.0) / displacement * (size / total)
+            price = np.where(is_open, gaps, 0.0) / displacement * (size / total)
         return cls(
             assembly=assembly,
             pose=pose,
             contacts=contacts,
+            gaps=gaps,
             friction=friction,
             length=length,
             force=force,
@@ -418,14 +437,15 @@ class _Problem:
         forces = state.forces if self.faces is None else point_forces(self.contacts, self.faces, state.forces)
         forces = forces - np.column_stack([self.tension, np.zeros((len(forces), forces.shape[1] - 1))])
         nothing = np.inf if status is LimitStatus.UNBOUNDED else np.nan
+        in_place = replace(self.contacts, gaps=self.gaps)
         return LimitLoad(
             multiplier=static if found else nothing,
             bounds=(static, kinematic / self.live_size) if found else (nothing, nothing),
             certificate=Certificate(
                 equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / total,
                 friction_excess=friction_excess(state.forces, self.friction, self.cohesion) / total,
-                carrying_gap=carrying_gap(self.contacts, forces),
-                largest_penetration=largest_penetration(self.contacts),
+                carrying_gap=carrying_gap(in_place, forces),
+                largest_penetration=largest_penetration(in_place),
                 duality_gap=abs(kinematic - multiplier) / (1.0 + abs(multiplier)) if found else state.gap,
                 kinematic_violation=float(np.maximum(-room, 0.0).max(initial=0.0)) / size,
             ),
@@ -466,6 +486,17 @@ def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs:
     parts = np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
     moved = normals[-1] + ACCELERATED * errors[-1] - (changes + ACCELERATED * of_errors) @ parts
     return np.asarray(np.maximum(moved, 0.0))
+
+
+def _beyond_give(
+    assembly: Assembly, interfaces: Interfaces, contacts: Contacts, bonds: Bonds, holds: np.ndarray
+) -> np.ndarray:
+    """(n,) array [m]: gaps beyond those at which joints have no force; some hold by tension, an (n,) bool array."""
+    gaps = contacts.gaps - bonds.rest_at(contacts)
+    (stiffness,) = interfaces.values(assembly, contacts.block_a, contacts.block_b, "normal_stiffness")
+    # Give of elastic joints is neither a gap nor a penetration.
+    gives = (stiffness > 0.0) & np.isfinite(stiffness) & (holds | (gaps < 0.0))
+    return np.where(gives, 0.0, gaps)
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:

@@ -57,8 +57,8 @@ def pushover_increments(
     control.check_dimension(assembly)
     check_blocks(assembly, controls.overlap_tolerance)
     interfaces.refuse_crushing("a pushover")
-    if pose is not None:
-        interfaces.refuse_elastic("a pushover from a given pose")
+    if pose is not None and bonds_at is None:
+        interfaces.refuse_pose_alone()
     if pose is not None and bonds_at is None and any(law.bonds for law in interfaces.laws):
         raise ValueError(
             "joints have cohesion, of which a pose does not tell what is left; give bonds_at, the bonds of the "

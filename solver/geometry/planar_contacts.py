@@ -47,7 +47,9 @@ def corners_and_edges(features: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
     return vertex, np.where(on_corner, edge, other), np.where(on_corner, other, -1)
 
 
-def measured_points(shapes: Outlines, vertices: np.ndarray, features: np.ndarray) -> Contacts:
+def measured_points(
+    shapes: Outlines, vertices: np.ndarray, features: np.ndarray, areas: np.ndarray | None = None
+) -> Contacts:
     """Frames and gaps of given pairs of features where the corners now are.
 
     Parameters
@@ -57,6 +59,8 @@ def measured_points(shapes: Outlines, vertices: np.ndarray, features: np.ndarray
         Current corners of all blocks.
     features : (n, 4) int array
         As in :class:`Contacts`.
+    areas : (n,) array, optional [m²]
+        Tributary areas, where they are known; measured by default.
 
     Notes
     -----
@@ -88,7 +92,7 @@ def measured_points(shapes: Outlines, vertices: np.ndarray, features: np.ndarray
         frames=frames,
         gaps=_dot(offset, normal),
         slip=_dot(offset, tangent)[:, None],
-        areas=_areas(shapes, block_a, block_b, points, frames),
+        areas=_areas(shapes, block_a, block_b, points, frames) if areas is None else areas,
     )
 
 

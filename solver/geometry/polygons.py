@@ -44,7 +44,7 @@ class Polygons(Outlines):
 
     def measure(self, vertices: np.ndarray, contacts: Contacts) -> Contacts:
         """Measure the contact points between the same features, with the corners (n_vertices, 2) [m] elsewhere."""
-        return measured_points(self, vertices, contacts.features)
+        return measured_points(self, vertices, contacts.features, contacts.areas)
 
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pairs of blocks that overlap by more than ``tolerance`` [m]; see :func:`overlap_depths`."""

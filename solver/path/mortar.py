@@ -9,7 +9,7 @@ import numpy as np
 from solver.geometry.contacts import Contacts, matched_contacts, successors
 from solver.program.model import Model
 from solver.program.strength import largest_tension
-from solver.results.increment import Bonds
+from solver.results.increment import Bonds, State
 from solver.tolerances import COMPUTED_GAP
 
 from .state import Place
@@ -101,6 +101,17 @@ class Mortar:
         rest[number[same]] = (give * forces[:, 0])[same] * self.model.length
         return replace(place, bonds=replace(place.bonds, rest=rest))
 
+    def kept(self, place: Place, contacts: Contacts, bonds: Bonds) -> Place:
+        """The place with what a path has left of its joints, elastic ones under the force of their gap."""
+        place = replace(place, bonds=bonds)
+        joints = self.points(place, contacts)
+        gives, forces = joints.give[:, 0] > 0.0, np.zeros_like(contacts.points)
+        if not gives.any():
+            return place
+        pressed = -joints.beyond_give(contacts.gaps)[gives] / (joints.length * joints.give[gives, 0])
+        forces[gives, 0] = np.maximum(pressed, -joints.tension[gives])
+        return replace(place, contacts=contacts, forces=forces, trial=forces, followed=forces[:, 0])
+
     def points(self, place: Place, contacts: Contacts) -> JointPoints:
         """What the joints add to contact points at a place."""
         model, (n, d) = self.model, contacts.points.shape
@@ -131,16 +142,20 @@ class Mortar:
             length=model.length,
         )
 
-    def told(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) arrays: part of the strength of contact points that is left, and of the joint [m²] that has it.
-
-        Empty where no joint had any.
-        """
-        if not any(law.bonds for law in self.model.interfaces.laws):
-            return np.zeros(0), np.zeros(0)
+    def told(self, state: State, place: Place, contacts: Contacts) -> State:
+        """The arrays of an increment with those that tell of its joints; dry rigid ones have none."""
+        interfaces = self.model.interfaces
+        if not self.present:
+            return state
         joints, bonds = self.points(place, contacts), self.renamed(place, contacts).bonds
-        intact, areas = np.where(joints.cohesion > 0.0, joints.left, 0.0), replace(bonds, left=np.ones(len(bonds)))
-        return intact, np.where(intact > 0.0, areas.areas_left(contacts), 0.0)
+        number, bonded = matched_contacts(contacts, bonds)
+        left = np.where(joints.cohesion > 0.0, joints.left, 0.0)
+        return replace(
+            state,
+            bonded=np.where(bonded, self._of(bonds.areas, number), contacts.areas),
+            intact=left if any(law.bonds for law in interfaces.laws) else state.intact,
+            unloaded=joints.rest if interfaces.elastic else state.unloaded,
+        )
 
     def renamed(self, place: Place, contacts: Contacts) -> Place:
         """The place with its bonds at these contact points: one that vanishes passes its bond to the nearest ones."""

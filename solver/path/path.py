@@ -125,7 +125,8 @@ class Path:
             place = self.stepper.members.installed(place, self.number)
         else:
             place = self.stepper.unloaded(start, self.number, ties_at, bonds_at)
-            resting = self._at_rest(place)
+            drawn = bonds_at is None
+            resting = self._at_rest(place, drawn)
             if resting is None:
                 # Joints that the drawing leaves open close.
                 closed = self.fall.relaxed(place, JUMP)
@@ -134,7 +135,7 @@ class Path:
                     # Those that have mortar are the ones that are closed then, or a settlement before has left.
                     closed = self.stepper.mortar.renamed(closed, self.stepper.contacts(closed.pose))
                     closed = replace(closed, contacts=None, velocity=None)
-                    resting = self._at_rest(self.stepper.whole(closed) if bonds_at is None else closed)
+                    resting = self._at_rest(self.stepper.whole(closed) if drawn else closed, drawn)
             place = resting or place
         return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
 
@@ -180,7 +181,8 @@ class Path:
         beyond = forces.copy()
         beyond[:, 0] += self.stepper.mortar.points(place, contacts).tension
         trial = np.where(beyond[:, :1] > 0.0, beyond, -np.eye(forces.shape[1])[0])
-        place = self.stepper.mortar.at_rest(place, contacts, forces)
+        if anew:
+            place = self.stepper.mortar.at_rest(place, contacts, forces)
         return replace(place, contacts=contacts, forces=forces, trial=trial, followed=forces[:, 0])
 
     # The loop ----------------------------------------------------------------------------------------------------
@@ -491,7 +493,9 @@ class Path:
         """Multiplier at the place beyond, at or below zero; None where equilibrium itself is lost, not the capacity."""
         if self.model.live is None:
             return None
-        unloaded = self.stepper.unloaded(state.start, self.number)
+        # The gaps of elastic joints at the start tell with their lengths without force what carries there.
+        bonds = state.place.bonds if self.model.interfaces.elastic else None
+        unloaded = self.stepper.unloaded(state.start, self.number, bonds_at=bonds)
         first, bounds = self.checks.bounds(unloaded), self.checks.bounds(beyond, CLOSING_GAP)
         vanishes = state.place.multiplier <= VANISHING * first.high
         return bounds.high if vanishes and bounds.in_equilibrium and bounds.high <= 0.0 else None

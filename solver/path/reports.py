@@ -69,8 +69,7 @@ class Reports:
         notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
         self.notes = []
         state = self._state(place.pose, contacts, forces, friction, velocity, support_forces, ties)
-        intact, bonded = self.stepper.mortar.told(place, contacts)
-        state = replace(state, intact=intact, bonded=bonded)
+        state = self.stepper.mortar.told(state, place, contacts)
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
         return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
 

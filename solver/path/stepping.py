@@ -183,7 +183,7 @@ class Stepper:
     ) -> Place:
         """Return the place of a pose without forces, with the members of a phase, from 0, and all joints whole."""
         place = self.members.installed(Place.unloaded(pose), phase, ties_at)
-        return self.whole(place) if bonds_at is None else replace(place, bonds=bonds_at)
+        return self.whole(place) if bonds_at is None else self.mortar.kept(place, self.contacts_at(place), bonds_at)
 
     def whole(self, place: Place) -> Place:
         """Return the place with mortar in all closed joints."""
@@ -562,8 +562,10 @@ class Stepper:
             number, is_stepped = matched_contacts(end, stepped)
             earlier = np.where(is_stepped, np.minimum(stepped.gaps[number], 0.0), 0.0)
         deepest = -LARGEST_PENETRATION * self.model.length
-        # In an elastic joint corners come closer as its force grows.
-        deep = (end.gaps - earlier < deepest) & (self.mortar.points(before, end).give[:, 0] == 0.0)
+        deep = end.gaps - earlier < deepest
+        if self.model.interfaces.elastic:
+            # In an elastic joint corners come closer as its force grows.
+            deep &= self.mortar.points(before, end).give[:, 0] == 0.0
         found = measure_contacts(self.model.assembly, moved_vertices(self.model.assembly, before.pose), end[deep])
         if is_stepped[deep].any() or (found.gaps < deepest).any():
             raise Penetration(movement_size)

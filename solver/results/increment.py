@@ -109,6 +109,13 @@ class Bonds:
         number, bonded = matched_contacts(contacts, self)
         return np.where(bonded, (self.areas * self.left)[number], 0.0)
 
+    def rest_at(self, contacts: Contacts) -> np.ndarray:
+        """(n,) array [m]: gap without force of each contact point."""
+        if not len(self) or not len(contacts):
+            return np.zeros(len(contacts))
+        number, bonded = matched_contacts(contacts, self)
+        return np.where(bonded, self.rest[number], 0.0)
+
 
 @dataclass(frozen=True)
 class State:
@@ -137,7 +144,9 @@ class State:
     intact : (n_contacts,) array
         Part of its cohesion and tensile strength that each contact point has left; empty for dry joints.
     bonded : (n_contacts,) array [m²]
-        Part of the joint, at rest, that its mortar stands for; empty for dry joints.
+        Part of the joint, at rest, that its mortar or its springs stand for; empty for dry rigid joints.
+    unloaded : (n_contacts,) array [m]
+        Gap at which an elastic joint has no force, as :attr:`Bonds.rest`; empty for rigid joints.
     """
 
     pose: Pose
@@ -151,6 +160,7 @@ class State:
     ties: TieForces = field(default_factory=TieForces)
     intact: np.ndarray = field(default_factory=lambda: np.zeros(0))
     bonded: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    unloaded: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class StoredState(Protocol):
@@ -190,11 +200,13 @@ class HasState:
 
     @property
     def bonds(self) -> Bonds | None:
-        """The strength that rigid joints have left; None where they are dry."""
-        intact = self.state.intact
-        if not len(intact):
+        """The strength that joints have left, and where elastic ones have no force; None of dry rigid joints."""
+        state = self.state
+        n = len(state.bonded)
+        if not n:
             return None
-        return Bonds(self.contacts.features[:, :3], self.state.bonded, intact, np.zeros(len(intact)))
+        intact, unloaded = (of if len(of) else np.zeros(n) for of in (state.intact, state.unloaded))
+        return Bonds(state.contacts.features[:, :3], state.bonded, intact, unloaded)
 
     @property
     def contacts(self) -> Contacts:

@@ -50,6 +50,20 @@ def test_what_a_prop_carried_goes_to_the_piers_when_it_is_taken_away() -> None:
     assert any("'prop' taken away before settlement 2" in note for note in response.notes)
 
 
+@pytest.mark.parametrize("law", [solver.InterfaceLaw(0.6, normal_stiffness=2e6), solver.InterfaceLaw(0.6)])
+def test_springs_keep_what_has_compressed_them_when_something_apart_is_taken_away(law: solver.InterfaceLaw) -> None:
+    pads = [rectangle(x - 0.05, -0.3, x + 0.05, 0.0) for x in (-1.0, 0.0, 1.0)]
+    apart = [rectangle(3.0, 0.0, 3.4, 0.4), rectangle(3.0, -0.3, 3.4, 0.0)]
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(-1.2, 0.0, 1.2, 0.4), *pads, *apart], roles=["free", "fixed", "fixed", "moving", "free", "fixed"]
+    )
+    structure = solver.Structure(assembly, solver.Interfaces(law))
+    phases = [solver.Settlement([0.0, -1.0], increment=5e-3, limit=5e-3)] * 2
+    change = solver.PhaseChange(1, np.arange(6) == 4)
+    found = [structure.settle(phases, changes=changes).path[-1].reaction for changes in ([], [change])]
+    assert found[1] == pytest.approx(found[0], abs=1e-4 * mechanics.total_weight(assembly))
+
+
 def test_a_load_acts_from_its_phase_on() -> None:
     structure = beam_on_a_prop()
     dead = np.zeros((6, 3))

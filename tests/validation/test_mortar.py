@@ -1,5 +1,7 @@
 """Mortar along a path, and ground that gives: what statics says by hand of the point model."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -164,7 +166,8 @@ def test_a_wedge_that_has_slipped_on_its_slope_keeps_friction():
 
 
 @pytest.mark.slow
-def test_what_a_settlement_has_torn_off_is_missing_from_limit_load_and_pushover():
+@pytest.mark.parametrize("stiffness", [np.inf, 1e10])
+def test_what_a_settlement_has_torn_off_is_missing_from_limit_load_and_pushover(stiffness):
     """A block on a bed and glued to a wall at its side, which sinks: pulled off it, μ W + c A of the bed is left."""
     cohesion, tension, friction = 2e4, 1e4, 0.6
     assembly = solver.Assembly.from_outlines(
@@ -172,7 +175,8 @@ def test_what_a_settlement_has_torn_off_is_missing_from_limit_load_and_pushover(
         roles=["free", "fixed", "moving"], names=["block", "ground", "wall"], thickness=0.4,
     )  # fmt: skip
     weight = mechanics.total_weight(assembly)
-    interfaces = solver.Interfaces(solver.InterfaceLaw(friction, cohesion, tensile_strength=tension))
+    give = {"normal_stiffness": stiffness, "shear_stiffness": stiffness}
+    interfaces = solver.Interfaces(solver.InterfaceLaw(friction, cohesion, tensile_strength=tension, **give))
     bed, side = 0.5 * 0.4, 0.25 * 0.4
     live = solver.point_load(assembly, 0, (-weight, 0.0), point=(0.0, 0.0))
     structure = solver.Structure(assembly, interfaces, solver.Loads(solver.self_weight(assembly).dead, live))
@@ -183,11 +187,81 @@ def test_what_a_settlement_has_torn_off_is_missing_from_limit_load_and_pushover(
     found = structure.limit_load(pose=sunk.pose, bonds_at=sunk.bonds)
     assert found.multiplier == pytest.approx(left, rel=1e-5)
     control = solver.ControlDisplacement("block", (-1.0, 0.0), limit=1e-3, increment=1e-3)
-    with pytest.raises(ValueError, match="of which a pose does not tell what is left; give bonds_at"):
+    with pytest.raises(ValueError, match="of which a pose does not tell what"):
         structure.pushover(control, pose=sunk.pose)
     pushed = structure.pushover(control, pose=sunk.pose, bonds_at=sunk.bonds)
     assert pushed.values[0] == pytest.approx(left, rel=1e-5)
     assert pushed.values[1] == pytest.approx(friction, rel=1e-3)
+
+
+def block_on_two_springs(interfaces, sunk=5e-4):
+    """A block of 1 x 1.5 m, pushed to the right at mid height by its weight, on pads of which the right one sinks."""
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(-0.5, 0.0, 0.5, 1.5), rectangle(-0.45, -0.3, -0.35, 0.0), rectangle(0.35, -0.3, 0.45, 0.0)],
+        roles=["free", "fixed", "moving"], names=["block", "left", "right"], thickness=0.5,
+    )  # fmt: skip
+    live = solver.point_load(assembly, 0, (mechanics.total_weight(assembly), 0.0), point=(0.0, 0.75))
+    structure = solver.Structure(assembly, interfaces, solver.Loads(solver.self_weight(assembly).dead, live))
+    settlement = solver.Settlement(direction=(0.0, -1.0), increment=sunk, limit=sunk)
+    return structure, structure.settle(settlement).increments[-1]
+
+
+@pytest.mark.parametrize(
+    "interfaces",
+    [
+        solver.Interfaces(solver.InterfaceLaw(2.0, normal_stiffness=5e7, shear_stiffness=2e7)),
+        solver.Interfaces(
+            solver.InterfaceLaw(2.0, 1e4, tensile_strength=5e3, normal_stiffness=5e7, shear_stiffness=2e7)
+        ),
+        solver.Interfaces(solver.InterfaceLaw(2.0), ground={"left": 5e7, "right": 5e7}),
+    ],
+    ids=["joints", "mortar", "ground"],
+)
+def test_a_block_that_leans_on_springs_tips_about_its_edge(interfaces):
+    """α W y = W x about the outer edge of the right pad, from which the centroid is at (-x, y) at rest.
+
+    Mortar adds what pulls at the other three ends of pads: t A/2 each, 0.1, 0.8 and 0.9 m away.
+    """
+    structure, sunk = block_on_two_springs(interfaces)
+    leaning = -sunk.pose.rotations[0, 0]
+    assert 4e-4 < leaning < 7e-4
+    x, y = 0.45 - sunk.pose.positions[0, 0], 5e-4 + sunk.pose.positions[0, 1]
+    tension, weight = interfaces.default.tensile_strength, mechanics.total_weight(structure.assembly)
+    expected = (x + tension * 0.025 * 1.8 / weight) / y
+    for more in ({}, {"flow": "non-associative"}, {"displacement": 1e-3}):
+        found = structure.limit_load(pose=sunk.pose, bonds_at=sunk.bonds, **more)
+        assert found.multiplier == pytest.approx(expected, rel=1e-6)
+        assert holds(found)
+    # By its gaps alone the right pad, which carries less than at rest, has let go of the block.
+    rigid = replace(sunk.bonds, left=0.0 * sunk.bonds.left, rest=0.0 * sunk.bonds.rest)
+    assert structure.limit_load(pose=sunk.pose, bonds_at=rigid).status is solver.LimitStatus.NO_EQUILIBRIUM
+    control = solver.ControlDisplacement("block", (1.0, 0.0), point=(0.0, 1.5), limit=2e-3, increment=1e-3)
+    # The bounds of the path, with the live load for their objective, are the same program.
+    pushed = structure.pushover(control, pose=sunk.pose, bonds_at=sunk.bonds)
+    assert pushed.values[0] == pytest.approx(expected, rel=1e-6)
+    # Then springs give.
+    assert 0.0 < pushed.values[1] < pushed.values[2] < expected
+    for analysis in (structure.limit_load, lambda **at: structure.pushover(control, **at)):
+        with pytest.raises(ValueError, match="joints are elastic, of which a pose does not tell what compresses them"):
+            analysis(pose=sunk.pose)
+
+
+def test_capacities_with_stiff_joints_are_those_with_rigid_ones():
+    """Of an arch that has spread; with a stiffness of 1e10 Pa/m they are 0.1 % less."""
+    arch = generators.build("arch", {"voussoirs": 11})
+    loads = solver.Loads(solver.self_weight(arch).dead, solver.weight_fraction(arch, (1.0, 0.0), arch.free))
+    settlement = solver.Settlement(direction=(1.0, 0.0), increment=0.01, limit=0.01)
+    found = []
+    for stiffness in (np.inf, 1e14, 1e10):
+        law = solver.InterfaceLaw(0.9, normal_stiffness=stiffness, shear_stiffness=stiffness)
+        structure = solver.Structure(arch, solver.Interfaces(law), loads)
+        last = structure.settle(settlement).increments[-1]
+        found.append(structure.limit_load(pose=last.pose, bonds_at=last.bonds).multiplier)
+        assert (last.bonds is None) == (stiffness == np.inf)
+    rigid, stiff, soft = found
+    assert stiff == pytest.approx(rigid, rel=1e-6)
+    assert soft == pytest.approx(rigid, rel=2e-3)
+    assert abs(soft / rigid - 1.0) > 1e-4
 
 
 @pytest.mark.parametrize(
