@@ -30,6 +30,9 @@ __all__ = ["ENGINES", "IN_SPACE", "Drive", "Sample", "are_convex", "convex_piece
 REST = 0.3
 SAMPLING = 0.01
 
+#: How LMGC90 calls a contact of its law of Mohr and Coulomb that has not broken, as far as compas_lmgc90 hands it on.
+WHOLE = "Mst"
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -43,19 +46,29 @@ class Drive:
     speed : float [m/s, or rad/s where the ground turns]
     slow, slow_from : float
         The speed from a displacement on: what falls takes time, in which fast supports go on.
+    ramp : float [s]
+        Time in which the speed is reached: a jolt breaks what is brittle.
     """
 
     direction: Any
     speed: float
     slow: float = 0.0
     slow_from: float = inf
+    ramp: float = 0.0
+
+    @property
+    def slows_at(self) -> float:
+        """When the slower speed begins [s]; a ramp ends before."""
+        return self.slow_from / self.speed + self.ramp / 2.0
 
     def at(self, clock: float) -> tuple[float, float]:
         """Displacement and speed at a time since the supports began to move [s]."""
-        change = self.slow_from / self.speed
-        if clock < change:
-            return self.speed * max(clock, 0.0), self.speed if clock > -1e-9 else 0.0
-        return self.slow_from + self.slow * (clock - change), self.slow
+        if 0.0 <= clock < self.ramp:
+            speed = self.speed * clock / self.ramp
+            return speed * clock / 2.0, speed
+        if clock < self.slows_at:
+            return self.speed * max(clock - self.ramp / 2.0, 0.0), self.speed if clock > -1e-9 else 0.0
+        return self.slow_from + self.slow * (clock - self.slows_at), self.slow
 
     @property
     def turns(self) -> bool:
@@ -83,6 +96,8 @@ class Sample:
         Of the structure on the moving supports, mean since the last sample.
     ties : (n_ties,) array [N]
         Their tension, mean since the last sample.
+    whole : float
+        Part of the contact points at rest whose mortar has not broken.
     """
 
     time: float
@@ -90,6 +105,7 @@ class Sample:
     positions: np.ndarray
     force: np.ndarray
     ties: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    whole: float = 0.0
 
 
 def convex_pieces(outline: np.ndarray) -> list[np.ndarray]:
@@ -291,8 +307,8 @@ def _strips(outline: np.ndarray, width: float, gap: float) -> list[np.ndarray]:
 
 def _evolution(drive: Drive, part: float, time_step: float) -> np.ndarray:
     """Times and velocities of a component of the drive, between which LMGC90 interpolates."""
-    fast, slow, change = drive.speed * part, drive.slow * part, REST + min(drive.slow_from / drive.speed, 1e5)
-    times = [0.0, REST, REST + time_step, change, change + time_step, 1e6]
+    fast, slow, change = drive.speed * part, drive.slow * part, REST + min(drive.slows_at, 1e5)
+    times = [0.0, REST, REST + max(drive.ramp, time_step), change, change + time_step, 1e6]
     return np.array([times, [0.0, 0.0, fast, fast, slow, slow]])
 
 
@@ -350,7 +366,7 @@ def lmgc90_path(
     moving = np.flatnonzero(assembly.moving[owner])
     first_piece = np.searchsorted(owner, np.arange(assembly.n_blocks))
     start = np.array(engine.init_coor)[:, [0, 2]]  # centres of mass, which engine.centroids are not
-    per_sample = max(1, round(sampling / time_step))
+    per_sample, bonded = max(1, round(sampling / time_step)), 0
     for sample in range(10**9):
         force = np.zeros(2)
         for _ in range(per_sample):
@@ -363,8 +379,14 @@ def lmgc90_path(
         moved = np.array(state.bodies)[:, [0, 2]] - start
         clock = (sample + 1) * per_sample * time_step - REST
         displacement = float(moved[moving[0]] @ drive.direction)
+        whole = sum(status.startswith(WHOLE) for status in state.interaction_status)
+        bonded = bonded or whole
         yield Sample(
-            clock, displacement, assembly.centroids + moved[first_piece], force * thickness / (depth * per_sample)
+            clock,
+            displacement,
+            assembly.centroids + moved[first_piece],
+            force * thickness / (depth * per_sample),
+            whole=whole / max(bonded, 1),
         )
 
 

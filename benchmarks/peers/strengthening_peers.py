@@ -1,15 +1,21 @@
 """Ties beside MuJoCo, mortar beside LMGC90: one wall each, the same blocks and the same settlement.
 
-    python benchmarks/peers/strengthening_peers.py [--ties none elastic iron] [--cohesions 0 2e4 6e4] [--seconds 600]
+    python benchmarks/peers/strengthening_peers.py [--ties none elastic iron] [--tensions 1e5] [--cohesions 0 6e4]
+        [--push] [--seconds 600]
 
 with ``mujoco`` and ``compas_lmgc90`` as ``peers.py`` says; what is not installed is left out.
 
 Ties: the arch on two piers of ``examples/arch_with_tie.toml``, with a tie that gives (an elastic rod, whose force says
 how far the piers have moved apart) and with the tie of iron that yields at 1 kN (the displacement at which the arch
-falls says what it has resisted). MuJoCo's tie is a spatial tendon, slack below its length. Mortar: the panel of
-``examples/wall_with_mortar.toml``, dry and with mortar, against LMGC90's brittle law of Mohr and Coulomb, in which a
-contact has a tensile strength and a cohesion times its part of the face until it opens or slides. Both engines run with
-a time step and with half of it, and move the support slowly; forces are means over ``WINDOW`` before the settlement.
+falls says what it has resisted). MuJoCo's tie is a spatial tendon, slack below its length.
+
+Mortar is brittle in LMGC90's law of Mohr and Coulomb: a contact has a tensile strength times its part of the face until
+it opens or slides. While it is whole its coefficient of friction is cohesion over tensile strength, whatever is given
+(``--push`` shows that), so that ours gets tensile strengths of cohesion over friction, with which both laws are one.
+Two structures: an arch whose supports spread, in which three joints break, and the panel of
+``examples/wall_with_mortar.toml``, dry and with mortar, in which many do. Supports start slowly, since the jolt of a
+joint that breaks breaks others. Engines run with a time step and with half of it; forces are means over ``WINDOW``
+before the settlement.
 """
 
 from __future__ import annotations
@@ -32,6 +38,7 @@ import physics_engines
 from peers import loaded
 
 import solver
+from blockvis import generators
 from blockvis.generators import catalogue
 from solver import mechanics
 
@@ -52,8 +59,17 @@ TIES = ("none", "elastic", "iron")
 #: Where the tie and the support are read [m], the stiffness of the elastic tie [N/m], the strength of the iron one [N].
 ARCH_AT, ELASTIC, YIELDS = (0.05, 0.1, 0.2), 1e4, 1000.0
 
-#: Where the wall is read [m], and cohesions; the tensile strength is half of them [Pa].
-WALL_AT, COHESIONS = (0.002, 0.005, 0.01), (0.0, 6e4, 2e5)
+#: Where the panel is read [m], its cohesions [Pa], speed of its support in LMGC90 [m/s], which it has after [s].
+WALL_AT, COHESIONS, WALL_MOVES = (0.002, 0.005, 0.01), (1.8e4, 6e4, 2e5), (0.005, 0.1)
+
+#: Of our own steps along it.
+OUR_TOLERANCES = (0.005, 0.00125)
+
+#: Tensile strengths of the arch of mortar [Pa], where it is read [m], speed and time likewise.
+TENSIONS, CRACKED_AT, ARCH_MOVES = (5e4, 1e5), (0.0015, 0.01, 0.05), (0.02, 100.0)
+
+#: Tensile strength and cohesion [Pa], and friction, of the brick that LMGC90 pushes off its bed.
+PUSHED = ((1e4, 6e3, 0.6), (1e4, 6e3, 0.3), (6e3, 6e3, 0.6), (3e3, 6e3, 0.6))
 
 
 def example(name: str) -> tuple[solver.Assembly, dict[str, Any]]:
@@ -69,15 +85,20 @@ def engine(
     at: Sequence[float],
     time_step: float,
     budget: float,
+    *,
+    moves: tuple[float, float] | None = None,
+    to_the_fall: bool = True,
     **options: Any,
-) -> tuple[list[np.ndarray], float, float]:
-    """Reads an engine: (reaction, forces of ties) [N] at settlements, the last one before a fall [m], and seconds."""
-    found: list[np.ndarray] = []
+) -> tuple[list[physics_engines.Sample], float, float]:
+    """Reads an engine: samples with mean forces at settlements, the last one before a fall [m], and seconds."""
+    found: list[physics_engines.Sample] = []
     seen: list[physics_engines.Sample] = []
     within, seconds = round(WINDOW / physics_engines.SAMPLING), 0.0
-    speed = SPEED[name]
-    given = (name, assembly, physics_engines.Drive(direction, speed), time_step, FRICTION)
-    for spent, sample in physics_engines.in_a_process(*given, budget=budget, **options):
+    speed, ramp = moves or (SPEED[name], 0.0)
+    drive = physics_engines.Drive(direction, speed, ramp=ramp)
+    for spent, sample in physics_engines.in_a_process(
+        name, assembly, drive, time_step, FRICTION, budget=budget, **options
+    ):
         seconds = spent
         if sample.time < 0.0:
             continue
@@ -88,9 +109,9 @@ def engine(
         if moved > FALLING * speed * WINDOW:
             return found, seen[-1 - within].displacement, seconds
         if len(found) < len(at) and sample.displacement >= at[len(found)]:
-            mean = np.mean([np.append(one.force @ direction, one.ties) for one in seen[-within:]], axis=0)
-            found.append(mean)
-            if len(found) == len(at) and at[-1] < min(ARCH_AT):
+            force, pulled = (np.mean([getattr(one, of) for one in seen[-within:]], axis=0) for of in ("force", "ties"))
+            found.append(replace(sample, force=force, ties=pulled))
+            if len(found) == len(at) and not to_the_fall:
                 break
     return found, float("nan"), seconds
 
@@ -127,48 +148,145 @@ def ties(chosen: Sequence[str], steps: Sequence[float], budget: float) -> None:
         )
         for time_step in steps if loaded("mujoco") else ():
             found, falls, seconds = engine("mujoco", assembly, (1.0, 0.0), ARCH_AT, time_step, budget, ties=given)
-            reaction = cell([one[0] for one in found], 0)
-            pull = cell([float(one[1:].sum()) for one in found], 0)
+            reaction = cell([one.force[0] for one in found], 0)
+            pull = cell([float(one.ties.sum()) for one in found], 0)
             print(
                 f"| {kind} | MuJoCo {1e3 * time_step:g} ms | {reaction} | {pull} | {falls:.4f} | {seconds:.1f} |",
                 flush=True,
             )
 
 
-def mortar(cohesions: Sequence[float], steps: Sequence[float], budget: float) -> None:
+def of_mortar(cohesion: float, tension: float) -> solver.InterfaceLaw:
+    return replace(solver.InterfaceLaw(FRICTION), cohesion=cohesion, tensile_strength=tension)
+
+
+def whole(path: Sequence[solver.Increment], at_rest: solver.Increment) -> str:
+    """Part of the contact points at rest whose mortar has not broken, of ours."""
+    bonds = [one.bonds for one in (at_rest, *path)]
+    first, *left = (np.nan if one is None else float(one.left.sum()) for one in bonds)
+    return cell([part / first for part in left], 2)
+
+
+def arch(tensions: Sequence[float], steps: Sequence[float], budget: float) -> None:
+    """An arch of mortar, by tensile strength."""
+    assembly = generators.arch()
+    weight, looks = mechanics.total_weight(assembly), " / ".join(f"{1e3 * s:g}" for s in CRACKED_AT)
+    print(f"\n| tensile strength [kPa] | by | R / W at {looks} mm | whole | falls at [m] | seconds |")
+    for tension in tensions:
+        started = time.process_time()
+        settlement = solver.Settlement(direction=(1.0, 0.0), increment=0.01, limit=1.5, stops=CRACKED_AT)
+        structure = solver.Structure(assembly, solver.Interfaces(of_mortar(FRICTION * tension, tension)))
+        response = structure.settle(settlement, controls=solver.Controls(falling_frames=0))
+        falls = float("nan") if response.collapse is None else response.collapse.displacement
+        path = [min(response.path, key=lambda one, s=s: abs(one.settlement - s)) for s in CRACKED_AT if not s > falls]
+        ours = cell([one.reaction / weight for one in path], 4)
+        print(
+            f"| {tension / 1e3:g} | blockvis | {ours} | {whole(path, response.path[0])} | {falls:.4f} | "
+            f"{time.process_time() - started:.1f} |",
+            flush=True,
+        )
+        strength = (tension, FRICTION * tension)
+        for time_step in steps if loaded("compas_lmgc90") else ():
+            found, _, seconds = engine(
+                "compas_lmgc90",
+                assembly,
+                (1.0, 0.0),
+                CRACKED_AT,
+                time_step,
+                budget,
+                moves=ARCH_MOVES,
+                to_the_fall=False,
+                strength=strength,
+            )
+            theirs, left = cell([one.force[0] / weight for one in found], 4), cell([one.whole for one in found], 2)
+            print(
+                f"| {tension / 1e3:g} | LMGC90 {1e3 * time_step:g} ms | {theirs} | {left} | not run | {seconds:.1f} |",
+                flush=True,
+            )
+
+
+def panel(cohesions: Sequence[float], steps: Sequence[float], budget: float) -> None:
     """The panel, by cohesion."""
     assembly, _ = example("wall_with_mortar")
     weight = mechanics.total_weight(assembly)
-    print("\n| cohesion [kPa] | by | R / W at " + " / ".join(f"{1e3 * s:g}" for s in WALL_AT) + " mm | seconds |")
+    print(
+        "\n| cohesion [kPa] | by | R / W at " + " / ".join(f"{1e3 * s:g}" for s in WALL_AT) + " mm | whole | seconds |"
+    )
     for cohesion in cohesions:
-        started = time.process_time()
-        law = replace(solver.InterfaceLaw(FRICTION), cohesion=cohesion, tensile_strength=cohesion / 2.0)
-        settlement = solver.Settlement(direction=(0.0, -1.0), increment=0.002, limit=max(WALL_AT), stops=WALL_AT)
-        response = solver.Structure(assembly, solver.Interfaces(law)).settle(settlement)
-        path = [min(response.path, key=lambda one, s=s: abs(one.settlement - s)) for s in WALL_AT]
-        ours = cell([one.reaction / weight for one in path], 4)
-        print(f"| {cohesion / 1e3:g} | blockvis | {ours} | {time.process_time() - started:.1f} |", flush=True)
-        strength = (cohesion / 2.0, cohesion) if cohesion else None
+        law = of_mortar(cohesion, cohesion / FRICTION)
+        for tolerance in OUR_TOLERANCES:
+            started = time.process_time()
+            settlement = solver.Settlement(direction=(0.0, -1.0), increment=0.002, limit=max(WALL_AT), stops=WALL_AT)
+            controls = solver.Controls(falling_frames=0, step_tolerance=tolerance)
+            response = solver.Structure(assembly, solver.Interfaces(law)).settle(settlement, controls=controls)
+            path = [min(response.path, key=lambda one, s=s: abs(one.settlement - s)) for s in WALL_AT]
+            ours, left = cell([one.reaction / weight for one in path], 4), whole(path, response.path[0])
+            print(
+                f"| {cohesion / 1e3:g} | blockvis, step_tolerance {tolerance:g} | {ours} | {left} | "
+                f"{time.process_time() - started:.1f} |",
+                flush=True,
+            )
+        strength = (cohesion / FRICTION, cohesion) if cohesion else None
         for time_step in steps if loaded("compas_lmgc90") else ():
             found, _, seconds = engine(
-                "compas_lmgc90", assembly, (0.0, -1.0), WALL_AT, time_step, budget, strength=strength
+                "compas_lmgc90",
+                assembly,
+                (0.0, -1.0),
+                WALL_AT,
+                time_step,
+                budget,
+                moves=WALL_MOVES,
+                to_the_fall=False,
+                strength=strength,
             )
-            theirs = cell([one[0] / weight for one in found], 4)
-            print(f"| {cohesion / 1e3:g} | LMGC90 {1e3 * time_step:g} ms | {theirs} | {seconds:.1f} |", flush=True)
+            theirs, left = cell([-one.force[1] / weight for one in found], 4), cell([one.whole for one in found], 2)
+            print(
+                f"| {cohesion / 1e3:g} | LMGC90 {1e3 * time_step:g} ms | {theirs} | {left} | {seconds:.1f} |",
+                flush=True,
+            )
+
+
+def push(budget: float) -> None:
+    """What a brick on its bed of mortar resists in LMGC90: cohesion, and friction of cohesion over tension."""
+    boxes = ((0.0, 0.0, 0.4, 0.2), (0.0, -0.4, 1.4, 0.0), (-0.4, 0.02, 0.0, 0.024))
+    outlines = [[[left, low], [right, low], [right, high], [left, high]] for left, low, right, high in boxes]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["free", "fixed", "moving"], thickness=0.25)
+    weight, area = mechanics.total_weight(assembly), 0.4 * 0.25
+    print("\n| tension, cohesion [Pa], friction | c A + (c / t) N [N] | LMGC90, whole | friction N | broken |")
+    for tension, cohesion, friction in PUSHED if loaded("compas_lmgc90") else ():
+        drive, forces = physics_engines.Drive((1.0, 0.0), 1e-4), []
+        for _, sample in physics_engines.in_a_process(
+            "compas_lmgc90", assembly, drive, 1e-3, friction, budget=budget, sampling=1e-3, strength=(tension, cohesion)
+        ):
+            forces.append(-float(sample.force[0]))
+            if sample.time > 0.02:
+                break
+        expected = cohesion * area + cohesion / tension * weight
+        print(
+            f"| {tension:g}, {cohesion:g}, {friction:g} | {expected:.0f} | {max(forces):.0f} | "
+            f"{friction * weight:.0f} | {forces[-1]:.0f} |",
+            flush=True,
+        )
 
 
 def main() -> None:
-    """Print both tables, or the one that is asked for."""
+    """Print all tables, or those that are asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ties", nargs="*", default=list(TIES), choices=TIES)
-    parser.add_argument("--cohesions", nargs="*", type=float, default=list(COHESIONS), help="[Pa]")
+    parser.add_argument("--tensions", nargs="*", type=float, default=list(TENSIONS), help="of the arch of mortar [Pa]")
+    parser.add_argument("--cohesions", nargs="*", type=float, default=list(COHESIONS), help="of the panel [Pa]")
+    parser.add_argument("--push", action="store_true", help="show LMGC90's law on a brick")
     parser.add_argument("--steps", nargs="+", type=float, default=list(STEPS), help="time steps of the engines [s]")
     parser.add_argument("--seconds", type=float, default=600.0, help="processor time of one run of an engine")
     chosen = parser.parse_args()
     if chosen.ties:
         ties(chosen.ties, chosen.steps, chosen.seconds)
+    if chosen.push:
+        push(chosen.seconds)
+    if chosen.tensions:
+        arch(chosen.tensions, chosen.steps, chosen.seconds)
     if chosen.cohesions:
-        mortar(chosen.cohesions, chosen.steps, chosen.seconds)
+        panel(chosen.cohesions, chosen.steps, chosen.seconds)
 
 
 if __name__ == "__main__":

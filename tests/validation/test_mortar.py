@@ -381,6 +381,52 @@ def test_weak_mortar_on_stiff_joints_is_a_dry_wall(friction, courses, strength):
         assert other.pose.positions == pytest.approx(one.pose.positions, abs=1e-5)
 
 
+def thrust_of_the_broken_arch(arch, tension):
+    """Thrust once three joints have broken, one after the other, of an arch on elastic joints: the force method.
+
+    Of its right half: the two point forces of the crown's joint are unknown, those of the others follow from statics.
+    """
+    half = np.flatnonzero(arch.free & (arch.centroids[:, 0] > 0.0))
+    half = half[np.argsort(arch.centroids[half, 0])]
+    radii, angles = np.array([0.925, 1.075]), np.linspace(0.0, np.pi / 2.0, len(half) + 1)
+    weights = solver.GRAVITY * arch.masses[half]
+    above, moment = (np.append(0.0, np.cumsum(w)) for w in (weights, weights * arch.centroids[half, 0]))
+    # Joints carry (H, -above), whose moment about the centre is that of their two points alone.
+    of_points = np.linalg.inv(np.array([np.ones(2), radii]))
+    influence = np.array([of_points @ np.array([[np.cos(a)] * 2, radii]) for a in angles]).reshape(-1, 2)
+    loads = np.array([of_points @ pair for pair in zip(above * np.sin(angles), moment, strict=True)]).ravel()
+    give = np.repeat(np.append(0.5, np.ones(len(half))), 2)  # half of the crown's joint belongs to the other side
+    normal = influence.T @ (give[:, None] * influence)
+    rest = loads - influence @ np.linalg.solve(normal, influence.T @ (give * loads))
+    broken: list[int] = []
+    while len(broken) < 2:
+        # Forces that give least, without those of broken points, as they are and for a unit of spreading.
+        ends, zero = influence[broken], np.zeros((len(broken), len(broken)))
+        system = np.block([[normal, ends.T], [ends, zero]])
+        still = np.append(influence.T @ (give * (rest - loads)), -loads[broken])
+        spreading = np.append([-1.0, -1.0], np.zeros(len(broken)))
+        now, rate = (influence @ np.linalg.solve(system, side)[:2] for side in (still, spreading))
+        now += loads
+        left = np.where(rate < -1e-12, (now + tension * 0.075) / -np.minimum(rate, -1e-12), np.inf)
+        left[broken] = np.inf
+        broken.append(int(left.argmin()))
+    return float(np.linalg.solve(influence[broken], -loads[broken]).sum()), [point // 2 for point in broken]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("tension", "joint"), [(2e4, 4), (5e4, 5), (1e5, 6)])
+def test_an_arch_of_mortar_breaks_where_elastic_joints_do(tension, joint):
+    """Brittle joints: the crown first, then one that is the further from it the stronger the mortar."""
+    arch = generators.arch()
+    thrust, broken = thrust_of_the_broken_arch(arch, tension)
+    assert broken == [0, joint]
+    law = solver.InterfaceLaw(0.6, 10.0 * tension, tensile_strength=tension)
+    settlement = solver.Settlement(direction=(1.0, 0.0), increment=5e-5, limit=1e-4)
+    response = solver.Structure(arch, solver.Interfaces(law)).settle(settlement)
+    assert response.increments[-1].reaction == pytest.approx(thrust, rel=1e-3)
+    assert (response.increments[-1].bonds.left < 1.0).sum() == 3
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_a_stone_in_space_hangs_by_the_tension_of_its_bed(share):
