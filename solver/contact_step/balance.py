@@ -25,6 +25,9 @@ BALANCED, CONVERGED = 1e-11, 1e-12
 #: Force out of balance, in block weights, that is accepted of an iterate that no further one improves.
 ACCEPTED = 1e-9
 
+#: Sum of forces, as a multiple of the load, that no equilibrium of masonry needs.
+LARGEST_FORCES = 1e6
+
 
 @dataclass(frozen=True)
 class _Change:
@@ -154,6 +157,21 @@ class _Iterate:
         of_limits = float(reserve @ (self.yielding + part * change.yielding))
         return (float((u * (self.z + part * change.z)).sum()) + of_limits) / self.count
 
+    def least_forces(self) -> float:
+        """Sum of forces that an equilibrium has at least, as a multiple of the load; infinite after Farkas: none exists.
+
+        In equilibrium the load works in any movement against the forces. What it gains beyond all that friction,
+        cohesion and limits may take has to come from contact points where the movement leaves the dual cones.
+        """
+        outside = self.rows.relative(self.motion) - self.slope * self.z.T
+        outside[self.limited, 0] += self.sense * self.yielding
+        gain = float(self.motion @ self.load) - float((self.offset * self.z.T).sum() + self.limit @ self.yielding)
+        if self.unit_reaction is not None:
+            outside = outside + self.rho * self.unit_reaction
+            gain -= self.rho * self.reaction
+        # A load of zero is in equilibrium with no forces.
+        return gain / max(float(np.abs(outside).max()) * float(np.abs(self.load).sum()), 1e-300)
+
     def take(self, change: _Change, part: float) -> None:
         """Add a part of a change."""
         self.forces, self.z = self.forces + part * change.forces, self.z + part * change.z
@@ -240,6 +258,8 @@ def nearest_equilibrium(
         point.take(change, part)
         if not np.isfinite(point.residual):
             break
+        if point.least_forces() > LARGEST_FORCES:
+            raise NotSolved("no forces are in equilibrium: a movement gains more than they can take")
         best = min(best, (point.residual, point.forces), key=lambda candidate: candidate[0])
     if best[0] > ACCEPTED:
         raise NotSolved(f"forces nearest to an equilibrium leave {best[0]:.1e} block weights out of balance")
