@@ -313,7 +313,7 @@ class _Phase:
     def close_joints(self, s: float, first: Pose, solution: ProgramSolution) -> _Equilibrium:
         """Close what a program has left at the pose ``first``, with the supports fixed, until forces balance there.
 
-        Raises _NoEquilibrium, _NotClosed or SolveError.
+        Raises _NoEquilibrium, _JointsOpen or SolveError.
         """
         pose = first
         for number in range(LINEARISATIONS + 1):
@@ -341,7 +341,7 @@ class _Phase:
         )
 
     def refuse_overlap(self, pose: Pose) -> None:
-        """Raise _NotClosed where a free block has come into another, contact points or not."""
+        """Raise _JointsOpen where a free block has come into another, contact points or not."""
         assembly, deepest = self.assembly, OVERLAP * float(self.assembly.widths.min())
         for a, b, depth in zip(*assembly.shapes.overlaps(moved_vertices(assembly, pose), deepest), strict=True):
             if assembly.free[a] or assembly.free[b]:
