@@ -189,8 +189,10 @@ def _geometry(table: Table) -> dict[str, Any]:
     values = keys.GEOMETRY.read(table)
     file, layout = values["file"], values["layout"]
     if (file is None) == (layout is None):
-        problem = "is missing; name the layout file" if file is None else "and layout are both given; give one of them"
-        raise table.error("file", problem + f", or a layout: {', '.join(generators.LAYOUTS)}" * (file is None))
+        if file is not None:
+            raise table.error("file", "and layout are both given; give one of them")
+        layouts = f'"{next(iter(generators.LAYOUTS))}", one of {len(generators.LAYOUTS)} (blockvis layout --help)'
+        raise table.error("file", f"is missing; name the file of the blocks, or give layout = {layouts}")
     if file is not None and values["parameters"]:
         raise table.error("parameters", "belong to a layout, not to a file")
     if layout is not None and values["unit"] not in (None, "m"):
