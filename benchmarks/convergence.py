@@ -1,12 +1,12 @@
 """Whether the path of a settlement converges: smaller tolerances of its steps, shorter increments, other descriptions.
 
     python benchmarks/convergence.py [--only NAME ...] [--walls N] [--random N] [--tolerance 0.005] [--refinement 8] \
-        [--half] [--variants tolerance,increment,description] [--seconds 900] [--json OUT.jsonl]
+        [--told] [--variants tolerance,increment,description] [--seconds 900] [--json OUT.jsonl]
 
 Sixteen walls and twenty random ones (``convergence_walls.py``), each as it is and
 
-- "tolerance": with an eighth of the tolerance of a step, and with half and a quarter of it where that is asked for:
-  then it is counted how often the error is below twice what ``blockvis run`` tells of it;
+- "tolerance": with an eighth of the tolerance of a step; with --told also with a quarter of it, as ``blockvis run``
+  does, and it is counted how often the error is below twice what that tells of it;
 - "increment": with the increment halved and quartered;
 - "description": mirrored, and with its blocks in another order.
 
@@ -32,7 +32,7 @@ import numpy as np
 from convergence_walls import DESCRIPTIONS, WALLS, Wall, random_walls
 
 import solver
-from blockvis.runs.step_check import ERROR_OVER_DIFFERENCE, NOTABLE, SMALLEST
+from blockvis.runs.step_check import ERROR_OVER_DIFFERENCE, FINER, SMALLEST
 from solver import mechanics
 
 VARIANTS = ("tolerance", "increment", "description")
@@ -64,6 +64,8 @@ class Run:
         As drawn: mirrored back, blocks in the order of their names.
     ways : dict of int to float [m]
         How far the corners of the moving supports have come at most.
+    bracket : float
+        Half of that of the collapse, as a part of it.
     """
 
     reactions: dict[int, float] = field(default_factory=dict)
@@ -72,6 +74,7 @@ class Run:
     ending: str = ""
     message: str = ""
     collapse: float | None = None
+    bracket: float = 0.0
     programs: int = 0
     seconds: float = 0.0
 
@@ -133,7 +136,10 @@ def told_by(wall: Wall, tolerance: float, seconds: float) -> Run:
         run.ending, run.message = f"raised {type(error).__name__}", str(error)
     else:
         run.ending, run.message = str(response.stop), response.message
-        run.collapse = None if response.collapse is None else response.collapse.displacement
+        if response.collapse is not None:
+            low, high = response.collapse.bracket
+            run.collapse = response.collapse.displacement
+            run.bracket = 0.5 * (high - low) / run.collapse
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
     run.seconds = time.process_time() - started
@@ -170,7 +176,7 @@ def compared(
     """The runs of one variant, each with its difference from the wall as it is."""
     found = []
     if variant == "tolerance":
-        for factor in ([2.0, 4.0] if given.half else []) + [given.refinement]:
+        for factor in ([1.0 / FINER] if given.told else []) + [given.refinement]:
             finer = follow(wall, given.tolerance / factor)
             found.append((f"tolerance/{factor:g}", finer, difference(whole, finer)))
     elif variant == "increment":
@@ -225,21 +231,18 @@ def summary(name: str, differences: Sequence[Difference]) -> None:
     )
 
 
-def told_beside_true(half: Difference, quarter: Difference, fine: Difference) -> list[tuple[str, float, float]]:
-    """What a run tells of its errors by the first two, and what they are by the third; of each kind, in parts."""
-    largest = max(half.reactions.max(initial=0.0), half.collapse or 0.0)
-    matters = ERROR_OVER_DIFFERENCE * largest > NOTABLE or not half.same_ending
-    known = [half, quarter] if matters else [half]
-
-    def told(of: Callable[[Difference], float]) -> float:
-        return ERROR_OVER_DIFFERENCE * max(of(one) for one in known)
-
-    reaction, place = (told(lambda one, k=k: getattr(one, k).max(initial=0.0)) for k in ("reactions", "positions"))
+def told_beside_true(whole: Run, quarter: Difference, fine: Difference) -> list[tuple[str, float, float]]:
+    """What a run tells of its errors by the first difference, what they are by the second; of each kind, in parts."""
+    reaction, place = (
+        ERROR_OVER_DIFFERENCE * float(of.max(initial=0.0)) for of in (quarter.reactions, quarter.positions)
+    )
     found = [("reaction at a settlement", reaction, float(off)) for off in fine.reactions]
     found += [("largest reaction", reaction, float(fine.reactions.max(initial=0.0)))]
     found += [("position of the worst block", place, float(fine.positions.max(initial=0.0)))]
     if fine.collapse is not None:
-        found.append(("collapse", told(lambda one: one.collapse or 0.0), fine.collapse))
+        # A collapse is told with its bracket.
+        told = max(ERROR_OVER_DIFFERENCE * (quarter.collapse or 0.0), whole.bracket)
+        found.append(("collapse", told, fine.collapse))
     return found
 
 
@@ -294,7 +297,7 @@ def main() -> None:
     parser.add_argument("--variants", type=variants, default=VARIANTS[:1], help=",".join(VARIANTS))
     parser.add_argument("--tolerance", type=float, default=0.005, help="of a step")
     parser.add_argument("--refinement", type=float, default=8.0, help="parts of the tolerance of the finer run")
-    parser.add_argument("--half", action="store_true", help="half and a quarter of the tolerance, too")
+    parser.add_argument("--told", action="store_true", help="count how often errors are below twice what is told")
     parser.add_argument("--seconds", type=float, default=900.0, help="of processor time that a run is given")
     parser.add_argument("--json", type=Path, help="a line per run, appended to")
     given = parser.parse_args()
@@ -320,8 +323,8 @@ def main() -> None:
             for changed, run, off in compared(wall, whole, variant, given, follow):
                 keep(name, changed, run, off)
                 found.setdefault(changed, []).append(off)
-        if given.half and "tolerance" in given.variants:
-            told += told_beside_true(*(of[-1] for name, of in found.items() if name.startswith("tolerance")))
+        if given.told and "tolerance" in given.variants:
+            told += told_beside_true(whole, *(of[-1] for name, of in found.items() if name.startswith("tolerance")))
     print()
     for changed, differences in found.items():
         summary(changed, differences)

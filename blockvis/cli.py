@@ -186,9 +186,9 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--check-steps",
         action=argparse.BooleanOptionalAction,
-        help="follow the path a second time, with half the step tolerance, and say the error that follows (default: in "
-        f"a process of its own, given up after {PATIENCE:g} times what the run took, at least {LEAST_PATIENCE:g} s; "
-        "--check-steps waits to its end)",
+        help="follow the path a second time, with a quarter of the step tolerance, and say the error that follows "
+        f"(default: in a process of its own, given up after {PATIENCE:g} times what the run took, at least "
+        f"{LEAST_PATIENCE:g} s; --check-steps waits to its end)",
     )
     run.add_argument(
         "--range",

@@ -1,4 +1,4 @@
-"""How exact a run is: the same path with half the error that its steps aim for; a quarter, too, where steps matter."""
+"""How exact a run is: the same path with a quarter of the error that its steps aim for."""
 
 from __future__ import annotations
 
@@ -21,8 +21,11 @@ from blockvis.system.atomic_files import write_atomic
 from .once_more import LINEAR_PROGRAM, OnceMore, Traced, followed, takes_steps, traced
 from .reopen import open_results
 
-#: Error of a run over its difference from one with half the step tolerance: steps are of the first order. Walls
-#: whose bricks slide differ from an eighth of the tolerance mostly 1 to 2.1 times as much as from half of it.
+#: Step tolerance of the other path over that of the run. Half of it is near by chance too often.
+FINER = 0.25
+
+#: Error of a run over its difference from the other path: 4/3 where steps are of the first order, and half as much
+#: more for where they are not.
 ERROR_OVER_DIFFERENCE = 2.0
 
 #: Reactions below this part of the first are compared with it: where one passes through zero nothing is a part of it.
@@ -37,7 +40,7 @@ LOOK, WORTH_A_WORD = 0.2, 2.0
 
 @dataclass(frozen=True)
 class StepCheck:
-    """How far a run and others with half and a quarter of the step tolerance are apart.
+    """How far a run and the same with a quarter of the step tolerance are apart.
 
     Attributes
     ----------
@@ -51,11 +54,11 @@ class StepCheck:
     unit : str
         Of the parameter.
     collapse : float
-        Largest difference of the displacements at collapse, as a fraction; nan unless all collapse.
+        Difference of the displacements at collapse, as a fraction; nan unless both collapse.
     position : float [m]
         Largest distance between the two places of a block at the same parameter.
     stop, stop_of_check : str
-        How the run ended, and the first of the others that ended otherwise.
+        How the run and the other ended.
     """
 
     what: str
@@ -90,18 +93,14 @@ class StepCheck:
             parts.append(f"collapse {_percent(error['collapse'])}")
         parts.append(f"blocks {_millimetres(error['position'])}")
         if self.stop != self.stop_of_check:
-            parts.append(f"but with half the step tolerance it ends as '{self.stop_of_check}', not '{self.stop}'")
+            ends = f"it ends as '{self.stop_of_check}', not '{self.stop}'"
+            parts.append(f"but with a quarter of the step tolerance {ends}")
         return f"error of the steps: {', '.join(parts)}"
-
-    @property
-    def matters(self) -> bool:
-        """Whether the steps matter: then two runs may be near each other by chance, and a third is followed."""
-        return self.error > NOTABLE or self.stop != self.stop_of_check
 
     @property
     def warning(self) -> str:
         """What there is to say where the difference matters; nothing where it does not."""
-        if not self.matters:
+        if self.error <= NOTABLE and self.stop == self.stop_of_check:
             return ""
         return (
             f"the steps matter by more than {100.0 * NOTABLE:g} %: take a smaller step_tolerance; where that changes "
@@ -122,8 +121,7 @@ class StepChecking:
     """
 
     def __init__(self, case: Case, folder: Path | None = None) -> None:
-        self._case, self._folder = case, folder
-        self._other = OnceMore(_finer(case, 0.5), folder)
+        self._other = OnceMore(_finer(case), folder)
 
     def compared(
         self,
@@ -148,29 +146,11 @@ class StepChecking:
         ------
         TimeoutError
         """
-        began = time.monotonic()
-        half = self._found(began, patience, waiting)
-        if half is None:
-            return None
-        check = compared(response, half)
-        if check.matters:
-            self.close()
-            self._other = OnceMore(_finer(self._case, 0.25), self._folder)
-            quarter = None
-            with contextlib.suppress(TimeoutError):
-                quarter = self._found(began, patience, lambda: None)
-            if quarter is not None:
-                check = compared(response, half, quarter)
-            elif check.collapse < check.difference:
-                check = replace(check, collapse=np.nan)
-        return _written(Path(folder), check)
-
-    def _found(self, began: float, patience: float | None, waiting: Callable[[], None]) -> Traced | None:
-        """Wait for the path that the process follows."""
-        reported = False
+        began, reported = time.monotonic(), False
         while True:
             with contextlib.suppress(TimeoutError):
-                return self._other.found(LOOK)
+                other = self._other.found(LOOK)
+                return None if other is None else _written(Path(folder), compared(response, other))
             waited = time.monotonic() - began
             if patience is not None and waited > patience:
                 raise TimeoutError(f"the same path in shorter steps takes longer than {patience:.0f} s more")
@@ -220,11 +200,7 @@ def check_steps(folder: str | Path) -> StepCheck:
             f"'{folder}' has no path whose steps could be checked ({response.analysis}, {len(response.path)} "
             f"increments{by}); it takes a settlement or a pushover"
         )
-    half = followed(_finer(case, 0.5), response.assembly)
-    check = compared(response, half)
-    if check.matters:
-        check = compared(response, half, followed(_finer(case, 0.25), response.assembly))
-    return _written(folder, check)
+    return _written(folder, compared(response, followed(_finer(case), response.assembly)))
 
 
 def stored_check(folder: Path) -> StepCheck | None:
@@ -236,9 +212,9 @@ def stored_check(folder: Path) -> StepCheck | None:
     return StepCheck(**{**known, "collapse": np.nan if known["collapse"] is None else known["collapse"]})
 
 
-def _finer(case: Case, part: float) -> Case:
-    """Make the same case with a part of the error that its steps aim for."""
-    return replace(case, controls=replace(case.controls, step_tolerance=part * case.controls.step_tolerance))
+def _finer(case: Case) -> Case:
+    """Make the same case with a quarter of the error that its steps aim for."""
+    return replace(case, controls=replace(case.controls, step_tolerance=FINER * case.controls.step_tolerance))
 
 
 def _percent(part: float | None) -> str:
@@ -260,35 +236,30 @@ def _written(folder: Path, check: StepCheck) -> StepCheck:
     return check
 
 
-def compared(response: solver.Response, *others: Traced) -> StepCheck:
-    """Compare a run with others of shorter steps.
+def compared(response: solver.Response, other: Traced) -> StepCheck:
+    """Compare a run with another of shorter steps.
 
     Parameters
     ----------
     response : solver.Response
-    others : Traced
+    other : Traced
         Of the same case.
     """
     ours = traced(response)
+    mine, theirs = ours.same_places(other)
+    a, b = ours.measured[mine], other.measured[theirs]
     first = LEAST_REACTION * np.abs(ours.measured[:1]).max(initial=0.0)
-    difference = at = position = 0.0
-    for other in others:
-        mine, theirs = ours.same_places(other)
-        a, b = ours.measured[mine], other.measured[theirs]
-        apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), first), np.finfo(float).tiny)
-        if apart.max(initial=0.0) > difference:
-            difference, at = float(apart.max()), float(ours.parameters[mine[np.argmax(apart)]])
-        moved = np.linalg.norm(ours.positions[mine] - other.positions[theirs], axis=2)
-        position = max(position, float(moved.max(initial=0.0)))
-    ends = np.array([np.nan if path.collapse is None else path.collapse for path in (ours, *others)])
+    apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), first), np.finfo(float).tiny)
+    moved = np.linalg.norm(ours.positions[mine] - other.positions[theirs], axis=2)
+    ends = [np.nan if path.collapse is None else path.collapse for path in (ours, other)]
     driver = response.settlements[-1] if response.control is None and response.settlements else None
     return StepCheck(
         what=response.measured.name,
-        difference=difference,
-        at=at,
+        difference=float(apart.max(initial=0.0)),
+        at=float(ours.parameters[mine[np.argmax(apart)]]) if apart.any() else 0.0,
         unit=response.parameter.unit if driver is None else driver.unit,
-        collapse=float(np.max(ends) - np.min(ends)) / float(ends[0]) if ends[0] > 0.0 else np.nan,
-        position=position,
+        collapse=abs(ends[1] - ends[0]) / ends[0] if ends[0] > 0.0 else np.nan,
+        position=float(moved.max(initial=0.0)),
         stop=ours.stop,
-        stop_of_check=next((path.stop for path in others if path.stop != ours.stop), ours.stop),
+        stop_of_check=other.stop,
     )
