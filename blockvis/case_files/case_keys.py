@@ -486,7 +486,7 @@ ANALYSIS_KEYS = (
         "per increment (Portioli and Cascini, 2017), of settlements only", "coulomb",
         default="coulomb"),
     Key("falling_frames", whole(0, MOST_STEPS), "Frames of the mechanism after collapse", 20,
-        otherwise=f"{_CONTROLS.frames(2)} in the plane, {_CONTROLS.frames(3)} in space"),
+        default=_CONTROLS.falling_frames),
     Key("increment_seconds", POSITIVE, "Time that an increment of a path may take: a run that needs more says what it "
         "was doing and ends, and blockvis run --resume goes on with it", 60.0, "s", otherwise="as long as it takes"),
 )  # fmt: skip

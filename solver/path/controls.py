@@ -25,9 +25,8 @@ class Controls:
         increment, of settlements in the plane only, which gives the least reaction.
     overlap_tolerance : float, optional [m]
         Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
-    falling_frames : int, optional
-        Frames of the fall after collapse: enough for the mechanism in the plane, where dynamics can show the fall, and
-        to follow it in space.
+    falling_frames : int
+        Frames of the fall after collapse: enough for the mechanism.
     step_tolerance : float
         Relative error of the reaction that the steps of the path are chosen for.
     local_loss : float
@@ -45,7 +44,7 @@ class Controls:
 
     increments: str | None = None
     overlap_tolerance: float | None = None
-    falling_frames: int | None = None
+    falling_frames: int = 10
     step_tolerance: float = 0.005
     local_loss: float = 0.05
     compliance_factor: float = 1.0
@@ -71,10 +70,6 @@ class Controls:
                 f"local_loss is {self.local_loss:g}; it is a share of the weight from 0, which ends at the first "
                 "loss, to 1, by default 0.05"
             )
-
-    def frames(self, dimension: int) -> int:
-        """Frames of the fall after collapse of a structure in the plane, 2, or in space, 3."""
-        return {2: 10, 3: 40}[dimension] if self.falling_frames is None else self.falling_frames
 
 
 @dataclass(frozen=True)

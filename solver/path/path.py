@@ -92,7 +92,7 @@ class Path:
     ) -> None:
         self.on_step = on_step
         self.full_model, self.driver, self.number = model, driver, number
-        self.frames, self.local_loss = controls.frames(model.dimension), controls.local_loss
+        self.frames, self.local_loss = controls.falling_frames, controls.local_loss
         self._remove_blocks(np.zeros(0))
         self.largest_lag = LAG_PER_ERROR * controls.step_tolerance
         self.largest_turn = TURN_PER_ERROR * controls.step_tolerance
