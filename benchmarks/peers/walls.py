@@ -157,7 +157,7 @@ WALLS = {
         lambda: bay().assembly, 0.6, SINKS, 0.005, 0.02, 0.02, looks=(0.01, 0.02)
     ),
     "dome of 8 lunes, springers spread": Wall(
-        lambda: generators.dome(cap=15.0), 0.7, {"radial_from": (0.0, 0.0)}, 0.04, 0.5, 0.05, exact=0.1721334
+        lambda: generators.dome(cap=15.0), 0.7, {"radial_from": (0.0, 0.0)}, 0.04, 0.5, 0.02, exact=0.1721334
     ),
     "corner of 16 bricks, a support sinks": Wall(
         lambda: generators.l_corner(bricks=2, across=2, courses=4),
