@@ -273,7 +273,7 @@ class _Problem:
         pulled = np.zeros((len(contacts), rows.shape[1] // max(len(contacts), 1)))
         pulled[:, 0] = tension / force
         if displacement > 0.0:
-            total = float(_lengths(live[:, :d]).sum() + _lengths(live[:, d:]).sum())
+            total = float(np.linalg.norm(live[:, :d], axis=1).sum() + np.linalg.norm(live[:, d:], axis=1).sum())
             price = np.where(is_open, gaps, 0.0) / displacement * (size / total)
         return cls(
             assembly=assembly,
@@ -379,7 +379,7 @@ class _Problem:
         for _ in range(PROGRAMS):
             state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
-            beyond = _lengths(state.forces[:, 1:]) - self.friction * state.forces[:, 0] - self.cohesion
+            beyond = np.linalg.norm(state.forces[:, 1:], axis=1) - self.friction * state.forces[:, 0] - self.cohesion
             excess = float(beyond.max(initial=0.0)) / largest
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
             error = np.inf if state.falls else max(excess, change)
@@ -418,7 +418,7 @@ class _Problem:
         relative[:, 0] += self.price * max(live_power, 0.0)
         drag = self.cohesion if state.drag is None else state.drag
         slope = self.friction if state.drag is None else np.zeros(len(relative))
-        slip, brittle = _lengths(relative[:, 1:]), np.isfinite(self.crushing)
+        slip, brittle = np.linalg.norm(relative[:, 1:], axis=1), np.isfinite(self.crushing)
         # What crushes may come closer than what is rigid, at the price of its strength.
         closer = np.where(brittle, np.maximum(slope * slip - relative[:, 0], 0.0), 0.0)
         crushed = np.where(brittle, self.crushing, 0.0) * closer
@@ -497,11 +497,6 @@ def _beyond_give(
     # Give of elastic joints is neither a gap nor a penetration.
     gives = (stiffness > 0.0) & np.isfinite(stiffness) & (holds | (gaps < 0.0))
     return np.where(gives, 0.0, gaps)
-
-
-def _lengths(vectors: np.ndarray) -> np.ndarray:
-    """(n,) array: lengths of vectors, of a single number its absolute value."""
-    return np.hypot.reduce(np.abs(vectors), axis=1)
 
 
 def checked_live(assembly: Assembly, loads: Loads) -> Loads:

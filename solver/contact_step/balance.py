@@ -158,11 +158,9 @@ class _Iterate:
         return (float((u * (self.z + part * change.z)).sum()) + of_limits) / self.count
 
     def least_forces(self) -> float:
-        """Sum of forces that an equilibrium has at least, as a multiple of the load.
+        """Sum of forces that an equilibrium has at least, as a multiple of the load; none exists where it is infinite.
 
-        After Farkas there is none where it is infinite.
-        In equilibrium the load works in any movement against the forces. What it gains beyond all that friction,
-        cohesion and limits may take has to come from contact points where the movement leaves the dual cones.
+        Farkas: what the load gains in a movement, points have to take at which it leaves the duals of their cones.
         """
         outside = self.rows.relative(self.motion) - self.slope * self.z.T
         outside[self.limited, 0] += self.sense * self.yielding

@@ -85,12 +85,12 @@ class ContactProblem:
     def projected(self, trial: np.ndarray) -> np.ndarray:
         """(n, d) array: the forces nearest to trial forces that push and stay within the friction bound."""
         shear = trial[:, 1:]
-        part = np.minimum(1.0, self.bound / np.maximum(_lengths(shear), 1e-300))
+        part = np.minimum(1.0, self.bound / np.maximum(np.linalg.norm(shear, axis=1), 1e-300))
         return np.column_stack([np.clip(trial[:, 0], 0.0, self.most), shear * part[:, None]])
 
     def stiffness(self, trial: np.ndarray) -> np.ndarray:
         """(n, d, d) array: derivative of the allowed forces by movements, times -1; symmetric and positive."""
-        size = _lengths(trial[:, 1:])
+        size = np.linalg.norm(trial[:, 1:], axis=1)
         part = np.minimum(1.0, self.bound / np.maximum(size, 1e-300))
         along = trial[:, 1:] / np.maximum(size, 1e-300)[:, None]
         d = trial.shape[1]
@@ -104,7 +104,7 @@ class ContactProblem:
     def status(self, trial: np.ndarray) -> np.ndarray:
         """(n,) int array: which points push, which as much as they can, and which slide."""
         pushes = 2 * (trial[:, 0] > 0.0) + 2 * (trial[:, 0] >= self.most)
-        return np.asarray(pushes + (_lengths(trial[:, 1:]) > self.bound))
+        return np.asarray(pushes + (np.linalg.norm(trial[:, 1:], axis=1) > self.bound))
 
     def unbalanced(self, motion: np.ndarray, forces: np.ndarray, multiplier: float) -> np.ndarray:
         """(n_dof,) array: what loads, viscosity and contact forces leave out of balance."""
@@ -133,8 +133,3 @@ class StepSolution:
     trial: np.ndarray
     multiplier: float
     factorisations: int
-
-
-def _lengths(vectors: np.ndarray) -> np.ndarray:
-    """(n,) array: lengths of vectors; of single numbers their absolute values."""
-    return np.abs(vectors[:, 0]) if vectors.shape[1] == 1 else np.linalg.norm(vectors, axis=1)
