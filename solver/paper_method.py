@@ -280,9 +280,8 @@ class _Phase:
             return solve_program(self.inputs, pose, contacts, **arguments)
         except SupportsLocked:
             # Drawings and programs are off by as much; blocks that are wedged cannot give way to it.
-            arguments["gaps"] = np.where(
-                np.abs(arguments["gaps"]) < ACCEPTED_ERROR * self.length, 0.0, arguments["gaps"]
-            )
+            is_small = np.abs(arguments["gaps"]) < ACCEPTED_ERROR * self.length
+            arguments["gaps"] = np.where(is_small, 0.0, arguments["gaps"])
             return solve_program(self.inputs, pose, contacts, **arguments)
 
     def rate(self, s: float) -> np.ndarray:
@@ -413,13 +412,9 @@ class _Phase:
     ) -> tuple[Increment, Ending]:
         """Give the fall and the collapse, from the program without equilibrium beyond the last one."""
         fall = self.reported(solution, upper_bound, 0.0, Status.FALLING)
-        bracket, motion, words = (
-            (current.s, upper_bound),
-            solution.state.velocity,
-            str(mechanism_of(self.assembly, fall)),
-        )
-        mechanism, unit = motion / self.size(motion), self.phase.unit
-        collapse = Collapse(sum(bracket) / 2.0, bracket, current.reaction, mechanism, unit, words)
+        bracket, motion = (current.s, upper_bound), solution.state.velocity
+        mechanism, words = motion / self.size(motion), str(mechanism_of(self.assembly, fall))
+        collapse = Collapse(sum(bracket) / 2.0, bracket, current.reaction, mechanism, self.phase.unit, words)
         return fall, Ending(Status.COLLAPSED, str(collapse), collapse)
 
 
