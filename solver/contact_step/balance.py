@@ -168,8 +168,9 @@ class _Iterate:
         if self.unit_reaction is not None:
             outside = outside + self.rho * self.unit_reaction
             gain -= self.rho * self.reaction
-        # A load of zero is in equilibrium with no forces.
-        return gain / max(float(np.abs(outside).max()) * float(np.abs(self.load).sum()), 1e-300)
+        # Where there is no load nothing is gained.
+        size = float(np.abs(self.load).sum()) + abs(self.reaction)
+        return gain / max(float(np.abs(outside).max()) * size, 1e-300)
 
     def take(self, change: _Change, part: float) -> None:
         """Add a part of a change."""

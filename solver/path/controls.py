@@ -55,6 +55,8 @@ class Controls:
         refuse_text(self)
         if self.increments not in (None, *INCREMENTS):
             raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
+        if self.falling_frames is None or self.falling_frames < 0:
+            raise ValueError(f"falling_frames is {self.falling_frames}; it is a number of at least 0, by default 10")
         if not 0.0 < self.step_tolerance < 1.0:
             raise ValueError(
                 f"step_tolerance is {self.step_tolerance:g}; it is a number between 0 and 1, by default 0.005"
@@ -66,10 +68,7 @@ class Controls:
                 f"imperfection_factor is {self.imperfection_factor:g}; it is a number of at least 0, by default 1"
             )
         if not 0.0 <= self.local_loss <= 1.0:
-            raise ValueError(
-                f"local_loss is {self.local_loss:g}; it is a share of the weight from 0, which ends at the first "
-                "loss, to 1, by default 0.05"
-            )
+            raise ValueError(f"local_loss is {self.local_loss:g}; it is a share of the weight, 0 to 1, by default 0.05")
 
 
 @dataclass(frozen=True)

@@ -127,6 +127,20 @@ def test_text_in_place_of_a_number_is_named(make):
         make()
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"falling_frames": None}, "falling_frames is None; it is a number of at least 0"),
+        ({"falling_frames": -1}, "falling_frames is -1; it is a number of at least 0"),
+        ({"local_loss": 1.5}, "local_loss is 1.5; it is a share of the weight, 0 to 1"),
+        ({"step_tolerance": 0.0}, "step_tolerance is 0; it is a number between 0 and 1"),
+    ],
+)
+def test_refused_controls(given, message):
+    with pytest.raises(ValueError, match=message):
+        solver.Controls(**given)
+
+
 def test_friction_given_in_degrees_warns():
     with pytest.warns(UserWarning, match=r"friction_coefficient = 60 is .* give its tangent, 1\.73"):
         solver.Structure(ASSEMBLY, friction_coefficient=60)
