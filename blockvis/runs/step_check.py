@@ -87,7 +87,8 @@ class StepCheck:
     def __str__(self) -> str:
         """Say it in a line."""
         error = self.step_error
-        where = f" (at {self.at:.4g} {self.unit})" if self.difference > 0.0 else ""
+        # Where it is too small to be told rounding decides where it is largest.
+        where = f" (at {self.at:.4g} {self.unit})" if ERROR_OVER_DIFFERENCE * self.difference >= SMALLEST else ""
         parts = [f"{self.what} {_percent(error['reaction'])}{where}"]
         if error["collapse"] is not None:
             parts.append(f"collapse {_percent(error['collapse'])}")

@@ -153,7 +153,7 @@ def test_the_error_is_twice_the_difference_and_what_matters_is_warned_of():
     assert str(replace(CHECK, position=0.117)).endswith(", blocks ± 230 mm")
     assert ", collapse ± 0.6 %, blocks" in str(replace(CHECK, collapse=0.003))
     small = replace(CHECK, difference=1e-7, position=1e-9, collapse=0.0)
-    words = "reaction below 0.01 % (at 0.1 m), collapse below 0.01 %, blocks below 0.01 mm"
+    words = "reaction below 0.01 %, collapse below 0.01 %, blocks below 0.01 mm"
     assert str(small) == f"error of the steps: {words}"
     assert small.warning == ""
 
