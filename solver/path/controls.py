@@ -68,9 +68,7 @@ class Controls:
                 f"imperfection_factor is {self.imperfection_factor:g}; it is a number of at least 0, by default 1"
             )
         if not 0.0 <= self.local_loss <= 1.0:
-            raise ValueError(
-                f"local_loss is {self.local_loss:g}; it is a share of the weight from 0 to 1 (default 0.05)"
-            )
+            raise ValueError(f"local_loss is {self.local_loss:g}; give a share of the weight from 0 to 1")
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,7 @@ def test_text_in_place_of_a_number_is_named(make):
     [
         ({"falling_frames": None}, "falling_frames is None; it is a number of at least 0"),
         ({"falling_frames": -1}, "falling_frames is -1; it is a number of at least 0"),
-        ({"local_loss": 1.5}, "local_loss is 1.5; it is a share of the weight from 0 to 1"),
+        ({"local_loss": 1.5}, "local_loss is 1.5; give a share of the weight from 0 to 1"),
         ({"step_tolerance": 0.0}, "step_tolerance is 0; it is a number between 0 and 1"),
     ],
 )
