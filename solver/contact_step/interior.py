@@ -38,6 +38,13 @@ class _Change:
     slide: np.ndarray
 
 
+def _frames(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(k, k, n) array: rows along and across each of n vectors (k, n); and their lengths."""
+    length = np.sqrt(inner(vectors, vectors))
+    along = np.where(length > 0.0, vectors / np.maximum(length, 1e-300), np.eye(len(vectors))[0][:, None])
+    return along[None] if len(vectors) == 1 else np.stack([along, np.stack([-along[1], along[0]])]), length
+
+
 class _Iterate:
     """Forces N, u = (B, T), openings y, yielding w and slides z of a problem's contact points, inside their bounds."""
 
@@ -106,15 +113,13 @@ class _Iterate:
         yielding = np.zeros_like(self.normal)
         yielding[self.limited] = self.yielding / self.reserve
         self.normal_stiffness = 1.0 / (p.compliance[:, 0] + self.opening / self.normal + yielding)
-        # (isotropic I + 2 η² w wᵀ)⁻¹ = (I - reduction w wᵀ) / isotropic
-        axis, curvature = self.scaling.w[1:].T, 2.0 * self.scaling.square
-        isotropic = p.compliance[self.rough, 1] + self.scaling.square
-        reduction = curvature / (isotropic + curvature * inner(axis.T, axis.T))
-        self.shear_stiffness = np.eye(d - 1) - reduction[:, None, None] * axis[:, :, None] * axis[:, None, :]
-        self.shear_stiffness /= isotropic[:, None, None]
+        # (isotropic I + 2 η² w wᵀ)⁻¹ along w and across it: what rounds across is large along it.
+        self.frames, self.length = _frames(self.scaling.w[1:])
+        self.shear_stiffness = 1.0 / (p.compliance[self.rough, 1:].T + self.scaling.square)
+        self.shear_stiffness[0] /= 1.0 + 2.0 * self.scaling.square * self.length**2 * self.shear_stiffness[0]
         stiffness = np.zeros((len(p.gap), d, d))
         stiffness[:, 0, 0] = self.normal_stiffness
-        stiffness[self.rough, 1:, 1:] = self.shear_stiffness
+        stiffness[self.rough, 1:, 1:] = np.einsum("ijn,in,ikn->njk", self.frames, self.shear_stiffness, self.frames)
         self.solve = p.rows.factorised(stiffness, p.viscosity)
         self.by_live = None if p.live is None else self.solve(p.live)
 
@@ -128,11 +133,12 @@ class _Iterate:
         target = scaling.scaled(quotient(slide_products, scaling.scaled_point))
         slip_target = target[1:] + self.slip_error
 
-        def shear_of(distances: np.ndarray) -> np.ndarray:
-            return np.einsum("nij,jn->in", self.shear_stiffness, distances)
+        slip_target = np.einsum("ijn,jn->in", self.frames, slip_target)
 
-        shear = np.concatenate([np.zeros((1, len(self.rough))), shear_of(slip_target)])
-        forces = self.forces(self.normal_stiffness * normal_target, shear)
+        def shear_of(along: np.ndarray) -> np.ndarray:
+            return np.concatenate([np.zeros((1, len(self.rough))), np.einsum("ijn,in->jn", self.frames, along)])
+
+        forces = self.forces(self.normal_stiffness * normal_target, shear_of(self.shear_stiffness * slip_target))
         motion, multiplier = self.solve(self.unbalanced + p.rows.resultant(forces)), 0.0
         if self.by_live is not None and p.control is not None:
             multiplier = (self.control_error - float(p.control @ motion)) / float(p.control @ self.by_live)
@@ -142,10 +148,12 @@ class _Iterate:
         yielding = (yielding_products + self.yielding * normal[limited]) / self.reserve
         opening = relative[:, 0] + p.compliance[:, 0] * normal - self.gap_error
         opening[limited] += yielding
-        shear[1:] = shear_of(slip_target - relative[self.rough, 1:].T)
-        first = target[0] - 2.0 * scaling.square * scaling.w[0] * inner(scaling.w[1:], shear[1:])
-        slide = relative[self.rough, 1:].T + p.compliance[self.rough, 1] * shear[1:] - self.slip_error
-        return _Change(motion, multiplier, normal, opening, yielding, shear, np.concatenate([first[None], slide]))
+        slip = relative[self.rough, 1:].T
+        along = self.shear_stiffness * (slip_target - np.einsum("ijn,jn->in", self.frames, slip))
+        shear = shear_of(along)
+        first = target[0] - 2.0 * scaling.square * scaling.w[0] * self.length * along[0]
+        slide = np.concatenate([first[None], slip + p.compliance[self.rough, 1] * shear[1:] - self.slip_error])
+        return _Change(motion, multiplier, normal, opening, yielding, shear, slide)
 
     def longest(self, change: _Change) -> float:
         """Largest part of a change, at most 1, that keeps everything inside."""
