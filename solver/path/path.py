@@ -28,7 +28,7 @@ from .stepping import StepError, Stepper
 #: First, longest and shortest step, as movements of the supports in block sizes; the first is accepted at any error.
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-5, 0.02, 1e-11
 
-#: Error of a step without sliding, in errors aimed for, below which hinges turn evenly, and the longest step there.
+#: Error of a step, in errors aimed for, below which blocks turn and slide evenly, and the longest step there.
 CALM, CALM_STEP = 0.1, 0.05
 
 #: Changes in a step, per relative error of the reaction: of friction bounds, in weights of the structure, and of
@@ -340,8 +340,7 @@ class Path:
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
         new = replace(new, s=s, works=self._accumulated_works(place, new, motion))
         history = (*state.history[:1], *state.history[1:][-5:], place)
-        is_calm = measure < CALM and not error.slides
-        state = replace(state, place=new, step=self._next_step(state.step, length, measure, is_calm), history=history)
+        state = replace(state, place=new, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
             # The equilibrium at the bound may be one of reduced viscosity only.
             until = s + ENCLOSED * self.driver.tolerance
@@ -373,13 +372,13 @@ class Path:
         # Two equal steps rather than a long one and a sliver.
         return ahead if ahead <= 1.000001 * step else min(step, ahead / 2.0)
 
-    def _next_step(self, step: float, length: float, measure: float, is_calm: bool) -> float:
+    def _next_step(self, step: float, length: float, measure: float) -> float:
         unit = self.stepper.unit
         grow = min(2.0, max(0.5, 1.0 / max(measure, 1e-300)))
         if grow <= 1.0:
             return max(grow * length, min(length, FIRST_STEP * unit))
         # A step that was cut at its target does not shorten the next.
-        longest = CALM_STEP if is_calm else LONGEST_STEP
+        longest = CALM_STEP if measure < CALM else LONGEST_STEP
         return min(longest * unit, max(step if length < 0.99 * step else 0.0, grow * length))
 
     def _is_on_path(self, new: Place, error: StepError, length: float, refining: bool) -> bool:

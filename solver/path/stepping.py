@@ -83,15 +83,12 @@ class StepError:
         Movement of the fastest block, in block sizes.
     penetration : float
         Deepest penetration at a contact point that carries, in block sizes.
-    slides : bool
-        Whether a contact point that carries has used up its friction.
     """
 
     lag: float
     turn: float
     moved: float
     penetration: float
-    slides: bool
 
 
 def viscous_weights(model: Model) -> np.ndarray:
@@ -357,8 +354,7 @@ class Stepper:
         lag += float((joints.cohesion - left.cohesion).sum()) / self.weight
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
-        touching = self._penetration(points, new), self._slides(start, new.forces, points.bound)
-        return new, motion / model.lengths, StepError(lag, turn, movement_size, *touching)
+        return new, motion / model.lengths, StepError(lag, turn, movement_size, self._penetration(points, new))
 
     def _solved(
         self,
