@@ -483,7 +483,7 @@ class Path:
         length = state.upper_bound - state.place.s
         for _ in range(20):
             try:
-                return self.stepper.step(state.place, length, viscosity=REFINED)[0]
+                return self.stepper.step(state.place, length)[0]
             except NotSolved:
                 length /= 4.0
         return state.place
