@@ -265,8 +265,10 @@ class Path:
 
     def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
-        place = state.place
-        resting = place if self._in_equilibrium(place) else self.fall.relaxed(place)
+        place, reaction = state.place, self._reaction(state.place)
+        check = self.checks.check(place, reaction)
+        carries = check.bounds.in_equilibrium and (self.model.live is None or check.bounds.high > 0.0)
+        resting = place if carries else self.fall.relaxed(place)
         is_far = resting is not None and self.fall.movements(place, resting).max() > JUMP
         # Blocks that rest far away may have left an equilibrium in a step that was too long.
         if resting is None or (is_far and state.refine_until < place.s):
@@ -276,7 +278,7 @@ class Path:
         if is_far:
             state = self._continue_from(state, resting)
         self.state = state = replace(state, history=(replace(resting, works=place.works),), ended=ended)
-        yield self._report(state, self._check(resting, self._reaction(place)))
+        yield self._report(state, check if resting is place else self._check(resting, reaction))
 
     def _report(self, state: PathState, check: EquilibriumCheck) -> Increment:
         """The increment of an equilibrium, with the state as its checkpoint."""
