@@ -14,7 +14,7 @@ import pytest
 from test_space_static import box
 
 import solver
-from blockvis.generators import arch, dome, extruded_arch
+from blockvis.generators import arch, cross_vault, dome, extruded_arch
 
 pytestmark = pytest.mark.path
 
@@ -170,3 +170,21 @@ def test_supports_turn_about_an_axis_in_space():
     c, s = math.cos(0.2), math.sin(0.2)
     x, z = 1.0 + c * arm[0] + s * arm[1], -s * arm[0] + c * arm[1]
     assert pose.positions[1] == pytest.approx([x, 0.5, z], abs=1e-6)
+
+
+@pytest.mark.slow
+def test_programs_of_sliding_stones_take_few_factorisations(monkeypatch):
+    minimise, taken = import_module("solver.contact_step.minimise"), []
+    interior_point = minimise.interior_point
+
+    def counted(problem, multiplier):
+        solution = interior_point(problem, multiplier)
+        taken.append(solution.factorisations)
+        return solution
+
+    monkeypatch.setattr(minimise, "interior_point", counted)
+    sinks = solver.Settlement(direction=(0, 0, -1), increment=1e-4, limit=1e-4)
+    solver.settle(cross_vault(voussoirs=31, stone=0.25), sinks, friction_coefficient=0.6)
+    # What rounds across a slide stopped a third of them short of their solution, after 60.
+    assert len(taken) > 20
+    assert max(taken) < 25
