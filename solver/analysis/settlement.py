@@ -114,17 +114,16 @@ def _increments(
         start = start if resume is None else resume.start
         model = model_of(assembly, loads_in(loads, changes, number), interfaces, controls, ties=ties)
         path = Path(model, SupportMotion(assembly, phase, start), number, controls, on_step)
-        at = 0.0
         try:
             state = path.begin(start, before) if resume is None else resume
             now = [change for change in changes if change.phase == number]
             if resume is None and (now or (number and any(tie.phase == number + 1 for tie in ties))):
                 gone = {name for change in now for name in change.ties}
                 state = path.changed(state, removed_before(changes, number, assembly.n_blocks), gone)
-            at = state.place.s
             ending = yield from path.follow(state, resume is not None)
         except SolveError as error:
-            return Ending(Status.SOLVER_FAILED, f"at a settlement of {at:.6g} {phase.unit}: {error}")
+            at = max(path.reported, 0.0)
+            return Ending(Status.SOLVER_FAILED, f"beyond a settlement of {at:.6g} {phase.unit}: {error}")
         resume, before = None, path.state
         if ending.stop is not Status.LIMIT_REACHED:
             return ending
