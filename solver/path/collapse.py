@@ -12,7 +12,7 @@ from solver.kinematics import motion_size
 from solver.results.increment import Increment, Status
 from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse
-from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, FARTHEST_FALL
+from solver.tolerances import CLOSING_GAP, FARTHEST_FALL
 
 from .controls import Ending
 from .equilibrium_check import EquilibriumChecks
@@ -104,7 +104,7 @@ class Fall:
             if self.movements(place, end).max() > farthest:
                 return end, False
             at_rest = acceleration < SLOW and speed < SLOW
-            if at_rest and self.checks.in_equilibrium(end, COMPUTED_GAP):
+            if at_rest and self.checks.in_equilibrium(end):
                 return end, True
         # A corner that comes to rest on the end of an edge is within rounding of contact points there.
         return end, at_rest and self.checks.in_equilibrium(end, CLOSING_GAP)

@@ -39,7 +39,7 @@ class EquilibriumChecks:
     def __init__(self, stepper: Stepper) -> None:
         self.stepper, self.model, self.driver = stepper, stepper.model, stepper.driver
 
-    def in_equilibrium(self, place: Place, gap: float) -> bool:
+    def in_equilibrium(self, place: Place, gap: float = COMPUTED_GAP) -> bool:
         """Whether a place is in equilibrium, with some of the live load where there is one.
 
         Parameters

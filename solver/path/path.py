@@ -154,7 +154,7 @@ class Path:
             lengths[[tie.name in ties for tie in self.model.ties]] = np.nan
             state = replace(state, place=replace(state.place, tie_lengths=lengths))
         self.disturbed = True
-        if not self._in_equilibrium(state.place):
+        if not self.checks.in_equilibrium(state.place):
             end, at_rest = self.fall.relax(state.place)
             settled = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
             if settled is None:
@@ -439,9 +439,6 @@ class Path:
 
     # Places ------------------------------------------------------------------------------------------------------
 
-    def _in_equilibrium(self, place: Place) -> bool:
-        return self.checks.in_equilibrium(place, COMPUTED_GAP)
-
     def _continue_from(self, state: PathState, resting: Place) -> PathState:
         """Continue from the place where blocks came to rest."""
         if self.fall.movements(state.place, resting).max() > JUMP:
@@ -471,7 +468,7 @@ class Path:
             np.where(fallen, end.pose.rotations, state.place.pose.rotations),
         )
         remaining = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
-        end, at_rest = remaining.place, self._in_equilibrium(remaining.place)
+        end, at_rest = remaining.place, self.checks.in_equilibrium(remaining.place)
         if not at_rest:
             end, at_rest = self.fall.relax(end)
         continued = self._continue_from(remaining, end) if at_rest else self._remove_fallen(remaining, end)

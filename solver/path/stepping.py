@@ -446,20 +446,12 @@ class Stepper:
         bonds = self.mortar.bonds(place, points.start, left.left)
         return lag, replace(new, followed=followed, tie_lengths=lengths, bonds=bonds)
 
-    @staticmethod
-    def _touches(contacts: Contacts, forces: np.ndarray) -> np.ndarray:
-        """Which contact points between blocks carry, (n,) bool array."""
-        return (forces[:, 0] > CARRIES) & ~is_member(contacts)
-
     def _penetration(self, points: _StepPoints, new: Place) -> float:
         """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""
         assert new.contacts is not None
         gap = points.joints.beyond_give(new.contacts.gaps, new.forces[:, 0])
-        return -float(gap[self._touches(new.contacts, new.forces)].min(initial=0.0)) / self.model.length
-
-    def _slides(self, contacts: Contacts, forces: np.ndarray, bound: np.ndarray) -> bool:
-        touches = self._touches(contacts, forces)
-        return bool((np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * bound)[touches].any())
+        touches = (new.forces[:, 0] > CARRIES) & ~is_member(new.contacts)
+        return -float(gap[touches].min(initial=0.0)) / self.model.length
 
     def _points(self, place: Place, start: Contacts) -> _StepPoints:
         """The contact points of a step from a place."""
@@ -498,7 +490,8 @@ class Stepper:
         gap = points.joints.beyond_give(contacts.gaps) / self.model.length
         carries = np.abs(forces[:, 0]) > CARRIES
         touches = carries & ~is_member(contacts)
-        exact = EXACT_SLIDING if self._slides(contacts, forces, points.bound) else EXACT
+        slides = touches & (forces[:, 0] > 0.0) & (np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * points.bound)
+        exact = EXACT_SLIDING if slides.any() else EXACT
         apart = (gap + points.joints.give[:, 0] * forces[:, 0])[touches]
         return max(self._largest(apart) / closed, self._largest((gap - predicted)[carries]) / exact)
 
