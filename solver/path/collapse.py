@@ -20,9 +20,6 @@ from .reports import Reports
 from .state import EquilibriumCheck, Place
 from .stepping import Stepper
 
-#: Viscosity where a collapse is enclosed, as a part of the model's.
-REFINED = 1e-3
-
 #: Steps in time, with those that are refused.
 TIME_STEPS = 200
 

@@ -17,7 +17,7 @@ from solver.results.increment import Bonds, Increment, Status
 from solver.ties import TieForces, is_member
 from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, JUMP
 
-from .collapse import MECHANISM, REFINED, Fall
+from .collapse import MECHANISM, Fall
 from .controls import Controls, Ending
 from .drivers import Driver
 from .equilibrium_check import EquilibriumChecks
@@ -47,6 +47,9 @@ REFUSED = 4.0
 #: Speed of a block, in speeds of the supports, and movements in a step, in block sizes: equilibrium is checked from the
 #: first on where blocks are fast, and from the second on in any case. Open joints that close move blocks by less.
 FAST, NEAR, FAR = 3.0, 1e-3, 0.05
+
+#: Viscosity where a collapse is enclosed, as a part of the model's.
+REFINED = 1e-3
 
 #: Tolerances beyond a bound that has an equilibrium after all in which the viscosity stays reduced.
 ENCLOSED = 8.0

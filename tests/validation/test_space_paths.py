@@ -102,7 +102,9 @@ def test_extruded_arches_are_those_of_the_plane(voussoirs, direction, expected):
     per_metre = solid.total_weight / flat.total_weight
     for s in shared:
         one, other = (next(i for i in r.path if i.parameter == s) for r in (flat, solid))
-        assert other.reaction / per_metre == pytest.approx(one.reaction, rel=1e-5)
+        # Shortly before the collapse differences of the poses grow: 4.8e-6 to 6.5e-6 were measured there, by the steps.
+        same = 5e-6 if s < 0.9 * expected else 1e-5
+        assert other.reaction / per_metre == pytest.approx(one.reaction, rel=same)
 
 
 def test_sparse_factors_give_what_those_of_a_band_give(monkeypatch):
