@@ -76,8 +76,8 @@ class _Iterate:
         limit = 0.9 * self.slope[:, 0] * self.forces[:, 0] + 0.9 * cohesion
         self.forces[:, 1:] *= np.minimum(1.0, limit / np.maximum(length, 1e-300))[:, None]
         self.z = np.zeros((self.d, n))
-        self.z[0] = np.maximum(1e-2, 1e-2 / (self.slope * self.forces + self.offset)[:, 0])
-        self.yielding = 1e-2 / self.reserve
+        self.z[0] = np.maximum(1.0, 1.0 / (self.slope * self.forces + self.offset)[:, 0])
+        self.yielding = 1.0 / self.reserve
         self.motion, self.rho, self.count = np.zeros_like(load), 0.0, 2 * n + len(self.limited)
         self.measure()
 
@@ -233,8 +233,8 @@ def nearest_equilibrium(
     best, part = (point.residual, point.forces), 1.0
     for _ in range(ITERATIONS):
         converged = point.residual < BALANCED and point.mean < CONVERGED * max(1.0, float(point.forces[:, 0].max()))
-        # What is out of balance then stays so: a reaction that the forces have only to their own digits.
-        if converged or part < 1e-6 or point.mean == 0.0:
+        # What is out of balance then stays so: there is no equilibrium, or a reaction has its own digits only.
+        if converged or part < 1e-3 or point.mean == 0.0:
             break
         try:
             point.factorise()
