@@ -51,15 +51,10 @@ class EquilibriumChecks:
         if self.model.live is not None:
             bounds = self.bounds(place, gap)
             return bounds.in_equilibrium and bounds.high > 0.0
-        try:
-            # Forces in balance within friction are proof enough.
-            self.nearest(place, gap)
-        except NotSolved:
-            contacts, friction = self._contacts_at(place)
-            self.stepper.programs += 1
-            beyond, limits = self.stepper.force_limits(place, contacts, gap)
-            return in_equilibrium(self.model, place.pose, beyond, friction, gap, limits)
-        return True
+        contacts, friction = self._contacts_at(place)
+        self.stepper.programs += 1
+        beyond, limits = self.stepper.force_limits(place, contacts, gap)
+        return in_equilibrium(self.model, place.pose, beyond, friction, gap, limits)
 
     def nearest(self, place: Place, gap: float, reaction: float | None = None, at_rest: bool = False) -> np.ndarray:
         """(n_contacts, d) array: forces in equilibrium nearest to those of a place, in units of the program.

@@ -268,10 +268,8 @@ class Path:
 
     def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
-        place, reaction = state.place, self._reaction(state.place)
-        check = self.checks.check(place, reaction)
-        carries = check.bounds.in_equilibrium and (self.model.live is None or check.bounds.high > 0.0)
-        resting = place if carries else self.fall.relaxed(place)
+        place = state.place
+        resting = place if self.checks.in_equilibrium(place) else self.fall.relaxed(place)
         is_far = resting is not None and self.fall.movements(place, resting).max() > JUMP
         # Blocks that rest far away may have left an equilibrium in a step that was too long.
         if resting is None or (is_far and state.refine_until < place.s):
@@ -281,7 +279,7 @@ class Path:
         if is_far:
             state = self._continue_from(state, resting)
         self.state = state = replace(state, history=(replace(resting, works=place.works),), ended=ended)
-        yield self._report(state, check if resting is place else self._check(resting, reaction))
+        yield self._report(state, self._check(resting, self._reaction(place)))
 
     def _report(self, state: PathState, check: EquilibriumCheck) -> Increment:
         """The increment of an equilibrium, with the state as its checkpoint."""
@@ -329,12 +327,11 @@ class Path:
             new, motion, error = self.stepper.step(place, length, viscosity=viscosity)
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))
-        if self._may_be_wedged(new, error):
-            if self._supports_locked(place):
-                self.wedged = new
-                return state, Outcome.LOCKED
-            if error.penetration > WEDGED and length > FIRST_STEP * unit:
-                return replace(state, step=length / 3.0), None
+        if error.penetration > WEDGED and length > FIRST_STEP * unit:
+            return replace(state, step=length / 3.0), None
+        if self._may_be_wedged(new, error) and self._supports_locked(place):
+            self.wedged = new
+            return state, Outcome.LOCKED
         measure = max(error.lag / self.largest_lag, error.turn / self.largest_turn)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
