@@ -40,17 +40,13 @@ def determinant(a: np.ndarray) -> np.ndarray:
 
 def longest_step(a: np.ndarray, change: np.ndarray) -> float:
     """Largest part of a change that stays inside the cones, infinite where none leaves them."""
-    square = change[0] ** 2 - inner(change[1:], change[1:])
-    half_slope = a[0] * change[0] - inner(a[1:], change[1:])
-    constant = determinant(a)
-    root = np.sqrt(np.maximum(half_slope**2 - square * constant, 0.0))
-    # The smallest positive root of square t² + 2 half t + room, where there is one.
-    crosses = (half_slope**2 >= square * constant) & ((square < 0.0) | (half_slope < 0.0))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        part = np.where(half_slope < 0.0, constant / (root - half_slope), (-half_slope - root) / square)
-        # Through the apex rounding may see no root.
-        apex = np.where(change[0] < 0.0, -a[0] / change[0], np.inf)
-    return float(np.minimum(np.where(crosses & (part >= 0.0), part, np.inf), apex).min(initial=np.inf))
+    # What maps a to (1, 0) maps the cone to itself.
+    size = np.sqrt(determinant(a))
+    point, change = a / size, change / size
+    first = point[0] * change[0] - inner(point[1:], change[1:])
+    rest = change[1:] - (first + change[0]) / (1.0 + point[0]) * point[1:]
+    steepest = float((np.sqrt(inner(rest, rest)) - first).max(initial=0.0))
+    return 1.0 / steepest if steepest > 0.0 else np.inf
 
 
 class Scaling:
