@@ -282,11 +282,11 @@ class Engine:
         axes: np.ndarray,
     ) -> mechanics.ContactProblem:
         """State the program of a step, linearised where contact points are measured."""
-        rows = mechanics.ContactRows(mechanics.wrench_matrix(measured, pose, self.length), self.free)
-        loads = self.loads
+        matrix, loads = mechanics.wrench_matrix(measured, pose, self.length), self.loads
         if self.d == 3:
+            each = matrix.data.reshape(len(start), 3, 12)
             for block, first in ((start.block_a, 3), (start.block_b, 9)):
-                rows.blocks[:, :, first : first + 3] = rows.blocks[:, :, first : first + 3] @ axes[block]
+                each[:, :, first : first + 3] = each[:, :, first : first + 3] @ axes[block]
             loads, beside_flight = (self._along(of, axes.transpose(0, 2, 1)) for of in (loads, beside_flight))
         members = mechanics.is_member(start)
         # What has come into another block is pushed out over some steps.
@@ -296,7 +296,7 @@ class Engine:
         number = start.features[members, 1]
         compliance[members, 0], most[members] = self.give[number], self.strength[number]
         return mechanics.ContactProblem(
-            rows=rows,
+            rows=mechanics.ContactRows(matrix, self.free, self.assembly.centroids),
             gap=gaps / self.length,
             slip=measured.slip / self.length,
             # Gaps are absolute, slip counts from the start of the step.

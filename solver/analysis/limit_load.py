@@ -356,7 +356,8 @@ class _Problem:
     def at_rest(self, balanced: _State) -> np.ndarray:
         """(n,) array: normal forces of the state of least elastic energy under the dead load, where there is one."""
         free, d = self.assembly.free, self.contacts.points.shape[1]
-        rows = ContactRows(wrench_matrix(self.contacts, self.pose, self.length), free)
+        matrix = wrench_matrix(self.contacts, self.pose, self.length)
+        rows = ContactRows(matrix, free, self.assembly.centroids)
         load, near = self.dead + balanced.multiplier * self.live, np.zeros((len(self.contacts), d))
         try:
             compliance = Stepper.joint_compliance(self.contacts)

@@ -83,7 +83,7 @@ class EquilibriumChecks:
         # The program is that of the normal forces beyond the least ones.
         base = np.zeros_like(reference)
         base[:, 0] = limits.least
-        rows = ContactRows(matrix, free)[closed]
+        rows = ContactRows(matrix, free, model.assembly.centroids)[closed]
         unit_reaction = None if reaction is None else self._reaction_rows(place, matrix, len(contacts))[closed]
         beyond = 0.0
         if unit_reaction is not None and reaction is not None:

@@ -379,10 +379,10 @@ class Stepper:
         motion_so_far, before_step = np.zeros_like(before), np.column_stack([points.kept * forces[:, 0], forces[:, 1:]])
         pose = self._with_supports(place.pose, supports)
         contacts = self.measured(start, pose, place.tie_lengths)
-        number, rows = 0, ContactRows(wrench_matrix(contacts, pose, model.length), free)
+        number, rows = 0, ContactRows(wrench_matrix(contacts, pose, model.length), free, model.assembly.centroids)
         while True:
             if number:
-                rows = ContactRows(wrench_matrix(contacts, pose, model.length), free)
+                rows = ContactRows(wrench_matrix(contacts, pose, model.length), free, model.assembly.centroids)
             control = driver.control(pose) if model.live is not None else None
             load = self._load(pose, loads)
             problem = ContactProblem(

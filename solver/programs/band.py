@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import lapack
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from solver.ordering import narrowest, positions_in
 from solver.tolerances import ACCEPTED_ERROR, INTERIOR_TOLERANCE
 
 from .problem import LinearProgram, Solution, Unbounded
@@ -69,7 +69,7 @@ class _Band:
         self.rows, counts = len(self.kept), np.diff(matrix.indptr)
         # Each column is as wide as it has entries, at least: a load on every block fills the matrix.
         self._refuse_wide(int(counts.max(initial=0)))
-        self.order, self.width = narrowest(matrix, places)
+        self.order, self.width = narrowest(_joined(matrix), places)
         self._refuse_wide(self.width)
         position = positions_in(self.order)
         slots, weights, columns, pairs = [], [], [], []
@@ -238,30 +238,10 @@ class _Method:
         )
 
 
-def narrowest(matrix: sp.csc_array, places: np.ndarray | None) -> tuple[np.ndarray, int]:
-    """Choose an order of the rows: (m,) array, and how wide their band is in it."""
+def _joined(matrix: sp.csc_array) -> sp.csr_array:
+    """(m, m) sparse array: which rows have a column in common."""
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape[::-1])
-    joined = sp.csr_array(pattern.T @ pattern)
-    orders = [reverse_cuthill_mckee(sp.csr_matrix(joined), symmetric_mode=True)]
-    if places is not None:
-        axis = int(np.argmax(np.ptp(places, axis=0)))
-        # Along the longest side, by inclined lines, as bricks above each other move to either side.
-        across = np.delete(places, axis, axis=1).sum(axis=1)
-        orders += [np.argsort(places[:, axis] + tilt * across, kind="stable") for tilt in (0.01, 0.1, 0.3)]
-    row = np.repeat(np.arange(matrix.shape[0]), np.diff(joined.indptr))
-    widths = []
-    for order in orders:
-        position = positions_in(order)
-        widths.append(int(np.abs(position[row] - position[joined.indices]).max(initial=0)) + 1)
-    least = int(np.argmin(widths))
-    return orders[least], widths[least]
-
-
-def positions_in(order: np.ndarray) -> np.ndarray:
-    """(m,) int array: where in an order each row comes."""
-    position = np.empty(len(order), dtype=np.int64)
-    position[order] = np.arange(len(order))
-    return position
+    return sp.csr_array(pattern.T @ pattern + sp.eye_array(matrix.shape[0]))
 
 
 def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float:
@@ -276,8 +256,7 @@ def run_band(program: LinearProgram) -> tuple[Solution | None, str]:
     Parameters
     ----------
     program : LinearProgram
-        Its places are for orders of the rows to try beside that of Cuthill & McKee: along the longer side of a wall
-        they make a band two thirds as wide.
+        Its places are for orders of the rows to try, see :func:`solver.ordering.narrowest`.
 
     Returns
     -------
@@ -311,7 +290,7 @@ def _solved_in_pieces(program: LinearProgram, wide: np.ndarray) -> tuple[np.ndar
     """Solve with wide columns cut into pieces along the rows, and equations that all pieces of one are the same."""
     rows, columns = program.matrix.shape
     narrow = np.delete(np.arange(columns), wide)
-    position = positions_in(narrowest(sp.csc_array(program.matrix[:, narrow]), program.places)[0])
+    position = positions_in(narrowest(_joined(sp.csc_array(program.matrix[:, narrow])), program.places)[0])
     n = int(position.max()) // PIECE + 1
     each = sp.csc_array((np.ones(rows), (np.arange(rows), position // PIECE)), shape=(rows, n))
     cut = [sp.diags_array(program.matrix[:, [k]].toarray()[:, 0]) @ each for k in wide]

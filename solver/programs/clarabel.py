@@ -8,8 +8,8 @@ import scipy.sparse as sp
 
 from .problem import ConicProgram, Solution
 
-#: Tolerance of Clarabel, and whether it equilibrates rows and columns, by route: vaults that slide, and stacks near their
-#: collapse, are often solved without equilibration only.
+#: Tolerance of Clarabel, and whether it equilibrates rows and columns, by route: vaults that slide, and stacks near
+#: their collapse, are often solved without equilibration only.
 ROUTES = {"clarabel": (1e-11, True), "clarabel not equilibrated": (1e-9, False)}
 
 

@@ -58,6 +58,7 @@ ORDER = (
     "solver.assembly",
     "solver.geometry",
     "solver.views",
+    "solver.ordering",
     "solver.tolerances",
     "solver.words",
 )
