@@ -191,7 +191,7 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
     ------
     NotSolved, Singular
     """
-    point, short = _Iterate(problem, multiplier), False
+    point = _Iterate(problem, multiplier)
     for _ in range(ITERATIONS):
         size = max(point.size, float(np.abs(point.motion).max()))
         if point.mean <= CONVERGED * size and point.imbalance < BALANCED and point.residual <= CONVERGED * size:
@@ -209,8 +209,6 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
         closing = np.clip(-change.normal[point.limited] * change.yielding, -limit, limit)
         third = product(point.scaling.scaled(change.shear), point.scaling.unscaled(change.slide))
         third *= np.minimum(1.0, limit / np.maximum(np.abs(third).sum(axis=0), 1e-300))
-        if short:
-            centring, second, closing, third = 1.0, 0.0 * second, 0.0 * closing, 0.0 * third
         slide_target = -slide_products - third
         slide_target[0] += 2.0 * centring * point.mean
         target = centring * point.mean
@@ -218,8 +216,6 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
         part = 0.99 * point.longest(change)
         if not (part > 1e-9 and np.isfinite(change.motion).all()):
             break
-        # After a short step the next one only centres.
-        short = part < 0.1 and not short
         point.take(change, part)
     if point.mean > ACCEPTED * size or point.imbalance > ACCEPTED or point.residual > ACCEPTED * size:
         raise NotSolved(
