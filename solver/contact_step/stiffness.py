@@ -1,4 +1,4 @@
-"""How contact points act on the free blocks, and factors of their stiffness: of a band, sparse where it is wide."""
+"""How contact points act on the free blocks, and factors of their stiffness, which is a band."""
 
 from __future__ import annotations
 
@@ -8,14 +8,10 @@ from functools import lru_cache
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import lapack
-from scipy.sparse.linalg import splu
 
 from solver.ordering import narrowest, positions_in
 
 Solve = Callable[[np.ndarray], np.ndarray]
-
-#: Multiplications of a band's factor above which sparse factors take less time: even near 1e9, half of it at 2e10.
-WIDE = 3e9
 
 
 class Singular(ArithmeticError):
@@ -76,49 +72,10 @@ class Band:
         return solve
 
 
-class Sparse:
-    """Where the small matrices of contact points between pairs of blocks go in a sparse symmetric matrix.
-
-    Parameters
-    ----------
-    pairs : (n, 2) int array
-        Numbers of the two blocks of each contact point; -1 for a support.
-    n_blocks, dof : int
-
-    Notes
-    -----
-    Factors by SuperLU in its symmetric mode, pivots on the diagonal, in the order of minimum degree.
-    """
-
-    def __init__(self, pairs: np.ndarray, n_blocks: int, dof: int) -> None:
-        n = n_blocks * dof
-        rows = np.where(pairs[:, :, None] < 0, n, pairs[:, :, None] * dof + np.arange(dof)).reshape(len(pairs), 2 * dof)
-        i, j = np.broadcast_arrays(rows[:, :, None], rows[:, None, :])
-        self.kept = np.flatnonzero(((i < n) & (j < n)).ravel())
-        on_diagonal = np.arange(n, dtype=np.int64) * (n + 1)
-        cells = np.concatenate([(j * np.int64(n) + i).ravel()[self.kept], on_diagonal])
-        cells, number = np.unique(cells, return_inverse=True)
-        self.entry, self.diagonal = np.split(number, [len(self.kept)])
-        self.rows = (cells % n).astype(np.int32)
-        self.columns = np.searchsorted(cells, np.arange(n + 1, dtype=np.int64) * n).astype(np.int32)
-
-    def factorised(self, matrices: np.ndarray, diagonal: np.ndarray) -> Solve:
-        """Factorise the sum of the points' matrices and a diagonal, as :meth:`Band.factorised`."""
-        values = np.bincount(self.entry, matrices.ravel()[self.kept], len(self.rows))
-        values[self.diagonal] += diagonal + 1e-14 * values[self.diagonal].max()
-        matrix = sp.csc_matrix((values, self.rows, self.columns), shape=(len(diagonal),) * 2)
-        try:
-            factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        except RuntimeError as error:
-            raise Singular(str(error)) from None
-        return factors.solve
-
-
 @lru_cache(maxsize=4)
-def _pattern(pairs: bytes, places: bytes | None, n_blocks: int, dof: int) -> Band | Sparse:
-    array = np.frombuffer(pairs, dtype=np.int64).reshape(-1, 2)
-    band = Band(array, None if places is None else np.frombuffer(places).reshape(n_blocks, -1), n_blocks, dof)
-    return band if band.shape[0] * band.shape[1] ** 2 < WIDE else Sparse(array, n_blocks, dof)
+def _band(pairs: bytes, places: bytes | None, n_blocks: int, dof: int) -> Band:
+    of_blocks = None if places is None else np.frombuffer(places).reshape(n_blocks, -1)
+    return Band(np.frombuffer(pairs, dtype=np.int64).reshape(-1, 2), of_blocks, n_blocks, dof)
 
 
 class ContactRows:
@@ -180,7 +137,7 @@ class ContactRows:
         """
         weighted = np.matmul(stiffness, self.blocks)
         pairs = self.pairs.astype(np.int64).tobytes()
-        pattern = _pattern(pairs, self.places, self.n_dof // self.dof, self.dof)
+        band = _band(pairs, self.places, self.n_dof // self.dof, self.dof)
         # Small products of arrays that do not lie in order take three times as long.
         each = np.matmul(np.ascontiguousarray(self.blocks.transpose(0, 2, 1)), weighted)
-        return pattern.factorised(each, diagonal)
+        return band.factorised(each, diagonal)

@@ -107,15 +107,16 @@ def test_extruded_arches_are_those_of_the_plane(voussoirs, direction, expected):
         assert other.reaction / per_metre == pytest.approx(one.reaction, rel=same)
 
 
-def test_sparse_factors_give_what_those_of_a_band_give(monkeypatch):
+def test_the_order_of_blocks_in_factors_changes_nothing(monkeypatch):
     spreads = solver.Settlement(direction=(1, 0, 0), increment=0.01, limit=0.01)
-    by_band = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
-    # The wrapped function keeps no pattern.
-    unkept = import_module("solver.contact_step.stiffness")._pattern.__wrapped__
-    monkeypatch.setattr("solver.contact_step.stiffness._pattern", unkept)
-    monkeypatch.setattr("solver.contact_step.stiffness.WIDE", 0.0)
-    sparse = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
-    assert sparse.path[-1].reaction == pytest.approx(by_band.path[-1].reaction, rel=1e-9)
+    narrow = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
+    # The wrapped function keeps no band.
+    unkept = import_module("solver.contact_step.stiffness")._band.__wrapped__
+    monkeypatch.setattr("solver.contact_step.stiffness._band", unkept)
+    full_width = "solver.contact_step.stiffness.narrowest", lambda joined, places: (np.arange(len(places)), len(places))
+    monkeypatch.setattr(*full_width)
+    full = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
+    assert full.path[-1].reaction == pytest.approx(narrow.path[-1].reaction, rel=1e-9)
 
 
 @pytest.mark.slow
