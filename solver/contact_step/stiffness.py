@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from functools import lru_cache
 
 import numpy as np
@@ -98,26 +99,23 @@ class ContactRows:
         rows = matrix.indices.reshape(n, d, 2 * dof)[:, 0].astype(np.int64)
         number = np.append(np.where(free, np.cumsum(free) - 1, -1), -1)
         self.pairs = number[rows[:, [0, dof]] // dof]
-        self.n_dof = dof * int(free.sum())
-        self.dof = dof
-        # Rows of supports go beyond the last.
-        at = self.pairs[:, :, None] * dof + np.arange(dof)
-        self._set(
-            np.where(self.pairs[:, :, None] < 0, self.n_dof, at).reshape(n, 2 * dof), matrix.data.reshape(n, d, 2 * dof)
-        )
+        self.n_dof, self.dof, self.blocks = dof * int(free.sum()), dof, matrix.data.reshape(n, d, 2 * dof)
+        self._assemble()
 
-    def _set(self, rows: np.ndarray, blocks: np.ndarray) -> None:
-        n, d, both = blocks.shape
-        self.rows, self.blocks = rows, blocks
-        columns, starts = np.repeat(rows, d, axis=0).ravel(), np.arange(n * d + 1) * both
-        self.matrix = sp.csr_array((blocks.ravel(), columns, starts), shape=(n * d, self.n_dof + 1))
+    def _assemble(self) -> None:
+        """Put what the contact points do in a sparse matrix; supports have a last column of their own."""
+        (n, d, both), dofs = self.blocks.shape, np.arange(self.dof)
+        columns = np.where(self.pairs[:, :, None] < 0, self.n_dof, self.pairs[:, :, None] * self.dof + dofs)
+        columns = np.repeat(columns.reshape(n, both), d, axis=0).ravel()
+        starts = np.arange(n * d + 1) * both
+        self.matrix = sp.csr_array((self.blocks.ravel(), columns, starts), shape=(n * d, self.n_dof + 1))
         self.transposed = self.matrix.T
 
     def __getitem__(self, chosen: np.ndarray) -> ContactRows:
         """Choose some of the contact points, by a mask or their numbers."""
-        one = object.__new__(ContactRows)
-        one.pairs, one.places, one.n_dof, one.dof = self.pairs[chosen], self.places, self.n_dof, self.dof
-        one._set(self.rows[chosen], self.blocks[chosen])
+        one = copy(self)
+        one.pairs, one.blocks = self.pairs[chosen], self.blocks[chosen]
+        one._assemble()
         return one
 
     def relative(self, motion: np.ndarray) -> np.ndarray:
