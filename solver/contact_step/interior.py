@@ -184,6 +184,7 @@ class _Iterate:
         self._measure()
 
 
+@np.errstate(all="ignore")  # A step that overflows is seen by its result.
 def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolution:
     """Follow the central path to the minimum of a step's program.
 
