@@ -83,8 +83,8 @@ class Fall:
                 continue
             place = new
             yield place, motion, error.turn / time**2, moved / time
-            # Each is twice as long as the one before: forces out of balance would have moved the blocks. Steps that grow
-            # faster carry blocks past places where they come to rest.
+            # Each is twice as long as the one before, so that forces out of balance would have moved the blocks; steps
+            # that grow faster carry blocks past places where they come to rest.
             idle = idle + 1 if moved < NO_MOVEMENT else 0
             if idle == 12:
                 return

@@ -19,7 +19,7 @@ from solver.ties import is_member
 from solver.tolerances import COMPUTED_GAP
 
 from .state import EquilibriumCheck, Place
-from .stepping import Stepper
+from .stepping import CARRIES, Stepper
 
 
 def on_supports(model: Model, contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
@@ -55,6 +55,12 @@ class EquilibriumChecks:
         self.stepper.programs += 1
         beyond, limits = self.stepper.force_limits(place, contacts, gap)
         return in_equilibrium(self.model, place.pose, beyond, friction, gap, limits)
+
+    def is_within_friction(self, place: Place) -> bool:
+        """Whether the forces of a place are within friction, as they are where blocks only turn."""
+        assert place.contacts is not None
+        allowed = self.stepper.friction(place.contacts) * place.forces[:, 0]
+        return bool((np.linalg.norm(place.forces[:, 1:], axis=1) < allowed + CARRIES).all())
 
     def nearest(self, place: Place, gap: float, reaction: float | None = None, at_rest: bool = False) -> np.ndarray:
         """(n_contacts, d) array: forces in equilibrium nearest to those of a place, in units of the program.
