@@ -233,8 +233,8 @@ def nearest_equilibrium(
     best, part = (point.residual, point.forces), 1.0
     for _ in range(ITERATIONS):
         converged = point.residual < BALANCED and point.mean < CONVERGED * max(1.0, float(point.forces[:, 0].max()))
-        # What is out of balance then stays so: there is no equilibrium, or a reaction has its own digits only.
-        if converged or part < 1e-3 or point.mean == 0.0:
+        # What is out of balance after a short step stays so: there is no equilibrium, or a reaction has too few digits.
+        if converged or part < (1e-6 if point.residual <= ACCEPTED else 1e-3) or point.mean == 0.0:
             break
         try:
             point.factorise()
@@ -260,7 +260,8 @@ def nearest_equilibrium(
             break
         if point.least_forces() > LARGEST_FORCES:
             raise NotSolved("no forces are in equilibrium: a movement gains more than they can take")
-        best = min(best, (point.residual, point.forces), key=lambda candidate: candidate[0])
+        # Of those in balance the last one is the nearest.
+        best = min((point.residual, point.forces), best, key=lambda candidate: max(candidate[0], BALANCED))
     if best[0] > ACCEPTED:
         raise NotSolved(f"forces nearest to an equilibrium leave {best[0]:.1e} block weights out of balance")
     return best[1]
