@@ -39,10 +39,9 @@ def narrowest(joined: sp.csr_array, places: np.ndarray | None) -> tuple[np.ndarr
         orders += [np.argsort(places[:, axis] + tilt * across, kind="stable") for tilt in TILTS]
     for order in orders:
         for _ in range(PASSES + 1):
-            of_joined = positions_in(order)[joined.indices]
-            best = min(
-                best, (int(np.abs(positions_in(order)[row] - of_joined).max()) + 1, order), key=lambda one: one[0]
-            )
+            position = positions_in(order)
+            of_joined = position[joined.indices]
+            best = min(best, (int(np.abs(position[row] - of_joined).max(initial=0)) + 1, order), key=lambda one: one[0])
             ends = np.minimum.reduceat(of_joined, starts) + np.maximum.reduceat(of_joined, starts)
             order = np.argsort(ends, kind="stable")
     return best[1], best[0]
