@@ -45,11 +45,12 @@ from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, D
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25
 
-#: Non-associative flow: part of the new normal forces in the next program, and programs at most.
-RELAXATION, PROGRAMS = 0.9, 300
+#: Non-associative flow: part of the new normal forces in the next program where they have come nearer to those before,
+#: part where they have not, as programs of vaults that go in circles, and programs at most.
+RELAXATION, CAUTIOUS, PROGRAMS = 0.9, 0.5, 300
 
-#: Non-associative flow: programs after which the next one follows of so many changes, and part of the new forces then.
-PLAIN_PROGRAMS, REMEMBERED, ACCELERATED = 40, 15, 0.5
+#: Non-associative flow: programs after which those that do not come nearer follow of so many changes.
+PLAIN_PROGRAMS, REMEMBERED = 15, 6
 
 #: Non-associative flow has converged when the multiplier changes by less than programs are solved to, and shear forces
 #: exceed friction by less than this part of the largest normal force; the second in space, where the multiplier is off
@@ -477,15 +478,16 @@ class _Problem:
 def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs: int) -> np.ndarray:
     """(n,) array: normal forces to try after those of the last programs and what these answered.
 
-    Anderson (1965), https://doi.org/10.1145/321296.321305, once a constant relaxation has not converged, as in vaults,
-    whose programs go in circles: what changes of the forces did to their error says which would take it away.
+    Anderson (1965), https://doi.org/10.1145/321296.321305, where a relaxation does not converge, as in vaults, whose
+    programs go in circles: what changes of the forces did to their error says which would take it away.
     """
-    if programs <= PLAIN_PROGRAMS:
-        return np.asarray((1.0 - RELAXATION) * normals[-1] + RELAXATION * answers[-1])
     errors = np.subtract(answers, normals)
-    changes, of_errors = np.diff(normals, axis=0).T, np.diff(errors, axis=0).T
-    parts = np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
-    moved = normals[-1] + ACCELERATED * errors[-1] - (changes + ACCELERATED * of_errors) @ parts
+    sizes = np.abs(errors).max(axis=1, initial=0.0)
+    nearer = len(sizes) == 1 or sizes[-1] < sizes[-2]
+    moved = normals[-1] + (RELAXATION if nearer else CAUTIOUS) * errors[-1]
+    if programs > PLAIN_PROGRAMS and not nearer:
+        changes, of_errors = np.diff(normals, axis=0).T, np.diff(errors, axis=0).T
+        moved -= (changes + CAUTIOUS * of_errors) @ np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
     return np.asarray(np.maximum(moved, 0.0))
 
 
