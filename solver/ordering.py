@@ -12,6 +12,9 @@ TILTS = (0.01, 0.1)
 #: Times that each row moves to the middle of those it is joined to; more bring little.
 PASSES = 5
 
+#: Rows of a part that is cut no further.
+WHOLE = 20
+
 
 def narrowest(joined: sp.csr_array, places: np.ndarray | None) -> tuple[np.ndarray, int]:
     """Choose an order of rows.
@@ -33,10 +36,7 @@ def narrowest(joined: sp.csr_array, places: np.ndarray | None) -> tuple[np.ndarr
     """
     row, starts = np.repeat(np.arange(joined.shape[0]), np.diff(joined.indptr)), joined.indptr[:-1]
     orders, best = [reverse_cuthill_mckee(sp.csr_matrix(joined), symmetric_mode=True)], (joined.shape[0] + 1, starts)
-    places = np.empty((len(starts), 0)) if places is None else places
-    for axis in range(places.shape[1]):
-        across = np.delete(places, axis, axis=1).sum(axis=1)
-        orders += [np.argsort(places[:, axis] + tilt * across, kind="stable") for tilt in TILTS]
+    orders += [np.argsort(values, kind="stable") for values in _along(places)]
     for order in orders:
         for _ in range(PASSES + 1):
             position = positions_in(order)
@@ -47,8 +47,63 @@ def narrowest(joined: sp.csr_array, places: np.ndarray | None) -> tuple[np.ndarr
     return best[1], best[0]
 
 
+def _along(places: np.ndarray | None) -> list[np.ndarray]:
+    """Values (m,) that put places in order, along each axis and a little across it."""
+    if places is None:
+        return []
+    return [
+        places[:, axis] + tilt * np.delete(places, axis, axis=1).sum(axis=1)
+        for axis in range(places.shape[1])
+        for tilt in TILTS
+    ]
+
+
 def positions_in(order: np.ndarray) -> np.ndarray:
     """(m,) int array: where in an order each row comes."""
     position = np.empty(len(order), dtype=np.int64)
     position[order] = np.arange(len(order))
     return position
+
+
+def dissected(joined: sp.csr_array, places: np.ndarray | None) -> list[tuple[np.ndarray, int]]:
+    """Cut what is joined into parts, until they are small, by the fewest rows near the middle of an order.
+
+    Parameters
+    ----------
+    joined, places
+        As of :func:`narrowest`.
+
+    Returns
+    -------
+    list of ((m,) int array, int)
+        Rows of each part, or of each cut, and the cut around it, -1 for the last. Parts come before what cuts them.
+
+    Notes
+    -----
+    Nested dissection, George (1973), https://doi.org/10.1137/0710032.
+    """
+    orders = [positions_in(reverse_cuthill_mckee(sp.csr_matrix(joined), symmetric_mode=True)).astype(float)]
+    return _cut(joined, np.array([*orders, *_along(places)]), np.arange(joined.shape[0]))
+
+
+def _cut(joined: sp.csr_array, orders: np.ndarray, rows: np.ndarray) -> list[tuple[np.ndarray, int]]:
+    """Parts of some rows, by the values (k, m) that put them in order, as those of ``dissected``."""
+    if len(rows) <= WHOLE:
+        return [(rows, -1)]
+    between, n = joined[rows][:, rows], len(rows)
+    middle = np.arange(n // 3, 2 * n // 3 + 1)
+    found = []
+    for values in orders[:, rows]:
+        position = positions_in(np.argsort(values, kind="stable"))
+        last = np.maximum.reduceat(position[between.indices], between.indptr[:-1])
+        across = np.cumsum(np.bincount(position + 1, minlength=n + 2) - np.bincount(last + 1, minlength=n + 2))
+        at = middle[np.argmin(across[middle] + np.abs(middle - n / 2) / WHOLE)]
+        found.append((int(across[at]), position < at, (position < at) & (last >= at)))
+    _, before, cut = min(found, key=lambda one: one[0])
+    # In order along the cut, where parts meet it in few runs.
+    along = orders[np.argmax(np.ptp(orders[1:, rows[cut]], axis=1)) + 1] if len(orders) > 1 and cut.any() else orders[0]
+    own = rows[cut][np.argsort(along[rows[cut]], kind="stable")]
+    parts: list[tuple[np.ndarray, int]] = []
+    for some in (before & ~cut, ~before):
+        parts += [(blocks, into + len(parts) if into >= 0 else -1) for blocks, into in _cut(joined, orders, rows[some])]
+    return [*((blocks, into if into >= 0 else len(parts)) for blocks, into in parts), (own, -1)]

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .cones import ITERATIONS, Scaling, longest_step, product, quotient
+from .factors import Singular
 from .problem import NotSolved
-from .stiffness import ContactRows, Singular
+from .stiffness import ContactRows
 
 #: Force out of balance, and mean product of forces and multipliers, in block weights, at which it has converged.
 BALANCED, CONVERGED = 1e-11, 1e-12

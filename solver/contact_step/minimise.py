@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from .factors import Singular, Solve
 from .interior import BALANCED, interior_point
 from .problem import ContactProblem, NotSolved, StepSolution
-from .stiffness import Singular, Solve
 
 #: Factorisations of Newton's method, and force out of balance, in block weights, beyond which it would take more: the
 #: interior method, which takes 8 to 14 wherever it starts, takes over.

@@ -1,82 +1,30 @@
-"""How contact points act on the free blocks, and factors of their stiffness, which is a band."""
+"""How contact points act on the free blocks, and factors of their stiffness."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from copy import copy
 from functools import lru_cache
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import lapack
 
-from solver.ordering import narrowest, positions_in
-
-Solve = Callable[[np.ndarray], np.ndarray]
-
-
-class Singular(ArithmeticError):
-    """The matrix is not positive definite, by rounding."""
-
-
-class Band:
-    """Where the small matrices of contact points between pairs of blocks go in a symmetric band.
-
-    Parameters
-    ----------
-    pairs : (n, 2) int array
-        Numbers of the two blocks of each contact point; -1 for a support.
-    places : (n_blocks, d) array, optional
-        For the order of the blocks.
-    n_blocks, dof : int
-
-    Notes
-    -----
-    The band is stored as in LAPACK's ``pbtrf``, lower, by columns.
-    """
-
-    def __init__(self, pairs: np.ndarray, places: np.ndarray | None, n_blocks: int, dof: int) -> None:
-        touching = pairs[(pairs >= 0).all(axis=1)]
-        graph = sp.csr_array((np.ones(len(touching)), touching.T), shape=(n_blocks, n_blocks))
-        order, width = narrowest(sp.csr_array(graph + graph.T + sp.eye_array(n_blocks)), places)
-        self.order = (order[:, None] * dof + np.arange(dof)).ravel()
-        positions = np.append(positions_in(order), -1)[pairs]
-        self.shape = (n_blocks * dof, dof * width)
-        rows = (positions[:, :, None] * dof + np.arange(dof)).reshape(len(pairs), 2 * dof)
-        on_support = np.repeat(positions < 0, dof, axis=1)
-        i, j = rows[:, :, None], rows[:, None, :]
-        lower = (~on_support[:, :, None] & ~on_support[:, None, :] & (i >= j)).ravel()
-        self.kept = np.flatnonzero(lower)
-        self.entry = (j * self.shape[1] + i - j).ravel()[self.kept]
-
-    def factorised(self, matrices: np.ndarray, diagonal: np.ndarray) -> Solve:
-        """Factorise the sum of the points' matrices, (n, 2 dof, 2 dof), and a diagonal; gives what solves with it.
-
-        Raises
-        ------
-        Singular
-        """
-        size, width = self.shape
-        band = np.bincount(self.entry, matrices.ravel()[self.kept], size * width).reshape(self.shape).T
-        # Blocks without contact need some stiffness.
-        band[0] += diagonal[self.order] + 1e-14 * band[0].max()
-        factor, bad = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
-        if bad:
-            raise Singular(f"pivot {bad} of {size} is not positive")
-
-        def solve(right: np.ndarray) -> np.ndarray:
-            solution, _ = lapack.dpbtrs(factor, right[self.order], lower=1)
-            out = np.empty_like(solution)
-            out[self.order] = solution
-            return out
-
-        return solve
+from solver.contact_step.factors import Factorisation, Solve, factorisation
 
 
 @lru_cache(maxsize=4)
-def _band(pairs: bytes, places: bytes | None, n_blocks: int, dof: int) -> Band:
+def _over_pairs(pairs: bytes) -> tuple[sp.csr_array, bytes]:
+    """Give what sums over the points of each pair of blocks, and the pairs."""
+    of_points = np.frombuffer(pairs, dtype=np.int64).reshape(-1, 2)
+    some, pair = np.unique(of_points, axis=0, return_inverse=True)
+    points = np.arange(len(of_points))
+    sums = sp.csr_array((np.ones(len(points)), (pair.ravel(), points)), shape=(len(some), len(points)))
+    return sums, some.tobytes()
+
+
+@lru_cache(maxsize=4)
+def _factorisation(pairs: bytes, places: bytes | None, n_blocks: int, dof: int) -> Factorisation:
     of_blocks = None if places is None else np.frombuffer(places).reshape(n_blocks, -1)
-    return Band(np.frombuffer(pairs, dtype=np.int64).reshape(-1, 2), of_blocks, n_blocks, dof)
+    return factorisation(np.frombuffer(pairs, dtype=np.int64).reshape(-1, 2), of_blocks, n_blocks, dof)
 
 
 class ContactRows:
@@ -134,8 +82,8 @@ class ContactRows:
         Singular
         """
         weighted = np.matmul(stiffness, self.blocks)
-        pairs = self.pairs.astype(np.int64).tobytes()
-        band = _band(pairs, self.places, self.n_dof // self.dof, self.dof)
+        sums, pairs = _over_pairs(self.pairs.astype(np.int64).tobytes())
+        of_pairs = _factorisation(pairs, self.places, self.n_dof // self.dof, self.dof)
         # Small products of arrays that do not lie in order take three times as long.
         each = np.matmul(np.ascontiguousarray(self.blocks.transpose(0, 2, 1)), weighted)
-        return band.factorised(each, diagonal)
+        return of_pairs.factorised(sums @ each.reshape(len(each), -1), diagonal)

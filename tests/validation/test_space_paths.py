@@ -107,16 +107,16 @@ def test_extruded_arches_are_those_of_the_plane(voussoirs, direction, expected):
         assert other.reaction / per_metre == pytest.approx(one.reaction, rel=same)
 
 
-def test_the_order_of_blocks_in_factors_changes_nothing(monkeypatch):
+def test_factors_by_fronts_and_of_a_band_give_the_same(monkeypatch):
     spreads = solver.Settlement(direction=(1, 0, 0), increment=0.01, limit=0.01)
     narrow = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
-    # The wrapped function keeps no band.
-    unkept = import_module("solver.contact_step.stiffness")._band.__wrapped__
-    monkeypatch.setattr("solver.contact_step.stiffness._band", unkept)
-    full_width = "solver.contact_step.stiffness.narrowest", lambda joined, places: (np.arange(len(places)), len(places))
-    monkeypatch.setattr(*full_width)
-    full = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
-    assert full.path[-1].reaction == pytest.approx(narrow.path[-1].reaction, rel=1e-9)
+    # The wrapped function keeps none.
+    unkept = import_module("solver.contact_step.stiffness")._factorisation.__wrapped__
+    monkeypatch.setattr("solver.contact_step.stiffness._factorisation", unkept)
+    monkeypatch.setattr("solver.contact_step.factors.WIDE", 0)
+    monkeypatch.setattr("solver.ordering.WHOLE", 3)
+    by_fronts = solver.settle(extruded_arch(voussoirs=5), spreads, friction_coefficient=2.0)
+    assert by_fronts.path[-1].reaction == pytest.approx(narrow.path[-1].reaction, rel=1e-9)
 
 
 @pytest.mark.slow
