@@ -11,7 +11,7 @@ from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.programs.problem import LinearProgram, Solution, SolveError, Unbounded
-from solver.programs.solve import solve_between, solve_lp
+from solver.programs.solve import CONIC_ROUTES, solve_between, solve_lp
 from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
 
 from .model import Model
@@ -240,7 +240,8 @@ class _StaticProgram:
             none = np.zeros_like(self.reserve)
             if self.d == 3:
                 lower, upper = np.append(-self.load, none), np.append(-self.load, self.reserve)
-                return solve_between(cost, matrix, lower, upper, self.friction, 3)
+                routes = CONIC_ROUTES if sign else CONIC_ROUTES[::-1]
+                return solve_between(cost, matrix, lower, upper, self.friction, 3, routes)
             lower = np.append(-self.load - self.tolerance, none)
             upper = np.append(-self.load + self.tolerance, self.reserve)
             return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, places=self.places))

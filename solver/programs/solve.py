@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
 
 from .band import run_band
-from .clarabel import ROUTES as CONIC_ROUTES
-from .clarabel import run_clarabel
+from .clarabel import ROUTES, run_clarabel
 from .highs import run_highs
 from .problem import ConicProgram, LinearProgram, Solution, SolveError
 
@@ -25,6 +24,9 @@ BAND = "band"
 
 #: Routes of large programs, of which the simplex method alone gives a ray where the band does not apply.
 LADDER = (BAND, "hipo", "simplex")
+
+#: Routes of conic programs; whether an equilibrium exists is found sooner by the last first.
+CONIC_ROUTES = tuple(ROUTES)
 
 
 def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, vertex: bool = False) -> Solution:
@@ -55,12 +57,14 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, v
     return _first_accepted(runs, f"linear program with {rows} rows and {columns} columns")
 
 
-def solve_cones(program: ConicProgram) -> Solution:
+def solve_cones(program: ConicProgram, routes: Sequence[str] = CONIC_ROUTES) -> Solution:
     """Solve a conic program by Clarabel, trying one route after another until a solution passes its check.
 
     Parameters
     ----------
     program : ConicProgram
+    routes : sequence of str
+        In the order in which they are tried.
 
     Raises
     ------
@@ -70,7 +74,7 @@ def solve_cones(program: ConicProgram) -> Solution:
         If no route gives a solution that passes; the message lists what each of them ended with.
     """
     what = f"conic program with {program.matrix.shape[0]} rows and {len(program.friction)} cones"
-    return _first_accepted({route: partial(run_clarabel, program, route) for route in CONIC_ROUTES}, what)
+    return _first_accepted({route: partial(run_clarabel, program, route) for route in routes}, what)
 
 
 def _first_accepted(runs: Mapping[str, Callable[[], tuple[Solution | None, str]]], what: str) -> Solution:
@@ -87,7 +91,13 @@ def _first_accepted(runs: Mapping[str, Callable[[], tuple[Solution | None, str]]
 
 
 def solve_between(
-    cost: np.ndarray, matrix: sp.csc_array, lower: np.ndarray, upper: np.ndarray, friction: np.ndarray, size: int
+    cost: np.ndarray,
+    matrix: sp.csc_array,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    friction: np.ndarray,
+    size: int,
+    routes: Sequence[str] = CONIC_ROUTES,
 ) -> Solution:
     """Minimise cost · x with lower ≤ A x ≤ upper, the first columns in round cones: without any, a linear program.
 
@@ -100,6 +110,8 @@ def solve_between(
     friction : (k,) array
     size : int
         As of :class:`ConicProgram`.
+    routes : sequence of str
+        As of :func:`solve_cones`.
 
     Returns
     -------
@@ -127,5 +139,6 @@ def solve_between(
             right=np.concatenate([lower[equal], lower[below], upper[above]]),
             friction=friction,
             size=size,
-        )
+        ),
+        routes,
     )
