@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,19 +25,7 @@ class Singular(ArithmeticError):
     """The matrix is not positive definite, by rounding."""
 
 
-class Factorisation(Protocol):
-    """Where the matrices of pairs of blocks go, once for all that have the same pairs."""
-
-    def factorised(self, matrices: np.ndarray, diagonal: np.ndarray) -> Solve:
-        """Factorise the sum of the pairs' matrices, (n, (2 dof)²), and a diagonal; gives what solves with it.
-
-        Raises
-        ------
-        Singular
-        """
-
-
-def factorisation(pairs: np.ndarray, places: np.ndarray | None, n_blocks: int, dof: int) -> Factorisation:
+def factorisation(pairs: np.ndarray, places: np.ndarray | None, n_blocks: int, dof: int) -> Band | Fronts:
     """Choose how to factorise what acts between pairs of blocks.
 
     Parameters
@@ -71,7 +58,12 @@ class Band:
         self.entry = (j * self.shape[1] + i - j).ravel()[self.kept]
 
     def factorised(self, matrices: np.ndarray, diagonal: np.ndarray) -> Solve:
-        """As of :class:`Factorisation`."""
+        """Factorise the sum of the pairs' matrices, (n, (2 dof)²), and a diagonal; gives what solves with it.
+
+        Raises
+        ------
+        Singular
+        """
         size, width = self.shape
         band = np.bincount(self.entry, matrices.ravel()[self.kept], size * width).reshape(self.shape).T
         band[0] += diagonal[self.order] + ALONE * band[0].max()
@@ -165,7 +157,7 @@ class Fronts:
         self.entry, self.kept = (np.concatenate([of.ravel() for of in all_of]) for all_of in (entries, kept))
 
     def factorised(self, matrices: np.ndarray, diagonal: np.ndarray) -> Solve:
-        """As of :class:`Factorisation`."""
+        """Factorise as a band does."""
         values = np.bincount(self.entry, matrices.ravel()[self.kept], self.size)
         values[self.diagonal] += diagonal[self.order] + ALONE * values[self.diagonal].max()
         arrived: list[list[tuple[Front, np.ndarray]]] = [[] for _ in self.fronts]

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import scipy.sparse as sp
 
-from solver.contact_step.factors import Factorisation, Solve, factorisation
+from solver.contact_step.factors import Band, Fronts, Solve, factorisation
 
 
 @lru_cache(maxsize=4)
@@ -22,7 +22,7 @@ def _over_pairs(pairs: bytes) -> tuple[sp.csr_array, bytes]:
 
 
 @lru_cache(maxsize=4)
-def _factorisation(pairs: bytes, places: bytes | None, n_blocks: int, dof: int) -> Factorisation:
+def _factorisation(pairs: bytes, places: bytes | None, n_blocks: int, dof: int) -> Band | Fronts:
     of_blocks = None if places is None else np.frombuffer(places).reshape(n_blocks, -1)
     return factorisation(np.frombuffer(pairs, dtype=np.int64).reshape(-1, 2), of_blocks, n_blocks, dof)
 
