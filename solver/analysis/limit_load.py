@@ -15,7 +15,7 @@ from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import block_forces, wrench_matrix
 from solver.geometry.contacts import Contacts, joined_contacts
 from solver.interfaces import Interfaces
-from solver.kinematics import Pose, dimension_of, moved_vertices, relative_velocities, unit_lengths
+from solver.kinematics import Pose, moved_vertices, relative_velocities, unit_lengths
 from solver.loads import Loads, checked_loads
 from solver.path.stepping import Stepper
 from solver.program.strength import Admissible, point_strength
@@ -137,7 +137,7 @@ def find_limit_load(
     if not (np.isfinite(displacement) and displacement >= 0.0):
         raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
     states = np.full(len(ties), ELASTIC) if ties_at is None else ties_at.states
-    problem = _Problem.stated(
+    problem = _Problem(
         assembly, interfaces, loads, pose, closed_gap, displacement, torsion, tuple(ties), states, bonds_at
     )
     balanced, status = problem.balanced(with_live=False), LimitStatus.FOUND
@@ -183,7 +183,6 @@ class _State:
     drag: np.ndarray | None = None
 
 
-@dataclass(frozen=True)
 class _Problem:
     """One geometry and its loads in units of block size and mean block load; rows of the free blocks.
 
@@ -191,30 +190,8 @@ class _Problem:
     the give of joints, by which they are open or closed.
     """
 
-    assembly: Assembly
-    pose: Pose
-    contacts: Contacts
-    gaps: np.ndarray
-    friction: np.ndarray
-    length: float
-    force: float
-    matrix: sp.csr_array
-    dead: np.ndarray
-    live: np.ndarray
-    live_size: float
-    live_force: float
-    price: np.ndarray
-    cohesion: np.ndarray
-    crushing: np.ndarray
-    tension: np.ndarray
-    total: float
-    ties: tuple[Tie, ...]
-    tie_states: np.ndarray
-    faces: Faces | None = None
-
-    @classmethod
-    def stated(
-        cls,
+    def __init__(
+        self,
         assembly: Assembly,
         interfaces: Interfaces,
         loads: Loads,
@@ -225,21 +202,21 @@ class _Problem:
         ties: tuple[Tie, ...],
         tie_states: np.ndarray,
         bonds: Bonds | None,
-    ) -> _Problem:
-        length, free = assembly.block_size, assembly.free
-        reach = max(closed_gap, REACH * length) if displacement > 0.0 else closed_gap
+    ) -> None:
+        self.assembly, self.pose, self.ties, self.tie_states = assembly, pose, ties, tie_states
+        self.length, free, d = assembly.block_size, assembly.free, assembly.dimension
+        reach = max(closed_gap, REACH * self.length) if displacement > 0.0 else closed_gap
         vertices = moved_vertices(assembly, pose)
         contacts = find_contacts(assembly, vertices, reach)
         dry = interfaces.dry and bonds is None
-        around = contacts if dry else find_contacts(assembly, vertices, max(reach, REACH * length))
-        gaps, bonded = contacts.gaps, None
-        if bonds is not None:
-            contacts, bonded = around, bonds.areas_left(around)
-        cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around, bonded)
-        is_open = gaps > closed_gap
-        if bonds is not None:
+        around = contacts if dry else find_contacts(assembly, vertices, max(reach, REACH * self.length))
+        bonded = None if bonds is None else bonds.of(around)
+        contacts, areas = (contacts, None) if bonded is None else (around, bonded.areas * bonded.left)
+        cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around, areas)
+        gaps, is_open = contacts.gaps, contacts.gaps > closed_gap
+        if bonded is not None:
             # As along the path: closed is what has no gap beyond the give of its joint, or holds by tension.
-            gaps = _beyond_give(assembly, interfaces, contacts, bonds, tension > 0.0)
+            gaps = _beyond_give(assembly, interfaces, contacts, gaps - bonded.rest, tension > 0.0)
             is_open = (gaps > closed_gap) & (tension == 0.0)
             near = ~is_open | (gaps <= reach)
             contacts, gaps, is_open = contacts[near], gaps[near], is_open[near]
@@ -250,54 +227,35 @@ class _Problem:
             # Each is as long as it is, so that all carry.
             rest = np.where(there, tie_lengths(tie_ends(ties, assembly, pose)), np.nan)
             members = member_contacts(ties, assembly, pose, rest, present_members(ties, rest))
-            strength = np.array([ties[i].strength for i in members.features[:, 1]])
-            contacts, crushing = joined_contacts([contacts, members]), np.append(crushing, strength)
+            contacts = joined_contacts([contacts, members])
+            crushing = np.append(crushing, [ties[i].strength for i in members.features[:, 1]])
             none = np.zeros(len(members))
             cohesion, friction, tension, gaps = (np.append(of, none) for of in (cohesion, friction, tension, gaps))
             is_open = np.append(is_open, none > 0.0)
-        n_dof = loads.dead.shape[1]
-        d = dimension_of(n_dof)
-        units = unit_lengths(n_dof, length)
-        weights = np.abs(loads.dead[free] / units)
-        live = loads.live[free] / units
-        force = float(weights.sum() / len(weights)) or float(np.abs(live).max())
+        units = unit_lengths(loads.dead.shape[1], self.length)
+        dead, live = loads.dead[free] / units, loads.live[free] / units
         size = float(np.abs(live).max())
-        faces = Faces.of(contacts, length) if torsion == UNIFORM and len(contacts) else None
-        matrix = wrench_matrix(contacts, pose, length)
-        if faces is not None:
-            matrix = face_wrench_matrix(contacts, faces, pose, length)
-        # What a unit of normal force costs in multipliers of the scaled live load.
-        price = np.zeros(len(contacts))
+        self.force = float(np.abs(dead).sum() / len(dead)) or size
+        self.faces = Faces.of(contacts, self.length) if torsion == UNIFORM and len(contacts) else None
+        matrix = wrench_matrix(contacts, pose, self.length)
+        if self.faces is not None:
+            matrix = face_wrench_matrix(contacts, self.faces, pose, self.length)
+        self.matrix = sp.csr_array(matrix)[np.repeat(free, len(units))]
+        self.contacts, self.gaps, self.friction = contacts, gaps, friction
         cohesion, tension = (np.where(is_open, 0.0, strength) for strength in (cohesion, tension))
-        rows = sp.csr_array(matrix)[np.repeat(free, n_dof)]
-        dead = (loads.dead[free] / units / force).ravel()
-        pulled = np.zeros((len(contacts), rows.shape[1] // max(len(contacts), 1)))
-        pulled[:, 0] = tension / force
+        self.cohesion = np.maximum(cohesion - friction * tension, 0.0) / self.force
+        self.crushing, self.tension = (crushing + tension) / self.force, tension / self.force
+        self.dead = (dead / self.force).ravel()
+        self.total = float(np.abs(self.dead).sum())
+        if tension.any():
+            self.dead = self.dead - self.matrix[:, :: self.size] @ self.tension
+        self.live, self.live_size = (live / size).ravel(), size / self.force
+        self.live_force = float(np.hypot.reduce(loads.live[free, :d].sum(axis=0)))
+        # What a unit of normal force costs in multipliers of the scaled live load.
+        self.price = np.zeros(len(contacts))
         if displacement > 0.0:
             total = float(np.linalg.norm(live[:, :d], axis=1).sum() + np.linalg.norm(live[:, d:], axis=1).sum())
-            price = np.where(is_open, gaps, 0.0) / displacement * (size / total)
-        return cls(
-            assembly=assembly,
-            pose=pose,
-            contacts=contacts,
-            gaps=gaps,
-            friction=friction,
-            length=length,
-            force=force,
-            matrix=rows,
-            dead=dead - rows @ pulled.ravel() if tension.any() else dead,
-            live=(live / size).ravel(),
-            live_size=size / force,
-            live_force=float(np.hypot.reduce(loads.live[free, :d].sum(axis=0))),
-            price=price,
-            cohesion=np.maximum(cohesion - friction * tension, 0.0) / force,
-            crushing=(crushing + tension) / force,
-            tension=tension / force,
-            total=float(np.abs(dead).sum()),
-            ties=ties,
-            tie_states=tie_states,
-            faces=faces,
-        )
+            self.price = np.where(is_open, gaps, 0.0) / displacement * (size / total)
 
     @property
     def admissible(self) -> Admissible:
@@ -492,10 +450,9 @@ def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs:
 
 
 def _beyond_give(
-    assembly: Assembly, interfaces: Interfaces, contacts: Contacts, bonds: Bonds, holds: np.ndarray
+    assembly: Assembly, interfaces: Interfaces, contacts: Contacts, gaps: np.ndarray, holds: np.ndarray
 ) -> np.ndarray:
-    """(n,) array [m]: gaps beyond those at which joints have no force; some hold by tension, an (n,) bool array."""
-    gaps = contacts.gaps - bonds.rest_at(contacts)
+    """(n,) array [m]: gaps, from those without force, beyond the give; some hold by tension, an (n,) bool array."""
     (stiffness,) = interfaces.values(assembly, contacts.block_a, contacts.block_b, "normal_stiffness")
     # Give of elastic joints is neither a gap nor a penetration.
     gives = (stiffness > 0.0) & np.isfinite(stiffness) & (holds | (gaps < 0.0))

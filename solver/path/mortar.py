@@ -86,8 +86,6 @@ class Mortar:
 
     def cast(self, place: Place, contacts: Contacts) -> Place:
         """The place with all of its closed joints whole."""
-        if not self.present:
-            return place
         closed = contacts[contacts.gaps <= COMPUTED_GAP * self.model.length]
         n = len(closed)
         return replace(place, bonds=Bonds(closed.features[:, :3], closed.areas, np.ones(n), np.zeros(n)))
@@ -124,21 +122,20 @@ class Mortar:
         cohesion, tension, *of_joints = model.interfaces.values(
             model.assembly, *blocks, "cohesion", "tensile_strength", *names
         )
-        number, bonded = matched_contacts(contacts, place.bonds)
-        area = np.where(bonded, self._of(place.bonds.areas, number), contacts.areas)
+        bonds = place.bonds.of(contacts)
         friction = model.interfaces.friction(model.assembly, *blocks)
         # Corners alone, and points of members, have no area.
         across, along = (
-            np.divide(model.force, k * area * model.length, out=np.zeros(n), where=k * area > 0.0)
+            np.divide(model.force, k * bonds.areas * model.length, out=np.zeros(n), where=k * bonds.areas > 0.0)
             for k in (np.where(np.isfinite(k), k, 0.0) for k in of_joints[:2])
         )
         strength = np.column_stack([largest_tension(tension, cohesion, friction), cohesion])
         return JointPoints(
-            strength=strength * np.where(bonded, area / model.force, 0.0)[:, None],
-            left=np.where(bonded, self._of(place.bonds.left, number), 0.0),
+            strength=strength * (bonds.areas / model.force)[:, None],
+            left=bonds.left,
             fracture=np.maximum(np.column_stack(of_joints[2:]) / model.length, BRITTLE),
             give=np.column_stack([across] + [along] * (d - 1)),
-            rest=np.where(bonded, self._of(place.bonds.rest, number), 0.0),
+            rest=bonds.rest,
             length=model.length,
         )
 
@@ -148,11 +145,10 @@ class Mortar:
         if not self.present:
             return state
         joints, bonds = self.points(place, contacts), self.renamed(place, contacts).bonds
-        number, bonded = matched_contacts(contacts, bonds)
         left = np.where(joints.cohesion > 0.0, joints.left, 0.0)
         return replace(
             state,
-            bonded=np.where(bonded, self._of(bonds.areas, number), contacts.areas),
+            bonded=bonds.of(contacts).areas,
             intact=left if any(law.bonds for law in interfaces.laws) else state.intact,
             unloaded=joints.rest if interfaces.elastic else state.unloaded,
         )
@@ -188,7 +184,3 @@ class Mortar:
         of_bonds = place.bonds.left.copy()
         of_bonds[number[bonded]] = left[bonded]
         return replace(place.bonds, left=of_bonds)
-
-    @staticmethod
-    def _of(values: np.ndarray, number: np.ndarray) -> np.ndarray:
-        return values[number] if len(values) else np.zeros(len(number))

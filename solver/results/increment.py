@@ -102,19 +102,13 @@ class Bonds:
         """Count the points."""
         return len(self.features)
 
-    def areas_left(self, contacts: Contacts) -> np.ndarray:
-        """(n,) array [m²]: part of the joint of each contact point whose strength is left."""
-        if not len(self) or not len(contacts):
-            return np.zeros(len(contacts))
+    def of(self, contacts: Contacts) -> Bonds:
+        """Return the bonds of these contact points, in their order: of areas with nothing left where there is none."""
         number, bonded = matched_contacts(contacts, self)
-        return np.where(bonded, (self.areas * self.left)[number], 0.0)
-
-    def rest_at(self, contacts: Contacts) -> np.ndarray:
-        """(n,) array [m]: gap without force of each contact point."""
-        if not len(self) or not len(contacts):
-            return np.zeros(len(contacts))
-        number, bonded = matched_contacts(contacts, self)
-        return np.where(bonded, self.rest[number], 0.0)
+        areas, left, rest = contacts.areas.copy(), np.zeros(len(contacts)), np.zeros(len(contacts))
+        for values, of_bonds in ((areas, self.areas), (left, self.left), (rest, self.rest)):
+            values[bonded] = of_bonds[number[bonded]]
+        return Bonds(contacts.features[:, :3], areas, left, rest)
 
 
 @dataclass(frozen=True)
