@@ -17,13 +17,15 @@ from unittest.mock import patch
 import numpy as np
 
 import solver
-import solver.program.admissible as admissible
 from solver import mechanics
 from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
+from solver.program.admissible import StaticProgram
 from solver.program.model import Model
+from solver.program.strength import ForceLimits
+from solver.programs import solve
 from solver.programs.problem import ConicProgram, Solution
-from solver.programs.solve import solve_cones
+from solver.tolerances import COMPUTED_GAP
 
 LENGTH, HEIGHT, THICKNESS, FRICTION = 0.25, 0.06, 0.12, 0.6
 
@@ -56,18 +58,19 @@ def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
     """The program of the least reaction, and how many contact points it has."""
     load, length = solver.self_weight(assembly).dead, assembly.block_size
     force = float(np.abs(load[assembly.free, 2]).mean())
-    model = Model(assembly, Interfaces(InterfaceLaw(FRICTION)), load, length, force, length, length / 4.0)
+    model = Model(assembly, Interfaces(InterfaceLaw(FRICTION)), load, length, force, length / 4.0)
     contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-6 * length)
     sinks = np.zeros((assembly.n_blocks, 6))
     sinks[assembly.moving, 2] = -1.0
     stated: list[ConicProgram] = []
 
-    def kept(program: ConicProgram) -> Solution:
+    def kept(program: ConicProgram, *_: object) -> Solution:
         stated.append(program)
         raise StopIteration
 
-    with patch.object(admissible, "solve_cones", kept), suppress(StopIteration):
-        admissible.admissible(model, Pose.initial(assembly), contacts, np.full(len(contacts), FRICTION), sinks)
+    friction, limits = np.full(len(contacts), FRICTION), ForceLimits.dry(len(contacts))
+    with patch.object(solve, "solve_cones", kept), suppress(StopIteration):
+        StaticProgram(model, Pose.initial(assembly), contacts, friction, sinks, COMPUTED_GAP, limits).bounds()
     return stated[0], len(contacts)
 
 
@@ -81,7 +84,7 @@ def main() -> None:
         assembly = wall(blocks)
         program, points = program_of(assembly)
         started = time.process_time()
-        found = solve_cones(program)
+        found = solve.solve_cones(program)
         seconds = time.process_time() - started
         print(
             f"{int(assembly.free.sum()):7} {points:7} {seconds:8.2f} {found.iterations:10} "

@@ -13,7 +13,7 @@ from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import block_forces, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.program.admissible import EquilibriumBounds, admissible, in_equilibrium
+from solver.program.admissible import EquilibriumBounds, StaticProgram
 from solver.program.model import Model
 from solver.ties import is_member
 from solver.tolerances import COMPUTED_GAP
@@ -51,10 +51,8 @@ class EquilibriumChecks:
         if self.model.live is not None:
             bounds = self.bounds(place, gap)
             return bounds.in_equilibrium and bounds.high > 0.0
-        contacts, friction = self._contacts_at(place)
         self.stepper.programs += 1
-        beyond, limits = self.stepper.force_limits(place, contacts, gap)
-        return in_equilibrium(self.model, place.pose, beyond, friction, gap, limits)
+        return self._program(place, gap).in_equilibrium()
 
     def is_within_friction(self, place: Place) -> bool:
         """Whether the forces of a place are within friction, as they are where blocks only turn."""
@@ -177,11 +175,14 @@ class EquilibriumChecks:
     def bounds(self, place: Place, gap: float = COMPUTED_GAP) -> EquilibriumBounds:
         """Bounds of the reaction or multiplier in equilibrium at a place."""
         rate = None if self.model.live is not None else self.driver.rate(place.s)
-        contacts, friction = self._contacts_at(place)
-        beyond, limits = self.stepper.force_limits(place, contacts, gap)
-        bounds = admissible(self.model, place.pose, beyond, friction, rate, gap=gap, limits=limits)
+        bounds = self._program(place, gap, rate).bounds()
         self.stepper.programs += bounds.programs
         return bounds
+
+    def _program(self, place: Place, gap: float, rate: np.ndarray | None = None) -> StaticProgram:
+        contacts, friction = self._contacts_at(place)
+        beyond, limits = self.stepper.force_limits(place, contacts, gap)
+        return StaticProgram(self.model, place.pose, beyond, friction, rate, gap, limits)
 
     def _contacts_at(self, place: Place) -> tuple[Contacts, np.ndarray]:
         contacts = self.stepper.contacts_at(place)

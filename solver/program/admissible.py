@@ -12,7 +12,7 @@ from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.programs.problem import LinearProgram, Solution, SolveError, Unbounded
 from solver.programs.solve import CONIC_ROUTES, solve_between, solve_lp
-from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
+from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, FALLING_FRACTION
 
 from .model import Model
 from .strength import Admissible, ForceLimits
@@ -56,36 +56,8 @@ class EquilibriumBounds:
         return self.unbalanced <= FALLING_FRACTION
 
 
-def in_equilibrium(
-    model: Model,
-    pose: Pose,
-    contacts: Contacts,
-    friction: np.ndarray,
-    gap: float = COMPUTED_GAP,
-    limits: ForceLimits | None = None,
-) -> bool:
-    """Whether an equilibrium within friction exists at a pose, under some live load where there is one.
-
-    One program: the least sum of unbalanced forces. Parameters are those of :func:`admissible`.
-
-    Raises
-    ------
-    SolveError
-    """
-    return _StaticProgram(model, pose, contacts, friction, None, gap, limits).most_balanced()[1] <= FALLING_FRACTION
-
-
-def admissible(
-    model: Model,
-    pose: Pose,
-    contacts: Contacts,
-    friction: np.ndarray,
-    rate: np.ndarray | None = None,
-    *,
-    gap: float = COMPUTED_GAP,
-    limits: ForceLimits | None = None,
-) -> EquilibriumBounds:
-    """Bound the reaction or the multiplier of all equilibria within friction at a pose.
+class StaticProgram:
+    """The program over all contact forces at a pose.
 
     Parameters
     ----------
@@ -99,65 +71,8 @@ def admissible(
         Movement of the supports along which the reaction is bounded.
     gap : float
         Largest one of a contact point that carries force, in block sizes.
-    limits : ForceLimits, optional
-        Those of dry contact points by default.
-
-    Raises
-    ------
-    SolveError
-
-    Notes
-    -----
-    Two linear programs over the multipliers of the friction cones' rays, in space two conic programs over the forces in
-    round cones: the least and the largest reaction (or multiplier). The least is that of Portioli & Cascini (2017) at
-    this geometry. Forces out of balance have a cost above that of any mechanism.
+    limits : ForceLimits
     """
-    program = _StaticProgram(model, pose, contacts, friction, rate, gap, limits)
-    # A bound may stay unknown, except that of a pushover.
-    forces_sign = 1.0 if program.live_size == 0.0 else -1.0
-    unknown: set[float] = set()
-    solutions: dict[float, Solution | None] = {}
-    for sign in (1.0, -1.0):
-        try:
-            solutions[sign] = program.bound(sign)
-        except SolveError:
-            if sign == forces_sign and program.live_size > 0.0:
-                raise
-            unknown.add(sign)
-            solutions[sign] = None
-    arbitrary, unbalanced = None, np.inf
-    if solutions[forces_sign] is None and (forces_sign in unknown or solutions[-forces_sign] is None):
-        # Where blocks are wedged neither bound is finite, and others may fall.
-        arbitrary, unbalanced = program.most_balanced()
-    imbalance = {sign: program.unbalanced(solution) for sign, solution in solutions.items() if solution is not None}
-    unbalanced = min([unbalanced, *imbalance.values()])
-    values, gaps = [], [0.0]
-    forces_of: dict[float, np.ndarray] = {}
-    for sign, solution in solutions.items():
-        slack = True
-        if solution is not None and imbalance[sign] > FALLING_FRACTION >= unbalanced:
-            # Forces out of balance cost less than this bound, though an equilibrium exists.
-            slack = False
-            try:
-                solution = program.bound(sign, slack=False)
-            except SolveError:
-                unknown.add(sign)
-                solution = None
-        if solution is None:
-            values.append(np.nan if sign in unknown else -sign * np.inf)
-            continue
-        values.append(program.value(solution, slack))
-        gaps.append(solution.gap)
-        forces_of[sign] = program.forces(solution)
-    if arbitrary is not None:
-        forces_of[0.0] = program.forces(arbitrary)
-    ordered = [forces_of[sign] for sign in (forces_sign, -forces_sign, 0.0) if sign in forces_of]
-    other_forces = ordered[1] if len(ordered) > 1 else None
-    return EquilibriumBounds(unbalanced, values[0], values[1], max(gaps), program.programs, ordered[0], other_forces)
-
-
-class _StaticProgram:
-    """The program over all contact forces at a pose; parameters as in :func:`admissible`."""
 
     def __init__(
         self,
@@ -167,11 +82,10 @@ class _StaticProgram:
         friction: np.ndarray,
         rate: np.ndarray | None,
         gap: float,
-        limits: ForceLimits | None,
+        limits: ForceLimits,
     ) -> None:
         d, blocks = model.dimension, model.assembly.free
         free = np.repeat(blocks, model.n_dof)
-        limits = ForceLimits.dry(len(contacts)) if limits is None else limits
         least, most = limits.least, limits.most
         closed = np.flatnonzero((contacts.gaps <= gap * model.length) | limits.hold)
         matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
@@ -223,6 +137,72 @@ class _StaticProgram:
             limits_of = sp.hstack([normal, beside])
             self.matrix = sp.csc_array(sp.vstack([self.matrix, limits_of], format="csc"))
             self.places = np.vstack([self.places, places])
+
+    def in_equilibrium(self) -> bool:
+        """Whether an equilibrium within friction exists, under some live load where there is one.
+
+        One program: the least sum of unbalanced forces.
+
+        Raises
+        ------
+        SolveError
+        """
+        return self.most_balanced()[1] <= FALLING_FRACTION
+
+    def bounds(self) -> EquilibriumBounds:
+        """Bound the reaction or the multiplier of all equilibria within friction.
+
+        Raises
+        ------
+        SolveError
+
+        Notes
+        -----
+        Two linear programs over the multipliers of the friction cones' rays, in space two conic programs over the
+        forces in round cones: the least and the largest reaction (or multiplier). The least is that of Portioli &
+        Cascini (2017) at this geometry. Forces out of balance have a cost above that of any mechanism.
+        """
+        # A bound may stay unknown, except that of a pushover.
+        forces_sign = 1.0 if self.live_size == 0.0 else -1.0
+        unknown: set[float] = set()
+        solutions: dict[float, Solution | None] = {}
+        for sign in (1.0, -1.0):
+            try:
+                solutions[sign] = self.bound(sign)
+            except SolveError:
+                if sign == forces_sign and self.live_size > 0.0:
+                    raise
+                unknown.add(sign)
+                solutions[sign] = None
+        arbitrary, unbalanced = None, np.inf
+        if solutions[forces_sign] is None and (forces_sign in unknown or solutions[-forces_sign] is None):
+            # Where blocks are wedged neither bound is finite, and others may fall.
+            arbitrary, unbalanced = self.most_balanced()
+        imbalance = {sign: self.unbalanced(solution) for sign, solution in solutions.items() if solution is not None}
+        unbalanced = min([unbalanced, *imbalance.values()])
+        values, gaps = [], [0.0]
+        forces_of: dict[float, np.ndarray] = {}
+        for sign, solution in solutions.items():
+            slack = True
+            if solution is not None and imbalance[sign] > FALLING_FRACTION >= unbalanced:
+                # Forces out of balance cost less than this bound, though an equilibrium exists.
+                slack = False
+                try:
+                    solution = self.bound(sign, slack=False)
+                except SolveError:
+                    unknown.add(sign)
+                    solution = None
+            if solution is None:
+                values.append(np.nan if sign in unknown else -sign * np.inf)
+                continue
+            values.append(self.value(solution, slack))
+            gaps.append(solution.gap)
+            forces_of[sign] = self.forces(solution)
+        if arbitrary is not None:
+            forces_of[0.0] = self.forces(arbitrary)
+        ordered = [forces_of[sign] for sign in (forces_sign, -forces_sign, 0.0) if sign in forces_of]
+        other_forces = ordered[1] if len(ordered) > 1 else None
+        return EquilibriumBounds(unbalanced, values[0], values[1], max(gaps), self.programs, ordered[0], other_forces)
 
     def bound(self, sign: float, *, slack: bool = True) -> Solution | None:
         """Least or, by sign, largest value, or 0 for any; with or without unbalanced forces; None without a bound.
