@@ -46,15 +46,18 @@ class Driver(Protocol):
 
     def control_displacement(self, pose: Pose) -> float:
         """Control displacement at a pose; 0 where supports drive."""
+        return 0.0
 
     def control(self, pose: Pose) -> np.ndarray | None:
         """(n_blocks, n_dof) array: gradient of the control displacement; None where supports drive."""
+        return None
 
     def misdirected(self) -> str:
-        """Message where the multiplier has to change its sign for the parameter to grow."""
+        """Message where the multiplier has to change its sign for the parameter to grow; none where supports drive."""
+        return ""
 
 
-class SupportMotion:
+class SupportMotion(Driver):
     """Supports that follow a settlement, from a pose."""
 
     what = "settlement"
@@ -73,18 +76,6 @@ class SupportMotion:
     def rate(self, s: float) -> np.ndarray:
         """Of the settlement."""
         return self.phase.rate(self.assembly, self.start, s)
-
-    def control_displacement(self, pose: Pose) -> float:
-        """No control displacement."""
-        return 0.0
-
-    def control(self, pose: Pose) -> None:
-        """No control displacement."""
-        return
-
-    def misdirected(self) -> str:
-        """No multiplier."""
-        return ""
 
 
 @dataclass(frozen=True)
@@ -180,7 +171,7 @@ class ControlDisplacement:
                 raise ValueError(f"control {name} is {list(given)}, and the blocks are {what}")
 
 
-class ControlledLoad:
+class ControlledLoad(Driver):
     """A live load whose multiplier makes a control displacement grow; all supports are fixed."""
 
     what, lever = "control displacement", 1.0
