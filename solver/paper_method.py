@@ -48,7 +48,7 @@ from solver.geometry.contacts import Contacts, matched_contacts
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose, motion_size, moved, moved_vertices, point_velocities, relative_velocities
 from solver.loads import Loads, Settlement
-from solver.path.controls import Controls, Ending
+from solver.path.controls import Ending
 from solver.path.reports import no_equilibrium
 from solver.path.state import PathState, Place
 from solver.program.admissible import UNBALANCED_COST
@@ -423,7 +423,6 @@ def linear_program_increments(
     phases: Sequence[Settlement],
     interfaces: Interfaces,
     loads: Loads,
-    controls: Controls,
     resume: PathState | None = None,
 ) -> Generator[Increment, None, Ending]:
     """Yield the increments of settlements by the paper's linear programs; return how they ended.
@@ -435,8 +434,6 @@ def linear_program_increments(
     phases : sequence of Settlement
     interfaces : Interfaces
     loads : Loads
-    controls : Controls
-        Not used.
     resume : PathState, optional
         Of an increment that such a loop has yielded, with the same other arguments: those after it follow bit for bit.
 

@@ -12,7 +12,6 @@ from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
 from solver.path.drivers import ControlDisplacement, ControlledLoad
 from solver.path.path import Path
 from solver.path.state import PathState
-from solver.program.model import Model
 from solver.programs.problem import SolveError
 from solver.results.increment import Bonds, Increment, Status
 from solver.ties import Tie, TieForces, check_ties
@@ -59,11 +58,11 @@ def pushover_increments(
     interfaces.refuse_crushing("a pushover")
     if pose is not None and bonds_at is None:
         interfaces.refuse_pose_alone()
-    if pose is not None and bonds_at is None and any(law.bonds for law in interfaces.laws):
-        raise ValueError(
-            "joints have cohesion, of which a pose does not tell what is left; give bonds_at, the bonds of the "
-            "increment that the pose is from"
-        )
+        if any(law.bonds for law in interfaces.laws):
+            raise ValueError(
+                "joints have cohesion, of which a pose does not tell what is left; give bonds_at, the bonds of the "
+                "increment that the pose is from"
+            )
     loads = checked_live(assembly, loads)
     if not assembly.free[assembly.index(control.block)]:
         raise ValueError(f"control block '{control.block}' is a support; name a free block")
@@ -74,23 +73,16 @@ def pushover_increments(
         )
     check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
     model = model_of(assembly, loads, interfaces, controls, loads.live, tuple(ties))
-    return TimedIncrements(_increments(model, control, controls, pose, ties_at, bonds_at, resume, on_step))
+    start = Pose.initial(assembly) if pose is None else pose
+    if resume is not None:
+        start = resume.start
+    path = Path(model, ControlledLoad(assembly, control, start), 0, controls, on_step)
+    return TimedIncrements(_increments(path, start, ties_at, bonds_at, resume))
 
 
 def _increments(
-    model: Model,
-    control: ControlDisplacement,
-    controls: Controls,
-    pose: Pose | None,
-    ties_at: TieForces | None,
-    bonds_at: Bonds | None,
-    resume: PathState | None,
-    on_step: Callable[[PathState], None] | None,
+    path: Path, start: Pose, ties_at: TieForces | None, bonds_at: Bonds | None, resume: PathState | None
 ) -> Generator[Increment, None, Ending]:
-    start = Pose.initial(model.assembly) if pose is None else pose
-    if resume is not None:
-        start = resume.start
-    path = Path(model, ControlledLoad(model.assembly, control, start), 0, controls, on_step)
     at = 0.0
     try:
         state = path.begin(start, ties_at=ties_at, bonds_at=bonds_at) if resume is None else resume

@@ -72,10 +72,10 @@ def settlement_increments(
     loads = replace(loads, fills=tuple(fill.shifted(-origin) for fill in loads.fills))
     if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
-    follow = linear_program_increments
-    if not by_program:
-        follow = partial(_increments, ties=near_ties, changes=changes, on_step=on_step)
-    steps = follow(near, local, interfaces, loads, controls, resume)
+    if by_program:
+        steps = linear_program_increments(near, local, interfaces, loads, resume)
+    else:
+        steps = _increments(near, local, interfaces, loads, controls, resume, near_ties, changes, on_step)
     return TimedIncrements(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
 
 
