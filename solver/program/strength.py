@@ -111,10 +111,16 @@ class Admissible:
         """
         n = len(friction)
         sticky, brittle = np.flatnonzero(cohesion > 0.0), np.flatnonzero(np.isfinite(crushing))
-        if size > 2:
-            return cls._round(friction, cohesion[sticky], crushing[brittle], sticky, brittle, size)
-        rays = friction_rays(friction)
         p, q = len(sticky), len(brittle)
+        if size > 2:
+            shear, of_added = ((size * which[:, None] + np.arange(1, size)).ravel() for which in (sticky, np.arange(p)))
+            added = sp.csc_array((np.ones(len(shear)), (shear, of_added)), shape=(size * n, size * p))
+            columns = sp.csc_array(sp.hstack([sp.eye_array(size * n, format="csc"), added], format="csc"))
+            limited = np.concatenate([size * (n + np.arange(p)), size * brittle])
+            limits = sp.csc_array((np.ones(p + q), (np.arange(p + q), limited)), shape=(p + q, columns.shape[1]))
+            most = np.concatenate([cohesion[sticky], crushing[brittle]])
+            return cls(columns, limits, most, np.concatenate([friction, np.ones(p)]))
+        rays = friction_rays(friction)
         values = np.tile([1.0, -1.0], p)
         shear = sp.csc_array((values, (np.repeat(2 * sticky + 1, 2), np.arange(2 * p))), shape=(2 * n, 2 * p))
         columns = sp.csc_array(sp.hstack([rays, shear], format="csc"))
@@ -123,22 +129,3 @@ class Admissible:
         normal = sp.csr_array(columns)[2 * brittle] if q else sp.csr_array((0, columns.shape[1]))
         limits = sp.csc_array(sp.vstack([each, normal], format="csc"))
         return cls(columns, limits, np.concatenate([np.repeat(cohesion[sticky], 2), crushing[brittle]]), np.zeros(0))
-
-    @classmethod
-    def _round(
-        cls,
-        friction: np.ndarray,
-        cohesion: np.ndarray,
-        crushing: np.ndarray,
-        sticky: np.ndarray,
-        brittle: np.ndarray,
-        size: int,
-    ) -> Admissible:
-        n, p, q = len(friction), len(sticky), len(brittle)
-        shear, of_added = ((size * which[:, None] + np.arange(1, size)).ravel() for which in (sticky, np.arange(p)))
-        added = sp.csc_array((np.ones(len(shear)), (shear, of_added)), shape=(size * n, size * p))
-        columns = sp.csc_array(sp.hstack([sp.eye_array(size * n, format="csc"), added], format="csc"))
-        limited = np.concatenate([size * (n + np.arange(p)), size * brittle])
-        limits = sp.csc_array((np.ones(p + q), (np.arange(p + q), limited)), shape=(p + q, columns.shape[1]))
-        slopes = np.concatenate([friction, np.ones(p)])
-        return cls(columns, limits, np.concatenate([cohesion, crushing]), slopes)
