@@ -97,6 +97,8 @@ class Path:
         self.full_model, self.driver, self.number = model, driver, number
         self.frames, self.local_loss = controls.falling_frames, controls.local_loss
         self._remove_blocks(np.zeros(0))
+        # Of contact points that may carry, in block sizes: viscosity retards joints that close.
+        self.closed_gap = max(COMPUTED_GAP, min(CLOSING_GAP, driver.tolerance / self.stepper.unit))
         self.largest_lag = LAG_PER_ERROR * controls.step_tolerance
         self.largest_turn = TURN_PER_ERROR * controls.step_tolerance
         self.disturbed = False
@@ -133,7 +135,6 @@ class Path:
             if resting is None:
                 # Joints that the drawing leaves open close.
                 closed = self.fall.relaxed(place, JUMP)
-                resting = None
                 if closed is not None:
                     # Those that have mortar are the ones that are closed then, or a settlement before has left.
                     closed = self.stepper.mortar.renamed(closed, self.stepper.contacts(closed.pose))
@@ -395,22 +396,17 @@ class Path:
         fast = error.moved > min(max(FAST * length / self.stepper.unit, NEAR), FAR)
         if not (fast or refining):
             return True
-        if self.checks.in_equilibrium(new, self._closed_gap(refining)):
+        if self.checks.in_equilibrium(new, self.closed_gap):
             return True
         # Blocks that the viscosity retards may come to rest nearby.
         return not refining and self.fall.relaxed(new, JUMP) is not None
-
-    def _closed_gap(self, refining: bool) -> float:
-        """Largest gap of contact points that may carry, in block sizes: viscosity retards joints that close."""
-        return max(COMPUTED_GAP, min(CLOSING_GAP, self.driver.tolerance / self.stepper.unit))
 
     def _go_back(self, state: PathState, bound: float) -> PathState:
         """Go back to the last place in equilibrium from a parameter that has none."""
         # The oldest place is in equilibrium: it was reported, or is the start.
         oldest, *later = state.history
         places = [oldest, *(place for place in (*later, state.place) if oldest.s < place.s < bound)]
-        gap = self._closed_gap(False)
-        while len(places) > 1 and not self.checks.in_equilibrium(places[-1], gap):
+        while len(places) > 1 and not self.checks.in_equilibrium(places[-1], self.closed_gap):
             # The path may have come here because blocks that the viscosity retards come to rest nearby.
             resting = self.fall.relaxed(places[-1], JUMP)
             if resting is not None:
@@ -522,10 +518,8 @@ class Path:
         """Next parameter that is reported: a multiple of the driver's increment, one of its stops, or the limit."""
         near = 1e-9 * self.driver.increment
         number = np.floor(s / self.driver.increment + 1e-9) + 1.0
-        stops = [number * self.driver.increment, self.driver.limit, *self.driver.stops]
-        return float(
-            min(stop for stop in stops if stop > s + near) if s < self.driver.limit - near else self.driver.limit
-        )
+        stops = (number * self.driver.increment, *self.driver.stops)
+        return float(min([self.driver.limit, *(stop for stop in stops if stop > s + near)]))
 
     def _next_motion(self, place: Place) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity in the movement that follows, per unit of the parameter."""

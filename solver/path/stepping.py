@@ -232,11 +232,9 @@ class Stepper:
             Of contact points that may carry, in block sizes.
         """
         gaps, limits = self.joint_limits(place, contacts)
-        of_members, members = self.members.force_limits(contacts, gap), is_member(contacts)
-        least, most = (
-            np.where(members, m, j) for m, j in ((of_members.least, limits.least), (of_members.most, limits.most))
-        )
-        return replace(contacts, gaps=gaps), replace(limits, least=least, most=most)
+        of_members = self.members.force_limits(contacts, gap)
+        least = np.where(is_member(contacts), of_members.least, limits.least)
+        return replace(contacts, gaps=gaps), replace(limits, least=least, most=of_members.most)
 
     def joint_limits(
         self, place: Place, contacts: Contacts, forces: np.ndarray | None = None

@@ -363,9 +363,7 @@ class LimitLoad(HasState, Shown):
     programs: int
     held: State | StoredState | None = field(default=None, repr=False, compare=False)
     torsion: str = "points"
-    analysed: tuple[Assembly, Interfaces, Loads, tuple[Tie, ...]] | None = field(
-        default=None, repr=False, compare=False
-    )
+    analysed: Analysed | None = field(default=None, repr=False, compare=False)
 
     @property
     def mechanism(self) -> np.ndarray:
