@@ -251,24 +251,12 @@ def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float
 
 
 def run_band(program: LinearProgram) -> tuple[Solution | None, str]:
-    """Solve a program whose rows form a narrow band.
+    """Solve a program whose rows form a narrow band; what comes back is as of :func:`solver.programs.highs.run_highs`.
 
     Parameters
     ----------
     program : LinearProgram
         Its places are for orders of the rows to try, see :func:`solver.ordering.narrowest`.
-
-    Returns
-    -------
-    Solution or None
-        None where there is none; its check is up to the caller.
-    str
-        How it ended.
-
-    Raises
-    ------
-    Unbounded
-        If a ray proves that the program has no minimum.
 
     Notes
     -----

@@ -14,25 +14,7 @@ ROUTES = {"clarabel": (1e-11, True), "clarabel not equilibrated": (1e-9, False)}
 
 
 def run_clarabel(program: ConicProgram, route: str) -> tuple[Solution | None, str]:
-    """Solve a program by one route.
-
-    Parameters
-    ----------
-    program : ConicProgram
-    route : str
-        One of ``ROUTES``.
-
-    Returns
-    -------
-    Solution or None
-        None where Clarabel has none; its check is up to the caller.
-    str
-        Its status.
-
-    Raises
-    ------
-    Unbounded
-        If a ray proves that the program has no minimum.
+    """Solve a conic program by one of ``ROUTES``: all that is told of :func:`solver.programs.highs.run_highs` holds.
 
     Notes
     -----

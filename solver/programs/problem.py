@@ -33,8 +33,32 @@ class Unbounded(Exception):
         self.x = x
 
 
+class _Program:
+    """What linear and conic programs have in common."""
+
+    cost: np.ndarray
+    matrix: sp.csc_array
+
+    def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
+        """Measure a solution by the program alone.
+
+        Parameters
+        ----------
+        x : (n,) array
+        y : (m,) array
+            Multipliers of the rows.
+        route, iterations
+            As of :class:`Solution`.
+        """
+        return Solution(x, y, float(self.cost @ x), *self._measures(x, y), route, iterations)
+
+    def _measures(self, x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
+        """Dual objective, violation by x, and violation by the reduced costs."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
-class LinearProgram:
+class LinearProgram(_Program):
     """Minimise cost · x subject to lower ≤ A x ≤ upper and x ≥ 0.
 
     Attributes
@@ -53,28 +77,14 @@ class LinearProgram:
     upper: np.ndarray
     places: np.ndarray | None = None
 
-    def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
-        """Measure a solution by the program alone; violations are absolute.
-
-        Parameters
-        ----------
-        x : (n,) array
-        y : (m,) array
-            Multipliers of the rows.
-        route, iterations
-            As of :class:`Solution`.
-        """
+    def _measures(self, x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
+        """Dual objective, and violations, which are absolute."""
         activity = self.matrix @ x
         violation = np.maximum(self.lower - activity, activity - self.upper).max(initial=0.0)
-        return Solution(
-            x=x,
-            row_dual=y,
-            objective=float(self.cost @ x),
-            dual_objective=float(np.where(y > 0, y * self.lower, y * self.upper).sum()),
-            primal_violation=max(float(violation), float(-x.min(initial=0.0))),
-            dual_violation=float(-(self.cost - self.matrix.T @ y).min(initial=0.0)),
-            route=route,
-            iterations=iterations,
+        return (
+            float(np.where(y > 0, y * self.lower, y * self.upper).sum()),
+            max(float(violation), float(-x.min(initial=0.0))),
+            float(-(self.cost - self.matrix.T @ y).min(initial=0.0)),
         )
 
     def raise_if_unbounded(self, ray: np.ndarray) -> None:
@@ -89,7 +99,7 @@ class LinearProgram:
 
 
 @dataclass(frozen=True)
-class ConicProgram:
+class ConicProgram(_Program):
     """Minimise cost · x subject to A x = right, the first columns in round friction cones and x ≥ 0 in the others.
 
     Attributes
@@ -144,30 +154,14 @@ class ConicProgram:
         excess /= np.hypot(1.0, self.friction)
         return max(float(excess.max(initial=0.0)), float(-reduced[self.in_cones :].min(initial=0.0)))
 
-    def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
-        """Measure a solution by the program alone; violations are relative to 1 + the largest number of their kind.
-
-        Parameters
-        ----------
-        x : (n,) array
-        y : (m,) array
-            Multipliers of the rows.
-        route, iterations
-            As of :class:`Solution`.
-        """
+    def _measures(self, x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
+        """Dual objective, and violations, which are relative to 1 + the largest number of their kind."""
+        of_right, of_x, of_y = (1.0 + float(np.abs(kind).max(initial=0.0)) for kind in (self.right, x, y))
         violation = float(np.abs(self.matrix @ x - self.right).max(initial=0.0))
-        return Solution(
-            x=x,
-            row_dual=y,
-            objective=float(self.cost @ x),
-            dual_objective=float(self.right @ y),
-            primal_violation=max(
-                violation / (1.0 + float(np.abs(self.right).max(initial=0.0))),
-                self.outside(x) / (1.0 + float(np.abs(x).max(initial=0.0))),
-            ),
-            dual_violation=self.outside_dual(self.cost - self.matrix.T @ y) / (1.0 + float(np.abs(y).max(initial=0.0))),
-            route=route,
-            iterations=iterations,
+        return (
+            float(self.right @ y),
+            max(violation / of_right, self.outside(x) / of_x),
+            self.outside_dual(self.cost - self.matrix.T @ y) / of_y,
         )
 
     def raise_if_unbounded(self, ray: np.ndarray) -> None:

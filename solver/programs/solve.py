@@ -68,10 +68,8 @@ def solve_cones(program: ConicProgram, routes: Sequence[str] = CONIC_ROUTES) -> 
 
     Raises
     ------
-    Unbounded
-        If the program has no minimum, proved by a ray.
-    SolveError
-        If no route gives a solution that passes; the message lists what each of them ended with.
+    Unbounded, SolveError
+        As of :func:`solve_lp`.
     """
     what = f"conic program with {program.matrix.shape[0]} rows and {len(program.friction)} cones"
     return _first_accepted({route: partial(run_clarabel, program, route) for route in routes}, what)
