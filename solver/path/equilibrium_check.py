@@ -136,16 +136,13 @@ class EquilibriumChecks:
                 return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
         determined = high - low <= 1e-6 * max(abs(low), abs(high))
         try:
-            forces = self._forces_with(place, measured, determined, gap)
+            if self.model.live is None:
+                forces = self.nearest(place, gap, None if determined else measured)
+            else:
+                forces = self.nearest(replace(place, multiplier=measured), gap)
         except NotSolved:
             forces = self._between_bounds(contacts, place, bounds, measured)
         return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
-
-    def _forces_with(self, place: Place, measured: float, determined: bool, gap: float) -> np.ndarray:
-        """Forces in equilibrium with a reaction, or with a multiplier."""
-        if self.model.live is None:
-            return self.nearest(place, gap, None if determined else measured)
-        return self.nearest(replace(place, multiplier=measured), gap)
 
     def _between_bounds(
         self, contacts: Contacts, place: Place, bounds: EquilibriumBounds, measured: float

@@ -139,9 +139,9 @@ class Mortar:
             length=model.length,
         )
 
-    def told(self, state: State, place: Place, contacts: Contacts) -> State:
+    def told(self, state: State, place: Place) -> State:
         """The arrays of an increment with those that tell of its joints; dry rigid ones have none."""
-        interfaces = self.model.interfaces
+        interfaces, contacts = self.model.interfaces, state.contacts
         if not self.present:
             return state
         joints, bonds = self.points(place, contacts), self.renamed(place, contacts).bonds

@@ -13,7 +13,7 @@ from solver.kinematics import Pose, moved_vertices, relative_velocities
 from solver.loads import GRAVITY
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Increment, State, Status
-from solver.ties import TieForces, is_member
+from solver.ties import is_member
 from solver.words import counted
 
 from .controls import Ending
@@ -49,27 +49,25 @@ class Reports:
         live, live_size = model.scaled_live
         multiplier = check.measured * live_size if model.live is not None else 0.0
         balance = (resultant + model.scaled_load_at(place.pose) + multiplier * live)[model.assembly.free]
-        ties = self.stepper.members.told(contacts, check.forces, place.pose, place.tie_lengths)
         support_forces = on_supports(model, contacts, place.pose, check.forces)
-        between = ~is_member(contacts)
+        state = self._state(place, contacts, check.forces, check.friction, velocity, support_forces)
         gaps, limits = self.stepper.joint_limits(place, contacts, check.forces)
-        beyond, cohesion = check.forces.copy(), limits.cohesion[between]
+        between, beyond = ~is_member(contacts), check.forces.copy()
         beyond[:, 0] -= limits.least
-        contacts, forces, friction = contacts[between], check.forces[between], check.friction[between]
         # Give of elastic joints is neither a gap nor a penetration.
-        in_place = replace(contacts, gaps=gaps[between])
+        in_place = replace(state.contacts, gaps=gaps[between])
+        excess = friction_excess(beyond[between], state.friction, limits.cohesion[between])
         certificate = Certificate(
             equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
-            friction_excess=friction_excess(beyond[between], friction, cohesion) / model.total_load,
-            carrying_gap=carrying_gap(in_place, forces),
+            friction_excess=excess / model.total_load,
+            carrying_gap=carrying_gap(in_place, check.forces[between]),
             largest_penetration=largest_penetration(in_place),
             duality_gap=bounds.gap,
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
         notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
         self.notes = []
-        state = self._state(place.pose, contacts, forces, friction, velocity, support_forces, ties)
-        state = self.stepper.mortar.told(state, place, contacts)
+        state = self.stepper.mortar.told(state, place)
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
         return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
 
@@ -77,26 +75,24 @@ class Reports:
         """The increment of a place that is not in equilibrium."""
         contacts = self.stepper.contacts_at(place)
         forces, friction = self.stepper.transferred(place, contacts)[0], self.stepper.friction(contacts)
-        ties = self.stepper.members.told(contacts, forces, place.pose, place.tie_lengths)
-        between = ~is_member(contacts)
-        contacts, forces, friction = contacts[between], forces[between], friction[between]
-        state = self._state(place.pose, contacts, forces, friction, velocity, np.zeros_like(self.model.load), ties)
-        certificate = Certificate(largest_penetration=largest_penetration(contacts))
+        state = self._state(place, contacts, forces, friction, velocity, np.zeros_like(self.model.load))
+        certificate = Certificate(largest_penetration=largest_penetration(state.contacts))
         return self._increment(s, state, 0.0, certificate, Status.FALLING)
 
     def _state(
         self,
-        pose: Pose,
+        place: Place,
         contacts: Contacts,
         forces: np.ndarray,
         friction: np.ndarray,
         velocity: np.ndarray,
         support_forces: np.ndarray,
-        ties: TieForces,
     ) -> State:
-        """The arrays of an increment, from forces in units of the program."""
+        """The arrays of an increment, from forces in units of the program at contact points of blocks and members."""
+        ties, pose = self.stepper.members.told(contacts, forces, place.pose, place.tie_lengths), place.pose
+        between = ~is_member(contacts)
+        contacts, newtons, friction = contacts[between], forces[between] * self.model.force, friction[between]
         rates = relative_velocities(contacts, pose, velocity)
-        newtons = forces * self.model.force
         return State(pose, contacts, newtons, rates, friction, velocity, support_forces, self.fell_at, ties)
 
     def _increment(

@@ -435,14 +435,27 @@ class Stepper:
     def _arrived(
         self, place: Place, new: Place, points: _StepPoints, left: JointPoints, share: float
     ) -> tuple[float, Place]:
-        """Change of the friction bounds, and the new place with what its points, joints and members have become."""
+        """Change of the friction bounds of sliding joints, in weights of the structure, and the new place.
+
+        That is with what its points, joints and members have become.
+        """
         contacts, forces = new.contacts, new.forces
         assert contacts is not None
-        gap = left.beyond_give(contacts.gaps, forces[:, 0])
-        lag, followed = self._updated_bounds(contacts, gap, forces, points, share)
+        shear_force, normal = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
+        friction, followed, is_new = points.friction, points.followed, points.is_new
+        allowed = friction * normal + points.joints.cohesion
+        sliding = ((shear_force >= SLIDES * points.bound) | (shear_force > allowed)) & ~is_new
+        # In a joint that opens friction vanishes sooner.
+        gap = np.maximum(left.beyond_give(contacts.gaps, normal), 0.0)
+        shares = np.maximum(share, gap / (gap + OPEN * self.model.length))
+        # New contact points have the friction of their normal force at once.
+        after = np.where(is_new, normal, followed + shares * (normal - followed))
+        # What the points of one joint hand to each other does not change its friction.
+        change = np.bincount(contacts.joints()[1], np.where(sliding, friction * (after - followed), 0.0))
         lengths = self.members.after(contacts, forces, place.tie_lengths)
         bonds = self.mortar.bonds(place, points.start, left.left)
-        return lag, replace(new, followed=followed, tie_lengths=lengths, bonds=bonds)
+        new = replace(new, followed=after, tie_lengths=lengths, bonds=bonds)
+        return float(np.abs(change).sum()) / self.weight, new
 
     def _penetration(self, points: _StepPoints, new: Place) -> float:
         """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""
@@ -508,28 +521,6 @@ class Stepper:
         if place.velocity is None:
             return resisting, np.zeros_like(resisting)
         return resisting, kept * (place.velocity / self.model.lengths * length)[self.free].ravel()
-
-    def _updated_bounds(
-        self,
-        contacts: Contacts,
-        gap: np.ndarray,
-        forces: np.ndarray,
-        points: _StepPoints,
-        share: float | np.ndarray,
-    ) -> tuple[float, np.ndarray]:
-        """Change of the friction bounds of sliding joints, in weights of the structure, and followed normal forces."""
-        shear_force, normal = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
-        friction, followed, is_new = points.friction, points.followed, points.is_new
-        allowed = friction * normal + points.joints.cohesion
-        sliding = ((shear_force >= SLIDES * points.bound) | (shear_force > allowed)) & ~is_new
-        # In a joint that opens friction vanishes sooner.
-        gap = np.maximum(gap, 0.0)
-        share = np.maximum(share, gap / (gap + OPEN * self.model.length))
-        # New contact points have the friction of their normal force at once.
-        after = np.where(is_new, normal, followed + share * (normal - followed))
-        # What the points of one joint hand to each other does not change its friction.
-        change = np.bincount(contacts.joints()[1], np.where(sliding, friction * (after - followed), 0.0))
-        return float(np.abs(change).sum()) / self.weight, after
 
     def _velocity(self, place: Place, motion: np.ndarray, length: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity after a step, averaged with those before."""
