@@ -377,10 +377,9 @@ class Stepper:
         motion_so_far, before_step = np.zeros_like(before), np.column_stack([points.kept * forces[:, 0], forces[:, 1:]])
         pose = self._with_supports(place.pose, supports)
         contacts = self.measured(start, pose, place.tie_lengths)
-        number, rows = 0, ContactRows(wrench_matrix(contacts, pose, model.length), free, model.assembly.centroids)
+        number = 0
         while True:
-            if number:
-                rows = ContactRows(wrench_matrix(contacts, pose, model.length), free, model.assembly.centroids)
+            rows = ContactRows(wrench_matrix(contacts, pose, model.length), free, model.assembly.centroids)
             control = driver.control(pose) if model.live is not None else None
             load = self._load(pose, loads)
             problem = ContactProblem(
