@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.tolerances import CORNER_TOLERANCE
 
-from .convex_parts import ConvexParts
+from .convex_parts import ConvexParts, PlacedParts
 from .outlines import next_vertices
 from .portions import alike
 from .separations import SMALLEST_SINE
-from .solids import Faces, cross, dot, unit
+from .solids import cross, dot, unit
 from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of
 
 
-@dataclass(frozen=True)
-class ClippedCorners:
+class ClippedCorners(NamedTuple):
     """Corners of the polygons in which faces cover each other.
 
     Attributes
@@ -37,28 +36,20 @@ class ClippedCorners:
     widths: np.ndarray
 
 
-def clipped_faces(
-    parts: ConvexParts, faces: Faces, vertices: np.ndarray, face_a: np.ndarray, face_b: np.ndarray
-) -> ClippedCorners:
+def clipped_faces(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> ClippedCorners:
     """Corners of the polygons in which faces a and faces b, (n,) int arrays, cover each other."""
-    solids = parts.solids
-    sizes = np.diff(solids.face_offsets)
-    owners, features = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 4), dtype=np.int64)]
-    areas, widths = [np.zeros(0)], [np.zeros(0)]
+    sizes = np.diff(placed.solids.face_offsets)
+    none, no_area = np.zeros((0, 4), dtype=np.int64), np.zeros(0)
+    clipped = [ClippedCorners(none[:, 0], none, no_area, no_area)]
     for k in alike(sizes[face_a], sizes[face_b]):
-        owner, rows, area, width = _clipped(parts, faces, vertices, face_a[k], face_b[k])
-        owners.append(k[owner])
-        features.append(rows)
-        areas.append(area)
-        widths.append(width)
-    return ClippedCorners(*(np.concatenate(column) for column in (owners, features, areas, widths)))
+        corners = _clipped(placed, face_a[k], face_b[k])
+        clipped.append(corners._replace(owner=k[corners.owner]))
+    return ClippedCorners(*map(np.concatenate, zip(*clipped, strict=True)))
 
 
-def _clipped(
-    parts: ConvexParts, faces: Faces, vertices: np.ndarray, face_a: np.ndarray, face_b: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Owners, features, areas and widths for faces a that all have as many corners, and faces b likewise."""
-    solids = parts.solids
+def _clipped(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> ClippedCorners:
+    """Corners for faces a that all have as many corners, and faces b likewise."""
+    parts, solids, faces = placed.parts, placed.solids, placed.faces
     n_a, n_b = (int(solids.face_offsets[face[0] + 1] - solids.face_offsets[face[0]]) for face in (face_a, face_b))
     # Corners of a run clockwise seen along the normal of b; turned round, both run counter-clockwise. Edge k of either
     # polygon runs from its corner k to the next, which for a is the edge that starts at the latter.
@@ -72,7 +63,7 @@ def _clipped(
     origin = faces.middles[face_b][:, None]
     a, b = (
         np.stack([dot(arms, x[:, None]), dot(arms, y[:, None])], axis=-1)
-        for arms in (vertices[solids.corners[corner]] - origin for corner in (corner_a, corner_b))
+        for arms in (placed.starts(corner) - origin for corner in (corner_a, corner_b))
     )
     along_a, along_b = np.roll(a, -1, axis=1) - a, np.roll(b, -1, axis=1) - b
     long_a, long_b = (np.maximum(np.hypot(d[..., 0], d[..., 1]), 1e-300) for d in (along_a, along_b))
@@ -98,10 +89,10 @@ def _clipped(
     )
     alone_a, alone_b = used_a & ~both.any(axis=2), used_b & ~both.any(axis=1)
     pair, p = np.nonzero(alone_a)
-    vertex_a = _on_face(parts, vertices, end, depth_a, nearest_b, pair, p, corner_a, face_b, edge_b), a[pair, p]
+    vertex_a = _on_face(placed, end, depth_a, nearest_b, pair, p, corner_a, face_b, edge_b), a[pair, p]
     pair_a = pair
     pair, q = np.nonzero(alone_b)
-    vertex_b = _on_face(parts, vertices, end, depth_b, nearest_a, pair, q, corner_b, face_a, edge_a), b[pair, q]
+    vertex_b = _on_face(placed, end, depth_b, nearest_a, pair, q, corner_b, face_a, edge_a), b[pair, q]
     pair_b = pair
     pair, p, q = np.nonzero(crosses)
     u, v = on_a[pair, p, q], on_b[pair, p, q]
@@ -121,7 +112,7 @@ def _clipped(
     )
     areas, wide, long = corner_areas(owner, points, len(face_a))
     kept = wide[owner] > end[owner, 0]
-    clipped = owner[kept], features[kept], areas[kept], wide[owner[kept]]
+    clipped = ClippedCorners(owner[kept], features[kept], areas[kept], wide[owner[kept]])
     if parts.whole:
         return clipped
     narrow = ((wide <= end[:, 0]) & (long > 4.0 * end[:, 0]))[:, None]
@@ -133,24 +124,24 @@ def _clipped(
     )
 
 
-_Corners = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-
-
-def _with_reentrant_corners(parts: ConvexParts, clipped: _Corners, *sides: tuple[np.ndarray, ...]) -> _Corners:
+def _with_reentrant_corners(
+    parts: ConvexParts, clipped: ClippedCorners, *sides: tuple[np.ndarray, ...]
+) -> ClippedCorners:
     """Add the corners, of those used, at the end of a face at which its block was cut: they touch it, and cover none.
 
     Where a face ends at an edge of its block, an edge that only lies along that one may leave it; in a re-entrant
     corner it may not.
     """
-    owners, features = [clipped[0]], [clipped[1]]
+    owners, features = [clipped.owner], [clipped.features]
     for used, on_edge, corner, face, edge in sides:
         at_cut = (on_edge & parts.cut_edges[edge][:, None]).any(axis=2)
         pair, p = np.nonzero(used & at_cut & ~parts.made[parts.solids.corners[corner]])
         owners.append(pair)
         features.append(feature_rows(ON_FACE, parts.solids.corners[corner[pair, p]], face[pair], -1))
     owner = np.concatenate(owners)
-    zeros = np.zeros(len(owner) - len(clipped[0]))
-    return owner, np.concatenate(features), np.append(clipped[2], zeros), np.append(clipped[3], zeros + np.inf)
+    zeros = np.zeros(len(owner) - len(clipped.owner))
+    areas, widths = np.append(clipped.areas, zeros), np.append(clipped.widths, zeros + np.inf)
+    return ClippedCorners(owner, np.concatenate(features), areas, widths)
 
 
 def _crossings(
@@ -184,8 +175,7 @@ def _inside(points: np.ndarray, corners: np.ndarray, directions: np.ndarray) -> 
 
 
 def _on_face(
-    parts: ConvexParts,
-    vertices: np.ndarray,
+    placed: PlacedParts,
     end: np.ndarray,
     depth: np.ndarray,
     nearest: np.ndarray,
@@ -196,13 +186,12 @@ def _on_face(
     edge: np.ndarray,
 ) -> np.ndarray:
     """(n, 4) int array: features of corners on faces, with the edges that cross where they are on the boundary."""
-    solids, cut = parts.solids, parts.cut_edges
+    solids, cut = placed.solids, placed.parts.cut_edges
     own = corner[pair, p]
     other = edge[pair, nearest[pair, p]]
-    start, following = vertices[solids.corners], solids.next_corner
-    along = unit(start[following[other]] - start[other])
+    along = unit(placed.along(other))
     candidates = np.stack([own, solids.previous_corner[own]], axis=1)
-    crossing = cross(unit(start[following[candidates]] - start[candidates]), along[:, None])
+    crossing = cross(unit(placed.along(candidates)), along[:, None])
     sine = np.sqrt(dot(crossing, crossing))
     steepest = sine.argmax(axis=1)
     row = np.arange(len(own))

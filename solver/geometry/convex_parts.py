@@ -92,13 +92,51 @@ class ConvexParts:
         """Whether every block is convex: then the parts are the blocks."""
         return len(self.source) == 0
 
-    def placed(self, vertices: np.ndarray) -> np.ndarray:
-        """(n_corners, 3) array [m]: corners of the parts, with those of the blocks at ``vertices``."""
+    def placed(self, vertices: np.ndarray) -> PlacedParts:
+        """Put the parts where the corners of their blocks now are, (n_vertices, 3) [m]."""
         if self.whole:
-            return vertices
+            return PlacedParts(self, vertices)
         first = vertices[self.source[:, 0]]
         others = (vertices[self.source[:, k]] - first for k in (1, 2, 3))
-        return first + sum(self.weights[:, k + 1, None] * arm for k, arm in enumerate(others))
+        return PlacedParts(self, first + sum(self.weights[:, k + 1, None] * arm for k, arm in enumerate(others)))
+
+
+@dataclass(frozen=True)
+class PlacedParts:
+    """Convex parts of blocks where their corners now are.
+
+    Attributes
+    ----------
+    parts : ConvexParts
+    vertices : (n_corners, 3) array [m]
+        Current corners of all parts.
+    """
+
+    parts: ConvexParts
+    vertices: np.ndarray
+
+    @property
+    def solids(self) -> Solids:
+        """The parts as drawn."""
+        return self.parts.solids
+
+    @cached_property
+    def faces(self) -> Faces:
+        """Planes of their faces."""
+        return self.solids.faces(self.vertices)
+
+    def starts(self, edges: np.ndarray) -> np.ndarray:
+        """(..., 3) array [m]: corners at which edges start."""
+        return self.vertices[self.solids.corners[edges]]
+
+    def along(self, edges: np.ndarray) -> np.ndarray:
+        """(..., 3) array [m]: from the starts of edges to their ends."""
+        return self.starts(self.solids.next_corner[edges]) - self.starts(edges)
+
+    def outward(self, edges: np.ndarray) -> np.ndarray:
+        """(..., 3) array: sum of the outward normals of the two faces at each edge."""
+        face = self.solids.face_of_corner
+        return self.faces.normals[face[edges]] + self.faces.normals[face[self.solids.twins[edges]]]
 
 
 class NoParts(ValueError):

@@ -10,9 +10,10 @@ import numpy as np
 from solver.tolerances import PENETRATION_FRACTION
 
 from .broad_phase import box_pairs, boxes, expand_ranges
+from .convex_parts import PlacedParts
 from .portions import alike
 from .separations import face_separations
-from .solids import Faces, Solids, dot
+from .solids import dot
 
 #: Difference of separations, in widths, up to which they are equal, and the faces that oppose each other better lead.
 SAME_SEPARATION = 1e-6
@@ -73,15 +74,14 @@ class FacingParts:
         # Flanks of steep tips hardly do.
         return self.cosine <= -0.05
 
-    def other_faces(
-        self, solids: Solids, faces: Faces, inner: np.ndarray
-    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def other_faces(self, placed: PlacedParts) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Yield other pairs of faces, round by round, those that oppose each other better first.
 
         Yields
         ------
         pair, face_i, face_j : (n_round,) int arrays
         """
+        faces_of_part, normals = placed.solids.faces_of_block, placed.faces.normals
         equal = self.apart - SAME_SEPARATION * self.width
         columns = []
         for leading, lead, part, of_i in (
@@ -89,14 +89,14 @@ class FacingParts:
             (self.apart_j >= equal, self.lead_j, self.i, False),
         ):
             k = np.flatnonzero(leading)
-            owner, position = expand_ranges(np.diff(solids.faces_of_block)[part[k]])
+            owner, position = expand_ranges(np.diff(faces_of_part)[part[k]])
             pair = k[owner]
-            opposed, first = solids.faces_of_block[part[pair]] + position, lead[pair]
+            opposed, first = faces_of_part[part[pair]] + position, lead[pair]
             face_i, face_j = (first, opposed) if of_i else (opposed, first)
             new = (face_i != self.face_i[pair]) | (face_j != self.face_j[pair])
-            cosine = dot(faces.normals[face_i], faces.normals[face_j])
+            cosine = dot(normals[face_i], normals[face_j])
             # Neighbours across a corner open by nearly a right angle, and touch along an edge alone.
-            new &= (cosine <= -0.5) & ~inner[opposed]
+            new &= (cosine <= -0.5) & ~placed.parts.inner[opposed]
             columns.append((pair[new], face_i[new], face_j[new], cosine[new]))
         pair, face_i, face_j, cosine = (np.concatenate(column) for column in zip(*columns, strict=True))
         order = np.lexsort((face_j, face_i, cosine, pair))
@@ -108,64 +108,57 @@ class FacingParts:
 
 
 def near_parts(
-    solids: Solids, block_of_part: np.ndarray, vertices: np.ndarray, reach: float, useful: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of parts of different blocks, one of them useful, whose boxes come within reach; lower block first."""
-    low, high = boxes(vertices, solids.offsets)
+    placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs of parts of different blocks, one of them useful, whose boxes come within reach; lower block first.
+
+    With the width of the thinner of their blocks, from those of all blocks.
+    """
+    block_of_part = placed.parts.block_of_part
+    low, high = boxes(placed.vertices, placed.solids.offsets)
     i, j = box_pairs(low - reach / 2.0, high + reach / 2.0)
     a, b = block_of_part[i], block_of_part[j]
     chosen = (a != b) & (useful[a] | useful[b])
-    return i[chosen], j[chosen]
+    return i[chosen], j[chosen], np.minimum(widths[a], widths[b])[chosen]
 
 
-def _opposed_faces(solids: Solids, faces: Faces, inner: np.ndarray, leading: np.ndarray, j: np.ndarray) -> np.ndarray:
+def _opposed_faces(placed: PlacedParts, leading: np.ndarray, j: np.ndarray) -> np.ndarray:
     """(n,) int array: the face of part j, not inside its block, that opposes the leading face best."""
-    first = solids.faces_of_block
+    first, normals = placed.solids.faces_of_block, placed.faces.normals
     counts = np.diff(first)[j]
     opposed = np.empty(len(j), dtype=np.int64)
     for k in alike(counts):
         face = first[j[k]][:, None] + np.arange(counts[k[0]])
-        cosine = dot(faces.normals[face], faces.normals[leading[k]][:, None])
-        opposed[k] = face[np.arange(len(k)), np.where(inner[face], np.inf, cosine).argmin(axis=1)]
+        cosine = dot(normals[face], normals[leading[k]][:, None])
+        opposed[k] = face[np.arange(len(k)), np.where(placed.parts.inner[face], np.inf, cosine).argmin(axis=1)]
     return opposed
 
 
-def facing_parts(
-    solids: Solids,
-    faces: Faces,
-    vertices: np.ndarray,
-    parts: tuple[np.ndarray, np.ndarray],
-    reach: float,
-    width: np.ndarray,
-    inner: np.ndarray,
-) -> FacingParts:
+def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray) -> FacingParts:
     """Choose the faces of near parts that face each other, where no face separates them farther than ``reach``.
 
     Parameters
     ----------
-    solids : Solids
-    faces : Faces
-    vertices : (n_vertices, 3) array [m]
-    parts : two (n,) int arrays
+    placed : PlacedParts
     reach : float [m]
-    width : (n,) array [m]
-        Of the thinner of their blocks.
-    inner : (n_faces,) bool array
-        Faces inside a block, where it was cut into parts.
+    useful : (n_blocks,) bool array
+        One of two near parts must be of these blocks.
+    widths : (n_blocks,) array [m]
     """
-    i, j = parts
-    apart_i, lead_i, behind_i = face_separations(solids, faces, vertices, i, j, inner)
+    i, j, width = near_parts(placed, reach, useful, widths)
+    inner = placed.parts.inner
+    apart_i, lead_i, behind_i = face_separations(placed, i, j, inner)
     near = np.flatnonzero(np.maximum(apart_i, behind_i) <= reach)
     i, j, apart_i, lead_i, behind_i, width = (value[near] for value in (i, j, apart_i, lead_i, behind_i, width))
-    apart_j, lead_j, behind_j = face_separations(solids, faces, vertices, j, i, inner)
+    apart_j, lead_j, behind_j = face_separations(placed, j, i, inner)
     inside = np.maximum(behind_i, behind_j) > np.maximum(apart_i, apart_j) + SAME_SEPARATION * width
     near = np.flatnonzero((apart_j <= reach) & ~inside)
     i, j, apart_i, lead_i, apart_j, lead_j, width = (
         value[near] for value in (i, j, apart_i, lead_i, apart_j, lead_j, width)
     )
-    opposed_j = _opposed_faces(solids, faces, inner, lead_i, j)
-    opposed_i = _opposed_faces(solids, faces, inner, lead_j, i)
-    normals = faces.normals
+    opposed_j = _opposed_faces(placed, lead_i, j)
+    opposed_i = _opposed_faces(placed, lead_j, i)
+    normals = placed.faces.normals
     cosine_i, cosine_j = dot(normals[lead_i], normals[opposed_j]), dot(normals[lead_j], normals[opposed_i])
     equal = np.abs(apart_i - apart_j) <= SAME_SEPARATION * width
     i_leads = np.where(equal, cosine_i <= cosine_j, apart_i > apart_j)

@@ -9,6 +9,7 @@ import numpy as np
 
 from .contacts import Contacts
 from .convex_parts import ConvexParts, convex_parts
+from .entering import Movement
 from .solids import Solids
 from .spatial_contacts import entered_points, find_points, measured_points
 from .spatial_overlaps import overlap_depths_in_space
@@ -43,23 +44,19 @@ class Polyhedra(Solids):
 
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
         """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""
-        parts = self.parts
-        return find_points(parts, parts.placed(vertices), reach, useful, self.widths)
+        return find_points(self.parts.placed(vertices), reach, useful, self.widths)
 
     def measure(self, vertices: np.ndarray, contacts: Contacts) -> Contacts:
         """Measure the contact points between the same features, with the corners (n_vertices, 3) [m] elsewhere."""
-        parts = self.parts
-        return measured_points(
-            parts.solids, parts.block_of_part, parts.placed(vertices), contacts.features, contacts.areas
-        )
+        return measured_points(self.parts.placed(vertices), contacts.features, contacts.areas)
 
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pairs of blocks that overlap by more than ``tolerance`` [m]; see :func:`overlap_depths_in_space`."""
-        parts = self.parts
-        return overlap_depths_in_space(parts.solids, parts.block_of_part, parts.placed(vertices), tolerance)
+        return overlap_depths_in_space(self.parts.placed(vertices), tolerance)
 
     def entered(
         self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
     ) -> Contacts:
         """Contact points that would have kept blocks apart: see :class:`Shapes`."""
-        return entered_points(self.parts, self.widths, before, after, useful, tolerance, contacts)
+        movement = Movement(self.parts.placed(before), self.parts.placed(after))
+        return entered_points(movement, self.widths, useful, tolerance, contacts)

@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from .convex_parts import PlacedParts
 from .portions import alike
-from .solids import Faces, Solids, cross, dot, unit
+from .solids import cross, dot, unit
 
 #: Edges nearer to parallel than this sine have no common normal: they are clipped against each other.
 SMALLEST_SINE = 0.05
 
 
 def face_separations(
-    solids: Solids, faces: Faces, vertices: np.ndarray, i: np.ndarray, j: np.ndarray, inner: np.ndarray
+    placed: PlacedParts, i: np.ndarray, j: np.ndarray, inner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Largest separation of two convex parts by a face of one.
 
     Parameters
     ----------
-    solids : Solids
-    faces : Faces
-    vertices : (n_vertices, 3) array [m]
+    placed : PlacedParts
     i, j : (n,) int arrays
         Parts.
     inner : (n_faces,) bool array
@@ -35,7 +34,8 @@ def face_separations(
     behind : (n,) array [m]
         How far it is in front of a face of part i inside its block; minus infinity where there is none.
     """
-    first_face, first_vertex = solids.faces_of_block, solids.offsets
+    vertices, faces = placed.vertices, placed.faces
+    first_face, first_vertex = placed.solids.faces_of_block, placed.solids.offsets
     n_faces, n_vertices = np.diff(first_face)[i], np.diff(first_vertex)[j]
     apart, leading, behind = np.empty(len(i)), np.empty(len(i), dtype=np.int64), np.full(len(i), -np.inf)
     cut = inner.any()
@@ -57,20 +57,13 @@ def face_separations(
 
 
 def edge_separations(
-    solids: Solids,
-    faces: Faces,
-    vertices: np.ndarray,
-    i: np.ndarray,
-    j: np.ndarray,
-    smallest_sine: float = SMALLEST_SINE,
+    placed: PlacedParts, i: np.ndarray, j: np.ndarray, smallest_sine: float = SMALLEST_SINE
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Largest separation of two convex parts by two edges.
 
     Parameters
     ----------
-    solids : Solids
-    faces : Faces
-    vertices : (n_vertices, 3) array [m]
+    placed : PlacedParts
     i, j : (n,) int arrays
         Parts.
     smallest_sine : float
@@ -84,6 +77,7 @@ def edge_separations(
     own, other : (n,) int arrays
         The edges.
     """
+    solids, normals = placed.solids, placed.faces.normals
     once, first = solids.whole_edges
     count = np.diff(first)
     apart = np.full(len(i), -np.inf)
@@ -91,12 +85,11 @@ def edge_separations(
     for k in alike(count[i], count[j]):
         own = once[first[i[k]][:, None] + np.arange(count[i[k[0]]])]
         other = once[first[j[k]][:, None] + np.arange(count[j[k[0]]])]
-        a, b = vertices[solids.corners[own]], vertices[solids.corners[other]]
-        along_a = unit(vertices[solids.corners[solids.next_corner[own]]] - a)
-        along_b = unit(vertices[solids.corners[solids.next_corner[other]]] - b)
+        a, b = placed.starts(own), placed.starts(other)
+        along_a, along_b = unit(placed.along(own)), unit(placed.along(other))
         normal = cross(along_a[:, :, None], along_b[:, None])
         separates = dot(normal, normal) > smallest_sine**2
-        sides = outward(solids, faces, other)[:, None] - outward(solids, faces, own)[:, :, None]
+        sides = placed.outward(other)[:, None] - placed.outward(own)[:, :, None]
         sense = np.sign(dot(normal, sides))
         normal, separates = unit(normal) * sense[..., None], separates & (sense != 0.0)
         for edges, along, side, axis in ((own, along_a, 1.0, 2), (other, along_b, -1.0, 1)):
@@ -104,7 +97,7 @@ def edge_separations(
                 (solids.face_of_corner[edges], 1.0),
                 (solids.face_of_corner[solids.twins[edges]], -1.0),
             ):
-                inward = sense * cross(faces.normals[face], along)
+                inward = sense * cross(normals[face], along)
                 separates &= side * dot(np.expand_dims(inward, axis), normal) >= -1e-6
         distance = np.where(separates, dot(a[:, :, None] - b[:, None], normal), -np.inf).reshape(len(k), -1)
         farthest = distance.argmax(axis=1)
@@ -112,9 +105,3 @@ def edge_separations(
         apart[k] = distance[row, farthest]
         edge_i[k], edge_j[k] = own[row, farthest // other.shape[1]], other[row, farthest % other.shape[1]]
     return apart, edge_i, edge_j
-
-
-def outward(solids: Solids, faces: Faces, edges: np.ndarray) -> np.ndarray:
-    """(n, 3) array: sum of the outward normals of the two faces at each edge."""
-    face = solids.face_of_corner
-    return faces.normals[face[edges]] + faces.normals[face[solids.twins[edges]]]

@@ -14,30 +14,24 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 from .broad_phase import expand_ranges
 from .clipping import ClippedCorners, clipped_faces
 from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts
-from .convex_parts import ConvexParts
+from .convex_parts import PlacedParts
 from .cut_points import without_points_of_cuts
-from .entering import Movement, Place, across, entered
+from .entering import Movement, across, entered
 from .facing import FacingParts, facing_parts, near_parts
-from .separations import edge_separations, outward
-from .solids import Faces, Solids, cross, dot, unit
+from .separations import edge_separations
+from .solids import cross, dot, unit
 from .spatial_features import ACROSS, BEFORE_EDGE, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
 
 #: Width of a sliver at a cut, as a part of both faces, and its area, as a part of that in which the two blocks touch.
 SLIVER = 0.005
 
 
-def measured_points(
-    solids: Solids, block_of_part: np.ndarray, vertices: np.ndarray, features: np.ndarray, areas: np.ndarray
-) -> Contacts:
+def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray) -> Contacts:
     """Frames, gaps and slips of given pairs of features where the corners now are.
 
     Parameters
     ----------
-    solids : Solids
-        Convex parts.
-    block_of_part : (n_parts,) int array
-    vertices : (n_vertices, 3) array [m]
-        Current corners of all parts.
+    placed : PlacedParts
     features : (n, 4) int array
         As in :class:`Contacts`.
     areas : (n,) array [m²]
@@ -54,40 +48,39 @@ def measured_points(
     about the edge there where the normal is not the face's. The slip is the place of the point of ``block_a`` along
     them, so that its change is the slip between the blocks to first order.
     """
-    faces = solids.faces(vertices)
+    solids, faces, block_of_part = placed.solids, placed.faces, placed.parts.block_of_part
     kind, first, second, rest = features.T
-    corners, following, face_of = solids.corners, solids.next_corner, solids.face_of_corner
-    face_b = np.where(kind == ON_FACE, second, face_of[np.where(kind == ON_FACE, 0, second)])
-    x_a = vertices[np.where(kind == ON_FACE, first, corners[np.where(kind == ON_FACE, 0, first)])]
-    x_b = faces.middles[face_b]
+    corners, face_of, on_face = solids.corners, solids.face_of_corner, kind == ON_FACE
+    face_b = np.where(on_face, second, face_of[np.where(on_face, 0, second)])
+    vertex_a = np.where(on_face, first, corners[np.where(on_face, 0, first)])
+    x_a, x_b = placed.vertices[vertex_a], faces.middles[face_b]
     normals, tangents = faces.normals[face_b], faces.tangents[face_b]
     face_normals, face_tangents = normals.copy(), tangents.copy()
     along = np.zeros_like(normals)
 
     # A corner on the boundary of a face.
-    k = np.flatnonzero((kind == ON_FACE) & (rest >= 0))
+    k = np.flatnonzero(on_face & (rest >= 0))
     own, other = rest[k] % len(corners), rest[k] // len(corners)
-    x_b[k] = vertices[corners[other]]
-    along[k] = unit(vertices[corners[following[other]]] - x_b[k])
-    crossing = unit(cross(vertices[corners[following[own]]] - vertices[corners[own]], along[k]))
-    sense = np.sign(dot(crossing, outward(solids, faces, other) - outward(solids, faces, own)))
+    x_b[k], along[k] = placed.starts(other), unit(placed.along(other))
+    crossing = unit(cross(placed.along(own), along[k]))
+    sense = np.sign(dot(crossing, placed.outward(other) - placed.outward(own)))
     normals[k] = unit(face_normals[k] + sense[:, None] * crossing)
 
     # An edge across an edge.
     k = np.flatnonzero(kind == ACROSS)
     on_a, on_b, parallel = read_places(rest[k])
     own, other = first[k], second[k]
-    from_a, from_b = vertices[corners[own]], vertices[corners[other]]
-    edge_a, edge_b = vertices[corners[following[own]]] - from_a, vertices[corners[following[other]]] - from_b
-    x_a[k], x_b[k] = from_a + on_a[:, None] * edge_a, from_b + on_b[:, None] * edge_b
+    edge_a, edge_b = placed.along(own), placed.along(other)
+    x_a[k] = placed.starts(own) + on_a[:, None] * edge_a
+    x_b[k] = placed.starts(other) + on_b[:, None] * edge_b
     crossing = unit(cross(edge_a, edge_b))
-    sense = np.sign(dot(crossing, outward(solids, faces, other) - outward(solids, faces, own)))
+    sense = np.sign(dot(crossing, placed.outward(other) - placed.outward(own)))
     halfway = unit(face_normals[k] - faces.normals[face_of[own]])
     normals[k] = np.where(parallel[:, None], halfway, sense[:, None] * crossing)
     along[k] = np.where(parallel[:, None], 0.0, unit(edge_b))
 
     k = np.flatnonzero(kind == ON_CORNER)
-    x_b[k] = vertices[corners[second[k]]]
+    x_b[k] = placed.starts(second[k])
     normals[k] = unit(face_normals[k] - faces.normals[face_of[first[k]]])
 
     # Rotated about the edge; where there is none, projected onto the plane of the contact.
@@ -102,12 +95,11 @@ def measured_points(
     fixed, apart = x_b - faces.middles[face_b], x_a - x_b
     place = np.stack([dot(fixed, face_tangents), dot(fixed, cross(face_normals, face_tangents))], axis=1)
     slip = place + np.stack([dot(apart, frames[:, 1]), dot(apart, frames[:, 2])], axis=1)
-    part_a = solids.block_of_vertex[np.where(kind == ON_FACE, first, corners[np.where(kind == ON_FACE, 0, first)])]
     return Contacts(
         features=features,
-        block_a=block_of_part[part_a],
+        block_a=block_of_part[solids.block_of_vertex[vertex_a]],
         block_b=block_of_part[solids.block_of_face[face_b]],
-        points=np.where((kind == ON_FACE)[:, None], x_a, (x_a + x_b) / 2.0),
+        points=np.where(on_face[:, None], x_a, (x_a + x_b) / 2.0),
         frames=frames,
         gaps=dot(apart, normals),
         slip=slip,
@@ -115,17 +107,13 @@ def measured_points(
     )
 
 
-def find_points(
-    parts: ConvexParts, vertices: np.ndarray, reach: float, useful: np.ndarray, widths: np.ndarray
-) -> Contacts:
+def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray) -> Contacts:
     """Find the points at which blocks touch or may touch within one increment.
 
     Parameters
     ----------
-    parts : ConvexParts
+    placed : PlacedParts
         Those of one block and the faces inside it have no contact points.
-    vertices : (n_vertices, 3) array [m]
-        Current corners of all parts.
     reach : float [m]
         Largest gap of a contact point that is kept.
     useful : (n_blocks,) bool array
@@ -144,14 +132,8 @@ def find_points(
     corner of one part in the face of the other, or an edge across an edge. Where they do not cover each other, the next
     best answer. Where no faces oppose each other, a tip stands on a face, or an edge lies across an edge.
     """
-    solids, block_of_part, inner = parts.solids, parts.block_of_part, parts.inner
-    faces = solids.faces(vertices)
-    i, j = near_parts(solids, block_of_part, vertices, reach, useful)
-    width = np.minimum(widths[block_of_part[i]], widths[block_of_part[j]])
-    pairs = facing_parts(solids, faces, vertices, (i, j), reach, width, inner)
-
-    def measured(features: np.ndarray, areas: np.ndarray) -> Contacts:
-        return measured_points(solids, block_of_part, vertices, features, areas)
+    parts, solids, block_of_part = placed.parts, placed.solids, placed.parts.block_of_part
+    pairs = facing_parts(placed, reach, useful, widths)
 
     def near(contacts: Contacts) -> np.ndarray:
         deepest = PENETRATION_FRACTION * np.minimum(widths[contacts.block_a], widths[contacts.block_b])
@@ -159,10 +141,10 @@ def find_points(
 
     tried = np.flatnonzero(pairs.shallow & pairs.face_each_other)
     alone = pairs.shallow & ~pairs.face_each_other
-    tips = measured(*_tips(solids, faces, vertices, pairs[alone], reach))
+    tips = measured_points(placed, *_tips(placed, pairs[alone], reach))
     tips = tips[near(tips) & ~parts.made[tips.features[:, 1]]]
     # No edges fit between faces that oppose each other better.
-    crossed = measured(*_crossed_edges(solids, faces, vertices, pairs[pairs.cosine > -0.94], reach))
+    crossed = measured_points(placed, *_crossed_edges(placed, pairs[pairs.cosine > -0.94], reach))
     crossed = crossed[near(crossed) & ~parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)]
     found = [tips, crossed]
     # The planes of both faces, and whether the point is near.
@@ -173,17 +155,17 @@ def find_points(
     blocks = np.sort(np.stack([block_of_part[facing.i], block_of_part[facing.j]]), axis=0)
     _, joint = np.unique(blocks[0] * len(widths) + blocks[1], return_inverse=True)
     largest = np.zeros(len(facing))
-    rounds = chain([(np.arange(len(facing)), facing.face_i, facing.face_j)], facing.other_faces(solids, faces, inner))
+    rounds = chain([(np.arange(len(facing)), facing.face_i, facing.face_j)], facing.other_faces(placed))
     for pair, face_i, face_j in rounds:
         unresolved = ~resolved[pair]
         pair, face_i, face_j = pair[unresolved], face_i[unresolved], face_j[unresolved]
-        corners = clipped_faces(parts, faces, vertices, face_i, face_j)
-        contacts = measured(corners.features, corners.areas)
+        corners = clipped_faces(placed, face_i, face_j)
+        contacts = measured_points(placed, corners.features, corners.areas)
         lowest = np.full(len(pair), np.inf)
         np.minimum.at(lowest, corners.owner, contacts.gaps)
         strip = corners.widths < 0.5 * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
         np.maximum.at(largest, joint[pair], np.bincount(corners.owner, corners.areas, minlength=len(pair)))
-        sliver = _slivers(parts, face_i, face_j, corners, largest[joint[pair]])
+        sliver = _slivers(placed, face_i, face_j, corners, largest[joint[pair]])
         # What overlaps on a strip at a large gap slides past before it would touch.
         slides_past = strip & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
         # Edges that cross behind a plane that separates their parts do not touch.
@@ -209,21 +191,21 @@ def find_points(
 
 
 def _slivers(
-    parts: ConvexParts, face_i: np.ndarray, face_j: np.ndarray, corners: ClippedCorners, largest: np.ndarray
+    placed: PlacedParts, face_i: np.ndarray, face_j: np.ndarray, corners: ClippedCorners, largest: np.ndarray
 ) -> np.ndarray:
     """Whether corners are those of a sliver at a cut, (n,) bool, beside the area in which their blocks touch.
 
     Parameters
     ----------
-    parts : ConvexParts
+    placed : PlacedParts
     face_i, face_j : (n_pairs,) int arrays
     corners : ClippedCorners
     largest : (n_pairs,) array [m²]
         Of all polygons in which the same two blocks cover each other.
     """
-    solids = parts.solids
+    solids = placed.solids
     area = np.bincount(corners.owner, corners.areas, minlength=len(face_i))
-    at_cut = np.bincount(solids.face_of_corner, parts.cut_edges) > 0
+    at_cut = np.bincount(solids.face_of_corner, placed.parts.cut_edges) > 0
     small = (area < SLIVER * largest) & (at_cut[face_i] | at_cut[face_j])
     narrow = SLIVER * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])
     return small[corners.owner] & (corners.widths < narrow[corners.owner])
@@ -251,10 +233,9 @@ def _without_duplicates(contacts: Contacts, duplicates: np.ndarray, near: float)
     return replace(contacts, areas=areas[group])[np.sort(np.unique(group, return_index=True)[1])]
 
 
-def _tips(
-    solids: Solids, faces: Faces, vertices: np.ndarray, pairs: FacingParts, reach: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> tuple[np.ndarray, np.ndarray]:
     """Corners before a leading face that none of their faces opposes: a steep tip on a plane."""
+    solids, faces, vertices = placed.solids, placed.faces, placed.vertices
     i_leads = pairs.face_i == pairs.lead_i
     face, part = np.where(i_leads, pairs.lead_i, pairs.lead_j), np.where(i_leads, pairs.j, pairs.i)
     owner, position = expand_ranges(np.diff(solids.offsets)[part])
@@ -265,59 +246,43 @@ def _tips(
     start = solids.face_offsets[face]
     owner, position = expand_ranges(np.diff(solids.face_offsets)[face])
     corner = start[owner] + position
-    from_corner = vertices[solids.corners[corner]]
-    along = unit(vertices[solids.corners[solids.next_corner[corner]]] - from_corner)
-    inward = cross(faces.normals[face[owner]], along)
-    inside = dot(vertices[vertex[owner]] - from_corner, inward)
+    inward = cross(faces.normals[face[owner]], unit(placed.along(corner)))
+    inside = dot(vertices[vertex[owner]] - placed.starts(corner), inward)
     if len(owner):
         inside = np.minimum.reduceat(inside, np.flatnonzero(position == 0))
     over = inside >= -CORNER_TOLERANCE * solids.shortest_edges[face]
     return feature_rows(ON_FACE, vertex[over], face[over], -1), np.zeros(np.count_nonzero(over))
 
 
-def _crossed_edges(
-    solids: Solids, faces: Faces, vertices: np.ndarray, pairs: FacingParts, reach: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _crossed_edges(placed: PlacedParts, pairs: FacingParts, reach: float) -> tuple[np.ndarray, np.ndarray]:
     """Edges that separate two parts better than any of their faces: one point for a pair."""
-    apart, own, other = edge_separations(solids, faces, vertices, pairs.i, pairs.j)
+    apart, own, other = edge_separations(placed, pairs.i, pairs.j)
     # By more than rounding, in widths.
     k = np.flatnonzero((apart > pairs.apart + 1e-4 * pairs.width) & (apart <= reach))
     own, other = own[k], other[k]
-    on_a, on_b = _crossings(solids, vertices, own, other)
+    on_a, on_b = _crossings(placed, own, other)
     inside = (on_a > 0.0) & (on_a < 1.0) & (on_b > 0.0) & (on_b < 1.0)
     places = places_of(on_a[inside], on_b[inside], np.zeros(np.count_nonzero(inside), dtype=bool))
     return feature_rows(ACROSS, own[inside], other[inside], places), np.zeros(len(places))
 
 
-def _crossings(
-    solids: Solids, vertices: np.ndarray, own: np.ndarray, other: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _crossings(placed: PlacedParts, own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where along two edges, as parts of them, their lines are nearest to each other, two (n,) arrays."""
-    a, b = vertices[solids.corners[own]], vertices[solids.corners[other]]
-    along_a = vertices[solids.corners[solids.next_corner[own]]] - a
-    along_b = vertices[solids.corners[solids.next_corner[other]]] - b
+    apart, along_a, along_b = placed.starts(other) - placed.starts(own), placed.along(own), placed.along(other)
     area = cross(along_a, along_b)
-    on_a, on_b = (dot(cross(b - a, along), area) / dot(area, area) for along in (along_b, along_a))
+    on_a, on_b = (dot(cross(apart, along), area) / dot(area, area) for along in (along_b, along_a))
     return on_a, on_b
 
 
 def entered_points(
-    parts: ConvexParts,
-    widths: np.ndarray,
-    before: np.ndarray,
-    after: np.ndarray,
-    useful: np.ndarray,
-    tolerance: float,
-    contacts: Contacts,
+    movement: Movement, widths: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
 ) -> Contacts:
     """Find the points that would have kept apart blocks that overlap after a movement, measured before it.
 
     Parameters
     ----------
-    parts : ConvexParts
+    movement : Movement
     widths : (n_blocks,) array [m]
-    before, after : (n_vertices, 3) arrays [m]
-        Corners of the blocks.
     useful : (n_blocks,) bool array
         One of two blocks that overlap must be of these.
     tolerance : float [m]
@@ -330,37 +295,28 @@ def entered_points(
     Edges touch where they cross. Where that is known and does not help, as one turns, corners are to stay before the
     plane that separated the two.
     """
-    solids, block_of_part = parts.solids, parts.block_of_part
-    before, after = parts.placed(before), parts.placed(after)
-    faces, faces_after = solids.faces(before), solids.faces(after)
-    start, end = Place(before, faces.normals, faces.middles), Place(after, faces_after.normals, faces_after.middles)
-    once, edges_of = solids.whole_edges
-    ends = solids.corners[np.stack([once, solids.next_corner[once]], axis=1)]
-    edge_faces = solids.face_of_corner[np.stack([once, solids.twins[once]], axis=1)]
-    movement = Movement(start, end, solids.offsets, solids.faces_of_block, edges_of, ends, edge_faces)
-    i, j = near_parts(solids, block_of_part, after, -tolerance, useful)
-    deepest = PENETRATION_FRACTION * np.minimum(widths[block_of_part[i]], widths[block_of_part[j]])
-    found = entered(movement, i, j, tolerance, deepest)
-    own, other = once[found.own], once[found.other]
-    crossings = places_of(*_crossings(solids, after, own, other), np.zeros(len(own), dtype=bool))
+    before, after = movement
+    i, j, width = near_parts(after, -tolerance, useful, widths)
+    found = entered(movement, i, j, tolerance, PENETRATION_FRACTION * width)
+    crossings = places_of(*_crossings(after, found.own, found.other), np.zeros(len(found.own), dtype=bool))
     on_face, crossed = (
-        measured_points(solids, block_of_part, before, features, np.zeros(len(features)))
+        measured_points(before, features, np.zeros(len(features)))
         for features in (
             feature_rows(ON_FACE, found.corner, found.face, -1),
-            feature_rows(ACROSS, own, other, crossings),
+            feature_rows(ACROSS, found.own, found.other, crossings),
         )
     )
     known = are_known(crossed, contacts, same_normal=False)
     k = np.flatnonzero(known[found.at_edges])
     corner, pair = found.edge_corner[k], found.at_edges[k]
-    normals = across(movement, movement.before, found.own[pair], found.other[pair])
-    first, second = before[ends[found.other[pair]].T]
-    along, apart = unit(second - first), before[corner] - first
+    own, other = found.own[pair], found.other[pair]
+    normals, along = across(before, own, other), unit(before.along(other))
+    apart = before.vertices[corner] - before.starts(other)
     planes = Contacts(
-        features=feature_rows(BEFORE_EDGE, corner, other[pair], -1),
-        block_a=block_of_part[solids.block_of_vertex[corner]],
+        features=feature_rows(BEFORE_EDGE, corner, other, -1),
+        block_a=before.parts.block_of_part[before.solids.block_of_vertex[corner]],
         block_b=crossed.block_b[pair],
-        points=before[corner],
+        points=before.vertices[corner],
         frames=np.stack([normals, along, cross(normals, along)], axis=1),
         gaps=dot(apart, normals),
         slip=np.stack([dot(apart, along), dot(apart, cross(normals, along))], axis=1),

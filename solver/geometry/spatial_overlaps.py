@@ -5,23 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from .broad_phase import box_pairs, boxes
+from .convex_parts import PlacedParts
 from .entering import PARALLEL
 from .separations import edge_separations, face_separations
-from .solids import Solids
 
 
-def overlap_depths_in_space(
-    solids: Solids, block_of_part: np.ndarray, vertices: np.ndarray, tolerance: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def overlap_depths_in_space(placed: PlacedParts, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs of blocks that overlap by more than a tolerance, and by how much.
 
     Parameters
     ----------
-    solids : Solids
-        Convex parts.
-    block_of_part : (n_parts,) int array
-    vertices : (n_vertices, 3) array [m]
-        Current corners of all parts.
+    placed : PlacedParts
     tolerance : float [m]
 
     Returns
@@ -36,18 +30,19 @@ def overlap_depths_in_space(
     Convex parts are separated by a face of one of them or by two edges across each other: the largest separation of
     these, negative, is the depth.
     """
-    low, high = boxes(vertices, solids.offsets)
+    block_of_part = placed.parts.block_of_part
+    low, high = boxes(placed.vertices, placed.solids.offsets)
     i, j = box_pairs(low + tolerance / 2.0, high - tolerance / 2.0)
     other = block_of_part[i] != block_of_part[j]
     i, j = i[other], j[other]
-    faces, none = solids.faces(vertices), np.zeros(len(solids.block_of_face), dtype=bool)
-    apart, _, _ = face_separations(solids, faces, vertices, i, j, none)
+    none = np.zeros(len(placed.solids.block_of_face), dtype=bool)
+    apart, _, _ = face_separations(placed, i, j, none)
     deep = np.flatnonzero(apart < -tolerance)
     i, j, apart = i[deep], j[deep], apart[deep]
-    apart = np.maximum(apart, face_separations(solids, faces, vertices, j, i, none)[0])
+    apart = np.maximum(apart, face_separations(placed, j, i, none)[0])
     deep = np.flatnonzero(apart < -tolerance)
     i, j, apart = i[deep], j[deep], apart[deep]
-    apart = np.maximum(apart, edge_separations(solids, faces, vertices, i, j, PARALLEL)[0])
+    apart = np.maximum(apart, edge_separations(placed, i, j, PARALLEL)[0])
     deep = apart < -tolerance
     blocks = np.sort(np.stack([block_of_part[i[deep]], block_of_part[j[deep]]], axis=1), axis=1)
     pairs, pair_of = np.unique(blocks, axis=0, return_inverse=True)

@@ -69,7 +69,7 @@ def test_parts_are_convex_and_fill_the_stone(name):
     assert max(out_of_faces(parts.solids, k) for k in range(n)) < 1e-6
     assert max(shared_volume(parts.solids, i, j) for i in range(n) for j in range(i)) < 1e-6
     moved = shapes.vertices @ TURN + [1.0, 2.0, 3.0]
-    np.testing.assert_allclose(parts.placed(moved), parts.solids.vertices @ TURN + [1.0, 2.0, 3.0], atol=1e-9)
+    np.testing.assert_allclose(parts.placed(moved).vertices, parts.solids.vertices @ TURN + [1.0, 2.0, 3.0], atol=1e-9)
 
 
 def test_a_stone_that_is_convex_to_a_thousandth_of_its_width_is_left_whole():

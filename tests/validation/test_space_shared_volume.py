@@ -19,7 +19,7 @@ SHARED = 1e-6
 def largest_shared_volume(assembly: solver.Assembly, vertices: np.ndarray) -> float:
     """Largest volume that two blocks share, over that of the smaller one; of all pairs whose boxes meet."""
     parts, volumes = assembly.shapes.parts, assembly.shapes.volumes
-    corners = np.split(parts.placed(vertices), parts.solids.offsets[1:-1])
+    corners = np.split(parts.placed(vertices).vertices, parts.solids.offsets[1:-1])
     low, high = (np.array([f(own, axis=0) for own in corners]) for f in (np.min, np.max))
     origin = vertices.mean(axis=0)
     bodies = [manifold.Manifold.hull_points(own - origin) for own in corners]
