@@ -12,13 +12,15 @@ def expand_ranges(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return owner, np.arange(len(owner)) - first[owner]
 
 
-def box_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All pairs i < j of axis-parallel boxes that touch or overlap.
+def box_pairs(vertices: np.ndarray, offsets: np.ndarray, reach: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All pairs i < j of polygons or solids whose axis-parallel boxes come within reach along every axis.
 
     Parameters
     ----------
-    low, high : (n, d) arrays [m]
-        Corners of the boxes.
+    vertices : (n_vertices, d) array [m]
+    offsets : (n + 1,) int array
+    reach : float [m]
+        Negative for boxes that overlap by as much.
 
     Returns
     -------
@@ -28,6 +30,8 @@ def box_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray
     -----
     Sort and sweep along the axis on which fewer pairs survive; one long block (the ground) costs n pairs, not n².
     """
+    low, high = boxes(vertices, offsets)
+    low, high = low - reach / 2.0, high + reach / 2.0
     best = None
     for axis in range(low.shape[1]):
         order = np.argsort(low[:, axis], kind="stable")

@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.tolerances import PENETRATION_FRACTION
 
-from .broad_phase import box_pairs, boxes, expand_ranges
+from .broad_phase import box_pairs, expand_ranges
 from .convex_parts import PlacedParts
 from .portions import alike
 from .separations import face_separations
@@ -115,8 +115,7 @@ def near_parts(
     With the width of the thinner of their blocks, from those of all blocks.
     """
     block_of_part = placed.parts.block_of_part
-    low, high = boxes(placed.vertices, placed.solids.offsets)
-    i, j = box_pairs(low - reach / 2.0, high + reach / 2.0)
+    i, j = box_pairs(placed.vertices, placed.solids.offsets, reach)
     a, b = block_of_part[i], block_of_part[j]
     chosen = (a != b) & (useful[a] | useful[b])
     return i[chosen], j[chosen], np.minimum(widths[a], widths[b])[chosen]

@@ -72,9 +72,7 @@ class Outlines:
     @cached_property
     def previous_vertex(self) -> np.ndarray:
         """(n_vertices,) int array: the vertex before."""
-        previous = np.empty_like(self.next_vertex)
-        previous[self.next_vertex] = np.arange(len(self.next_vertex))
-        return previous
+        return np.argsort(self.next_vertex)
 
     @cached_property
     def edge_lengths(self) -> np.ndarray:
@@ -178,8 +176,7 @@ def overlap_depths(
     (depth: its distance to the outline), or where two edges cross (depth: the shortest of the four distances
     of their ends from the other edge).
     """
-    low, high = boxes(vertices, offsets)
-    i, j = box_pairs(low + tolerance / 2.0, high - tolerance / 2.0)
+    i, j = box_pairs(vertices, offsets, -tolerance)
     if len(i) == 0:
         return i, j, np.zeros(0)
     depth = np.maximum(_inside_depth(vertices, offsets, i, j), _inside_depth(vertices, offsets, j, i))

@@ -144,7 +144,10 @@ def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np
     faces run the same way the pair is a corner on a corner, kept once; where they part, the blocks are
     diagonal neighbours and do not touch.
     """
-    pair_a, pair_b = _near_blocks(shapes, vertices, reach, useful)
+    i, j = box_pairs(vertices, shapes.offsets, reach)
+    chosen = useful[i] | useful[j]
+    i, j = i[chosen], j[chosen]
+    pair_a, pair_b = np.concatenate([i, j]), np.concatenate([j, i])
     vertex, edge = _vertex_edge_candidates(shapes, vertices, pair_a, pair_b, reach)
     vertex, edge, corner = _classified_ends(shapes, vertices, vertex, edge)
     kept = _closest_faces(shapes, vertices, vertex, edge, corner)
@@ -195,17 +198,6 @@ def passed_edges(
     order = k[np.lexsort((np.minimum(heights[0][k], 0.0) / width[k] + part[k], vertex[k], owner[k]))]
     last = np.append((np.diff(owner[order]) != 0) | (np.diff(vertex[order]) != 0), True)[: len(order)]
     return vertex[order[last]], edge[order[last]]
-
-
-def _near_blocks(
-    shapes: Outlines, vertices: np.ndarray, reach: float, useful: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Ordered pairs of blocks whose boxes come within reach, one of them useful."""
-    low, high = boxes(vertices, shapes.offsets)
-    i, j = box_pairs(low - reach / 2.0, high + reach / 2.0)
-    chosen = useful[i] | useful[j]
-    i, j = i[chosen], j[chosen]
-    return np.concatenate([i, j]), np.concatenate([j, i])
 
 
 def _vertex_edge_candidates(

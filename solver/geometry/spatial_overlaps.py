@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .broad_phase import box_pairs, boxes
+from .broad_phase import box_pairs
 from .convex_parts import PlacedParts
 from .entering import PARALLEL
 from .separations import edge_separations, face_separations
@@ -31,8 +31,7 @@ def overlap_depths_in_space(placed: PlacedParts, tolerance: float) -> tuple[np.n
     these, negative, is the depth.
     """
     block_of_part = placed.parts.block_of_part
-    low, high = boxes(placed.vertices, placed.solids.offsets)
-    i, j = box_pairs(low + tolerance / 2.0, high - tolerance / 2.0)
+    i, j = box_pairs(placed.vertices, placed.solids.offsets, -tolerance)
     other = block_of_part[i] != block_of_part[j]
     i, j = i[other], j[other]
     none = np.zeros(len(placed.solids.block_of_face), dtype=bool)
