@@ -129,9 +129,7 @@ class Solids:
     @cached_property
     def previous_corner(self) -> np.ndarray:
         """(n_corners,) int array: the corner before."""
-        previous = np.empty_like(self.next_corner)
-        previous[self.next_corner] = np.arange(len(self.next_corner))
-        return previous
+        return np.argsort(self.next_corner)
 
     @cached_property
     def twins(self) -> np.ndarray:
