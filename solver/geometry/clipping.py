@@ -72,10 +72,7 @@ def _clipped(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> Cli
     # How far each corner is inside each edge of the other polygon: (n, corners, edges).
     a_in_b = _inside(a, b, along_b / long_b[..., None])
     b_in_a = _inside(b, a, along_a / long_a[..., None])
-    nearest_b, nearest_a = a_in_b.argmin(axis=2), b_in_a.argmin(axis=2)
-    depth_a = np.take_along_axis(a_in_b, nearest_b[..., None], axis=2)[..., 0]
-    depth_b = np.take_along_axis(b_in_a, nearest_a[..., None], axis=2)[..., 0]
-    used_a, used_b = depth_a >= -end, depth_b >= -end
+    used_a, used_b = a_in_b.min(axis=2) >= -end, b_in_a.min(axis=2) >= -end
     apart = np.abs(a[:, :, None] - b[:, None]).max(axis=3)
     both = (apart <= 2.0 * end[..., None]) & used_a[:, :, None] & used_b[:, None]
 
@@ -88,12 +85,8 @@ def _clipped(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> Cli
         (a[pair, p] + b[pair, q]) / 2.0,
     )
     alone_a, alone_b = used_a & ~both.any(axis=2), used_b & ~both.any(axis=1)
-    pair, p = np.nonzero(alone_a)
-    vertex_a = _on_face(placed, end, depth_a, nearest_b, pair, p, corner_a, face_b, edge_b), a[pair, p]
-    pair_a = pair
-    pair, q = np.nonzero(alone_b)
-    vertex_b = _on_face(placed, end, depth_b, nearest_a, pair, q, corner_b, face_a, edge_a), b[pair, q]
-    pair_b = pair
+    vertex_a = _on_face(placed, end, alone_a, a, a_in_b, corner_a, face_b, edge_b)
+    vertex_b = _on_face(placed, end, alone_b, b, b_in_a, corner_b, face_a, edge_a)
     pair, p, q = np.nonzero(crosses)
     u, v = on_a[pair, p, q], on_b[pair, p, q]
     sine = np.abs(along_a[pair, p, 0] * along_b[pair, q, 1] - along_a[pair, p, 1] * along_b[pair, q, 0]) / (
@@ -106,10 +99,7 @@ def _clipped(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> Cli
         feature_rows(ACROSS, edge_a[pair, p], edge_b[pair, q], places),
         a[pair, p] + u[:, None] * along_a[pair, p],
     )
-    owner, features, points = (
-        np.concatenate(column)
-        for column in zip(on_corner, (pair_a, *vertex_a), (pair_b, *vertex_b), across, strict=True)
-    )
+    owner, features, points = map(np.concatenate, zip(on_corner, vertex_a, vertex_b, across, strict=True))
     areas, wide, long = corner_areas(owner, points, len(face_a))
     kept = wide[owner] > end[owner, 0]
     clipped = ClippedCorners(owner[kept], features[kept], areas[kept], wide[owner[kept]])
@@ -177,28 +167,28 @@ def _inside(points: np.ndarray, corners: np.ndarray, directions: np.ndarray) -> 
 def _on_face(
     placed: PlacedParts,
     end: np.ndarray,
-    depth: np.ndarray,
-    nearest: np.ndarray,
-    pair: np.ndarray,
-    p: np.ndarray,
+    alone: np.ndarray,
+    points: np.ndarray,
+    inside: np.ndarray,
     corner: np.ndarray,
     face: np.ndarray,
     edge: np.ndarray,
-) -> np.ndarray:
-    """(n, 4) int array: features of corners on faces, with the edges that cross where they are on the boundary."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Owners, features and points of corners on faces, with the edges that cross where they are on the boundary."""
     solids, cut = placed.solids, placed.parts.cut_edges
-    own = corner[pair, p]
-    other = edge[pair, nearest[pair, p]]
+    pair, p = np.nonzero(alone)
+    depths = inside[pair, p]
+    own, other = corner[pair, p], edge[pair, depths.argmin(axis=1)]
     along = unit(placed.along(other))
     candidates = np.stack([own, solids.previous_corner[own]], axis=1)
     crossing = cross(unit(placed.along(candidates)), along[:, None])
     sine = np.sqrt(dot(crossing, crossing))
     steepest = sine.argmax(axis=1)
     row = np.arange(len(own))
-    on_boundary = (depth[pair, p] <= end[pair, 0]) & (sine[row, steepest] >= SMALLEST_SINE)
+    on_boundary = (depths.min(axis=1) <= end[pair, 0]) & (sine[row, steepest] >= SMALLEST_SINE)
     on_boundary &= ~cut[other] & ~cut[candidates[row, steepest]]
     code = np.where(on_boundary, other * np.int64(len(solids.corners)) + candidates[row, steepest], -1)
-    return feature_rows(ON_FACE, solids.corners[own], face[pair], code)
+    return pair, feature_rows(ON_FACE, solids.corners[own], face[pair], code), points[pair, p]
 
 
 def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
