@@ -26,7 +26,7 @@ from .spatial_features import ACROSS, BEFORE_EDGE, ON_CORNER, ON_FACE, feature_r
 SLIVER = 0.005
 
 
-def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray) -> Contacts:
+def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray | None = None) -> Contacts:
     """Frames, gaps and slips of given pairs of features where the corners now are.
 
     Parameters
@@ -34,8 +34,8 @@ def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray
     placed : PlacedParts
     features : (n, 4) int array
         As in :class:`Contacts`.
-    areas : (n,) array [m²]
-        Carried on.
+    areas : (n,) array, optional [m²]
+        Carried on; zero by default.
 
     Notes
     -----
@@ -103,7 +103,7 @@ def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray
         frames=frames,
         gaps=dot(apart, normals),
         slip=slip,
-        areas=areas,
+        areas=np.zeros(len(features)) if areas is None else areas,
     )
 
 
@@ -141,10 +141,10 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
 
     tried = np.flatnonzero(pairs.shallow & pairs.face_each_other)
     alone = pairs.shallow & ~pairs.face_each_other
-    tips = measured_points(placed, *_tips(placed, pairs[alone], reach))
+    tips = measured_points(placed, _tips(placed, pairs[alone], reach))
     tips = tips[near(tips) & ~parts.made[tips.features[:, 1]]]
     # No edges fit between faces that oppose each other better.
-    crossed = measured_points(placed, *_crossed_edges(placed, pairs[pairs.cosine > -0.94], reach))
+    crossed = measured_points(placed, _crossed_edges(placed, pairs[pairs.cosine > -0.94], reach))
     crossed = crossed[near(crossed) & ~parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)]
     found = [tips, crossed]
     # The planes of both faces, and whether the point is near.
@@ -233,8 +233,8 @@ def _without_duplicates(contacts: Contacts, duplicates: np.ndarray, near: float)
     return replace(contacts, areas=areas[group])[np.sort(np.unique(group, return_index=True)[1])]
 
 
-def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Corners before a leading face that none of their faces opposes: a steep tip on a plane."""
+def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
+    """Features of corners before a leading face that none of their faces opposes: a steep tip on a plane."""
     solids, faces, vertices = placed.solids, placed.faces, placed.vertices
     i_leads = pairs.face_i == pairs.lead_i
     face, part = np.where(i_leads, pairs.lead_i, pairs.lead_j), np.where(i_leads, pairs.j, pairs.i)
@@ -251,19 +251,18 @@ def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> tuple[np.nda
     if len(owner):
         inside = np.minimum.reduceat(inside, np.flatnonzero(position == 0))
     over = inside >= -CORNER_TOLERANCE * solids.shortest_edges[face]
-    return feature_rows(ON_FACE, vertex[over], face[over], -1), np.zeros(np.count_nonzero(over))
+    return feature_rows(ON_FACE, vertex[over], face[over], -1)
 
 
-def _crossed_edges(placed: PlacedParts, pairs: FacingParts, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Edges that separate two parts better than any of their faces: one point for a pair."""
+def _crossed_edges(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
+    """Features of edges that separate two parts better than any of their faces: one point for a pair."""
     apart, own, other = edge_separations(placed, pairs.i, pairs.j)
     # By more than rounding, in widths.
     k = np.flatnonzero((apart > pairs.apart + 1e-4 * pairs.width) & (apart <= reach))
     own, other = own[k], other[k]
     on_a, on_b = _crossings(placed, own, other)
     inside = (on_a > 0.0) & (on_a < 1.0) & (on_b > 0.0) & (on_b < 1.0)
-    places = places_of(on_a[inside], on_b[inside], np.zeros(np.count_nonzero(inside), dtype=bool))
-    return feature_rows(ACROSS, own[inside], other[inside], places), np.zeros(len(places))
+    return feature_rows(ACROSS, own[inside], other[inside], places_of(on_a[inside], on_b[inside]))
 
 
 def _crossings(placed: PlacedParts, own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -298,14 +297,9 @@ def entered_points(
     before, after = movement
     i, j, width = near_parts(after, -tolerance, useful, widths)
     found = entered(movement, i, j, tolerance, PENETRATION_FRACTION * width)
-    crossings = places_of(*_crossings(after, found.own, found.other), np.zeros(len(found.own), dtype=bool))
-    on_face, crossed = (
-        measured_points(before, features, np.zeros(len(features)))
-        for features in (
-            feature_rows(ON_FACE, found.corner, found.face, -1),
-            feature_rows(ACROSS, found.own, found.other, crossings),
-        )
-    )
+    crossings = places_of(*_crossings(after, found.own, found.other))
+    on_face = measured_points(before, feature_rows(ON_FACE, found.corner, found.face, -1))
+    crossed = measured_points(before, feature_rows(ACROSS, found.own, found.other, crossings))
     known = are_known(crossed, contacts, same_normal=False)
     k = np.flatnonzero(known[found.at_edges])
     corner, pair = found.edge_corner[k], found.at_edges[k]

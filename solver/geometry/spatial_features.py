@@ -20,7 +20,7 @@ def feature_rows(kind: int, first: np.ndarray, second: np.ndarray, rest: np.ndar
     return np.stack(np.broadcast_arrays(kind, first, second, rest), axis=1).astype(np.int64)
 
 
-def places_of(along_a: np.ndarray, along_b: np.ndarray, parallel: np.ndarray) -> np.ndarray:
+def places_of(along_a: np.ndarray, along_b: np.ndarray, parallel: np.ndarray | bool = False) -> np.ndarray:
     """(n,) int array that holds two fractions of edges and whether these are nearly parallel."""
     a, b = (np.clip(np.round(along / GRAIN), 0, 1 / GRAIN).astype(np.int64) for along in (along_a, along_b))
     return ((a << 30 | b) << 1) | parallel
