@@ -185,16 +185,13 @@ def convex_parts(solids: Solids) -> ConvexParts:
             surfaces.append((corners, around))
             block_of_part.append(block)
             far = ON_CORNER * float(np.linalg.norm(np.ptp(own, axis=0)))
-            made_corners.append(
-                (np.abs(corners[:, None] - own).max(axis=2).min(axis=1) > far)
-                if is_bent[block]
-                else np.zeros(len(corners), dtype=bool)
-            )
             if is_bent[block]:
+                made_corners.append(np.abs(corners[:, None] - own).max(axis=2).min(axis=1) > far)
                 arms = np.linalg.solve((own[frame[1:]] - own[frame[0]]).T, (corners - own[frame[0]]).T).T
                 sources.append(np.tile(start + frame, (len(corners), 1)))
                 weights.append(np.column_stack([1.0 - arms.sum(axis=1), arms]))
             else:
+                made_corners.append(np.zeros(len(corners), dtype=bool))
                 number = start + np.arange(len(corners))
                 sources.append(np.tile(number[:, None], (1, 4)))
                 weights.append(np.tile([1.0, 0.0, 0.0, 0.0], (len(corners), 1)))

@@ -78,13 +78,10 @@ def _outline(faces: list[list[int]]) -> list[int] | None:
     """Corners around faces that lie side by side; None where these do not form one simple loop."""
     edges = {edge for face in faces for edge in edges_of(face)}
     following = {a: b for a, b in edges if (b, a) not in edges}
-    if len(following) != sum((b, a) not in edges for a, b in edges):
+    if not following or len(following) != sum((b, a) not in edges for a, b in edges):
         return None
-    start = next(iter(following), None)
-    if start is None:
-        return None
-    loop = [start]
-    while following[loop[-1]] != start:
+    loop = [next(iter(following))]
+    while following[loop[-1]] != loop[0]:
         loop.append(following[loop[-1]])
     return loop if len(loop) == len(following) else None
 
@@ -93,11 +90,9 @@ def _without_straight_corners(vertices: np.ndarray, faces: list[list[int]]) -> l
     """Leave out corners between two faces only, in the middle of a straight edge."""
     count = np.bincount([corner for face in faces for corner in face], minlength=len(vertices))
     for corner in np.flatnonzero(count == 2).tolist():
-        for face in faces:
-            if corner in face:
-                k = face.index(corner)
-                before, after = vertices[face[k - 1]], vertices[face[(k + 1) % len(face)]]
-                break
+        face = next(face for face in faces if corner in face)
+        k = face.index(corner)
+        before, after = vertices[face[k - 1]], vertices[face[(k + 1) % len(face)]]
         along = after - before
         length = float(np.linalg.norm(along))
         away = float(np.linalg.norm(np.cross(vertices[corner] - before, along)))
