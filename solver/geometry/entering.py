@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -53,8 +52,7 @@ class Entered(NamedTuple):
     edge_corner: np.ndarray
 
 
-@dataclass(frozen=True)
-class _Axes:
+class _Axes(NamedTuple):
     """The best axis of one kind for each pair of parts.
 
     Attributes
@@ -72,9 +70,6 @@ class _Axes:
     before: np.ndarray
     after: np.ndarray
     apart: np.ndarray
-
-    def __getitem__(self, chosen: np.ndarray) -> _Axes:
-        return _Axes(*(value[chosen] for value in vars(self).values()))
 
 
 def entered(movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, deepest: np.ndarray) -> Entered:
@@ -100,7 +95,7 @@ def entered(movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, 
         axes = axes_of(movement, i, j)
         deep = axes.apart < -tolerance
         i, j, deepest = i[deep], j[deep], deepest[deep]
-        kinds = [kind[deep] for kind in [*kinds, axes]]
+        kinds = [_Axes(*(value[deep] for value in kind)) for kind in [*kinds, axes]]
     best = np.argmax([_score(kind.before, kind.after) for kind in kinds], axis=0)
     before = np.choose(best, [kind.before for kind in kinds])
     best = np.where(before < -deepest, len(kinds), best)
