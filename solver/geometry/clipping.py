@@ -38,23 +38,23 @@ class ClippedCorners(NamedTuple):
 
 def clipped_faces(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> ClippedCorners:
     """Corners of the polygons in which faces a and faces b, (n,) int arrays, cover each other."""
-    sizes = np.diff(placed.solids.face_offsets)
+    offsets = placed.solids.face_offsets
     none, no_area = np.zeros((0, 4), dtype=np.int64), np.zeros(0)
     clipped = [ClippedCorners(none[:, 0], none, no_area, no_area)]
-    for k in alike(sizes[face_a], sizes[face_b]):
-        corners = _clipped(placed, face_a[k], face_b[k])
+    for k, corner_a, corner_b in alike((offsets, face_a), (offsets, face_b)):
+        corners = _clipped(placed, face_a[k], face_b[k], corner_a, corner_b)
         clipped.append(corners._replace(owner=k[corners.owner]))
     return ClippedCorners(*map(np.concatenate, zip(*clipped, strict=True)))
 
 
-def _clipped(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> ClippedCorners:
-    """Corners for faces a that all have as many corners, and faces b likewise."""
+def _clipped(
+    placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray, corner_a: np.ndarray, corner_b: np.ndarray
+) -> ClippedCorners:
+    """Corners for faces a that all have as many corners, (n, n_corners) int, and faces b likewise."""
     parts, solids, faces = placed.parts, placed.solids, placed.faces
-    n_a, n_b = (int(solids.face_offsets[face[0] + 1] - solids.face_offsets[face[0]]) for face in (face_a, face_b))
     # Corners of a run clockwise seen along the normal of b; turned round, both run counter-clockwise. Edge k of either
     # polygon runs from its corner k to the next, which for a is the edge that starts at the latter.
-    corner_a = solids.face_offsets[face_a][:, None] + np.arange(n_a)[::-1]
-    corner_b = solids.face_offsets[face_b][:, None] + np.arange(n_b)
+    corner_a = corner_a[:, ::-1]
     edge_a, edge_b = np.roll(corner_a, -1, axis=1), corner_b
     normal = unit(faces.normals[face_b] - faces.normals[face_a])
     x = faces.tangents[face_b]

@@ -223,11 +223,9 @@ def _planes(parts: Solids, block_of_part: np.ndarray, is_bent: np.ndarray, width
 def _out_of_faces(solids: Solids) -> np.ndarray:
     """(n,) array [m]: how far a corner of each solid is in front of one of its own faces."""
     faces = solids.faces(solids.vertices)
-    n_faces, n_vertices = np.diff(solids.faces_of_block), np.diff(solids.offsets)
-    out = np.zeros(len(solids))
-    for k in alike(n_faces, n_vertices):
-        face = solids.faces_of_block[k][:, None] + np.arange(n_faces[k[0]])
-        corner = solids.vertices[solids.offsets[k][:, None] + np.arange(n_vertices[k[0]])]
+    every, out = np.arange(len(solids)), np.zeros(len(solids))
+    for k, face, vertex in alike((solids.faces_of_block, every), (solids.offsets, every)):
+        corner = solids.vertices[vertex]
         distance = dot(faces.normals[face][:, :, None], corner[:, None] - faces.middles[face][:, :, None])
         out[k] = distance.max(axis=(1, 2))
     return out

@@ -144,12 +144,9 @@ def _behind(
 def _of_faces(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
     """Give the axes along normals of faces of parts i, with parts j before them."""
     solids = movement.before.solids
-    n_faces, n_corners = np.diff(solids.faces_of_block)[i], np.diff(solids.offsets)[j]
     before, after, apart = np.empty((3, len(i)))
     first = np.empty(len(i), dtype=np.int64)
-    for k in alike(n_faces, n_corners):
-        face = solids.faces_of_block[i[k]][:, None] + np.arange(n_faces[k[0]])
-        corner = solids.offsets[j[k]][:, None] + np.arange(n_corners[k[0]])
+    for k, face, corner in alike((solids.faces_of_block, i), (solids.offsets, j)):
         gaps = []
         for placed in movement:
             normals = placed.faces.normals[face]
@@ -168,17 +165,12 @@ def _of_edges(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
     """Give the axes across an edge of parts i and one of parts j, on which their planes ride."""
     placed_before, placed_after = movement
     offsets, (once, edges_of) = placed_before.solids.offsets, placed_before.solids.whole_edges
-    n_own, n_other = (np.diff(edges_of)[k] for k in (i, j))
-    n_i, n_j = (np.diff(offsets)[k] for k in (i, j))
     before, after, apart = np.full((3, len(i)), -np.inf)
     first, second = np.zeros((2, len(i)), dtype=np.int64)
-    for k in alike(n_own * n_other, n_i + n_j, n_own, n_i):
-        own = once[edges_of[i[k]][:, None] + np.arange(n_own[k[0]])]
-        other = once[edges_of[j[k]][:, None] + np.arange(n_other[k[0]])]
-        own, other = np.repeat(own, other.shape[1], axis=1), np.tile(other, (1, own.shape[1]))
+    for k, own, other, *corners in alike((edges_of, i), (edges_of, j), (offsets, i), (offsets, j)):
+        own, other = np.repeat(once[own], other.shape[1], axis=1), np.tile(once[other], (1, own.shape[1]))
         if own.size == 0:
             continue
-        corners = [offsets[of[k]][:, None] + np.arange(n[k[0]]) for of, n in ((i, n_i), (j, n_j))]
         normals = across(placed_before, own, other)
         gaps, foremost = _gaps(placed_before, normals, own, other, corners)
         ridden, _ = _gaps(placed_after, _ridden(movement, normals, other), own, other, corners)

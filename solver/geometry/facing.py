@@ -123,11 +123,9 @@ def near_parts(
 
 def _opposed_faces(placed: PlacedParts, leading: np.ndarray, j: np.ndarray) -> np.ndarray:
     """(n,) int array: the face of part j, not inside its block, that opposes the leading face best."""
-    first, normals = placed.solids.faces_of_block, placed.faces.normals
-    counts = np.diff(first)[j]
+    normals = placed.faces.normals
     opposed = np.empty(len(j), dtype=np.int64)
-    for k in alike(counts):
-        face = first[j[k]][:, None] + np.arange(counts[k[0]])
+    for k, face in alike((placed.solids.faces_of_block, j)):
         cosine = dot(normals[face], normals[leading[k]][:, None])
         opposed[k] = face[np.arange(len(k)), np.where(placed.parts.inner[face], np.inf, cosine).argmin(axis=1)]
     return opposed

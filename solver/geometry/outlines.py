@@ -127,13 +127,14 @@ def polygon_integrals(vertices: np.ndarray, offsets: np.ndarray) -> tuple[np.nda
 def self_crossings(vertices: np.ndarray, offsets: np.ndarray) -> dict[int, tuple[int, int]]:
     """First pair of crossing edges of each polygon that crosses itself: {polygon: (edge, edge)}."""
     crossings: dict[int, tuple[int, int]] = {}
-    counts = np.diff(offsets)
-    for chosen in alike(counts, counts):
-        n = int(counts[chosen[0]])
+    every = np.arange(len(offsets) - 1)
+    # Twice, as there are as many pairs of edges as the square of their number.
+    for chosen, corners, _ in alike((offsets, every), (offsets, every)):
+        n = corners.shape[1]
         first, second = np.triu_indices(n, k=2)
         apart = ~((first == 0) & (second == n - 1))
         first, second = first[apart], second[apart]
-        ring = vertices[offsets[chosen][:, None] + np.arange(n)]
+        ring = vertices[corners]
         end = np.roll(ring, -1, axis=1)
         hit = segments_cross(ring[:, first], end[:, first], ring[:, second], end[:, second])
         for row in np.flatnonzero(hit.any(axis=1)):

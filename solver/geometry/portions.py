@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import prod
 
 import numpy as np
 
@@ -10,19 +11,32 @@ import numpy as np
 PORTION = 2_000_000
 
 
-def alike(*counts: np.ndarray) -> Iterator[np.ndarray]:
-    """Numbers of the items that have the same counts, in portions.
+def alike(*groups: tuple[np.ndarray, np.ndarray]) -> Iterator[tuple[np.ndarray, ...]]:
+    """Numbers of the items whose owners have as many members each, in portions, and these members.
 
     Parameters
     ----------
-    *counts : (n,) int arrays
-        An item's array has the product of these as its size.
+    *groups : (n_owners + 1,) and (n,) int arrays
+        Owner ``i`` has the members from entry ``i`` to entry ``i + 1`` of the first, item ``k`` the owner in entry
+        ``k`` of the second. An item's array has the product of the numbers of its members as its size.
+
+    Yields
+    ------
+    items : (m,) int array
+    *members : (m, n_members) int arrays, one for each group
     """
+    counts = [np.diff(offsets)[owner] for offsets, owner in groups]
     keys = np.zeros(len(counts[0]), dtype=np.int64)
     for count in counts:
         keys = keys * (int(count.max(initial=0)) + 1) + count
     order = np.argsort(keys, kind="stable")
-    for group in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1):
-        if len(group):
-            portion = max(1, PORTION // max(1, int(np.prod([count[group[0]] for count in counts]))))
-            yield from np.split(group, np.arange(portion, len(group), portion))
+    for same in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1):
+        if len(same):
+            sizes = [int(count[same[0]]) for count in counts]
+            portion = max(1, PORTION // max(1, prod(sizes)))
+            for items in np.split(same, np.arange(portion, len(same), portion)):
+                members = (
+                    offsets[owner[items]][:, None] + np.arange(size)
+                    for (offsets, owner), size in zip(groups, sizes, strict=True)
+                )
+                yield items, *members

@@ -34,16 +34,12 @@ def face_separations(
     behind : (n,) array [m]
         How far it is in front of a face of part i inside its block; minus infinity where there is none.
     """
-    vertices, faces = placed.vertices, placed.faces
-    first_face, first_vertex = placed.solids.faces_of_block, placed.solids.offsets
-    n_faces, n_vertices = np.diff(first_face)[i], np.diff(first_vertex)[j]
+    solids, vertices, faces = placed.solids, placed.vertices, placed.faces
     apart, leading, behind = np.empty(len(i)), np.empty(len(i), dtype=np.int64), np.full(len(i), -np.inf)
     cut = inner.any()
-    for k in alike(n_faces, n_vertices):
-        face = first_face[i[k]][:, None] + np.arange(n_faces[k[0]])
-        vertex = first_vertex[j[k]][:, None] + np.arange(n_vertices[k[0]])
+    for k, face, vertex in alike((solids.faces_of_block, i), (solids.offsets, j)):
         # From a corner near by, for the digits of coordinates far from the origin.
-        origin = vertices[first_vertex[i[k]]][:, None]
+        origin = vertices[solids.offsets[i[k]]][:, None]
         normal, corner = faces.normals[face], vertices[vertex] - origin
         level = dot(normal, faces.middles[face] - origin)
         distance = dot(normal[:, :, None], corner[:, None]).min(axis=2) - level
@@ -79,12 +75,10 @@ def edge_separations(
     """
     solids, normals = placed.solids, placed.faces.normals
     once, first = solids.whole_edges
-    count = np.diff(first)
     apart = np.full(len(i), -np.inf)
     edge_i, edge_j = np.zeros((2, len(i)), dtype=np.int64)
-    for k in alike(count[i], count[j]):
-        own = once[first[i[k]][:, None] + np.arange(count[i[k[0]]])]
-        other = once[first[j[k]][:, None] + np.arange(count[j[k[0]]])]
+    for k, own, other in alike((first, i), (first, j)):
+        own, other = once[own], once[other]
         a, b = placed.starts(own), placed.starts(other)
         along_a, along_b = unit(placed.along(own)), unit(placed.along(other))
         normal = cross(along_a[:, :, None], along_b[:, None])
