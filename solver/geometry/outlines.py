@@ -1,9 +1,10 @@
-"""Outlines as flat arrays: areas, centroids, edges, crossings, overlaps; every loop runs in numpy."""
+"""Bodies by their corners, and outlines: areas, centroids, edges, crossings, overlaps; every loop runs in numpy."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -19,26 +20,45 @@ def next_vertices(offsets: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Outlines:
-    """Polygons with a thickness as flat arrays, and what follows from their drawing.
+class Bodies:
+    """Polygons or solids by their corners.
 
     Attributes
     ----------
-    vertices : (n_vertices, 2) array [m]
-        Corners of all polygons, one after another, counter-clockwise in each.
+    vertices : (n_vertices, d) array [m]
+        Corners of all bodies, one after another.
     offsets : (n + 1,) int array
-        Polygon ``i`` owns ``vertices[offsets[i]:offsets[i + 1]]``.
-    thickness : (n,) array [m]
-        Out of plane.
+        Body ``i`` owns ``vertices[offsets[i]:offsets[i + 1]]``.
     """
 
     vertices: np.ndarray
     offsets: np.ndarray
-    thickness: np.ndarray
 
     def __len__(self) -> int:
-        """Count the polygons."""
+        """Count the bodies."""
         return len(self.offsets) - 1
+
+    @cached_property
+    def block_of_vertex(self) -> np.ndarray:
+        """(n_vertices,) int array: the body each vertex belongs to."""
+        return np.repeat(np.arange(len(self)), np.diff(self.offsets))
+
+    def shifted(self, by: np.ndarray) -> Self:
+        """Move the drawing by (d,) [m]."""
+        return replace(self, vertices=self.vertices + by)
+
+
+@dataclass(frozen=True)
+class Outlines(Bodies):
+    """Polygons with a thickness as flat arrays, and what follows from their drawing; their corners counter-clockwise.
+
+    Attributes
+    ----------
+    thickness : (n,) array [m]
+        Out of plane.
+    """
+
+    thickness: np.ndarray
 
     @cached_property
     def _integrals(self) -> tuple[np.ndarray, np.ndarray]:
@@ -58,11 +78,6 @@ class Outlines:
     def volumes(self) -> np.ndarray:
         """(n,) array [m³]."""
         return self.areas * self.thickness
-
-    @cached_property
-    def block_of_vertex(self) -> np.ndarray:
-        """(n_vertices,) int array: the polygon each vertex belongs to."""
-        return np.repeat(np.arange(len(self)), np.diff(self.offsets))
 
     @cached_property
     def next_vertex(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,10 +33,6 @@ class Polygons(Outlines):
     def size(self, chosen: np.ndarray) -> float:
         """Edge of the square as large as the mean of the chosen blocks, (n_blocks,) bool, [m]."""
         return float(np.sqrt(self.areas[chosen].mean()))
-
-    def shifted(self, by: np.ndarray) -> Polygons:
-        """Move the drawing by (2,) [m]."""
-        return replace(self, vertices=self.vertices + by)
 
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
         """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -37,10 +37,6 @@ class Polyhedra(Solids):
     def gyration(self) -> np.ndarray:
         """(n_blocks,) array [m²]: square of the radius of gyration of each block, the mean about all axes."""
         return np.asarray(np.trace(self.inertia, axis1=1, axis2=2) / (3.0 * self.volumes))
-
-    def shifted(self, by: np.ndarray) -> Polyhedra:
-        """Move the drawing by (3,) [m]."""
-        return replace(self, vertices=self.vertices + by)
 
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
         """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""

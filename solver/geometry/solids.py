@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from .broad_phase import expand_ranges
-from .outlines import next_vertices
+from .outlines import Bodies, next_vertices
 
 
 def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -56,15 +56,11 @@ class Faces:
 
 
 @dataclass(frozen=True)
-class Solids:
+class Solids(Bodies):
     """Closed surfaces of plane faces as flat arrays, and what follows from their drawing.
 
     Attributes
     ----------
-    vertices : (n_vertices, 3) array [m]
-        Corners of all solids, one after another.
-    offsets : (n + 1,) int array
-        Solid ``i`` owns ``vertices[offsets[i]:offsets[i + 1]]``.
     corners : (n_corners,) int array
         Vertices around all faces, face after face, counter-clockwise seen from outside. A corner also names the edge
         that starts there.
@@ -74,8 +70,6 @@ class Solids:
         The solid each face belongs to, ascending.
     """
 
-    vertices: np.ndarray
-    offsets: np.ndarray
     corners: np.ndarray
     face_offsets: np.ndarray
     block_of_face: np.ndarray
@@ -101,15 +95,6 @@ class Solids:
         ends = self.face_offsets[self.faces_of_block[block] : self.faces_of_block[block + 1] + 1]
         loops = np.split(self.corners[ends[0] : ends[-1]] - start, ends[1:-1] - ends[0])
         return self.vertices[start:stop], [loop.tolist() for loop in loops]
-
-    def __len__(self) -> int:
-        """Count the solids."""
-        return len(self.offsets) - 1
-
-    @cached_property
-    def block_of_vertex(self) -> np.ndarray:
-        """(n_vertices,) int array: the solid each vertex belongs to."""
-        return np.repeat(np.arange(len(self)), np.diff(self.offsets))
 
     @cached_property
     def faces_of_block(self) -> np.ndarray:
