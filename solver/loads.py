@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -130,7 +131,8 @@ class Settlement:
             raise ValueError("settlement has a rotation but no rotation_centre")
         if self.rotation_centre is not None and self.direction is None:
             object.__setattr__(self, "rotation", float(np.sign(self.rotation)))
-        self._check_steps()
+        check_steps(self, "settlement")
+        self._check_stops()
 
     def _check_vectors(self) -> None:
         """Make numbers of what is given, and unit vectors of directions."""
@@ -174,13 +176,7 @@ class Settlement:
         scaled = {name: tuple((motion / largest).tolist()) for name, motion in motions.items()}
         object.__setattr__(self, "profile", scaled)
 
-    def _check_steps(self) -> None:
-        if self.tolerance is None:
-            object.__setattr__(self, "tolerance", self.increment / 100.0)
-        for name in ("increment", "limit", "tolerance"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ValueError(f"settlement {name} is {value:g}; it must be a positive number")
+    def _check_stops(self) -> None:
         for stop in self.stops:
             if not 0.0 <= stop <= self.limit:
                 raise ValueError(f"settlement stop {stop:g} is not between 0 and the limit of {self.limit:g}")
@@ -238,9 +234,8 @@ class Settlement:
                 rate[assembly.index(name)] = motion
             return np.where(part[:, None], rate, 0.0)
         _, angle, centre = self._motion(assembly, start, part, s)
-        rate[part, :d] = self._motion(assembly, start, part, 1.0)[0]
+        rate[part, :d], spin, _ = self._motion(assembly, start, part, 1.0)
         if self.rotation_centre is not None:
-            spin = self._motion(assembly, start, part, 1.0)[1]
             arm = turned(start.positions[part] - centre, np.broadcast_to(angle, (int(part.sum()), len(angle))))
             rate[part, :d] += np.einsum("nrd,r->nd", cross_rows(arm), spin)
             rate[part, d:] = spin
@@ -278,6 +273,16 @@ class Settlement:
             return travel, angle, np.zeros(d)
         axis = np.ones(1) if self.rotation_axis is None else np.asarray(self.rotation_axis)
         return travel, self.rotation * s * axis, np.asarray(self.rotation_centre)
+
+
+def check_steps(path: Any, what: str) -> None:
+    """Check the increment, limit and tolerance of what drives a path; a tolerance not given is made from the first."""
+    if path.tolerance is None:
+        object.__setattr__(path, "tolerance", path.increment / 100.0)
+    for name in ("increment", "limit", "tolerance"):
+        value = getattr(path, name)
+        if not (np.isfinite(value) and value > 0.0):
+            raise ValueError(f"{what} {name} is {value:g}; it must be a positive number")
 
 
 def _numbers(value: Sequence[float], name: str, counts: tuple[int, ...]) -> tuple[float, ...]:

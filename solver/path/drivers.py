@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.assembly import Assembly
 from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_count, rotation_matrices
-from solver.loads import Settlement
+from solver.loads import Settlement, check_steps
 
 
 class Driver(Protocol):
@@ -120,12 +120,7 @@ class ControlDisplacement:
             if length == 0.0:
                 raise ValueError("control direction is [0, 0]; give the direction in which the displacement counts")
             object.__setattr__(self, "direction", tuple(part / length for part in self.direction))
-        if self.tolerance is None:
-            object.__setattr__(self, "tolerance", self.increment / 100.0)
-        for name in ("increment", "limit", "tolerance"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ValueError(f"control {name} is {value:g}; it must be a positive number")
+        check_steps(self, "control")
 
     @property
     def unit(self) -> str:
