@@ -49,8 +49,6 @@ def without_points_of_cuts(parts: ConvexParts, contacts: Contacts, planes: np.nd
     at_cut = np.zeros(group.max(initial=-1) + 1, dtype=bool)
     at_cut[group[of_cut]] = True
     chosen = np.flatnonzero(at_cut[group])
-    if len(chosen) == 0:
-        return contacts, np.arange(len(contacts))
     chosen = chosen[np.argsort(group[chosen], kind="stable")]
     _, start, group_of = np.unique(group[chosen], return_index=True, return_inverse=True)
     group_of = group_of.ravel()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
@@ -81,41 +83,36 @@ def measured_points(
     # the tangent a quarter turn counter-clockwise from that normal is the edge's own direction.
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
     offset = v - base
-    points = np.where(on_corner[:, None], (v + base) / 2.0, v)
-    block_a, block_b = shapes.block_of_vertex[vertex], shapes.block_of_vertex[edge]
-    frames = np.stack([normal, tangent], axis=1)
-    return Contacts(
+    contacts = Contacts(
         features=features,
-        block_a=block_a,
-        block_b=block_b,
-        points=points,
-        frames=frames,
+        block_a=shapes.block_of_vertex[vertex],
+        block_b=shapes.block_of_vertex[edge],
+        points=np.where(on_corner[:, None], (v + base) / 2.0, v),
+        frames=np.stack([normal, tangent], axis=1),
         gaps=_dot(offset, normal),
         slip=_dot(offset, tangent)[:, None],
-        areas=_areas(shapes, block_a, block_b, points, frames) if areas is None else areas,
+        areas=np.zeros(len(features)) if areas is None else areas,
     )
+    return replace(contacts, areas=_areas(shapes, contacts)) if areas is None else contacts
 
 
-def _areas(
-    shapes: Outlines, block_a: np.ndarray, block_b: np.ndarray, points: np.ndarray, frames: np.ndarray
-) -> np.ndarray:
+def _areas(shapes: Outlines, contacts: Contacts) -> np.ndarray:
     """(n,) array [m²]: tributary area of each contact point of the faces between blocks.
 
     Half the distance to the neighbours along the face times the smaller thickness. Open contact points count too: a
     face has its whole length however it has turned.
     """
-    low, high = np.minimum(block_a, block_b).astype(np.int64), np.maximum(block_a, block_b).astype(np.int64)
-    _, first, which = np.unique(low * len(shapes) + high, return_index=True, return_inverse=True)
-    normal, reference = frames[:, 0], frames[first[which.ravel()], 0]
+    _, first, which = np.unique(contacts.pair_keys(), return_index=True, return_inverse=True)
+    normal, reference = contacts.frames[:, 0], contacts.frames[first[which.ravel()], 0]
     across = np.abs(normal[:, 0] * reference[:, 1] - normal[:, 1] * reference[:, 0]) > 0.5
     _, first, face = np.unique(2 * which.ravel() + across, return_index=True, return_inverse=True)
     face = face.ravel()
-    along = np.einsum("ki,ki->k", points, frames[first[face], 1])
+    along = np.einsum("ki,ki->k", contacts.points, contacts.frames[first[face], 1])
     order = np.lexsort((along, face))
     step = np.where(np.diff(face[order]) == 0, np.diff(along[order]), 0.0)
-    length = np.zeros(len(points))
-    length[order] = (np.append(step, 0.0) + np.append(0.0, step)) / 2.0 if len(points) else 0.0
-    return length * np.minimum(shapes.thickness[block_a], shapes.thickness[block_b])
+    length = np.zeros(len(contacts))
+    length[order] = (np.append(step, 0.0) + np.append(0.0, step)) / 2.0 if len(contacts) else 0.0
+    return length * np.minimum(shapes.thickness[contacts.block_a], shapes.thickness[contacts.block_b])
 
 
 def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:

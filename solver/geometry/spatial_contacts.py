@@ -152,8 +152,7 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
     # Other faces are tried where those that oppose each other best do not cover each other.
     facing = pairs[tried]
     resolved = np.zeros(len(facing), dtype=bool)
-    blocks = np.sort(np.stack([block_of_part[facing.i], block_of_part[facing.j]]), axis=0)
-    _, joint = np.unique(blocks[0] * len(widths) + blocks[1], return_inverse=True)
+    _, joint = np.unique(block_of_part[facing.i] * len(widths) + block_of_part[facing.j], return_inverse=True)
     largest = np.zeros(len(facing))
     rounds = chain([(np.arange(len(facing)), facing.face_i, facing.face_j)], facing.other_faces(placed))
     for pair, face_i, face_j in rounds:
@@ -216,13 +215,10 @@ def _without_duplicates(contacts: Contacts, duplicates: np.ndarray, near: float)
     from scipy.spatial import cKDTree
 
     chosen = np.flatnonzero(duplicates)
-    pairs = (
-        cKDTree(contacts.points[chosen]).query_pairs(near, output_type="ndarray") if len(chosen) else np.zeros((0, 2))
-    )
-    first, second = chosen[pairs.astype(np.int64)].T
-    blocks = np.sort(np.stack([contacts.block_a, contacts.block_b], axis=1), axis=1)
+    first, second = chosen[cKDTree(contacts.points[chosen]).query_pairs(near, output_type="ndarray")].T
+    pairs = contacts.pair_keys()
     sense = np.where(contacts.block_a[first] == contacts.block_a[second], 1.0, -1.0)
-    same = (blocks[first] == blocks[second]).all(axis=1)
+    same = pairs[first] == pairs[second]
     same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > 1.0 - 1e-4
     if not same.any():
         return contacts
