@@ -205,20 +205,19 @@ def member_contacts(
     features : (n, 4) int array
         Of :func:`present_members`.
     """
-    number, pushes = features[:, 1], features[:, 2] == 1
+    number, sense = features[:, 1], np.where(features[:, 2] == 1, -1.0, 1.0)
     ends, blocks = tie_ends(ties, assembly, pose)[number], _blocks(ties)[number]
     length = tie_lengths(ends)
     # Of block a: towards block b in tension.
-    along = (ends[:, 1] - ends[:, 0]) / length[:, None] * np.where(pushes, -1.0, 1.0)[:, None]
-    d = assembly.dimension
+    along = (ends[:, 1] - ends[:, 0]) / length[:, None] * sense[:, None]
     return Contacts(
         features=features,
         block_a=blocks[:, 0],
         block_b=blocks[:, 1],
         points=ends[:, 0],
         frames=_frames(along),
-        gaps=np.where(pushes, 1.0, -1.0) * (length - rest[number]),
-        slip=np.zeros((len(features), d - 1)),
+        gaps=-sense * (length - rest[number]),
+        slip=np.zeros((len(features), assembly.dimension - 1)),
         areas=np.zeros(len(features)),
     )
 
