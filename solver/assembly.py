@@ -16,7 +16,7 @@ from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
 from .geometry.shapes import Shapes
-from .geometry.surfaces import SMALLEST_SHAPE_FACTOR, polyhedra_of
+from .geometry.surfaces import SMALLEST_SHAPE_FACTOR, polyhedra_of, refuse_infinite
 from .tolerances import DRAWN_GAP
 from .views import Shown
 
@@ -361,17 +361,17 @@ def _labels(
     if n == 0:
         raise ValueError("an assembly needs at least one block; none was given")
     names = _unique_names([f"block {i}" for i in range(n)] if names is None else list(map(str, names)))
-    roles_array = np.array([FREE] * n if roles is None else list(roles), dtype="<U6")
+    roles = [FREE] * n if roles is None else list(roles)
+    roles_array = np.array(roles, dtype="<U6")
     materials = ("",) * n if materials is None else tuple(map(str, materials))
     for kind, given in (("names", len(names)), ("roles", len(roles_array)), ("materials", len(materials))):
         if given != n:
             raise ValueError(f"{n} {what} but {given} {kind}; give one per block")
     _refuse_half_characters(names, "name")
     _refuse_half_characters(materials, "material")
-    if roles is not None:
-        for name, role in zip(names, roles, strict=True):
-            if role not in ROLES:
-                raise ValueError(f"block '{name}' has role '{role}'; roles are {', '.join(ROLES)}")
+    for name, role in zip(names, roles, strict=True):
+        if role not in ROLES:
+            raise ValueError(f"block '{name}' has role '{role}'; roles are {', '.join(ROLES)}")
     return names, roles_array, materials
 
 
@@ -379,11 +379,7 @@ def _checked_ring(outline: ArrayLike, name: str) -> np.ndarray:
     ring = np.asarray(outline, dtype=float)
     if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3:
         raise ValueError(f"block '{name}' needs an outline of at least three (x, y) corners; its shape is {ring.shape}")
-    if not np.isfinite(ring).all():
-        corner = int(np.flatnonzero(~np.isfinite(ring).all(axis=1))[0])
-        raise ValueError(
-            f"block '{name}': corner {corner} is {ring[corner].tolist()}; coordinates must be finite numbers"
-        )
+    refuse_infinite(ring, name)
     repeated = np.flatnonzero((ring == np.roll(ring, -1, axis=0)).all(axis=1))
     return np.delete(ring, repeated, axis=0) if len(ring) - len(repeated) >= 3 else ring
 

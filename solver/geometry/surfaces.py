@@ -87,12 +87,7 @@ def _checked(solid: Surface, name: str) -> tuple[np.ndarray, list[list[int]]]:
             f"block '{name}' needs at least four (x, y, z) corners and four faces; the shape of its corners is "
             f"{vertices.shape}, and it has {len(faces)} faces"
         )
-    finite = np.isfinite(vertices).all(axis=1)
-    if not finite.all():
-        corner = int(np.flatnonzero(~finite)[0])
-        raise ValueError(
-            f"block '{name}': corner {corner} is {vertices[corner].tolist()}; coordinates must be finite numbers"
-        )
+    refuse_infinite(vertices, name)
     for k, face in enumerate(faces):
         if len(face) > 1 and face[0] == face[-1]:
             face.pop()
@@ -104,6 +99,14 @@ def _checked(solid: Surface, name: str) -> tuple[np.ndarray, list[list[int]]]:
         if len(face) < 3:
             raise ValueError(f"block '{name}': face {k} has {len(face)} corners; a face needs at least three")
     return renumbered(vertices, faces)
+
+
+def refuse_infinite(vertices: np.ndarray, name: str) -> None:
+    """Raise ``ValueError`` for the first corner of a block that is nowhere."""
+    for corner in np.flatnonzero(~np.isfinite(vertices).all(axis=1)).tolist():
+        raise ValueError(
+            f"block '{name}': corner {corner} is {vertices[corner].tolist()}; coordinates must be finite numbers"
+        )
 
 
 def _blocks_of_open_edges(solids: Solids) -> list[int]:
