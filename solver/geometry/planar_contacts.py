@@ -174,12 +174,8 @@ def passed_edges(
     a, b = np.concatenate([i, j]), np.concatenate([j, i])
     owner, position = expand_ranges(counts[a] * counts[b])
     vertex, edge = offsets[a][owner] + position // counts[b][owner], offsets[b][owner] + position % counts[b][owner]
-    heights, places = [], []
-    for corners in (before, after):
-        tangent = _unit(corners[following[edge]] - corners[edge])
-        offset = corners[vertex] - corners[edge]
-        heights.append(offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0])
-        places.append(_dot(offset, tangent))
+    seen = [_seen_from_edges(shapes, corners, vertex, edge) for corners in (before, after)]
+    _, places, heights = zip(*seen, strict=True)
     width = np.minimum(shapes.widths[a], shapes.widths[b])[owner]
     came = shapes.convex_vertex[vertex] & (heights[1] < 0.0) & (heights[0] > heights[1])
     came &= heights[0] >= -PENETRATION_FRACTION * width
@@ -248,13 +244,20 @@ def _is_behind_face(
     following, previous = shapes.next_vertex, shapes.previous_vertex
     inward = _inward(*_flanks(shapes, vertices, vertex[k]))
     for neighbour, shared in ((following[edge[k]], following[edge[k]]), (previous[edge[k]], edge[k])):
-        tangent = _unit(vertices[following[neighbour]] - vertices[neighbour])
-        offset = vertices[vertex[k]] - vertices[neighbour]
-        distance = offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
+        tangent, _, distance = _seen_from_edges(shapes, vertices, vertex[k], neighbour)
         # The block of a corner that came through the neighbouring face lies on that face's side.
         from_neighbour_side = inward[:, 0] * tangent[:, 1] - inward[:, 1] * tangent[:, 0] > 0.0
         through[k] &= ~(shapes.convex_vertex[shared] & from_neighbour_side & (distance > gap[k] + end[k]))
     return through
+
+
+def _seen_from_edges(
+    shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Directions of edges, (n, 2), and how far corners are along and before them, (n,) arrays [m]."""
+    tangent = _unit(vertices[shapes.next_vertex[edge]] - vertices[edge])
+    offset = vertices[vertex] - vertices[edge]
+    return tangent, _dot(offset, tangent), offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
 
 
 def _flanks(shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -274,14 +277,10 @@ def _classified_ends(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Drop corners past the end of their edge, and find those on the corner there."""
     following = shapes.next_vertex
-    start, stop = edge, following[edge]
-    tangent = _unit(vertices[stop] - vertices[start])
-    offset = vertices[vertex] - vertices[start]
-    along = _dot(offset, tangent)
-    gap = offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
+    tangent, along, gap = _seen_from_edges(shapes, vertices, vertex, edge)
     to_stop = shapes.edge_lengths[edge] - along
     at_start = along <= to_stop
-    other = np.where(at_start, start, stop)
+    other = np.where(at_start, edge, following[edge])
     overlap = np.minimum(along, to_stop)
     end = end_zone(shapes, vertex, edge)
     # Directions from the nearer end: of the edge, and of the face over the edge.
