@@ -160,15 +160,6 @@ class Solids(Bodies):
         return Faces(normals, unit(along), points[starts] + np.add.reduceat(arms, starts) / counts[:, None])
 
     @cached_property
-    def _triangles(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners of the triangles that fan out from the first corner of each face, and the solid of each."""
-        counts = np.diff(self.face_offsets) - 2
-        face, position = expand_ranges(counts)
-        first = self.face_offsets[face]
-        which = np.stack([first, first + position + 1, first + position + 2], axis=1)
-        return self.corners[which], self.block_of_face[face]
-
-    @cached_property
     def face_areas(self) -> np.ndarray:
         """(n_faces,) array [m²]."""
         starts, counts = self.face_offsets[:-1], np.diff(self.face_offsets)
@@ -194,10 +185,12 @@ class Solids(Bodies):
     def _integrals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Volumes, centroids, and the second moments about them.
 
-        Sums over tetrahedra between the triangles of the surface and the first vertex of each solid, so that
-        coordinates far from the origin (UTM) lose no digits.
+        Sums over tetrahedra between the triangles that fan out from the first corner of each face and the first vertex
+        of each solid, so that coordinates far from the origin (UTM) lose no digits.
         """
-        triangles, solid = self._triangles
+        face, position = expand_ranges(np.diff(self.face_offsets) - 2)
+        solid, corner = self.block_of_face[face], self.face_offsets[face]
+        triangles = self.corners[np.stack([corner, corner + position + 1, corner + position + 2], axis=1)]
         first = np.searchsorted(solid, np.arange(len(self)))
         origin = self.vertices[self.offsets[:-1]]
         a, b, c = np.moveaxis(self.vertices[triangles] - origin[solid][:, None], 1, 0)
