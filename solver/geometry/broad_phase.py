@@ -32,15 +32,12 @@ def box_pairs(vertices: np.ndarray, offsets: np.ndarray, reach: float | np.ndarr
     """
     low, high = boxes(vertices, offsets)
     low, high = low - reach / 2.0, high + reach / 2.0
-    best = None
+    sweeps = []
     for axis in range(low.shape[1]):
         order = np.argsort(low[:, axis], kind="stable")
         ends = np.searchsorted(low[order, axis], high[order, axis], side="right")
-        counts = np.maximum(ends - np.arange(1, len(order) + 1), 0)
-        if best is None or counts.sum() < best[1].sum():
-            best = (order, counts, axis)
-    assert best is not None
-    order, counts, swept = best
+        sweeps.append((order, np.maximum(ends - np.arange(1, len(order) + 1), 0), axis))
+    order, counts, swept = min(sweeps, key=lambda sweep: int(sweep[1].sum()))
     owner, position = expand_ranges(counts)
     i, j = order[owner], order[owner + 1 + position]
     for axis in range(low.shape[1]):
