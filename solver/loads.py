@@ -132,7 +132,10 @@ class Settlement:
         if self.rotation_centre is not None and self.direction is None:
             object.__setattr__(self, "rotation", float(np.sign(self.rotation)))
         check_steps(self, "settlement")
-        self._check_stops()
+        for stop in self.stops:
+            if not 0.0 <= stop <= self.limit:
+                raise ValueError(f"settlement stop {stop:g} is not between 0 and the limit of {self.limit:g}")
+        object.__setattr__(self, "stops", tuple(sorted(float(stop) for stop in self.stops)))
 
     def _check_vectors(self) -> None:
         """Make numbers of what is given, and unit vectors of directions."""
@@ -175,12 +178,6 @@ class Settlement:
         largest = 1.0 if abs(largest - 1.0) < 1e-12 else largest
         scaled = {name: tuple((motion / largest).tolist()) for name, motion in motions.items()}
         object.__setattr__(self, "profile", scaled)
-
-    def _check_stops(self) -> None:
-        for stop in self.stops:
-            if not 0.0 <= stop <= self.limit:
-                raise ValueError(f"settlement stop {stop:g} is not between 0 and the limit of {self.limit:g}")
-        object.__setattr__(self, "stops", tuple(sorted(float(stop) for stop in self.stops)))
 
     def step_to_stop(self, s: float) -> float:
         """Distance from s to the next stop, infinite after the last; 1e-9 increments before a stop count as on it."""

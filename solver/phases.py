@@ -34,11 +34,8 @@ class PhaseChange:
 
 def removed_before(changes: Sequence[PhaseChange], phase: int, n_blocks: int) -> np.ndarray:
     """(n_blocks,) bool array: blocks that are taken away before a settlement."""
-    removed = np.zeros(n_blocks, dtype=bool)
-    for change in changes:
-        if change.phase == phase and change.removed is not None:
-            removed |= change.removed
-    return removed
+    removed = [change.removed for change in changes if change.phase == phase and change.removed is not None]
+    return np.any([np.zeros(n_blocks, dtype=bool), *removed], axis=0)
 
 
 def loads_in(loads: Loads, changes: Sequence[PhaseChange], phase: int) -> Loads:
