@@ -65,7 +65,7 @@ def check(corners, faces, rotation, scale, most):
 @given(st.sampled_from(["L", "U", "T", "star"]), length, length, length, turn, st.sampled_from([1e-3, 1.0, 1e3]))
 def test_prisms_are_filled_by_few_convex_parts(name, a, b, c, rotation, scale):
     outline, most = outline_of(name, a, b, c)
-    check(*prism(outline, c), rotation, scale, most)
+    check(*prism(outline, 0.0, c), rotation, scale, most)
 
 
 @settings(max_examples=8, deadline=None)
