@@ -55,9 +55,11 @@ class EquilibriumChecks:
         return self._program(place, gap).in_equilibrium()
 
     def is_within_friction(self, place: Place) -> bool:
-        """Whether the forces of a place are within friction, as they are where blocks only turn."""
-        assert place.contacts is not None
-        allowed = self.stepper.friction(place.contacts) * place.forces[:, 0]
+        """Whether the forces of a place are within friction and cohesion, as they are where blocks only turn."""
+        contacts, normal = place.contacts, place.forces[:, 0]
+        assert contacts is not None
+        limits = self.stepper.joint_limits(place, contacts)[1]
+        allowed = self.stepper.friction(contacts) * (normal - limits.least) + limits.cohesion
         return bool((np.linalg.norm(place.forces[:, 1:], axis=1) < allowed + CARRIES).all())
 
     def nearest(self, place: Place, gap: float, reaction: float | None = None, at_rest: bool = False) -> np.ndarray:
