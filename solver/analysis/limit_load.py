@@ -45,17 +45,17 @@ from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, D
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25
 
-#: Non-associative flow: part of the new normal forces in the next program where they have come nearer to those before,
-#: part where they have not, as programs of vaults that go in circles, and programs at most.
-RELAXATION, CAUTIOUS, PROGRAMS = 0.9, 0.5, 300
+#: Non-associative flow: part of the new normal forces in the next program where they hardly depend on the last ones,
+#: and where they do, as in vaults, whose programs go in circles with more; programs at most.
+CONFIDENT, RELAXATION, PROGRAMS = 0.9, 0.5, 300
 
-#: Non-associative flow: programs after which those that do not come nearer follow of so many changes.
-PLAIN_PROGRAMS, REMEMBERED = 15, 6
+#: Non-associative flow: programs after which the next one follows of so many changes.
+PLAIN_PROGRAMS, REMEMBERED = 40, 15
 
 #: Non-associative flow has converged when the multiplier changes by less than programs are solved to, and shear forces
 #: exceed friction by less than this part of the largest normal force; the second in space, where the multiplier is off
-#: by as much.
-FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE = 1e-6, 1e-8
+#: by as much. There rounding may stop it short: then after so many programs that have come no nearer.
+FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE, NO_NEARER = 1e-6, 1e-8, 5
 
 #: Cost of a change of a normal force in the non-associative programs, in multipliers: it only decides between equals.
 #: The second in space, where solutions are interior ones and a smaller cost is lost in their rounding; it is seen in
@@ -335,7 +335,7 @@ class _Problem:
         change_cost = (CHANGE_COST if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
         normals: list[np.ndarray] = []
         answers: list[np.ndarray] = []
-        nearest, least, used, programs = balanced, np.inf, normal, 1
+        nearest, least, used, programs, best_at = balanced, np.inf, normal, 1, 0
         for _ in range(PROGRAMS):
             state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
@@ -345,8 +345,8 @@ class _Problem:
             error = np.inf if state.falls else max(excess, change)
             settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
             if nearest is balanced or settled or error < least:
-                nearest, least, used = state, error, normal
-            if settled:
+                nearest, least, used, best_at = state, error, normal, programs
+            if settled or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
                 break
             normals = [*normals[-REMEMBERED:], normal]
             answers = [*answers[-REMEMBERED:], state.forces[:, 0]]
@@ -354,8 +354,8 @@ class _Problem:
         if least <= FRICTION_EXCESS:
             status = found
         if status is found and not plane:
-            last = self._sliding(used, balanced.unbalanced, 0.0 * change_cost)
-            nearest, programs = replace(nearest, velocity=last.velocity, gap=last.gap), programs + 1
+            free = self._sliding(used, balanced.unbalanced, 0.0 * change_cost)
+            nearest, programs = replace(nearest, velocity=free.velocity, gap=free.gap), programs + 1
         return self.result(nearest, status, "non-associative", programs)
 
     def _sliding(self, normal: np.ndarray, unbalanced: np.ndarray, change_cost: np.ndarray) -> _State:
@@ -436,16 +436,15 @@ class _Problem:
 def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs: int) -> np.ndarray:
     """(n,) array: normal forces to try after those of the last programs and what these answered.
 
-    Anderson (1965), https://doi.org/10.1145/321296.321305, where a relaxation does not converge, as in vaults, whose
-    programs go in circles: what changes of the forces did to their error says which would take it away.
+    Anderson (1965), https://doi.org/10.1145/321296.321305, once a constant relaxation has not converged, as in vaults:
+    what changes of the forces did to their error says which would take it away.
     """
     errors = np.subtract(answers, normals)
-    sizes = np.abs(errors).max(axis=1, initial=0.0)
-    nearer = len(sizes) == 1 or sizes[-1] < sizes[-2]
-    moved = normals[-1] + (RELAXATION if nearer else CAUTIOUS) * errors[-1]
-    if programs > PLAIN_PROGRAMS and not nearer:
+    tried, answered = (float(np.abs(of[-1] - of[-2 % len(of)]).max(initial=0.0)) for of in (normals, answers))
+    moved = normals[-1] + (CONFIDENT if answered < 0.2 * tried else RELAXATION) * errors[-1]
+    if programs > PLAIN_PROGRAMS:
         changes, of_errors = np.diff(normals, axis=0).T, np.diff(errors, axis=0).T
-        moved -= (changes + CAUTIOUS * of_errors) @ np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
+        moved -= (changes + RELAXATION * of_errors) @ np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
     return np.asarray(np.maximum(moved, 0.0))
 
 
