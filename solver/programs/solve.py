@@ -49,7 +49,7 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, v
     """
     rows, columns = program.matrix.shape
     if routes is None:
-        routes = ("crossover", "simplex", "hipo") if vertex and rows <= CROSSOVER_ROWS else LADDER
+        routes = ("crossover", "simplex") if vertex and rows <= CROSSOVER_ROWS else LADDER
         routes = ("simplex", "hipo") if rows <= SIMPLEX_ROWS else routes
     runs = {route: partial(run_highs, program, route) for route in routes}
     if BAND in runs:
