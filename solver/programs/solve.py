@@ -22,6 +22,9 @@ CROSSOVER_ROWS = 1500
 #: Route of our own method for programs whose rows form a band.
 BAND = "band"
 
+#: Routes that give a vertex.
+VERTEX = ("simplex", "simplex without presolve")
+
 #: Routes of large programs, of which the simplex method alone gives a ray where the band does not apply.
 LADDER = (BAND, "hipo", "simplex")
 
@@ -49,8 +52,8 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, v
     """
     rows, columns = program.matrix.shape
     if routes is None:
-        routes = ("crossover", "simplex") if vertex and rows <= CROSSOVER_ROWS else LADDER
-        routes = ("simplex", "hipo") if rows <= SIMPLEX_ROWS else routes
+        routes = ("crossover", *VERTEX) if vertex and rows <= CROSSOVER_ROWS else LADDER
+        routes = (*VERTEX, "hipo") if rows <= SIMPLEX_ROWS else routes
     runs = {route: partial(run_highs, program, route) for route in routes}
     if BAND in runs:
         runs[BAND] = partial(run_band, program)

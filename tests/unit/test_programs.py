@@ -178,7 +178,7 @@ def test_another_route_is_taken_where_the_first_calls_a_wrong_solution_optimal(m
         return wrong(program, route, solution) if route == "simplex" else (solution, status)
 
     monkeypatch.setattr(solve, "run_highs", lies_first)
-    assert solve_lp(random_program(3)).route == "hipo"
+    assert solve_lp(random_program(3)).route == "simplex without presolve"
 
 
 def test_no_route_left_is_an_error_with_the_measures(monkeypatch):
