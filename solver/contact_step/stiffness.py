@@ -58,6 +58,9 @@ class ContactRows:
         starts = np.arange(n * d + 1) * both
         self.matrix = sp.csr_array((self.blocks.ravel(), columns, starts), shape=(n * d, self.n_dof + 1))
         self.transposed = self.matrix.T
+        # Small products of arrays that do not lie in order take three times as long.
+        self.across = np.ascontiguousarray(self.blocks.transpose(0, 2, 1))
+        self.key = self.pairs.astype(np.int64).tobytes()
 
     def __getitem__(self, chosen: np.ndarray) -> ContactRows:
         """Choose some of the contact points, by a mask or their numbers."""
@@ -82,8 +85,7 @@ class ContactRows:
         Singular
         """
         weighted = np.matmul(stiffness, self.blocks)
-        sums, pairs = _over_pairs(self.pairs.astype(np.int64).tobytes())
+        sums, pairs = _over_pairs(self.key)
         of_pairs = _factorisation(pairs, self.places, self.n_dof // self.dof, self.dof)
-        # Small products of arrays that do not lie in order take three times as long.
-        each = np.matmul(np.ascontiguousarray(self.blocks.transpose(0, 2, 1)), weighted)
+        each = np.matmul(self.across, weighted)
         return of_pairs.factorised(sums @ each.reshape(len(each), -1), diagonal)
