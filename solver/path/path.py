@@ -15,7 +15,7 @@ from solver.loads import GRAVITY
 from solver.program.model import Model
 from solver.results.increment import Bonds, Increment, Status
 from solver.ties import TieForces, is_member
-from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, JUMP
+from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, FRICTION_MEMORY, JUMP
 
 from .collapse import MECHANISM, Fall
 from .controls import Controls, Ending
@@ -28,12 +28,15 @@ from .stepping import StepError, Stepper
 #: First, longest and shortest step, as movements of the supports in block sizes; the first is accepted at any error.
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-5, 0.02, 1e-11
 
+#: Part of the movement over which friction follows, below which its error shortens no step: what slips or parts at once
+#: does so however short the steps are.
+AT_ONCE = 0.03
+
 #: Error of a step, in errors aimed for, below which blocks turn and slide evenly, and the longest step there.
 CALM, CALM_STEP = 0.1, 0.05
 
-#: Changes in a step, per relative error of the reaction: of friction bounds, in weights of the structure, and of
-#: movements, in block sizes, as measured on sliding walls.
-LAG_PER_ERROR, TURN_PER_ERROR = 20.0, 2.0
+#: Change of movements in a step, in block sizes, per relative error of the reaction, as measured on sliding walls.
+TURN_PER_ERROR = 2.0
 
 #: Steps tried for an increment before an analysis ends.
 MOST_STEPS = 3000
@@ -99,8 +102,7 @@ class Path:
         self._remove_blocks(np.zeros(0))
         # Of contact points that may carry, in block sizes: viscosity retards joints that close.
         self.closed_gap = max(COMPUTED_GAP, min(CLOSING_GAP, driver.tolerance / self.stepper.unit))
-        self.largest_lag = LAG_PER_ERROR * controls.step_tolerance
-        self.largest_turn = TURN_PER_ERROR * controls.step_tolerance
+        self.tolerance = controls.step_tolerance
         self.disturbed = False
         self.reported, self.failure, self.wedged = -np.inf, "", Place.unloaded(driver.supports(0.0))
 
@@ -338,7 +340,13 @@ class Path:
         if self._may_be_wedged(new, error) and self._supports_locked(place):
             self.wedged = new
             return state, Outcome.LOCKED
-        measure = max(error.lag / self.largest_lag, error.turn / self.largest_turn)
+        works = self._works(place, new, motion)
+        # Beside the work of the supports or the live load, unless that is next to nothing beside the others.
+        driven = max(abs(works[1] + works[2]), self.tolerance * sum(map(abs, works)), 1e-300)
+        of_friction = error.work / driven / self.tolerance
+        if length <= AT_ONCE * min(FRICTION_MEMORY * unit, place.s):
+            of_friction = min(of_friction, 1.0)
+        measure = max(of_friction, error.turn / TURN_PER_ERROR / self.tolerance)
         if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
         if not self._is_on_path(new, error, length, refining):
@@ -346,7 +354,7 @@ class Path:
                 return self._go_back(state, new.s), None
             return replace(state, upper_bound=new.s, refined=True, step=length / 3.0), None
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
-        new = replace(new, s=s, works=self._accumulated_works(place, new, motion))
+        new = replace(new, s=s, works=tuple(np.add(place.works, works).tolist()))
         history = (*state.history[:1], *state.history[1:][-5:], place)
         state = replace(state, place=new, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
@@ -421,8 +429,8 @@ class Path:
         """Whether no movement of the blocks is compatible with that of the supports: the reaction has no bound."""
         return self.model.live is None and bool(np.isneginf(self.checks.bounds(place).low))
 
-    def _accumulated_works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float, float]:
-        """Works of dead and live loads, on supports and of friction so far, with the forces at the end of the step."""
+    def _works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float, float]:
+        """Works of dead and live loads, on supports and of friction in a step, with the forces at its end."""
         model, contacts = self.model, after.contacts
         assert contacts is not None
         live, live_size = model.scaled_live
@@ -430,13 +438,12 @@ class Path:
         resultant = (wrench_matrix(contacts, after.pose, model.length) @ after.forces.ravel()).reshape(motion.shape)
         started, members = self.stepper.measured(contacts, before.pose, before.tie_lengths), is_member(contacts)
         slipped, closed = (contacts.slip - started.slip) / model.length, (contacts.gaps - started.gaps) / model.length
-        done = (
+        return (
             float((model.scaled_load_at(after.pose) * free * motion).sum()),
             after.multiplier * live_size * float((live * free * motion).sum()),
             float((np.where(free, 0.0, resultant) * motion).sum()),
             -float((after.forces[:, 1:] * slipped).sum() + (after.forces[:, 0] * closed)[members].sum()),
         )
-        return tuple(np.add(before.works, done).tolist())
 
     # Places ------------------------------------------------------------------------------------------------------
 

@@ -6,8 +6,9 @@ https://doi.org/10.1029/2000JB900230::
 
     dB/ds = (μ N - B) / ℓ
 
-Coulomb's law with the normal force of the same instant has several solutions where many joints slide; this has one, and
-the limit of short steps exists.
+Within a step the bound is that at its end were the normal forces to stay, so that what it is wrong by is of second
+order in the length of the step. Coulomb's law with the normal force of the same instant has several solutions where
+many joints slide; this has one, and the limit of short steps exists.
 """
 
 from __future__ import annotations
@@ -74,9 +75,8 @@ class StepError:
 
     Attributes
     ----------
-    lag : float
-        Change of the friction bounds of joints at their sliding points, and cohesion that is lost, in weights of the
-        structure.
+    work : float
+        Of friction by which bounds at the end of the step were not what was expected, in units of the program.
     turn : float
         Change of the movement against that of the steps before, in block sizes.
     moved : float
@@ -85,7 +85,7 @@ class StepError:
         Deepest penetration at a contact point that carries, in block sizes.
     """
 
-    lag: float
+    work: float
     turn: float
     moved: float
     penetration: float
@@ -112,6 +112,8 @@ class _StepPoints:
         At the start of the step.
     forces, trial : (n, d) arrays
     followed : (n,) array
+    expected : (n,) array
+        Normal forces of the friction bounds at the end of the step, were all normal forces to stay.
     is_new : (n,) bool array
     friction : (n,) array
     compliance : (n, d) array
@@ -128,6 +130,7 @@ class _StepPoints:
     forces: np.ndarray
     trial: np.ndarray
     followed: np.ndarray
+    expected: np.ndarray
     is_new: np.ndarray
     friction: np.ndarray
     compliance: np.ndarray
@@ -162,7 +165,6 @@ class Stepper:
         self.mortar = Mortar(model)
         self.free = model.assembly.free
         self.weights = viscous_weights(model)
-        self.weight = float(np.linalg.norm(model.scaled_load[self.free, : model.dimension].sum(axis=0)))
         self.lever = driver.lever
         self.unit = model.length / self.lever
         self.programs = 0
@@ -333,7 +335,9 @@ class Stepper:
         s, size = (place.s, 1e-3) if in_time else (place.s + length, length / self.unit)
         start = self.contacts_at(place) if candidates is None else candidates
         place = self.mortar.renamed(place, start)
-        points = self._points(place, start)
+        # A larger share alternates where the normal force falls as the bound grows.
+        share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
+        points = self._points(place, start, share)
         joints, loads = points.joints, 0.0 if in_time else viscosity
         resisting, before = self._resistance(place, length, in_time, viscosity)
         closed = np.inf if in_time or viscosity == 1.0 else EXACT
@@ -346,13 +350,11 @@ class Stepper:
             return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=all_points)
         motion = np.where(free[:, None], self._of_blocks(motion_so_far), place.pose.movement_to(new.pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
-        # A larger share alternates where the normal force falls as the bound grows.
-        share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
-        lag, new = self._arrived(place, replace(new, velocity=velocity), points, left, share)
-        lag += float((joints.cohesion - left.cohesion).sum()) / self.weight
+        new = self._arrived(place, replace(new, velocity=velocity), points, left, share)
+        work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
-        return new, motion / model.lengths, StepError(lag, turn, movement_size, self._penetration(points, new))
+        return new, motion / model.lengths, StepError(work, turn, movement_size, self._penetration(points, new))
 
     def _solved(
         self,
@@ -431,30 +433,30 @@ class Stepper:
         full[self.free] = motion.reshape(-1, full.shape[1]) * self.model.lengths
         return full
 
-    def _arrived(
-        self, place: Place, new: Place, points: _StepPoints, left: JointPoints, share: float
-    ) -> tuple[float, Place]:
-        """Change of the friction bounds of sliding joints, in weights of the structure, and the new place.
-
-        That is with what its points, joints and members have become.
-        """
-        contacts, forces = new.contacts, new.forces
+    def _arrived(self, place: Place, new: Place, points: _StepPoints, left: JointPoints, share: float) -> Place:
+        """The new place with what its points, joints and members have become."""
+        contacts, normal, followed = new.contacts, new.forces[:, 0], points.followed
         assert contacts is not None
-        shear_force, normal = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
-        friction, followed, is_new = points.friction, points.followed, points.is_new
-        allowed = friction * normal + points.joints.cohesion
-        sliding = ((shear_force >= SLIDES * points.bound) | (shear_force > allowed)) & ~is_new
         # In a joint that opens friction vanishes sooner.
         gap = np.maximum(left.beyond_give(contacts.gaps, normal), 0.0)
         shares = np.maximum(share, gap / (gap + OPEN * self.model.length))
         # New contact points have the friction of their normal force at once.
-        after = np.where(is_new, normal, followed + shares * (normal - followed))
+        after = np.where(points.is_new, normal, followed + shares * (normal - followed))
+        lengths = self.members.after(contacts, new.forces, place.tie_lengths)
+        return replace(
+            new, followed=after, tie_lengths=lengths, bonds=self.mortar.bonds(place, points.start, left.left)
+        )
+
+    def _work_in_error(self, points: _StepPoints, new: Place, lost: np.ndarray, size: float) -> float:
+        """Work of friction bounds that are not what was expected, and of lost cohesion (n,)."""
+        assert new.contacts is not None
+        # What slips faster than the supports move does so however short the step is.
+        slip = np.linalg.norm(new.contacts.slip - points.start.slip, axis=1) / self.model.length
+        change = np.where(points.is_new, 0.0, points.friction * (new.followed - points.expected)) - lost
         # What the points of one joint hand to each other does not change its friction.
-        change = np.bincount(contacts.joints()[1], np.where(sliding, friction * (after - followed), 0.0))
-        lengths = self.members.after(contacts, forces, place.tie_lengths)
-        bonds = self.mortar.bonds(place, points.start, left.left)
-        new = replace(new, followed=after, tie_lengths=lengths, bonds=bonds)
-        return float(np.abs(change).sum()) / self.weight, new
+        works = np.bincount(new.contacts.joints()[1], change * np.minimum(slip, size))
+        # Half of it, as bounds depart from what was expected in the course of the step, and joints err to either side.
+        return 0.25 * float(np.abs(works).sum())
 
     def _penetration(self, points: _StepPoints, new: Place) -> float:
         """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""
@@ -463,25 +465,28 @@ class Stepper:
         touches = (new.forces[:, 0] > CARRIES) & ~is_member(new.contacts)
         return -float(gap[touches].min(initial=0.0)) / self.model.length
 
-    def _points(self, place: Place, start: Contacts) -> _StepPoints:
+    def _points(self, place: Place, start: Contacts, share: float) -> _StepPoints:
         """The contact points of a step from a place."""
         forces, trial, followed, is_new = self.transferred(place, start)
         joints, friction = self.mortar.points(place, start), self.friction(start)
         compliance, none = self.compliance(start, joints), np.zeros(len(start))
         # The give of elastic joints and members stays.
         kept = np.where(is_member(start), 0.0, 1.0 - joints.give[:, 0] / compliance[:, 0])
+        # Not all of it in long steps, which would alternate sooner.
+        expected = followed + max(0.0, 1.0 - 2.0 * share) * share * (forces[:, 0] - followed)
+        pulled = np.zeros_like(forces)
         points = _StepPoints(
-            start, forces, trial, followed, is_new, friction, compliance, joints, none, kept, np.zeros_like(forces)
+            start, forces, trial, followed, expected, is_new, friction, compliance, joints, none, kept, pulled
         )
         return self._with_joints(points, joints)
 
     def _with_joints(self, points: _StepPoints, joints: JointPoints) -> _StepPoints:
         """The contact points of a step with what is left of their joints."""
-        bound, pulled = points.friction * points.followed, np.zeros_like(points.forces)
+        bound, pulled = points.friction * points.expected, np.zeros_like(points.forces)
         pulled[:, 0] = joints.tension
         if self.mortar.present:
             # Lost strength takes with it the tension that friction still followed.
-            bound = np.maximum(points.friction * np.maximum(points.followed, -joints.tension) + joints.cohesion, 0.0)
+            bound = np.maximum(points.friction * np.maximum(points.expected, -joints.tension) + joints.cohesion, 0.0)
         return replace(points, joints=joints, bound=bound, pulled=pulled)
 
     @staticmethod
