@@ -182,7 +182,8 @@ def _of_groups(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     def index(count: np.ndarray, total: np.ndarray, n: np.ndarray, s: np.ndarray, squares: np.ndarray) -> np.ndarray:
         mean = s / n
         between = (total**2 / np.maximum(count, 1.0)).sum(axis=-1) / n - mean**2
-        return np.asarray(between / np.maximum(squares / n - mean**2, 1e-300))
+        # Without one run the others may be the same: what rounding leaves of their variance is none.
+        return np.asarray(between / np.maximum(squares / n - mean**2, 1e-14 * squares / n + 1e-300))
 
     n, s, squares = float(len(y)), y.sum(), (y**2).sum()
     whole = float(index(count, total, np.array(n), s, squares))
