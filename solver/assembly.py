@@ -260,11 +260,6 @@ class Assembly(Shown):
         """(n_vertices,) array [m]: in the plane, length of the edge that starts at each vertex."""
         return self.polygons.edge_lengths
 
-    @property
-    def convex_vertex(self) -> np.ndarray:
-        """(n_vertices,) bool array: in the plane, false at re-entrant corners."""
-        return self.polygons.convex_vertex
-
     def outline(self, block: int) -> np.ndarray:
         """(n, 2) array [m]: in the plane, corners of one block, counter-clockwise, before any movement."""
         return self.vertices[self.offsets[block] : self.offsets[block + 1]]

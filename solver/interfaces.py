@@ -199,11 +199,6 @@ class Interfaces:
         alike = self._by_material("friction_coefficient", assembly, block_a, block_b)
         return alike if self.scatter is None else alike * self.scatter.factors(block_a, block_b)
 
-    def strength(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Two (n,) arrays [Pa]: cohesion and compressive strength between the blocks of each pair."""
-        cohesion, compressive = self.values(assembly, block_a, block_b, "cohesion", "compressive_strength")
-        return cohesion, compressive
-
     def values(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray, *names: str) -> list[np.ndarray]:
         """(n,) array of each named attribute of the laws between the blocks of each pair."""
         found = [self._by_material(name, assembly, block_a, block_b) for name in names]

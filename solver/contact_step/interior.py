@@ -131,9 +131,7 @@ class _Iterate:
         normal_target = opening_products / self.normal + self.gap_error
         normal_target[limited] -= yielding_products / self.reserve
         target = scaling.scaled(quotient(slide_products, scaling.scaled_point))
-        slip_target = target[1:] + self.slip_error
-
-        slip_target = np.einsum("ijn,jn->in", self.frames, slip_target)
+        slip_target = np.einsum("ijn,jn->in", self.frames, target[1:] + self.slip_error)
 
         def shear_of(along: np.ndarray) -> np.ndarray:
             return np.concatenate([np.zeros((1, len(self.rough))), np.einsum("ijn,in->jn", self.frames, along)])

@@ -331,8 +331,7 @@ class Path:
         refining = enclosing or place.s < state.refine_until
         length = self._length(state, target)
         try:
-            viscosity = REFINED if refining else 1.0
-            new, motion, error = self.stepper.step(place, length, viscosity=viscosity)
+            new, motion, error = self.stepper.step(place, length, viscosity=REFINED if refining else 1.0)
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))
         if error.penetration > WEDGED and length > FIRST_STEP * unit:
@@ -375,8 +374,7 @@ class Path:
 
     def _may_be_wedged(self, new: Place, error: StepError) -> bool:
         """Whether blocks may be wedged: they penetrate, or their forces exceed all loads."""
-        largest = float(new.forces[:, 0].max(initial=0.0))
-        return error.penetration > WEDGED or largest > 100.0 * self.model.total_load
+        return error.penetration > WEDGED or new.forces[:, 0].max(initial=0.0) > 100.0 * self.model.total_load
 
     def _length(self, state: PathState, target: float) -> float:
         """Length of the step to take [m or rad]."""

@@ -58,7 +58,7 @@ def test_neighbouring_vertices():
     assert (assembly.previous_vertex[assembly.next_vertex] == np.arange(12)).all()
     assert (assembly.block_of_vertex[assembly.next_vertex] == assembly.block_of_vertex).all()
     assert assembly.edge_lengths.tolist() == [1, 1, 1, 1, 3, 3, 1, 2, 1, 2, 1, 3]
-    assert np.flatnonzero(~assembly.convex_vertex).tolist() == [8, 9]
+    assert np.flatnonzero(~assembly.polygons.convex_vertex).tolist() == [8, 9]
 
 
 def test_roles():

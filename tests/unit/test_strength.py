@@ -94,7 +94,7 @@ def test_faces_are_shared_out_among_their_contact_points():
         at = flat & (np.abs(contacts.points[:, 1] - 0.1 * course) < 1e-9)
         assert areas[at].sum() == pytest.approx(bearing * 0.2, rel=1e-9)
     half = solver.Interfaces(solver.InterfaceLaw(), {("brick", "ground"): solver.InterfaceLaw(0.6, 1e3, 1e6)})
-    cohesion, strength = half.strength(wall, contacts.block_a, contacts.block_b)
+    cohesion, strength = half.values(wall, contacts.block_a, contacts.block_b, "cohesion", "compressive_strength")
     on_ground = contacts.points[:, 1] < 1e-9
     assert set(cohesion[on_ground & flat]) == {1e3}
     assert set(strength[~on_ground]) == {np.inf}
