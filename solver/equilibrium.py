@@ -70,28 +70,6 @@ def friction_rays(friction: np.ndarray) -> sp.csc_array:
     return sp.csc_array((values.ravel(), rows.ravel(), np.arange(0, 4 * n + 1, 2)), shape=(2 * n, 2 * n))
 
 
-def with_slack(*columns: sp.csc_array) -> sp.csc_array:
-    """Put the columns of a program side by side, after the first block a unit column of either sign per row.
-
-    Parameters
-    ----------
-    *columns : (m, n_k) sparse arrays, by columns
-
-    Returns
-    -------
-    (m, n_1 + 2 m + n_2 + ...) sparse array
-    """
-    rows = columns[0].shape[0]
-    unit, pointers = np.arange(rows), np.arange(rows + 1)
-    parts = [(columns[0].data, columns[0].indices, columns[0].indptr)]
-    parts += [(np.full(rows, sign), unit, pointers) for sign in (1.0, -1.0)]
-    parts += [(block.data, block.indices, block.indptr) for block in columns[1:]]
-    starts = np.cumsum([0] + [len(data) for data, _, _ in parts])
-    indptr = np.concatenate([[0]] + [start + p[1:] for start, (_, _, p) in zip(starts, parts, strict=False)])
-    data, indices = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-    return sp.csc_array((data, indices, indptr), shape=(rows, len(indptr) - 1))
-
-
 def block_forces(contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
     """Resultant of the contact forces on every block, moments about its centroid.
 

@@ -43,7 +43,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from solver.assembly import Assembly, find_contacts
-from solver.equilibrium import friction_rays, with_slack, wrench_matrix
+from solver.equilibrium import friction_rays, wrench_matrix
 from solver.geometry.contacts import Contacts, matched_contacts
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose, motion_size, moved, moved_vertices, point_velocities, relative_velocities
@@ -51,7 +51,6 @@ from solver.loads import Loads, Settlement
 from solver.path.controls import Ending
 from solver.path.reports import no_equilibrium
 from solver.path.state import PathState, Place
-from solver.program.admissible import UNBALANCED_COST
 from solver.programs.problem import LinearProgram, SolveError, Unbounded
 from solver.programs.solve import solve_lp
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
@@ -74,6 +73,9 @@ from solver.words import counted
 
 #: Programs that close the joints after a step.
 LINEARISATIONS = 10
+
+#: Cost of unbalanced force, against that of the reaction: above the speed of any block per speed of the supports.
+UNBALANCED_COST = 1e4
 
 
 class SupportsLocked(Exception):
@@ -168,7 +170,7 @@ def solve_program(
     rows, n = balance.shape
     program = LinearProgram(
         cost=np.concatenate([rays.T @ distance, np.full(2 * rows, trust / length)]),
-        matrix=with_slack(balance),
+        matrix=sp.hstack([balance, sp.eye_array(rows), -sp.eye_array(rows)], format="csc"),
         lower=-load[free].ravel() - BALANCE_TOLERANCE * total,
         upper=-load[free].ravel() + BALANCE_TOLERANCE * total,
         places=np.repeat(pose.positions[free], 3, axis=0),

@@ -48,11 +48,10 @@ class EquilibriumChecks:
         gap : float
             Of contact points that may carry, in block sizes.
         """
-        if self.model.live is not None:
-            bounds = self.bounds(place, gap)
-            return bounds.in_equilibrium and bounds.high > 0.0
-        self.stepper.programs += 1
-        return self._program(place, gap).in_equilibrium()
+        program = self._program(place, gap)
+        found = program.in_equilibrium()
+        self.stepper.programs += program.programs
+        return found
 
     def is_within_friction(self, place: Place) -> bool:
         """Whether the forces of a place are within friction and cohesion, as they are where blocks only turn."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from solver.equilibrium import friction_rays, with_slack, wrench_matrix
+from solver.equilibrium import friction_rays, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.programs.problem import LinearProgram, Solution, SolveError, Unbounded
@@ -16,9 +16,6 @@ from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, FALLING_FRACTIO
 
 from .model import Model
 from .strength import Admissible, ForceLimits
-
-#: Cost of unbalanced force, against that of the reaction: above the speed of any block per speed of the supports.
-UNBALANCED_COST = 1e4
 
 
 @dataclass(frozen=True)
@@ -31,13 +28,13 @@ class EquilibriumBounds:
         Least sum of unbalanced forces over the total load: zero where an equilibrium exists.
     low, high : float
         Of the reaction [N or N·m], or of the live loads' multiplier; infinite where friction bounds neither; one
-        whose program was not solved is not a number.
+        whose program was not solved is not a number. Without an equilibrium both are the value of ``forces``.
     gap : float
         Largest relative difference of the two objectives of the programs.
     programs : int
     forces : (n_contacts, d) array
         Normal and shear forces of the least reaction or largest multiplier, in units of the program; of another
-        equilibrium where that has no bound or was not found.
+        equilibrium where that has no bound or was not found; nearest to one where none exists.
     other_forces : (n_contacts, d) array, optional
         Those of the other bound, where there is one.
     """
@@ -113,16 +110,16 @@ class StaticProgram:
         if self.live_size > 0.0:
             column = sp.csc_array(live[blocks].reshape(-1, 1))
             columns += [column, -column]
-            objective = np.concatenate([objective, np.zeros(2 * self.rows), [1.0, -1.0]])
+            objective = np.append(objective, [1.0, -1.0])
             self.unit, self.constant = 1.0 / self.live_size, 0.0
         else:
             along = np.zeros(len(free)) if rate is None else (rate / model.lengths).ravel()
-            # Relative to the speed of the supports, as the cost of forces out of balance is.
+            # Relative to the speed of the supports, as the check of a solution is absolute.
             speed = float(np.abs(along).max(initial=0.0)) or 1.0
             along = np.where(free, 0.0, along / speed)
-            objective = np.concatenate([self.rays.T @ (matrix.T @ along), np.zeros(2 * self.rows)])
+            objective = self.rays.T @ (matrix.T @ along)
             self.unit, self.constant = model.force * model.length * speed, float(along @ given)
-        self.objective, self.matrix = objective, with_slack(*columns)
+        self.objective, self.matrix = objective, sp.hstack(columns, format="csc")
         self.places = np.repeat(pose.positions[blocks], model.n_dof, axis=0)
         limited = np.flatnonzero(np.isfinite(most))
         self.reserve = (most - least)[limited]
@@ -139,15 +136,17 @@ class StaticProgram:
             self.places = np.vstack([self.places, places])
 
     def in_equilibrium(self) -> bool:
-        """Whether an equilibrium within friction exists, under some live load where there is one.
-
-        One program: the least sum of unbalanced forces.
+        """Whether an equilibrium within friction exists, with some of the live load where there is one.
 
         Raises
         ------
         SolveError
         """
-        return self.most_balanced()[1] <= FALLING_FRACTION
+        balanced, unbalanced = self.most_balanced()
+        if unbalanced > FALLING_FRACTION or self.live_size == 0.0:
+            return unbalanced <= FALLING_FRACTION
+        most = self.bound(-1.0, balanced)
+        return most is None or self.value(most) > 0.0
 
     def bounds(self) -> EquilibriumBounds:
         """Bound the reaction or the multiplier of all equilibria within friction.
@@ -158,110 +157,97 @@ class StaticProgram:
 
         Notes
         -----
-        Two linear programs over the multipliers of the friction cones' rays, in space two conic programs over the
-        forces in round cones: the least and the largest reaction (or multiplier). The least is that of Portioli &
-        Cascini (2017) at this geometry. Forces out of balance have a cost above that of any mechanism.
+        Linear programs over the multipliers of the friction cones' rays, in space conic programs over the forces in
+        round cones: the least sum of unbalanced forces; where that is none, the least and the largest reaction (or
+        multiplier). The least is that of Portioli & Cascini (2017) at this geometry.
         """
-        # A bound may stay unknown, except that of a pushover.
-        forces_sign = 1.0 if self.live_size == 0.0 else -1.0
-        unknown: set[float] = set()
-        solutions: dict[float, Solution | None] = {}
-        for sign in (1.0, -1.0):
+        balanced, unbalanced = self.most_balanced()
+        if unbalanced > FALLING_FRACTION:
+            value = self.value(balanced)
+            return EquilibriumBounds(unbalanced, value, value, balanced.gap, self.programs, self.forces(balanced))
+        values, found = {}, []
+        for sign in (1.0, -1.0) if self.live_size == 0.0 else (-1.0, 1.0):
+            values[sign] = np.nan
             try:
-                solutions[sign] = self.bound(sign)
+                solution = self.bound(sign, balanced)
             except SolveError:
-                if sign == forces_sign and self.live_size > 0.0:
+                # A bound may stay unknown, except that of a pushover.
+                if sign < 0.0 < self.live_size:
                     raise
-                unknown.add(sign)
-                solutions[sign] = None
-        arbitrary, unbalanced = None, np.inf
-        if solutions[forces_sign] is None and (forces_sign in unknown or solutions[-forces_sign] is None):
-            # Where blocks are wedged neither bound is finite, and others may fall.
-            arbitrary, unbalanced = self.most_balanced()
-        imbalance = {sign: self.unbalanced(solution) for sign, solution in solutions.items() if solution is not None}
-        unbalanced = min([unbalanced, *imbalance.values()])
-        values, gaps = [], [0.0]
-        forces_of: dict[float, np.ndarray] = {}
-        for sign, solution in solutions.items():
-            slack = True
-            if solution is not None and imbalance[sign] > FALLING_FRACTION >= unbalanced:
-                # Forces out of balance cost less than this bound, though an equilibrium exists.
-                slack = False
-                try:
-                    solution = self.bound(sign, slack=False)
-                except SolveError:
-                    unknown.add(sign)
-                    solution = None
-            if solution is None:
-                values.append(np.nan if sign in unknown else -sign * np.inf)
                 continue
-            values.append(self.value(solution, slack))
-            gaps.append(solution.gap)
-            forces_of[sign] = self.forces(solution)
-        if arbitrary is not None:
-            forces_of[0.0] = self.forces(arbitrary)
-        ordered = [forces_of[sign] for sign in (forces_sign, -forces_sign, 0.0) if sign in forces_of]
-        other_forces = ordered[1] if len(ordered) > 1 else None
-        return EquilibriumBounds(unbalanced, values[0], values[1], max(gaps), self.programs, ordered[0], other_forces)
+            values[sign] = -sign * np.inf if solution is None else self.value(solution)
+            found += [] if solution is None else [solution]
+        # Where blocks are wedged neither bound is finite.
+        forces = [self.forces(solution) for solution in found or [balanced]]
+        gap = max(solution.gap for solution in (balanced, *found))
+        return EquilibriumBounds(unbalanced, values[1.0], values[-1.0], gap, self.programs, *forces)
 
-    def bound(self, sign: float, *, slack: bool = True) -> Solution | None:
-        """Least or, by sign, largest value, or 0 for any; with or without unbalanced forces; None without a bound.
+    def bound(self, sign: float, balanced: Solution) -> Solution | None:
+        """Least or, by sign, largest value in equilibrium; None without a bound.
+
+        Parameters
+        ----------
+        sign : float
+        balanced : Solution
+            An equilibrium; the rounding that leaves it out of balance may do so here.
 
         Raises
         ------
         SolveError
         """
-        cost, matrix = sign * self.objective, self.matrix
-        cost[self._slack] = UNBALANCED_COST if sign else 1.0
-        if not slack:
-            cost, matrix = np.delete(cost, self._slack), matrix[:, np.delete(np.arange(len(cost)), self._slack)]
-        self.programs += 1
         try:
-            none = np.zeros_like(self.reserve)
-            if self.d == 3:
-                lower, upper = np.append(-self.load, none), np.append(-self.load, self.reserve)
-                routes = CONIC_ROUTES if sign else CONIC_ROUTES[::-1]
-                return solve_between(cost, matrix, lower, upper, self.friction, 3, routes)
-            lower = np.append(-self.load - self.tolerance, none)
-            upper = np.append(-self.load + self.tolerance, self.reserve)
-            return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, places=self.places))
+            return self._solve(sign * self.objective, self.matrix, self._imbalance(balanced), CONIC_ROUTES)
         except Unbounded:
             return None
 
-    def most_balanced(self) -> tuple[Solution | None, float]:
+    def most_balanced(self) -> tuple[Solution, float]:
         """Find forces of least imbalance, and their unbalanced forces over the total load, 0 where that is rounding.
 
         Raises
         ------
         SolveError
         """
+        unit = sp.eye_array(self.matrix.shape[0], self.rows)
+        matrix = sp.hstack([self.matrix, unit, -unit], format="csc")
+        cost = np.append(np.zeros(self.matrix.shape[1]), np.ones(2 * self.rows))
         try:
-            solution = self.bound(0.0)
+            solution = self._solve(cost, matrix, np.zeros(self.rows), CONIC_ROUTES[::-1])
         except SolveError as error:
             best = error.best
             if best is None:
                 raise
-            if best.violation <= ACCEPTED_ERROR and self.unbalanced(best) <= ACCEPTED_ERROR:
+            if best.violation <= ACCEPTED_ERROR and self._unbalanced(best) <= ACCEPTED_ERROR:
                 return best, 0.0
             # The dual objective bounds the forces out of balance from below, but for its violation along the forces.
             doubt = best.dual_violation * (1.0 + float(np.abs(best.row_dual).max())) * float(np.abs(best.x).sum())
             if best.dual_objective <= 2.0 * best.gap + doubt:
                 raise
-            return best, self.unbalanced(best)
-        return solution, np.inf if solution is None else self.unbalanced(solution)
+            solution = best
+        return solution, self._unbalanced(solution)
 
-    @property
-    def _slack(self) -> slice:
-        return slice(self.n, self.n + 2 * self.rows)
+    def _solve(
+        self, cost: np.ndarray, matrix: sp.csc_array, imbalance: np.ndarray, routes: tuple[str, ...]
+    ) -> Solution:
+        self.programs += 1
+        right, none = -self.load - imbalance, np.zeros_like(self.reserve)
+        if self.d == 3:
+            lower, upper = np.append(right, none), np.append(right, self.reserve)
+            return solve_between(cost, matrix, lower, upper, self.friction, 3, routes)
+        lower, upper = np.append(right - self.tolerance, none), np.append(right + self.tolerance, self.reserve)
+        return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, places=self.places))
 
-    def unbalanced(self, solution: Solution) -> float:
-        """Sum of the unbalanced forces of a solution, over the total load."""
-        return float(solution.x[self._slack].sum()) / self.total
+    def _imbalance(self, balanced: Solution) -> np.ndarray:
+        """(n_rows,) array: unbalanced forces of a solution of least imbalance."""
+        missing, beyond = balanced.x[self.matrix.shape[1] :][: 2 * self.rows].reshape(2, -1)
+        return np.asarray(missing - beyond)
 
-    def value(self, solution: Solution, slack: bool) -> float:
+    def _unbalanced(self, balanced: Solution) -> float:
+        """Sum of the unbalanced forces of a solution of least imbalance, over the total load."""
+        return float(balanced.x[self.matrix.shape[1] :][: 2 * self.rows].sum()) / self.total
+
+    def value(self, solution: Solution) -> float:
         """Reaction [N or N·m] or multiplier of a solution."""
-        objective = self.objective if slack else np.delete(self.objective, self._slack)
-        return (float(objective @ solution.x[: len(objective)]) + self.constant) * self.unit
+        return (float(self.objective @ solution.x[: len(self.objective)]) + self.constant) * self.unit
 
     def forces(self, solution: Solution) -> np.ndarray:
         """(n_contacts, d) array: contact forces of a solution, in units of the program."""

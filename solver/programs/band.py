@@ -139,20 +139,7 @@ class _Method:
     def _start(self, matrix: sp.csc_array) -> _Point:
         """Start from equal multipliers, the rows balanced by their unit columns where they have any."""
         middle = (self.lower + self.upper) / 2.0
-        single = np.flatnonzero(np.diff(matrix.indptr) == 1)
-        row, value = matrix.indices[matrix.indptr[single]], matrix.data[matrix.indptr[single]]
-        # The last one of a row where there are several.
-        units = np.full((2, len(middle)), -1)
-        for unit, of_sign in zip(units, (value > 0.0, value < 0.0), strict=True):
-            unit[row[of_sign]] = single[of_sign]
-        rows = np.flatnonzero((units >= 0).all(axis=0))
-        single = single[np.isin(row, rows)]
         x = np.ones(matrix.shape[1])
-        x[single] = 0.0
-        missing = (middle - matrix @ x)[rows]
-        for unit, sign in zip(units[:, rows], (1.0, -1.0), strict=True):
-            x[unit] = np.maximum(sign * missing, 0.0) / np.abs(matrix.data[matrix.indptr[unit]])
-        x[single] += 0.1
         reduced = np.maximum(self.cost, 0.03)
         multiplier = np.minimum(float(x @ reduced) / len(x) / (middle - self.lower), reduced.max())
         return _Point(

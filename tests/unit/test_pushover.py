@@ -159,3 +159,16 @@ def test_a_load_without_limit_is_no_collapse():
     assert response.stop is solver.Status.LOCKED
     assert response.collapse is None
     assert "no live load of this pattern" in response.message
+
+
+@pytest.mark.slow
+def test_the_end_of_a_pushover_is_told_where_blocks_are_a_little_out_of_balance():
+    opening = {"x": 0.25, "y": 0.0, "width": 0.5, "height": 0.7, "head": "flat arch"}
+    wall = generators.build("wall", {"bricks": 5, "courses": 10, "openings": [opening]})
+    loads = sideways(wall)
+    begins = limit_load(wall, loads=loads, friction_coefficient=0.4).mechanism[:, 0].round(9)
+    control = solver.ControlDisplacement(wall.names[int(begins.argmax())], (1.0, 0.0), increment=0.0055, limit=0.11)
+    response = pushover(wall, control, loads=loads, friction_coefficient=0.4)
+    assert response.stop is solver.Status.COLLAPSED
+    assert response.collapse.displacement == pytest.approx(0.0797, rel=0.01)
+    assert response.path[-1].certificate.equilibrium_residual < 1e-8
