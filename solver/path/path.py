@@ -277,11 +277,11 @@ class Path:
         if not creeps or self.checks.in_equilibrium(place):
             check = self.checks.check(place, reaction)
         carries = check and check.bounds.in_equilibrium and (self.model.live is None or check.bounds.high > 0.0)
-        if check and carries and self.model.live is None:
-            if abs(check.measured - reaction) > self.tolerance * abs(reaction):
-                # Joints that close carry along the path while they are wider open than a computed pose leaves them.
-                wider = self.checks.check(place, reaction, CLOSING_GAP)
-                check = wider if wider.measured == reaction else check
+        off = abs(check.measured - reaction) if check and carries and self.model.live is None else 0.0
+        if off > self.tolerance * abs(reaction):
+            # Joints that close carry along the path while they are wider open than a computed pose leaves them.
+            wider = self.checks.check(place, reaction, CLOSING_GAP)
+            check = wider if wider.measured == reaction else check
         resting = place if carries else self.fall.relaxed(place)
         is_far = resting is not None and self.fall.movements(place, resting).max() > JUMP
         # Blocks that rest far away may have left an equilibrium in a step that was too long.
