@@ -26,14 +26,11 @@ from .state import EquilibriumCheck, Note, PathState, Place
 from .stepping import StepError, Stepper
 
 #: First, longest and shortest step, as movements of the supports in block sizes; the first is accepted at any error.
-FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-5, 0.02, 1e-11
+FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-5, 0.05, 1e-11
 
 #: Part of the movement over which friction follows, below which its error shortens no step: what slips or parts at once
 #: does so however short the steps are.
 AT_ONCE = 0.03
-
-#: Error of a step, in errors aimed for, below which blocks turn and slide evenly, and the longest step there.
-CALM, CALM_STEP = 0.1, 0.05
 
 #: Change of movements in a step, in block sizes, per relative error of the reaction, as measured on sliding walls.
 TURN_PER_ERROR = 2.0
@@ -397,8 +394,7 @@ class Path:
         if grow <= 1.0:
             return max(grow * length, min(length, FIRST_STEP * unit))
         # A step that was cut at its target does not shorten the next.
-        longest = CALM_STEP if measure < CALM else LONGEST_STEP
-        return min(longest * unit, max(step if length < 0.99 * step else 0.0, grow * length))
+        return min(LONGEST_STEP * unit, max(step if length < 0.99 * step else 0.0, grow * length))
 
     def _is_on_path(self, new: Place, error: StepError, length: float, refining: bool) -> bool:
         """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""

@@ -455,8 +455,10 @@ class Stepper:
         change = np.where(points.is_new, 0.0, points.friction * (new.followed - points.expected)) - lost
         # What the points of one joint hand to each other does not change its friction.
         works = np.bincount(new.contacts.joints()[1], change * np.minimum(slip, size))
+        # Differences of friction grow while bounds follow, by e in a step as long as the memory; longer ones miss that.
+        growth = (1.0 + size / FRICTION_MEMORY) ** 3
         # Half of it, as bounds depart from what was expected in the course of the step, and joints err to either side.
-        return 0.25 * float(np.abs(works).sum())
+        return 0.25 * growth * float(np.abs(works).sum())
 
     def _penetration(self, points: _StepPoints, new: Place) -> float:
         """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""
