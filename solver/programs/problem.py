@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from solver.tolerances import ACCEPTED_ERROR, RAY_BALANCE
+from solver.tolerances import ACCEPTED_ERROR
 
 
 class SolveError(RuntimeError):
@@ -171,11 +171,11 @@ class ConicProgram(_Program):
             return
         x = ray / size
         residual, outside = np.abs(self.matrix @ x), self.outside(x)
-        if max(float(residual.max(initial=0.0)), outside) > RAY_BALANCE:
+        if max(float(residual.max(initial=0.0)), outside) > ACCEPTED_ERROR:
             return
         # Its gain has to exceed the cost of its violation by far.
         violation = float(residual.sum()) + outside * len(self.friction)
-        if self.cost @ x < -RAY_BALANCE - 10.0 * violation * float(np.abs(self.cost).max(initial=0.0)):
+        if self.cost @ x < -ACCEPTED_ERROR - 10.0 * violation * float(np.abs(self.cost).max(initial=0.0)):
             raise Unbounded(x)
 
 
