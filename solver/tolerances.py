@@ -17,8 +17,11 @@ AT_LIMIT = 1e-9
 INTERIOR_TOLERANCE = 1e-8
 
 #: Violation of rows, bounds and reduced costs, and relative difference of the two objectives, that our own check of a
-#: solution accepts; violation by a ray of a conic program, its largest number 1.
+#: solution accepts.
 ACCEPTED_ERROR = 1e-7
+
+#: Violation of rows and cones by a ray of a conic program, its largest number 1, that is a proof.
+RAY_BALANCE = 1e-8
 
 # Of balance: fractions of the total load.
 

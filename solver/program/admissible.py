@@ -196,7 +196,8 @@ class StaticProgram:
         SolveError
         """
         try:
-            return self._solve(sign * self.objective, self.matrix, self._imbalance(balanced), CONIC_ROUTES)
+            missing, beyond = self._imbalance(balanced)
+            return self._solve(sign * self.objective, self.matrix, missing - beyond, CONIC_ROUTES)
         except Unbounded:
             return None
 
@@ -237,13 +238,12 @@ class StaticProgram:
         return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, places=self.places))
 
     def _imbalance(self, balanced: Solution) -> np.ndarray:
-        """(n_rows,) array: unbalanced forces of a solution of least imbalance."""
-        missing, beyond = balanced.x[self.matrix.shape[1] :][: 2 * self.rows].reshape(2, -1)
-        return np.asarray(missing - beyond)
+        """(2, n_rows) array: unbalanced forces of either sense of a solution of least imbalance."""
+        return balanced.x[self.matrix.shape[1] :][: 2 * self.rows].reshape(2, -1)
 
     def _unbalanced(self, balanced: Solution) -> float:
         """Sum of the unbalanced forces of a solution of least imbalance, over the total load."""
-        return float(balanced.x[self.matrix.shape[1] :][: 2 * self.rows].sum()) / self.total
+        return float(self._imbalance(balanced).sum()) / self.total
 
     def value(self, solution: Solution) -> float:
         """Reaction [N or N·m] or multiplier of a solution."""

@@ -7,8 +7,9 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import lsqr
 
-from solver.tolerances import ACCEPTED_ERROR
+from solver.tolerances import ACCEPTED_ERROR, RAY_BALANCE
 
 
 class SolveError(RuntimeError):
@@ -170,12 +171,17 @@ class ConicProgram(_Program):
         if not (np.isfinite(size) and size > 0.0):
             return
         x = ray / size
+        # What it is out of balance by is taken from its larger forces.
+        weight = np.abs(x)
+        weight[: self.in_cones] = np.repeat(x[: self.in_cones : self.size], self.size)
+        weighted = self.matrix @ sp.diags_array(weight)
+        x = x - weight * lsqr(weighted, self.matrix @ x, atol=1e-6, btol=1e-6)[0]
         residual, outside = np.abs(self.matrix @ x), self.outside(x)
-        if max(float(residual.max(initial=0.0)), outside) > ACCEPTED_ERROR:
+        if max(float(residual.max(initial=0.0)), outside) > RAY_BALANCE:
             return
         # Its gain has to exceed the cost of its violation by far.
         violation = float(residual.sum()) + outside * len(self.friction)
-        if self.cost @ x < -ACCEPTED_ERROR - 10.0 * violation * float(np.abs(self.cost).max(initial=0.0)):
+        if self.cost @ x < -RAY_BALANCE - 10.0 * violation * float(np.abs(self.cost).max(initial=0.0)):
             raise Unbounded(x)
 
 
