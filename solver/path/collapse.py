@@ -71,7 +71,7 @@ class Fall:
             Of the fastest block, in units of √(block size · g).
         """
         # In units of √(block size / g).
-        place, time, idle = replace(place, velocity=None), 0.02, 0
+        place, time, idle = replace(place, velocity=None), 0.01, 0
         for _ in range(TIME_STEPS):
             try:
                 new, motion, error = self.stepper.step(place, time, in_time=True)

@@ -333,7 +333,9 @@ class Path:
         refining = enclosing or place.s < state.refine_until
         length = self._length(state, target)
         try:
-            new, motion, error = self.stepper.step(place, length, viscosity=REFINED if refining else 1.0)
+            new, motion, error = self.stepper.step(
+                place, length, viscosity=REFINED if refining else 1.0, exact=refining or place.s + length >= target
+            )
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))
         if error.penetration > WEDGED and length > FIRST_STEP * unit:

@@ -303,6 +303,7 @@ class Stepper:
         *,
         in_time: bool = False,
         viscosity: float = 1.0,
+        exact: bool = False,
         candidates: Contacts | None = None,
     ) -> tuple[Place, np.ndarray, StepError]:
         """Take one step of the driver, or one in time with the supports at rest.
@@ -316,6 +317,8 @@ class Stepper:
             The supports are fixed, and blocks out of balance move against their inertia: M/h² for the viscosity.
         viscosity : float
             Times the model's; and the imperfection times the model's.
+        exact : bool
+            Where nothing slides, all that joints give is taken back in this step, and nothing of it left to the next.
         candidates : Contacts, optional
             Contact points of the step; by default those at the place.
 
@@ -340,14 +343,14 @@ class Stepper:
         points = self._points(place, start, share)
         joints, loads = points.joints, 0.0 if in_time else viscosity
         resisting, before = self._resistance(place, length, in_time, viscosity)
-        closed = np.inf if in_time or viscosity == 1.0 else EXACT
+        closed = np.inf if in_time or viscosity == 1.0 else EXACT, EXACT if exact else np.inf
         new, points, left, motion_so_far = self._solved(place, points, s, size, loads, resisting, before, closed)
         if not np.isfinite(motion_so_far).all():
             raise NotSolved("the movement is not finite")
         movement_size = float(np.abs(motion_so_far).max(initial=0.0))
         all_points = self._with_missed(start, place, new.pose, movement_size)
         if len(all_points) > len(start):
-            return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=all_points)
+            return self.step(place, length, in_time=in_time, viscosity=viscosity, exact=exact, candidates=all_points)
         motion = np.where(free[:, None], self._of_blocks(motion_so_far), place.pose.movement_to(new.pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
         new = self._arrived(place, replace(new, velocity=velocity), points, left, share)
@@ -365,7 +368,7 @@ class Stepper:
         loads: float,
         resisting: np.ndarray,
         before: np.ndarray,
-        closed: float,
+        closed: tuple[float, float],
     ) -> tuple[Place, _StepPoints, JointPoints, np.ndarray]:
         """The place at the end of a step, before joints and members have given, and the movement (n_dof,) to it.
 
@@ -376,8 +379,11 @@ class Stepper:
         guess: np.ndarray | None = points.trial
         live, live_size = model.scaled_live
         multiplier = place.multiplier * live_size
-        motion_so_far, before_step = np.zeros_like(before), np.column_stack([points.kept * forces[:, 0], forces[:, 1:]])
-        pose = self._with_supports(place.pose, supports)
+        before_step = np.column_stack([points.kept * forces[:, 0], forces[:, 1:]])
+        # Linearised where blocks come to that go on as before: what that is wrong by, not all they move, is squared.
+        # In time, what lands would be behind what it lands on.
+        motion_so_far = before if loads > 0.0 else np.zeros_like(before)
+        pose = self._with_supports(moved(place.pose, self._of_blocks(motion_so_far)), supports)
         contacts = self.measured(start, pose, place.tie_lengths)
         number = 0
         while True:
@@ -501,16 +507,16 @@ class Stepper:
         predicted: np.ndarray,
         forces: np.ndarray,
         points: _StepPoints,
-        closed: float,
+        closed: tuple[float, float],
     ) -> float:
         """Errors of the gaps of contact points that carry, and of what was predicted of them, over what is accepted."""
         gap = points.joints.beyond_give(contacts.gaps) / self.model.length
         carries = np.abs(forces[:, 0]) > CARRIES
         touches = carries & ~is_member(contacts)
         slides = touches & (forces[:, 0] > 0.0) & (np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * points.bound)
-        exact = EXACT_SLIDING if slides.any() else EXACT
+        exact, most = (EXACT_SLIDING, closed[0]) if slides.any() else (EXACT, closed[1])
         apart = (gap + points.joints.give[:, 0] * forces[:, 0])[touches]
-        return max(self._largest(apart) / closed, self._largest((gap - predicted)[carries]) / exact)
+        return max(self._largest(apart) / most, self._largest((gap - predicted)[carries]) / exact)
 
     def _load(self, pose: Pose, imperfection: float) -> np.ndarray:
         """(n_free n_dof,) array: loads on the free blocks at a pose, with so many times the imperfection."""
