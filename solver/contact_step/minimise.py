@@ -10,9 +10,10 @@ from .factors import Singular, Solve
 from .interior import BALANCED, interior_point
 from .problem import ContactProblem, NotSolved, StepSolution
 
-#: Factorisations of Newton's method, and force out of balance, in block weights, beyond which it would take more: the
-#: interior method, which takes 8 to 14 wherever it starts, takes over.
-NEWTON_FACTORISATIONS, NEAR = 12, 10.0
+#: Factorisations of Newton's method, and force out of balance, in block weights, were the blocks to go on as before or
+#: after the first one, beyond which it would take more: the interior method, which takes 8 to 14 wherever it starts,
+#: takes over.
+NEWTON_FACTORISATIONS, NEAR = 12, 20.0
 
 #: Slopes of the program along a step of Newton's method that are computed at most.
 SEARCHES = 20
@@ -48,8 +49,10 @@ def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplie
 def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float) -> tuple[StepSolution | None, int]:
     """Semismooth Newton steps from trial forces: the solution, None where they lead too far, and factorisations."""
     motion = np.zeros_like(problem.load)
-    # The first linear problem is that of the given trial forces, at the start.
     start, from_start = problem.trial(motion), trial is None
+    if not from_start and np.abs(problem.unbalanced(motion, problem.projected(start), multiplier)).max() > NEAR:
+        return None, 0
+    # The first linear problem is that of the given trial forces, at the start.
     trial = start if trial is None else trial
     stiffness = problem.stiffness(trial)
     forces = problem.projected(trial) + np.einsum("nij,nj->ni", stiffness, (start - trial) * problem.compliance)
