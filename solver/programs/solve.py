@@ -26,7 +26,7 @@ BAND = "band"
 VERTEX = ("simplex", "simplex without presolve")
 
 #: Routes of large programs, of which the simplex method alone gives a ray where the band does not apply.
-LADDER = (BAND, "hipo", "simplex")
+LADDER = (BAND, "hipo", *VERTEX)
 
 #: Routes of conic programs; whether an equilibrium exists is found sooner by the last first.
 CONIC_ROUTES = tuple(ROUTES)

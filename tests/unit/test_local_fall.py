@@ -1,6 +1,8 @@
 """A light piece that falls and is caught: the path goes on; what nothing catches is a collapse."""
 
+import importlib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -94,3 +96,18 @@ def test_a_run_resumes_from_a_checkpoint_before_or_after_a_snap():
         rest = list(settlement_increments(assembly, (TILT,), resume=whole[k].checkpoint, **given))
         assert [i.notes for i in rest] == [i.notes for i in whole[k + 1 :]]
         assert [i.pose.rotations.tobytes() for i in rest] == [i.pose.rotations.tobytes() for i in whole[k + 1 :]]
+
+
+@pytest.mark.slow
+def test_friction_that_has_yet_to_follow_holds_nothing_up(monkeypatch):
+    """Stones that friction bounds hold back come to rest a hundredth of their size farther on, and do not fall."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "benchmarks"))
+    wall = importlib.import_module("convergence_walls").WALLS["rubble 160"]()
+    response = solver.settle(
+        wall.assembly,
+        replace(wall.settlement, increment=wall.settlement.increment / 4.0),
+        interfaces=solver.Interfaces(solver.InterfaceLaw(wall.friction)),
+        loads=wall.loads,
+        controls=solver.Controls(falling_frames=0),
+    )
+    assert response.stop is solver.Status.LIMIT_REACHED
