@@ -37,11 +37,12 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
+from solver import tolerances
 from solver.assembly import Assembly, find_contacts
 from solver.equilibrium import friction_rays, wrench_matrix
 from solver.geometry.contacts import Contacts, matched_contacts
@@ -57,25 +58,16 @@ from solver.results.certificate import Certificate, carrying_gap, friction_exces
 from solver.results.increment import Increment, State, Status, carries, used_up
 from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse
-from solver.tolerances import (
-    ACCEPTED_ERROR,
-    AT_LIMIT,
-    BALANCE_TOLERANCE,
-    CARRYING_FRACTION,
-    COMPUTED_GAP,
-    FALLING_FRACTION,
-    FARTHEST_FALL,
-    FEASIBILITY_TOLERANCE,
-    GEOMETRY_TOLERANCE,
-    OVERLAP,
-)
 from solver.words import counted
 
 #: Programs that close the joints after a step.
 LINEARISATIONS = 10
 
-#: Cost of unbalanced force, against that of the reaction: above the speed of any block per speed of the supports.
+#: Cost of unbalanced force beside the reaction: above the speed of any block per speed of the supports.
 UNBALANCED_COST = 1e4
+
+#: Blocks, the laws of their joints, and the (n_blocks, 3) loads on them [N, N, N·m].
+Inputs = tuple[Assembly, Interfaces, np.ndarray]
 
 
 class SupportsLocked(Exception):
@@ -90,32 +82,15 @@ class _NoEquilibrium(Exception):
     """No forces balance the loads at a geometry; the solution has the motion of the blocks that fall."""
 
     def __init__(self, solution: ProgramSolution) -> None:
-        super().__init__("no equilibrium")
         self.solution = solution
-
-
-class Inputs(NamedTuple):
-    """Blocks, the laws of their joints, and the (n_blocks, 3) loads on them [N, N, N·m]."""
-
-    assembly: Assembly
-    interfaces: Interfaces
-    load: np.ndarray
 
 
 @dataclass(frozen=True)
 class ProgramSolution:
-    """Solution of a program.
+    """Solution of a program; the velocity of its state are the displacements.
 
-    Attributes
-    ----------
-    state : State
-        Forces, and as velocity the displacements in the program: of the supports as given, of the free blocks the dual
-        variables of their equilibrium.
-    touching : (n_contacts,) bool array
-        Points with N + g = μ |T + d|, whether or not they carry force.
-    balanced : bool
-        Whether the forces are in equilibrium with the loads. If not, the displacements are those of a fall.
-    certificate : Certificate
+    Points ``touching``, (n_contacts,) bool array, have N + g = μ |T + d|, with or without force. Unless the forces are
+    ``balanced`` with the loads, the displacements are those of a fall.
     """
 
     state: State
@@ -131,10 +106,6 @@ def solve_program(
 
     Parameters
     ----------
-    inputs : Inputs
-    pose : Pose
-    contacts : Contacts
-        At the pose.
     gaps : (n_contacts, 2) array [m]
         Gap function and drift of each point; one whose gap is infinite takes no part.
     supports : (n_blocks, 3) array [m, m, rad]
@@ -145,9 +116,8 @@ def solve_program(
     Raises
     ------
     SupportsLocked
-        Where the static form has no minimum: no displacements of the blocks are compatible with those of the supports.
+        Where no displacements of the blocks are compatible with those of the supports.
     SolveError
-        If no method gives a solution that passes its check.
 
     Notes
     -----
@@ -164,21 +134,21 @@ def solve_program(
     friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
     takes_part = np.isfinite(gaps[:, 0])
     rays, wrench = friction_rays(friction)[:, np.repeat(takes_part, 2)], wrench_matrix(contacts, pose, length)
-    rounded = np.where(takes_part[:, None] & (np.abs(gaps) >= FEASIBILITY_TOLERANCE * length), gaps, 0.0) / length
-    distance = rounded.ravel() + wrench.T @ (supports / units).ravel()
+    wide = takes_part[:, None] & (np.abs(gaps) >= tolerances.FEASIBILITY_TOLERANCE * length)
+    distance = np.where(wide, gaps, 0.0).ravel() / length + wrench.T @ (supports / units).ravel()
     balance = sp.csc_array(sp.csr_array(wrench)[np.repeat(free, 3)] @ rays)
     rows, n = balance.shape
     program = LinearProgram(
         cost=np.concatenate([rays.T @ distance, np.full(2 * rows, trust / length)]),
         matrix=sp.hstack([balance, sp.eye_array(rows), -sp.eye_array(rows)], format="csc"),
-        lower=-load[free].ravel() - BALANCE_TOLERANCE * total,
-        upper=-load[free].ravel() + BALANCE_TOLERANCE * total,
+        lower=-load[free].ravel() - tolerances.BALANCE_TOLERANCE * total,
+        upper=-load[free].ravel() + tolerances.BALANCE_TOLERANCE * total,
         places=np.repeat(pose.positions[free], 3, axis=0),
     )
     try:
         solution = solve_lp(program)
     except Unbounded as ray:
-        carrying = carries((rays @ ray.x[:n]).reshape(-1, 2), CARRYING_FRACTION)
+        carrying = carries((rays @ ray.x[:n]).reshape(-1, 2), tolerances.CARRYING_FRACTION)
         blocks = np.unique(np.concatenate([contacts.block_a[carrying], contacts.block_b[carrying]]))
         names = [f"'{assembly.names[i]}'" for i in blocks if free[i]]
         shown = ", ".join(names[:6]) + (" ..." if len(names) > 6 else "")
@@ -191,7 +161,7 @@ def solve_program(
     displacements[free] = -solution.row_dual.reshape(-1, 3)
     slack = rays.T @ (distance + wrench.T @ displacements.ravel())
     touching = np.zeros(len(contacts), dtype=bool)
-    touching[takes_part] = slack.reshape(-1, 2).min(axis=1) <= AT_LIMIT
+    touching[takes_part] = slack.reshape(-1, 2).min(axis=1) <= tolerances.AT_LIMIT
     motion = supports + displacements * units
     on_supports = np.where(free[:, None], 0.0, resultant) * force * length / units
     relative = relative_velocities(contacts, pose, motion)
@@ -204,38 +174,30 @@ def solve_program(
         duality_gap=solution.gap,
         kinematic_violation=float(np.maximum(-slack, 0.0).max(initial=0.0)),
     )
-    balanced = bool(solution.x[n:].max(initial=0.0) <= FALLING_FRACTION * total)
+    balanced = bool(solution.x[n:].max(initial=0.0) <= tolerances.FALLING_FRACTION * total)
     return ProgramSolution(state, touching, balanced, certificate)
 
 
 def joint_errors(contacts: Contacts, solution: ProgramSolution) -> tuple[float, np.ndarray]:
-    """Measure gaps and drift of the joints after the exact motion that follows a program.
-
-    Parameters
-    ----------
-    contacts : Contacts
-        After the motion.
-    solution : ProgramSolution
+    """Measure gaps and drift of the joints at their contacts after the exact motion that follows a program.
 
     Returns
     -------
     largest : float [m]
         Deepest penetration, largest gap of a point that carried force, or largest drift of one that stuck, too.
     gaps : (n_contacts, 2) array [m]
-        Gap function and drift of each point, for the next program. Where slip leaves a part q of a gap g again, the
-        gap function is g / (1 - q), which closes it at once. New points have no drift.
+        For the next program; where slip leaves a part q of a gap g again, the gap is g / (1 - q).
     """
     before, gap = solution.state, contacts.gaps
     place, same = matched_contacts(contacts, before.contacts)
     drift = contacts.slip[:, 0] - before.contacts.slip[place, 0] - before.displacements[place, 1]
-    carried = same & carries(before.forces, CARRYING_FRACTION)[place]
+    carried = same & carries(before.forces, tolerances.CARRYING_FRACTION)[place]
     sticking = carried & ~used_up(before.forces, before.friction)[place]
-    open_by = np.abs(gap[carried]).max(initial=0.0)
-    largest = max(open_by, np.abs(drift[sticking]).max(initial=0.0), -gap.min(initial=0.0))
+    errors = np.concatenate([np.abs(gap[carried]), np.abs(drift[sticking]), -gap])
     earlier = before.contacts.gaps[place]
     repeated = same & solution.touching[place] & (gap > 0.0) & (gap < earlier)
     part = np.divide(gap, earlier, out=np.zeros_like(gap), where=repeated)
-    return float(largest), np.column_stack([gap / (1.0 - 0.999 * part), np.where(same, drift, 0.0)])
+    return float(errors.max(initial=0.0)), np.column_stack([gap / (1.0 - 0.999 * part), np.where(same, drift, 0.0)])
 
 
 @dataclass(frozen=True)
@@ -252,8 +214,8 @@ class _Phase:
     """One settlement, phase ``number``, from the pose ``start``."""
 
     def __init__(self, inputs: Inputs, phase: Settlement, number: int, start: Pose) -> None:
-        self.inputs, self.assembly = inputs, inputs.assembly
-        self.phase, self.number, self.start, self.programs = phase, number, start, 0
+        self.inputs, self.assembly, self.phase, self.number = inputs, inputs[0], phase, number
+        self.start, self.programs = start, 0
         points, block = moved_vertices(self.assembly, start), self.assembly.block_of_vertex
         #: Largest displacement of a support per unit of s: 1 m/m where it only travels.
         self.lever = float(np.hypot(*point_velocities(points, block, start, self.rate(0.0)).T).max())
@@ -261,7 +223,7 @@ class _Phase:
         #: Largest gap [m] that one program may close, largest displacement [m] in it, largest gap [m] that may be left.
         self.reach = max(min(4.0 * movement, self.length / 2.0), self.length / 4.0)
         self.trust = max(self.length, 10.0 * movement)
-        self.gap_left = max(1e-2 * movement, COMPUTED_GAP * self.length)
+        self.gap_left = max(1e-2 * movement, tolerances.COMPUTED_GAP * self.length)
         self.tolerance = float(phase.tolerance or phase.increment / 100.0) * (1.0 + 1e-9)
 
     def contacts(self, pose: Pose) -> Contacts:
@@ -276,15 +238,15 @@ class _Phase:
         """Solve a program, by default of the gaps at the pose, with the supports fixed."""
         self.programs += 1
         gaps = np.column_stack([contacts.gaps, np.zeros(len(contacts))])
-        default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.inputs.load), "trust": self.trust}
+        default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.inputs[2]), "trust": self.trust}
         arguments = default | arguments
         try:
             return solve_program(self.inputs, pose, contacts, **arguments)
         except SupportsLocked:
             # Drawings and programs are off by as much; blocks that are wedged cannot give way to it.
-            is_small = np.abs(arguments["gaps"]) < ACCEPTED_ERROR * self.length
+            is_small = np.abs(arguments["gaps"]) < tolerances.ACCEPTED_ERROR * self.length
             arguments["gaps"] = np.where(is_small, 0.0, arguments["gaps"])
-            return solve_program(self.inputs, pose, contacts, **arguments)
+        return solve_program(self.inputs, pose, contacts, **arguments)
 
     def rate(self, s: float) -> np.ndarray:
         """Give the (n_blocks, 3) velocity of the supports per unit of s."""
@@ -293,8 +255,7 @@ class _Phase:
     def evaluate(self, s: float, pose: Pose) -> _Equilibrium:
         """Read forces and velocities at a pose: the program of a vanishing step, of closed joints only."""
         contacts, rate = self.contacts(pose), self.rate(s)
-        gaps = np.zeros((len(contacts), 2))
-        gaps[contacts.gaps > self.gap_left, 0] = np.inf
+        gaps = np.column_stack([np.where(contacts.gaps > self.gap_left, np.inf, 0.0), np.zeros(len(contacts))])
         try:
             solution = self.solve(pose, contacts, supports=rate, gaps=gaps, trust=UNBALANCED_COST * self.lever)
         except SupportsLocked:
@@ -318,12 +279,12 @@ class _Phase:
         """
         pose = first
         for number in range(LINEARISATIONS + 1):
-            far = self.size(first.movement_to(pose)) > FARTHEST_FALL * self.length
+            far = self.size(first.movement_to(pose)) > tolerances.FARTHEST_FALL * self.length
             if far or not solution.balanced:
                 raise _NoEquilibrium(solution)
             contacts, last = self.contacts(pose), number == LINEARISATIONS
             largest, gaps = joint_errors(contacts, solution)
-            if largest <= (self.gap_left if last else GEOMETRY_TOLERANCE * self.length):
+            if largest <= (self.gap_left if last else tolerances.GEOMETRY_TOLERANCE * self.length):
                 equilibrium = self.evaluate(s, pose)
                 if equilibrium.solution.balanced:
                     self.refuse_overlap(pose)
@@ -343,7 +304,7 @@ class _Phase:
 
     def refuse_overlap(self, pose: Pose) -> None:
         """Raise _JointsOpen where a free block has come into another, contact points or not."""
-        assembly, deepest = self.assembly, OVERLAP * float(self.assembly.widths.min())
+        assembly, deepest = self.assembly, tolerances.OVERLAP * float(self.assembly.widths.min())
         for a, b, depth in zip(*assembly.shapes.overlaps(moved_vertices(assembly, pose), deepest), strict=True):
             if assembly.free[a] or assembly.free[b]:
                 raise _JointsOpen(f"block '{assembly.names[a]}' came {depth:.3g} m into block '{assembly.names[b]}'")
@@ -386,8 +347,8 @@ class _Phase:
                 # The last equilibrium is reported, too, and the step from it repeated, as a resumed path does.
                 yield self.increment(current, step, upper_bound)
                 last = current.s
-        message = f"the settlement reached its limit of {phase.limit:g} {phase.unit}"
-        return Ending(Status.LIMIT_REACHED, message), current.pose
+        words = f"the settlement reached its limit of {phase.limit:g} {phase.unit}"
+        return Ending(Status.LIMIT_REACHED, words), current.pose
 
     def next_report(self, s: float) -> float:
         """Give the next settlement that is reported: a multiple of the increment, a stop, or the limit."""
@@ -405,16 +366,13 @@ class _Phase:
 
     def reported(self, solution: ProgramSolution, s: float, reaction: float, status: Status) -> Increment:
         """Report a program, and how many were solved since the last report."""
-        programs, self.programs = self.programs, 0
-        certificate, number = solution.certificate, self.number
-        return Increment(s, reaction, number, 0.0, reaction, certificate, status, programs, 0.0, solution.state)
+        n, self.programs, proof = self.programs, 0, solution.certificate
+        return Increment(s, reaction, self.number, 0.0, reaction, proof, status, n, 0.0, solution.state)
 
-    def collapse(
-        self, current: _Equilibrium, upper_bound: float, solution: ProgramSolution
-    ) -> tuple[Increment, Ending]:
+    def collapse(self, current: _Equilibrium, bound: float, solution: ProgramSolution) -> tuple[Increment, Ending]:
         """Give the fall and the collapse, from the program without equilibrium beyond the last one."""
-        fall = self.reported(solution, upper_bound, 0.0, Status.FALLING)
-        bracket, motion = (current.s, upper_bound), solution.state.velocity
+        fall = self.reported(solution, bound, 0.0, Status.FALLING)
+        bracket, motion = (current.s, bound), solution.state.velocity
         mechanism, words = motion / self.size(motion), str(mechanism_of(self.assembly, fall))
         collapse = Collapse(sum(bracket) / 2.0, bracket, current.reaction, mechanism, self.phase.unit, words)
         return fall, Ending(Status.COLLAPSED, str(collapse), collapse)
@@ -427,17 +385,9 @@ def linear_program_increments(
     loads: Loads,
     resume: PathState | None = None,
 ) -> Generator[Increment, None, Ending]:
-    """Yield the increments of settlements by the paper's linear programs; return how they ended.
+    """Yield the increments of settlements in the plane by the paper's linear programs; return how they ended.
 
-    Parameters
-    ----------
-    assembly : Assembly
-        In the plane.
-    phases : sequence of Settlement
-    interfaces : Interfaces
-    loads : Loads
-    resume : PathState, optional
-        Of an increment that such a loop has yielded, with the same other arguments: those after it follow bit for bit.
+    From a ``resume``, the checkpoint of an increment with the same other arguments, those after it follow bit for bit.
 
     Raises
     ------
@@ -450,7 +400,7 @@ def linear_program_increments(
     first, pose = (0, Pose.initial(assembly)) if resume is None else (resume.phase, resume.start)
     ending = Ending(Status.LIMIT_REACHED)
     for number, phase in enumerate(phases[first:], start=first):
-        path, reported = _Phase(Inputs(assembly, interfaces, load), phase, number, pose), resume is not None
+        path, reported = _Phase((assembly, interfaces, load), phase, number, pose), resume is not None
         step, upper_bound = phase.increment, np.inf
         try:
             if resume is not None:
