@@ -334,7 +334,7 @@ class Path:
         length = self._length(state, target)
         try:
             new, motion, error = self.stepper.step(
-                place, length, viscosity=REFINED if refining else 1.0, exact=refining or place.s + length >= target
+                place, length, viscosity=REFINED if refining else 1.0, exact=refining or length == target - place.s
             )
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))

@@ -38,6 +38,7 @@ def test_every_tolerance_stands_in_one_place_and_is_used():
             continue
         tree = ast.parse(path.read_text(encoding="utf-8"))
         used |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+        used |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
         stored = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
         if stored & names:
             elsewhere[path.name] = stored & names
