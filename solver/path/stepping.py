@@ -343,7 +343,8 @@ class Stepper:
         points = self._points(place, start, share)
         joints, loads = points.joints, 0.0 if in_time else viscosity
         resisting, before = self._resistance(place, length, in_time, viscosity)
-        closed = np.inf if in_time or viscosity == 1.0 else EXACT, EXACT if exact else np.inf
+        where_sliding = np.inf if in_time or viscosity == 1.0 else EXACT
+        closed = (where_sliding, EXACT if exact else np.inf)
         new, points, left, motion_so_far = self._solved(place, points, s, size, loads, resisting, before, closed)
         if not np.isfinite(motion_so_far).all():
             raise NotSolved("the movement is not finite")
