@@ -268,13 +268,10 @@ class Path:
 
     def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
-        place, reaction, check = state.place, self._reaction(state.place), None
-        # Walls that creep mostly are in no equilibrium, which one program says before bounds are worked out.
-        creeps = self.model.live is None and not self.checks.is_within_friction(place)
-        if not creeps or self.checks.in_equilibrium(place):
-            check = self.checks.check(place, reaction)
-        carries = check and check.bounds.in_equilibrium and (self.model.live is None or check.bounds.high > 0.0)
-        off = abs(check.measured - reaction) if check and carries and self.model.live is None else 0.0
+        place, reaction = state.place, self._reaction(state.place)
+        check = self.checks.check(place, reaction)
+        carries = check.bounds.in_equilibrium and (self.model.live is None or check.bounds.high > 0.0)
+        off = abs(check.measured - reaction) if carries and self.model.live is None else 0.0
         if off > self.tolerance * abs(reaction):
             # Joints that close carry along the path while they are wider open than a computed pose leaves them.
             wider = self.checks.check(place, reaction, CLOSING_GAP)
@@ -289,7 +286,7 @@ class Path:
         if is_far:
             state = self._continue_from(state, resting)
         self.state = state = replace(state, history=(replace(resting, works=place.works),), ended=ended)
-        yield self._report(state, check if check and carries else self._check(resting, reaction))
+        yield self._report(state, check if carries else self._check(resting, reaction))
 
     def _report(self, state: PathState, check: EquilibriumCheck) -> Increment:
         """The increment of an equilibrium, with the state as its checkpoint."""
