@@ -23,7 +23,7 @@ from .drivers import Driver
 from .equilibrium_check import EquilibriumChecks
 from .reports import Reports, no_equilibrium
 from .state import EquilibriumCheck, Note, PathState, Place
-from .stepping import StepError, Stepper
+from .stepping import CARRIES, StepError, Stepper
 
 #: First, longest and shortest step, as movements of the supports in block sizes; the first is accepted at any error.
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-5, 0.05, 1e-11
@@ -341,8 +341,8 @@ class Path:
             self.wedged = new
             return state, Outcome.LOCKED
         works = self._works(place, new, motion)
-        # Beside the work of the supports or the live load, unless that is next to nothing beside the others.
-        driven = max(abs(works[1] + works[2]), self.tolerance * sum(map(abs, works)), 1e-300)
+        # Beside the work of the supports or the live load, unless that is next to nothing, or so beside the others.
+        driven = max(abs(works[1] + works[2]), self.tolerance * sum(map(abs, works)), CARRIES * length / unit)
         of_friction = error.work / driven / self.tolerance
         if length <= AT_ONCE * min(FRICTION_MEMORY * unit, place.s):
             of_friction = min(of_friction, 1.0)

@@ -229,6 +229,16 @@ def test_bracket_is_as_narrow_as_asked(tolerance):
     assert response.settlement[-1] == low
 
 
+def test_support_that_moves_away_from_what_it_carried_takes_few_steps():
+    wall = generators.wall(bricks=4, courses=4, settling=(0.375, 0.625))
+    settlement = solver.Settlement(direction=(0.5, -1.0), increment=0.008, limit=0.024)
+    response = solver.settle(wall, settlement, friction_coefficient=0.79, controls=NO_FALL)
+    assert response.stop is solver.Status.LIMIT_REACHED
+    assert np.abs(response.reaction[1:]).max() < 1e-4 * response.reaction[0]
+    # 203 in the first increment where the error of a step was measured by a reaction of next to nothing.
+    assert max(increment.programs for increment in response.increments) < 60
+
+
 def test_rotation_about_a_point_moves_the_support_on_the_arc():
     centre = np.array([2.0, 7.0])
     settlement = solver.Settlement(rotation_centre=centre, rotation=1, increment=0.05, limit=0.2)
