@@ -599,7 +599,7 @@ def _try_new(text: str, target: Path, *, drawing: bool) -> None:
     else:
         print(f"blockvis: note: {found.says}", file=sys.stderr)
     if drawing:
-        layout = replace(layout_of(assembly), source=str(target))
+        layout = replace(layout_of(assembly), source=str(target), unit=case.unit or "m")
         try:
             # Its joints are closed: what is wider now is a place between arch and wall, and no mortar.
             shown = replace(inspected(layout), joints=Facing.none())

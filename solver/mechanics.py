@@ -26,6 +26,7 @@ from .kinematics import (
     turned,
 )
 from .path.controls import INCREMENTS, Ending
+from .path.reports import falling_blocks
 from .path.state import PathState, Place
 from .path.stepping import NotSolved, Stepper
 from .results.certificate import worst_of
@@ -109,6 +110,7 @@ __all__ = [
     "check_settlement",
     "corners_and_edges",
     "counted",
+    "falling_blocks",
     "features_of",
     "find_contacts",
     "is_member",

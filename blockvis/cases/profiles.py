@@ -161,7 +161,7 @@ PROFILE = Section(
         Key("depth", _DEPTH, "Of a Gaussian trough, 1, or -1 for a heave: the settlement scales it", -1.0, default=1.0),
         Key("points", _POINTS, "Places x [m] and how far the ground goes there, straight between them and level beyond",
             [[0.0, 0.0], [2.0, 1.0]], otherwise="required for points"),
-        Key("supports", _MOTIONS, "Displacement of each support in proportion, and its rotation [rad/m]",
+        Key("supports", _MOTIONS, "Displacement [m] of each support and its rotation [rad], in proportion",
             {"pier": [0.2, -0.5, 0.01]}, otherwise="required for supports"),
     ),
     forms=Forms(

@@ -151,7 +151,7 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
     if settings.trough is False or assembly.dimension == 3:
         return Ground(fixed, whole, troughs=False)
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+        warnings.simplefilter("always", UserWarning)
         cut = cut_ground(fixed, (), chosen=supports)
     pieces = {name: _pieces(name, cut, assembly) for name in whole}
     feet = sum(len(_bearing(cut, names)) for names in pieces.values())

@@ -102,7 +102,7 @@ def explain(
     if folder is not None:
         refuse_explanation(folder, overwrite)
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+        warnings.simplefilter("always", UserWarning)
         if not isinstance(case, Case):
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())

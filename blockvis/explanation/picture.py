@@ -261,14 +261,13 @@ def _computed(
             textcoords="offset points",
             fontsize=TEXT - 1,
             color=palette.hexadecimal(palette.FORCE),
-            # In space the blocks below are of many shades, and widths stand close.
-            bbox=None if canvas.view is None else {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none"},
+            bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none"},
             zorder=8,
         )
     moving = [assembly.index(name) for name in cause.best.candidate.motions]
     moved = canvas.placed((pose.positions - assembly.centroids)[moving])
     if np.hypot(*moved.T).max(initial=0.0) > 0.0 and not cause.best.candidate.turns:
-        _arrows(panel, canvas.placed(_tops(assembly, moving, shown)), moved, assembly)
+        _arrows(panel, canvas.placed(_tops(assembly, moving, shown)), moved, assembly, canvas.frame)
     amount = amount_text(float(cause.best.amounts[cause.at]), cause.unit)
     panel.set_title(
         f"{number}  {cause.name}, {percent(cause.probability)}\n"
@@ -290,15 +289,21 @@ def _tops(assembly: solver.Assembly, blocks: Sequence[int], pose: solver.Pose) -
     return np.array(places)
 
 
-def _arrows(panel: Axes, tails: np.ndarray, moved: np.ndarray, assembly: solver.Assembly) -> None:
-    """Draw displacements as arrows, the longest as long as a block."""
+def _arrows(
+    panel: Axes, tails: np.ndarray, moved: np.ndarray, assembly: solver.Assembly, within: Frame | None = None
+) -> None:
+    """Draw displacements as arrows, the longest as long as a block; those of supports are shifted into the frame."""
     longest = float(np.hypot(*moved.T).max(initial=0.0)) or 1.0
     for tail, vector in zip(tails, moved / longest * assembly.block_size, strict=True):
         if np.hypot(*vector) > 0.05 * assembly.block_size:
+            tip = tail + vector
+            if within is not None:
+                tip = np.clip(tip, within.low, within.high)
             panel.annotate(
                 "",
-                tail + vector,
-                xytext=tail,
+                tip,
+                xytext=tip - vector,
+                annotation_clip=False,
                 arrowprops={"arrowstyle": "-|>", "color": palette.hexadecimal(palette.SETTLEMENT), "lw": 2.0},
                 zorder=7,
             )

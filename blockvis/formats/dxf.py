@@ -102,7 +102,9 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     from ezdxf import recover
 
     try:
-        if path.open("rb").read(len(BINARY)) == BINARY:
+        with path.open("rb") as file:
+            is_binary = file.read(len(BINARY)) == BINARY
+        if is_binary:
             # recover reads text only.
             document = ezdxf.readfile(path)
             audit = document.audit()

@@ -354,7 +354,7 @@ def from_compas(model: Any, **options: Any) -> solver.Assembly:
     text = f"[{','.join(texts)}]" if isinstance(model, Sequence) else texts[0]
     # Messages name the model, not the file by which it comes.
     with TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
+        warnings.simplefilter("always", UserWarning)
         path = write_atomic(Path(folder) / "model.json", text, durable=False)
         try:
             assembly = read(path, **options)

@@ -23,8 +23,9 @@ from .kind import AnalysisKind, AnalysisRun, Course, RunInput, needs_no_crushing
 #: The methods in words, as ``[analysis] increments`` has them.
 COULOMB, LINEAR_PROGRAM = mechanics.INCREMENTS
 
-#: Difference of two reactions, in weights, of moments at a block's length, that is worth a line.
-NOTABLE = 1e-3
+#: Difference of two reactions, in weights, of moments at a block's length, that is worth a line, and a reaction that is
+#: the rounding of none.
+NOTABLE, NOTHING = 1e-3, 1e-8
 
 
 class SettlementKind(AnalysisKind):
@@ -99,6 +100,7 @@ class SettlementKind(AnalysisKind):
         path, weight = response.path, response.total_weight
 
         def reaction(value: float, increment: solver.Increment) -> str:
+            value = value if abs(value) > NOTHING * _size(response, increment) else 0.0
             if _is_moment(response, increment):
                 return f"{value:12.6g} N·m"
             return f"{value:12.6g} N   {value / weight:.6f} W"
@@ -112,8 +114,10 @@ class SettlementKind(AnalysisKind):
             if _rests_elsewhere(response):
                 lines[-1] += "   the least that equilibrium allows"
                 lines.append(f"reaction at rest     {reaction(path[0].reaction, path[0])}   before anything moves")
-            if path[0].reaction < 0.0:
+            if path[0].reaction < -NOTABLE * _size(response, path[0]):
                 lines[-1] += "   against the movement: by itself the structure would push these supports the other way"
+            if _is_idle(response):
+                lines.append("no free block touches the supports that move: nothing follows them")
         if response.collapse is not None:
             low, high = response.collapse.bracket
             at = response.collapse.displacement
@@ -194,8 +198,20 @@ def stored_settlements(summary: Mapping[str, Any]) -> tuple[solver.Settlement, .
 def _rests_elsewhere(response: solver.Response) -> bool:
     """Whether the reaction at rest is notably above the least that equilibrium allows there."""
     first = response.path[0]
-    size = response.total_weight * (response.assembly.block_size if _is_moment(response, first) else 1.0)
-    return abs(first.reaction - least_reaction(first)) > NOTABLE * size
+    return abs(first.reaction - least_reaction(first)) > NOTABLE * _size(response, first)
+
+
+def _is_idle(response: solver.Response) -> bool:
+    """Whether neither a free block nor a tie holds on to the supports that move, before they do."""
+    contacts = response.path[0].contacts
+    touches = contacts.gaps < NOTABLE * response.assembly.block_size
+    pairs = np.stack([contacts.block_a, contacts.block_b])[:, touches]
+    return not response.ties and not response.assembly.moving[pairs].any()
+
+
+def _size(response: solver.Response, increment: solver.Increment) -> float:
+    """Weight of the structure [N], at a block's length [N·m] where what resists the supports is a moment."""
+    return response.total_weight * (response.assembly.block_size if _is_moment(response, increment) else 1.0)
 
 
 def _is_moment(response: solver.Response, increment: solver.Increment) -> bool:
@@ -204,10 +220,11 @@ def _is_moment(response: solver.Response, increment: solver.Increment) -> bool:
 
 
 def _method(response: solver.Response) -> str | None:
-    """Name the method of the increments: only the path of Coulomb friction has an upper bound of its reactions."""
+    """Name the method of the increments: only the path of Coulomb friction has bounds of its reactions."""
     if not response.path:
         return None
-    return LINEAR_PROGRAM if np.isnan(response.path[0].largest) else COULOMB
+    bounds = [(increment.least, increment.largest) for increment in response.path]
+    return LINEAR_PROGRAM if np.isnan(bounds).all() else COULOMB
 
 
 def settlement_steps(

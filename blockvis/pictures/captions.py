@@ -243,11 +243,16 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
     if not (response.swings and increment.status == solver.Status.FALLING):
         parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")
     parts.append(f"W = {force_text(response.total_weight)}")
+    return state_text(increment, response), "   ·   ".join([*parts, *loss_words(increment)])
+
+
+def loss_words(increment: solver.Increment) -> list[str]:
+    """Say how many blocks have been taken away, and how many the structure has lost, by an increment that stands."""
+    if increment.status == solver.Status.FALLING:
+        return []
     removed = int(increment.removed.sum())
-    for count, fate in ((removed, "taken away"), (int(increment.fallen.sum()) - removed, "lost")):
-        if count and increment.status != solver.Status.FALLING:
-            parts.append(f"{mechanics.counted(count, 'block')} {fate}")
-    return state_text(increment, response), "   ·   ".join(parts)
+    counts = ((removed, "taken away"), (int(increment.fallen.sum()) - removed, "lost"))
+    return [f"{mechanics.counted(count, 'block')} {fate}" for count, fate in counts if count]
 
 
 def phase_words(response: solver.Response, increment: solver.Increment) -> list[str]:

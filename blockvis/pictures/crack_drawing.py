@@ -20,7 +20,7 @@ from blockvis.text import width_text
 from solver import mechanics
 
 from . import palette
-from .captions import phase_words, state_text
+from .captions import loss_words, phase_words, state_text
 from .flat_scene import FlatScene
 from .frame import Key, Sheet, framed, write_labels
 from .render import STILL_SIZE, seen_from
@@ -89,7 +89,8 @@ def draw_cracks(
         picture = drawing.image(main, _numbers(main, cracks))
         keys, pixel = drawing.keys, drawing.pixel
     none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
-    counted = "   ·   ".join([mechanics.counted(len(cracks), "crack"), *phase_words(response, increment)])
+    counts = [mechanics.counted(len(cracks), "crack"), *phase_words(response, increment), *loss_words(increment)]
+    counted = "   ·   ".join(counts)
     page = sheet.composed(
         picture,
         title=f"Cracks   ·   {state_text(increment, response)}",
@@ -117,8 +118,8 @@ def _drawn_in_plane(
     fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
     frame = framed(assembly, [solver.Pose.initial(assembly)])
     scene = FlatScene(assembly, frame, sheet.inside_size, fill, outline=palette.PALE_OUTLINE)
-    if increment.removed.any():
-        scene.hide(increment.removed)
+    if increment.fallen.any():
+        scene.hide(increment.fallen)
         scene.pose(solver.Pose.initial(assembly))
     others = [crack for crack in cracks if id(crack) not in {id(one) for one in main}]
     layers = [*zip(main, palette.SURVEYED, strict=False), *((crack, palette.FAINT) for crack in others)]
@@ -140,7 +141,7 @@ def _drawn_in_plane(
     named = zip(_numbers(main, cracks), palette.SURVEYED, strict=False)
     keys = [Key("line", f"crack {number}", colour) for number, colour in named]
     if others:
-        keys.append(Key("line", f"{len(others)} others", palette.FAINT))
+        keys.append(Key("line", mechanics.counted(len(others), "other"), palette.FAINT))
     return picture, keys, scene.pixel
 
 

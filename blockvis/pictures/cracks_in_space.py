@@ -68,7 +68,7 @@ class CracksInSpace:
         self._pieces, self._openings, self._owner = _opened(assembly, joints, increment)
         limits = class_limits(float(self._openings.max(initial=0.0)))
         colours = [palette.rgb(colour) for colour in palette.crack_colours(len(limits) + 1)]
-        self._scenes = self._drawn(assembly, limits, colours, plane_of(assembly, cut))
+        self._scenes = self._drawn(assembly, limits, colours, plane_of(assembly, cut), increment.fallen)
         self.pixel = self._scenes[0].pixel
         texts = [width_text(limit) for limit in limits]
         words = [*(f"to {text}" for text in texts), f"above {texts[-1]}" if texts else "open joint"]
@@ -80,6 +80,7 @@ class CracksInSpace:
         limits: Sequence[float],
         colours: Sequence[tuple[int, int, int]],
         plane: np.ndarray | None,
+        gone: np.ndarray,
     ) -> list[SolidScene]:
         width, height = self._sheet.inside_size
         below = round(WORDS * self._sheet.text) if len(self._views) > 1 else 0
@@ -97,6 +98,7 @@ class CracksInSpace:
                 assembly, view, frame, size, fill, fine=True, cut=plane, outlined=outlined,
                 outline=palette.PALE_OUTLINE,
             )  # fmt: skip
+            scene.hide(gone)
             scene.pose(solver.Pose.initial(assembly), fill)
             for k, colour in enumerate(colours):
                 part = k / max(len(colours) - 1, 1)

@@ -461,6 +461,9 @@ class Drawer:
                 keys.append(
                     Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",))
                 )
+            if self._loses:
+                colour = palette.rgb(palette.pale(self.fill[self.assembly.free][:1], np.ones(1, dtype=bool))[0])
+                keys.append(Key("area", "lost block", colour))
             if self.live.largest > 0.0:
                 keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
             if self._drawn_at is not None:

@@ -258,11 +258,13 @@ def tie_texts(course: TieCourse, unit: str = "m") -> tuple[str, str, str]:
         Of settlements.
     """
     sense = "tension" if course.force > 0.0 else "compression"
-    largest = f"{force_text(abs(course.force))} {sense} at {course.at:.4g} {unit}" if course.force else "no force"
+    # It breaks between two increments.
+    at = "by" if course.at == course.breaks_at else "at"
+    largest = f"{force_text(abs(course.force))} {sense} {at} {course.at:.4g} {unit}" if course.force else "no force"
     fate = [
-        f"{word} at {at:.4g} {unit}"
-        for word, at in (("yields", course.yields_at), ("breaks", course.breaks_at))
-        if at is not None
+        f"{word} by {first:.4g} {unit}"
+        for word, first in (("yields", course.yields_at), ("breaks", course.breaks_at))
+        if first is not None
     ]
     # What yields and breaks was told.
     said = {"yielding": course.yields_at, "broken": course.breaks_at}.get(course.state)

@@ -71,7 +71,8 @@ def first_equilibrium(case: Case, assembly: solver.Assembly) -> FirstEquilibrium
     message = "no first equilibrium was found" if ending is None else ending.message
     cause = _cause(case, assembly) if seconds < PATIENCE else ""
     says = f"{message.partition(';')[0]}; {cause}" if cause else message
-    return FirstEquilibrium(False, says, () if first is None else _falling(assembly, first))
+    falling = [] if first is None else mechanics.falling_blocks(assembly, first.velocity).tolist()
+    return FirstEquilibrium(False, says, tuple(falling))
 
 
 def settled_note(assembly: solver.Assembly, first: solver.Increment) -> str:
@@ -96,12 +97,6 @@ def _first_of(case: Case, assembly: solver.Assembly) -> tuple[solver.Increment |
         return first, steps.ending
     steps.close()
     return first, None
-
-
-def _falling(assembly: solver.Assembly, first: solver.Increment) -> tuple[int, ...]:
-    """Blocks that fall at least half as fast as the fastest, which are those that the message counts."""
-    fast = np.abs(first.velocity[:, : assembly.dimension]).max(axis=1)
-    return tuple(np.flatnonzero(assembly.free & (fast > 0.5 * fast.max())).tolist())
 
 
 def _cause(case: Case, assembly: solver.Assembly) -> str:

@@ -129,7 +129,7 @@ class Fall:
             There, at or below zero; None where equilibrium itself is lost.
         """
         driver, model = self.driver, self.model
-        frames = list(self._dead_load_alone()._fall(beyond))
+        frames = list(self.frames(beyond))
         if not frames:
             # Blocks that no time step moves keep the velocity of the path.
             velocity = np.zeros_like(model.load) if beyond.velocity is None else beyond.velocity
@@ -161,16 +161,16 @@ class Fall:
             what = f"equilibrium is lost along the control at α = {multiplier:.6g},"
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
 
-    def _dead_load_alone(self) -> Fall:
-        """The same without the live load, which does not act in a fall."""
-        if self.model.live is None:
-            return self
-        stepper = Stepper(replace(self.model, live=None), self.driver)
-        reports = Reports(stepper, self.reports.number, self.reports.fell_at)
-        return Fall(stepper, EquilibriumChecks(stepper), reports, self.n_frames)
+    def frames(self, place: Place) -> Iterator[Increment]:
+        """Frames of the fall, each a movement of the same size, until the blocks are at rest.
 
-    def _fall(self, place: Place) -> Iterator[Increment]:
-        """Frames of the fall, each a movement of the same size, until the blocks are at rest."""
+        The first one is large against the compliance of the joints. The live load does not act in a fall.
+        """
+        if self.model.live is not None:
+            stepper = Stepper(replace(self.model, live=None), self.driver)
+            reports = Reports(stepper, self.reports.number, self.reports.fell_at)
+            yield from Fall(stepper, EquilibriumChecks(stepper), reports, self.n_frames).frames(place)
+            return
         for least in (MECHANISM, *[0.1] * max(self.n_frames - 1, 0)):
             start, total = place, np.zeros_like(self.model.load)
             for moved, motion, _, _ in self.time_steps(start, 2.0 * least):

@@ -246,9 +246,9 @@ class Path:
             ending = yield from self.fall.collapse(check, place, place.s, None)
             return replace(ending, message="; ".join([*words, ending.message]))
         if not bounds.in_equilibrium:
-            motion = next((motion for _, motion, *_ in self.fall.time_steps(place)), self.stepper.weights)
-            yield self.reports.falling_increment(place, motion * model.lengths, place.s)
-            return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, motion))
+            frame = next(self.fall.frames(place))
+            yield frame
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, frame.velocity))
         if model.live is not None and not 0.0 < bounds.high < np.inf:
             if bounds.high > 0.0:
                 message = "at a control displacement of 0 m no live load of this pattern moves the structure"

@@ -163,6 +163,12 @@ class Reports:
         return f"block{'' if len(blocks) == 1 else 's'} {_listed(self.model.assembly, blocks, 4)}"
 
 
+def falling_blocks(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
+    """Numbers of the free blocks that move a tenth as fast as the fastest, or more, (n_blocks, n_dof) array."""
+    size = np.abs(motion[:, : assembly.dimension]).max(axis=1)
+    return np.flatnonzero(assembly.free & (size >= 0.1 * size.max()))
+
+
 def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
     """Message that names the blocks that fall before any settlement.
 
@@ -172,8 +178,7 @@ def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
     motion : (n_blocks, n_dof) array
         Of the fall.
     """
-    size = np.abs(motion[:, : assembly.dimension]).max(axis=1)
-    falling = np.flatnonzero(assembly.free & (size > 0.5 * size.max()))
+    falling = falling_blocks(assembly, motion)
     return (
         f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
         f"({_listed(assembly, falling, 8)}); look for gaps between blocks (joint_thickness), a missing support or too "

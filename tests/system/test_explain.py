@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from PIL import Image
 from structures import posed
 
@@ -107,6 +108,25 @@ def test_the_picture_has_three_panels_of_blocks_with_cracks(folder, said):
     orange = np.abs(pixels - [226, 78, 27]).sum(axis=2) < 40
     thirds = np.array_split(orange, 3, axis=1)
     assert all(third.sum() > 100 for third in thirds)
+
+
+def test_a_support_that_moves_down_has_its_arrow_in_the_picture(folder, monkeypatch):
+    tips = []
+    annotate = Axes.annotate
+
+    def noted(panel, text, xy, *given, **options):
+        if text == "" and "xytext" in options:
+            tips.append((panel, np.asarray(xy)))
+        return annotate(panel, text, xy, *given, **options)
+
+    monkeypatch.setattr(Axes, "annotate", noted)
+    rows = [{"block": "right springer", "dx [mm]": 0.0, "dy [mm]": -9.0}]
+    blockvis.explain(folder / "arch.toml", rows, folder / "arrow")
+    assert tips
+    for panel, tip in tips[1:]:
+        low, high = np.transpose([panel.get_xlim(), panel.get_ylim()])
+        assert (tip >= low).all()
+        assert (tip <= high).all()
 
 
 @pytest.mark.slow

@@ -244,3 +244,30 @@ def test_words_of_phases_in_other_units():
     lines = KINDS["settlement"].lines(response)
     assert any(re.fullmatch(r"first reaction +9810 N   1\.000000 W", line) for line in lines)
     assert any(re.fullmatch(r"last reaction +[\d.]+ N·m", line) for line in lines)
+
+
+def test_rounding_of_a_reaction_is_none_and_unknown_bounds_make_no_linear_program():
+    kind, response = KINDS["settlement"], lifted_brick()
+    first, *others = response.increments
+    rounded = replace(response, increments=(replace(first, reaction=-1e-13, measured=-1e-13, least=-1e-13), *others))
+    lines = kind.lines(rounded)
+    assert not any("against the movement" in line for line in lines)
+    assert any(re.fullmatch(r"first reaction +0 N   0\.000000 W.*", line) for line in lines)
+    unknown = replace(response, increments=(replace(first, least=np.nan, largest=np.nan), *others))
+    assert kind.summary(unknown)["increments_by"] == "coulomb"
+
+
+def test_supports_that_carry_nothing_are_told():
+    said = "no free block touches the supports that move: nothing follows them"
+    assert said not in KINDS["settlement"].lines(lifted_brick())
+    assert said in KINDS["settlement"].lines(lifted_brick(aside=3.0))
+
+
+def lifted_brick(aside: float = 0.0) -> solver.Response:
+    """A brick on a fixed support, and one that moves under it or beside it."""
+    assembly = solver.Assembly.from_outlines(
+        [[(-2, -1), (0, -1), (0, 0), (-2, 0)], [(aside, -1), (2 + aside, -1), (2 + aside, 0), (aside, 0)],
+         [(-1, 0), (1, 0), (1, 1), (-1, 1)]], roles=["fixed", "moving", "free"],
+    )  # fmt: skip
+    down = solver.Settlement(direction=(0.0, -1.0), increment=0.01, limit=0.02)
+    return solver.settle(assembly, down, friction_coefficient=0.8)

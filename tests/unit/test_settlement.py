@@ -58,7 +58,7 @@ def test_phase_that_moves_nothing_is_refused_by_its_number():
 
 
 def test_no_free_block_is_refused():
-    with pytest.raises(ValueError, match="all 3 blocks are supports"):
+    with pytest.raises(ValueError, match="no block is free: 3 supports"):
         solver.settle(two_bricks(roles=["fixed", "fixed", "moving"]), DOWN)
 
 
@@ -122,6 +122,16 @@ def test_no_initial_equilibrium_names_the_blocks_that_fall():
     assert "'seated'" not in response.message
     assert response.path == ()
     assert response.collapse is None
+
+
+def test_a_stone_in_the_air_makes_no_sound_arch_fall():
+    arch = generators.arch_on_piers()
+    outlines = [*np.split(arch.vertices, arch.offsets[1:-1]), rectangle(0.0, 8.0, 0.3, 8.3)]
+    roles = [*arch.roles, "free"]
+    assembly = solver.Assembly.from_outlines(outlines, names=[*arch.names, "in the air"], roles=roles)
+    response = solver.settle(assembly, DOWN, friction_coefficient=0.7)
+    assert response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
+    assert f"1 of {assembly.free.sum()} blocks fall ('in the air')" in response.message
 
 
 @pytest.mark.parametrize(("overhang", "stands"), [(0.99, True), (1.01, False)])

@@ -11,7 +11,7 @@ from structures import arch_response, dropped_brick, report_of
 import blockvis
 import solver
 from blockvis import draw_curve
-from blockvis.cli import _in_words
+from blockvis.cli import _in_words, main
 
 
 @pytest.mark.slow
@@ -55,3 +55,11 @@ def test_a_loss_is_in_every_output_and_drawn_pale(tmp_path):
     still = Image.open(blockvis.draw_still(response, -1, path=tmp_path / "last.png")).convert("RGB")
     standing = Image.open(blockvis.draw_still(response, 0, path=tmp_path / "first.png")).convert("RGB")
     assert np.asarray(still).mean() > np.asarray(standing).mean()
+    pictures = []
+    for number in ("0", "-1"):
+        assert main(["render", str(out), "--cracks", number]) == 0
+        with Image.open(out / "cracks.png") as picture:
+            # Below the caption.
+            pictures.append(np.asarray(picture.convert("L"))[100:])
+    whole, left = ((picture < 255).sum() for picture in pictures)
+    assert left < whole, "a stone that is lost leaves a hole in the survey of cracks"
