@@ -127,9 +127,7 @@ def fall_of(
     Fall or None
         None where nothing collapses along a path (limit loads, "limit reached"), and where nothing falls.
     """
-    path, collapse = response.path, response.collapse
-    collapsed = response.stop == solver.Status.COLLAPSED and response.parameter.is_path and not response.limits
-    if not collapsed or collapse is None or not path or not collapse.mechanism.any():
+    if not may_fall(response):
         return None
     assembly = response.assembly
     push = PUSH * np.sqrt(solver.GRAVITY * assembly.block_size)
@@ -148,6 +146,13 @@ def fall_of(
             break
         push *= 2.0
     return best
+
+
+def may_fall(response: solver.Response) -> bool:
+    """Whether a structure has collapsed along a path, so that its fall can be followed."""
+    collapse = response.collapse
+    collapsed = response.stop == solver.Status.COLLAPSED and response.parameter.is_path and not response.limits
+    return collapsed and collapse is not None and bool(response.path) and bool(collapse.mechanism.any())
 
 
 def _falling_mass(response: solver.Response) -> float:

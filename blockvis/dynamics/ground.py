@@ -11,7 +11,7 @@ from solver import mechanics
 GROUND = "ground"
 
 #: Faces of supports steeper than 1 in this are walls, not places to lie on; the ground lies no deeper below the
-#: structure than this part of its height, however far supports reach down.
+#: structure than this part of its height, however far supports reach down that are wider than tall.
 STEEP, DEEPEST = 0.3, 0.25
 
 #: Clearance between the ground and the lowest corner, in block sizes: what stands on a support stands on that alone.
@@ -20,6 +20,8 @@ CLEARANCE = 1e-3
 
 def ground_below(assembly: solver.Assembly, pose: solver.Pose) -> float:
     """Height of the ground [m]: below the lowest corner, in the plane of the lowest place where something may lie.
+
+    Supports that are taller than wide are piers, and stand on the ground; others are the ground.
 
     Parameters
     ----------
@@ -35,7 +37,9 @@ def ground_below(assembly: solver.Assembly, pose: solver.Pose) -> float:
         upward = ~free & (corners[:, 0] - following[:, 0] > STEEP * np.abs(following[:, 1] - corners[:, 1]))
         faces = np.minimum(corners[upward, 1], following[upward, 1])
         ground = min(max(faces.min(initial=low), low - DEEPEST * (high - low)), low)
-    return float(ground) - CLEARANCE * assembly.block_size
+    drawn = [assembly.vertices[assembly.block_of_vertex == block] for block in np.flatnonzero(~assembly.free)]
+    feet = [corners[:, -1].min() for corners in drawn if (np.ptp(corners, axis=0)[:-1] < np.ptp(corners[:, -1])).all()]
+    return float(min([ground, *feet])) - CLEARANCE * assembly.block_size
 
 
 def on_ground(assembly: solver.Assembly, pose: solver.Pose, ground: float) -> tuple[solver.Assembly, solver.Pose]:

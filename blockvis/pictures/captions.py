@@ -189,7 +189,7 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
         # Rounding is no reaction.
         force = increment.measured if abs(increment.measured) > ROUNDING * response.total_weight else 0.0
         text = f"{name} {force_text(force, moment, padded=True)}"
-        return text if moment else f"{text} = {increment.measured / response.total_weight:.4f} W"
+        return text if moment else f"{text} = {force / response.total_weight:.4f} W"
     if not np.isfinite(increment.measured):
         return f"{name} {measured.symbol} unbounded"
     text = f"{name} {measured.symbol} = {padded_text(increment.measured, 5)} {measured.unit}".rstrip()

@@ -24,7 +24,7 @@ from .backfill import FillBodies
 from .frame import Frame, framed, room_in
 from .marks import Marks, arrow_shapes
 from .solid_view import ABOVE, AROUND, View, showing_faces
-from .surface import section_of, sharp_edges, triangles_of
+from .surface import IN_PLANE, section_of, sharp_edges, triangles_of
 from .swing import MOST_PARTS, Swing
 from .ties import DASH, Strands, dashed
 
@@ -310,7 +310,8 @@ class SolidScene:
     def arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
         """Draw arrows from tails (n, 3) [m] to tips (n, 3) [m] over all: none is hidden behind its own support."""
         if self._cut is not None:
-            kept = (tails - self._cut[0]) @ self._cut[1] >= 0.0
+            near = IN_PLANE * float(np.ptp(self.assembly.vertices, axis=0).max())
+            kept = (tails - self._cut[0]) @ self._cut[1] >= -near
             tails, tips = tails[kept], tips[kept]
         # Of many supports those behind the structure would seem to push what is in front of them.
         self._overlays[f"{layer} top"] = _Arrows(tails, tips, colour, self._support if layer == "arrow" else None)

@@ -11,6 +11,9 @@ from solver import mechanics
 #: Edges between faces that differ by less than this cosine are not drawn.
 FLAT = 0.9995
 
+#: Distance from a plane, in sizes of the structure, at which a point lies in it.
+IN_PLANE = 1e-9
+
 
 def triangles_of(shapes: mechanics.Polyhedra) -> tuple[np.ndarray, np.ndarray]:
     """Cut all faces into triangles.
@@ -104,8 +107,10 @@ def section_of(
     u /= np.linalg.norm(u)
     v = np.cross(normal, u)
     height = (corners - point) @ normal
-    # A corner that lies in the plane belongs to its upper side, so that every triangle has none or two edges across.
-    height = np.where(height == 0.0, 1e-300, height)
+    # A corner that lies in the plane, to rounding, belongs to its lower side: every triangle has none or two edges
+    # across, and a block above, which is kept, is closed where its face lies in the plane.
+    near = IN_PLANE * float(np.ptp(corners, axis=0).max())
+    height = np.where(np.abs(height) <= near, -near, height)
     ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
     # Both triangles at an edge cut it from the same end: their points are the same to the last digit.
     ends = np.sort(ends, axis=2)
