@@ -95,7 +95,7 @@ def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
     """
     import tomlkit
 
-    parse_case(text, source)
+    parsed_toml(text, source)
     document: Any = tomlkit.parse(text)
     for change in changes:
         key, equals, value = change.partition("=")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -162,13 +163,15 @@ def toml_value(text: str) -> Any:
 
     Examples
     --------
-    >>> toml_value("0.5"), toml_value("[1, 0]"), toml_value("auto")
-    (0.5, [1, 0], 'auto')
+    >>> toml_value("0.5"), toml_value(".5"), toml_value("[1, 0]"), toml_value("auto")
+    (0.5, 0.5, [1, 0], 'auto')
     """
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
-        return text.strip()
+        plain = text.strip()
+        # Numbers to everybody but TOML.
+        return float(plain) if re.fullmatch(r"[+-]?(\d+\.|\.\d+)", plain) else plain
 
 
 def is_number(value: object) -> bool:

@@ -257,8 +257,11 @@ class LimitLoadKind(AnalysisKind):
         lines = [
             f"load multiplier      {state.load_multiplier:12.6g}     {said['limit_load_flow']} friction, static and "
             f"kinematic {kind} differ by {high - low:.1e}",
-            f"live load            {state.reaction:12.6g} N   {state.reaction / response.total_weight:.6f} W",
         ]
+        # Moments have no resultant.
+        if state.reaction:
+            share = state.reaction / response.total_weight
+            lines.append(f"live load            {state.reaction:12.6g} N   {share:.6f} W")
         if said["limit_load_status"] != solver.LimitStatus.FOUND:
             unproved = said["limit_load_status"] == solver.LimitStatus.NOT_CONVERGED
             lines.append(f"status: {said['limit_load_status']}{UNPROVED if unproved else ''}")
@@ -305,7 +308,8 @@ class LimitLoadKind(AnalysisKind):
                 rows.append(("torsion of the faces", limit.torsion))
             if limit.caveat:
                 rows.append(("note", limit.caveat))
-            rows.append(("live load at α = 1", force_text(limit.live_force)))
+            if limit.live_force:
+                rows.append(("live load at α = 1", force_text(limit.live_force)))
         if not response.parameter.is_path and len(path) > 1:
             rows.append(("lowest of", f"{len(path)} positions, at x = {state.parameter:.5g} m"))
         elif response.settlements:

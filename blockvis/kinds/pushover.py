@@ -125,9 +125,10 @@ class PushoverKind(AnalysisKind):
         if path:
             largest = max(path, key=lambda i: i.load_multiplier)
             for name, i in (("first", path[0]), ("largest", largest), ("last", path[-1])):
-                load = f"live load {i.reaction:.6g} N = {i.reaction / weight:.6f} W"
+                # Moments have no resultant.
+                load = f", live load {i.reaction:.6g} N = {i.reaction / weight:.6f} W" if i.reaction else ""
                 name = f"{name} multiplier"
-                lines.append(f"{name:<21}{i.load_multiplier:12.6g}     at {i.parameter:.6g} m, {load}")
+                lines.append(f"{name:<21}{i.load_multiplier:12.6g}     at {i.parameter:.6g} m{load}")
         if response.collapse is not None:
             low, high = response.collapse.bracket
             at = response.collapse.displacement

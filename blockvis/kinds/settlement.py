@@ -58,7 +58,8 @@ class SettlementKind(AnalysisKind):
         """Check that the keys of a case fit together."""
         if not case.settlements:
             raise ValueError(
-                f"{case.source}: [settlement] is missing; say how the moving supports move, direction = [1, 0]"
+                f"{case.source}: [settlement] is missing; say how the moving supports move, direction = [1, 0], "
+                "in space [1, 0, 0]"
             )
         if any(load.kind == "live" for load in case.loads):
             warnings.warn(

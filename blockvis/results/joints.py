@@ -287,7 +287,7 @@ class LargestMovements:
             seen = largest > CLOSED * self.assembly.block_size
             largest, at = np.where(seen, largest, 0.0), np.where(seen, at, 0.0)
             rows.append((f"{names[a]} | {names[b]}", *place, sizes[here].sum(), largest[0], at[0], largest[1], at[1]))
-        rows.sort(key=lambda row: -max(row[d + 2], row[d + 4]))
+        rows.sort(key=lambda row: (-row[d + 2], -row[d + 4]))
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         opening, slip = (f"{self.parameter.name} at largest {what}{unit}" for what in ("opening", "slip"))

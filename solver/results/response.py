@@ -435,9 +435,12 @@ class LimitLoad(HasState, Shown):
 
     def __str__(self) -> str:
         """Say how large it is, or why there is none."""
-        moving = int((np.abs(self.mechanism).max(axis=1) > 0.01).sum())
+        blocks = np.flatnonzero(np.abs(self.mechanism).max(axis=1) > 0.01).tolist()
+        moving = len(blocks)
         if self.status is LimitStatus.NO_EQUILIBRIUM:
-            return f"no equilibrium under the dead load: {counted(moving, 'block falls', 'blocks fall')}"
+            named = [f"'{self.analysed[0].names[k]}'" for k in blocks[:4]] if self.analysed else []
+            names = f" ({', '.join(named)}{' ...' if moving > 4 else ''})" if named else ""
+            return f"no equilibrium under the dead load: {counted(moving, 'block falls', 'blocks fall')}{names}"
         if self.status is LimitStatus.UNBOUNDED:
             return "unbounded: no live load of this pattern brings the structure down"
         law = "" if self.torsion == "points" else f", {self.torsion} torsion"

@@ -264,6 +264,15 @@ def test_set_makes_tables_and_takes_plain_words_and_lists(case):
     assert found.controls.falling_frames == 7
 
 
+def test_set_completes_a_case_that_lacks_a_table(case):
+    text = case.read_text(encoding="utf-8")
+    case.write_text(text[: text.index("[settlement]")], encoding="utf-8")
+    with pytest.raises(ValueError, match=r"\[settlement\] is missing"):
+        read_case(case)
+    found = read_case(case, ["settlement.direction=[0, -1]", "settlement.limit=.5"])
+    assert found.settlements[0].limit == 0.5
+
+
 def test_no_initial_equilibrium_has_its_own_exit_code(case, capsys):
     """A row of voussoirs whose springer is moving only: the other end has nothing to stand on."""
     _changed(case, '"left springer" = "fixed"', '"left springer" = "free"')

@@ -326,6 +326,22 @@ def test_a_section_leaves_out_what_lies_before_it_and_closes_the_stones(tmp_path
     assert proportions[1] == pytest.approx(proportions[0] / 2.0, rel=0.25)
 
 
+@pytest.mark.slow
+def test_a_section_in_a_joint_closes_the_stones_behind_it(tmp_path):
+    """In the joint between two rows as little beside it, whatever rounding says of the corners that lie there."""
+    row = [box((k, y, 0), (k + 1, y + 1, 1)) for y in (0, 1) for k in range(3)]
+    assembly = solver.Assembly.from_solids([*row, box((0, 0, -1), (3, 2.5, 0))], roles=["free"] * 6 + ["moving"])
+    east = solver.Settlement(direction=(0.6, 0.0, -0.8), increment=0.1, limit=0.1)
+    response = solver.settle(assembly, east, friction_coefficient=0.8)
+    eye = {"azimuth": -70, "elevation": 20}
+    cuts = [{"normal": (0, 1, 0), "point": (0, y, 0)} for y in (1.0, 1.0 + 1e-6)]
+    drawn = [
+        draw_still(response, -1, tmp_path / f"{k}.png", size=SMALL, view=eye, section=s) for k, s in enumerate(cuts)
+    ]
+    joint, beside = map(pixels, drawn)
+    assert (np.abs(joint - beside).max(axis=2) > 40).mean() < 1e-3
+
+
 def test_corners_of_a_still_lie_in_shade(tmp_path):
     """Where two faces meet at a hollow corner both are darker than away from it."""
     step = [box((0, 0, 0), (4, 4, 1)), box((0, 2, 1), (4, 4, 3))]

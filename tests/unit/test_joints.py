@@ -158,6 +158,14 @@ def test_joints_csv_names_the_widest_crack_first(tmp_path):
     assert openings[3] == 0.0, "what a step leaves is no opening"
 
 
+def test_a_joint_that_slips_far_stands_behind_those_that_are_open(tmp_path):
+    out = blockvis.write(parted(wall(6, 4), 6, 2), tmp_path / "out")
+    rows = list(csv.DictReader((out / "joints.csv").read_text(encoding="utf-8").splitlines()))
+    openings, slips = (np.array([float(row[f"largest {what} [m]"]) for row in rows]) for what in ("opening", "slip"))
+    assert slips.max() > openings.min()
+    assert (np.diff(openings) <= 0.0).all()
+
+
 def test_the_table_is_the_same_of_reopened_results(tmp_path):
     out = blockvis.write(parted(wall(6, 4), 6, 2), tmp_path / "out")
     again = blockvis.write(blockvis.open_results(out), tmp_path / "again")

@@ -67,7 +67,7 @@ def test_what_the_dead_load_brings_down_carries_nothing():
     assert limit.status is solver.LimitStatus.NO_EQUILIBRIUM
     assert np.isnan(limit.multiplier)
     assert limit.mechanism[0, 2] < 0.0
-    assert "1 block falls" in str(limit)
+    assert f"1 block falls ('{assembly.names[0]}')" in str(limit)
 
 
 def test_an_open_joint_carries_nothing():

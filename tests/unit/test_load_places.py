@@ -41,6 +41,11 @@ def test_the_sum_is_the_force_however_many_blocks_are_named(tmp_path):
     assert loads[block, 2] == pytest.approx(-500.0 * (0.3 - assembly.centroids[block, 0]))
 
 
+def test_a_point_far_outside_the_one_block_that_is_named_is_told(tmp_path):
+    with pytest.warns(UserWarning, match=r"point \(300, 250\) lies \d+ m outside block 'brick 2-1'.*is it in m"):
+        loads_of(tmp_path, 'blocks = "brick 2-1"\npoint = [300, 250]')
+
+
 def test_between_two_blocks_the_force_goes_into_the_one_it_pushes(tmp_path):
     course = float(np.ptp(blockvis.generators.wall(bricks=4, courses=4).outline(2)[:, 1]))
     blocks = {}
