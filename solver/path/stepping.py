@@ -165,11 +165,17 @@ class Stepper:
         self.mortar = Mortar(model)
         self.free = model.assembly.free
         self.weights = viscous_weights(model)
+        # What turns moves its corners against each other by its own width at most, however large the others are.
+        assembly, d = model.assembly, model.dimension
+        across = np.zeros(assembly.n_blocks)
+        arms = np.linalg.norm(assembly.vertices - assembly.centroids[assembly.block_of_vertex], axis=1)
+        np.maximum.at(across, assembly.block_of_vertex, 2.0 * arms)
+        turning = np.minimum(across[self.free] / model.length, 1.0)
+        self._shares = np.column_stack([np.ones_like(turning)] * d + [turning] * (model.n_dof - d)).ravel()
         self.lever = driver.lever
         self.unit = model.length / self.lever
         self.programs = 0
         self._last: tuple[Pose, Contacts] | None = None
-        d = model.dimension
         support_motion = driver.rate(0.0)[model.assembly.moving, :d].sum(axis=0)
         size = float(np.linalg.norm(support_motion))
         self.imperfection = np.zeros_like(model.load)
@@ -348,7 +354,7 @@ class Stepper:
         new, points, left, motion_so_far = self._solved(place, points, s, size, loads, resisting, before, closed)
         if not np.isfinite(motion_so_far).all():
             raise NotSolved("the movement is not finite")
-        movement_size = float(np.abs(motion_so_far).max(initial=0.0))
+        movement_size = self._largest(motion_so_far * self._shares)
         all_points = self._with_missed(start, place, new.pose, movement_size)
         if len(all_points) > len(start):
             return self.step(place, length, in_time=in_time, viscosity=viscosity, exact=exact, candidates=all_points)
@@ -357,7 +363,7 @@ class Stepper:
         new = self._arrived(place, replace(new, velocity=velocity), points, left, share)
         work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size)
         # The first step has no earlier movement to compare with.
-        turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
+        turn = (in_time or place.velocity is not None) * self._largest((motion_so_far - before) * self._shares)
         return new, motion / model.lengths, StepError(work, turn, movement_size, self._penetration(points, new))
 
     def _solved(

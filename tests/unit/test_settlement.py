@@ -249,6 +249,23 @@ def test_support_that_moves_away_from_what_it_carried_takes_few_steps():
     assert max(increment.programs for increment in response.increments) < 60
 
 
+def test_a_speck_that_tumbles_between_large_stones_makes_no_step_short():
+    stones = [rectangle(0, 0, 4, 3), rectangle(4, 0, 8, 3), rectangle(8, 0, 12, 3)]
+    lintels = [rectangle(1, 3, 5.9, 4), rectangle(5.9005, 3, 11, 4)]
+    outlines = [rectangle(-1, -0.5, 6, 0), rectangle(6, -0.5, 12, 0), *stones, *lintels]
+    speck, roles = rectangle(5.9, 3, 5.9005, 3.0005), ["moving", "fixed", *["free"] * 5]
+    down = solver.Settlement(direction=(0, -1), increment=0.02, limit=0.2)
+    with_it, without = (
+        solver.settle(
+            solver.Assembly.from_outlines(given, roles=[*roles, *["free"] * (len(given) - 7)]),
+            down, friction_coefficient=0.6, controls=NO_FALL,
+        )
+        for given in ([*outlines, speck], outlines)
+    )  # fmt: skip
+    assert with_it.reaction[-1] == pytest.approx(without.reaction[-1], rel=0.005)
+    assert sum(increment.programs for increment in with_it.increments) < 300, "13,012 by its rotation times their size"
+
+
 def test_rotation_about_a_point_moves_the_support_on_the_arc():
     centre = np.array([2.0, 7.0])
     settlement = solver.Settlement(rotation_centre=centre, rotation=1, increment=0.05, limit=0.2)
