@@ -298,7 +298,7 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
         Names both blocks and the depth.
     """
     if not assembly.free.any():
-        raise ValueError(f"no block is free: {counted(assembly.n_blocks, 'support')}; at least one block must be")
+        raise ValueError(f"{counted(assembly.n_blocks, 'block')}, all supports; at least one must be free")
     tolerance = DRAWN_GAP * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
     i, j, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
     real = np.flatnonzero(assembly.free[i] | assembly.free[j])

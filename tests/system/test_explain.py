@@ -110,6 +110,7 @@ def test_the_picture_has_three_panels_of_blocks_with_cracks(folder, said):
     assert all(third.sum() > 100 for third in thirds)
 
 
+@pytest.mark.slow
 def test_a_support_that_moves_down_has_its_arrow_in_the_picture(folder, monkeypatch):
     tips = []
     annotate = Axes.annotate

@@ -42,8 +42,8 @@ def test_the_sum_is_the_force_however_many_blocks_are_named(tmp_path):
 
 
 def test_a_point_far_outside_the_one_block_that_is_named_is_told(tmp_path):
-    with pytest.warns(UserWarning, match=r"point \(300, 250\) lies \d+ m outside block 'brick 2-1'.*is it in m"):
-        loads_of(tmp_path, 'blocks = "brick 2-1"\npoint = [300, 250]')
+    with pytest.warns(UserWarning, match=r"point \(0.3, 50\) lies 49\.\d m outside block 'brick 4-2'.*is it in m"):
+        loads_of(tmp_path, 'blocks = "brick 4-2"\npoint = [0.3, 50]')
 
 
 def test_between_two_blocks_the_force_goes_into_the_one_it_pushes(tmp_path):

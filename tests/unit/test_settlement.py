@@ -58,7 +58,7 @@ def test_phase_that_moves_nothing_is_refused_by_its_number():
 
 
 def test_no_free_block_is_refused():
-    with pytest.raises(ValueError, match="no block is free: 3 supports"):
+    with pytest.raises(ValueError, match="3 blocks, all supports"):
         solver.settle(two_bricks(roles=["fixed", "fixed", "moving"]), DOWN)
 
 
