@@ -273,6 +273,11 @@ class Assembly(Shown):
                 f"no block is named '{name}'; the assembly has {counted(self.n_blocks, 'block')}"
             ) from None
 
+    def listed(self, blocks: np.ndarray, most: int) -> str:
+        """Names of the first ``most`` blocks, by their numbers, and how many others there are."""
+        more = f" and {len(blocks) - most} more" if len(blocks) > most else ""
+        return ", ".join(f"'{self.names[i]}'" for i in blocks[:most]) + more
+
     def with_roles(self, roles: Sequence[str] | np.ndarray) -> Assembly:
         """Give the blocks other roles, (n_blocks,) of "free", "fixed" and "moving"."""
         unknown = set(map(str, roles)) - set(ROLES)

@@ -130,10 +130,6 @@ class Fall:
         """
         driver, model = self.driver, self.model
         frames = list(self.frames(beyond))
-        if not frames:
-            # Blocks that no time step moves keep the velocity of the path.
-            velocity = np.zeros_like(model.load) if beyond.velocity is None else beyond.velocity
-            frames = [self.reports.falling_increment(beyond, velocity, beyond.s)]
         # The first movement that is large against the compliance of the joints.
         sizes = [float(motion_size(frame.velocity, model.length).max()) for frame in frames]
         chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
@@ -162,10 +158,7 @@ class Fall:
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
 
     def frames(self, place: Place) -> Iterator[Increment]:
-        """Frames of the fall, each a movement of the same size, until the blocks are at rest.
-
-        The first one is large against the compliance of the joints. The live load does not act in a fall.
-        """
+        """Frames of the fall without live load, each a movement of the same size, until the blocks are at rest."""
         if self.model.live is not None:
             stepper = Stepper(replace(self.model, live=None), self.driver)
             reports = Reports(stepper, self.reports.number, self.reports.fell_at)

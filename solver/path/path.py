@@ -271,8 +271,7 @@ class Path:
         place, reaction = state.place, self._reaction(state.place)
         check = self.checks.check(place, reaction)
         carries = check.bounds.in_equilibrium and (self.model.live is None or check.bounds.high > 0.0)
-        off = abs(check.measured - reaction) if carries and self.model.live is None else 0.0
-        if off > self.tolerance * abs(reaction):
+        if carries and self.model.live is None and abs(check.measured - reaction) > self.tolerance * abs(reaction):
             # Joints that close carry along the path while they are wider open than a computed pose leaves them.
             wider = self.checks.check(place, reaction, CLOSING_GAP)
             check = wider if wider.measured == reaction else check

@@ -160,7 +160,7 @@ class Reports:
         return f"{self._named(np.flatnonzero(removed))} taken away before settlement {self.number + 1}, {weight:.4g} N"
 
     def _named(self, blocks: np.ndarray) -> str:
-        return f"block{'' if len(blocks) == 1 else 's'} {_listed(self.model.assembly, blocks, 4)}"
+        return f"block{'' if len(blocks) == 1 else 's'} {self.model.assembly.listed(blocks, 4)}"
 
 
 def falling_blocks(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
@@ -181,12 +181,6 @@ def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
     falling = falling_blocks(assembly, motion)
     return (
         f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
-        f"({_listed(assembly, falling, 8)}); look for gaps between blocks (joint_thickness), a missing support or too "
+        f"({assembly.listed(falling, 8)}); look for gaps between blocks (joint_thickness), a missing support or too "
         "little friction"
     )
-
-
-def _listed(assembly: Assembly, blocks: np.ndarray, most: int) -> str:
-    """Names of the first ``most`` blocks, and how many others there are."""
-    more = f" and {len(blocks) - most} more" if len(blocks) > most else ""
-    return ", ".join(f"'{assembly.names[i]}'" for i in blocks[:most]) + more

@@ -167,21 +167,18 @@ class Stepper:
         self.weights = viscous_weights(model)
         # What turns moves its corners against each other by its own width at most, however large the others are.
         assembly, d = model.assembly, model.dimension
-        across = np.zeros(assembly.n_blocks)
         arms = np.linalg.norm(assembly.vertices - assembly.centroids[assembly.block_of_vertex], axis=1)
-        np.maximum.at(across, assembly.block_of_vertex, 2.0 * arms)
+        across = 2.0 * np.maximum.reduceat(arms, np.flatnonzero(np.diff(assembly.block_of_vertex, prepend=-1)))
         turning = np.minimum(across[self.free] / model.length, 1.0)
         self._shares = np.column_stack([np.ones_like(turning)] * d + [turning] * (model.n_dof - d)).ravel()
         self.lever = driver.lever
         self.unit = model.length / self.lever
         self.programs = 0
         self._last: tuple[Pose, Contacts] | None = None
-        support_motion = driver.rate(0.0)[model.assembly.moving, :d].sum(axis=0)
-        size = float(np.linalg.norm(support_motion))
+        support_motion = driver.rate(0.0)[assembly.moving, :d].sum(axis=0)
+        sense = support_motion / max(float(np.linalg.norm(support_motion)), 1e-300)
         self.imperfection = np.zeros_like(model.load)
-        if size > 0.0:
-            imperfection = model.imperfection * IMPERFECTION
-            self.imperfection[:, :d] = imperfection * self.weights[:, :1] * support_motion / size
+        self.imperfection[:, :d] = model.imperfection * IMPERFECTION * self.weights[:, :1] * sense
 
     def unloaded(
         self, pose: Pose, phase: int, ties_at: TieForces | None = None, bonds_at: Bonds | None = None

@@ -435,17 +435,15 @@ class LimitLoad(HasState, Shown):
 
     def __str__(self) -> str:
         """Say how large it is, or why there is none."""
-        blocks = np.flatnonzero(np.abs(self.mechanism).max(axis=1) > 0.01).tolist()
-        moving = len(blocks)
+        moving = np.flatnonzero(np.abs(self.mechanism).max(axis=1) > 0.01)
         if self.status is LimitStatus.NO_EQUILIBRIUM:
-            named = [f"'{self.analysed[0].names[k]}'" for k in blocks[:4]] if self.analysed else []
-            names = f" ({', '.join(named)}{' ...' if moving > 4 else ''})" if named else ""
-            return f"no equilibrium under the dead load: {counted(moving, 'block falls', 'blocks fall')}{names}"
+            named = f" ({self.analysed[0].listed(moving, 4)})" if self.analysed else ""
+            return f"no equilibrium under the dead load: {counted(len(moving), 'block falls', 'blocks fall')}{named}"
         if self.status is LimitStatus.UNBOUNDED:
             return "unbounded: no live load of this pattern brings the structure down"
         law = "" if self.torsion == "points" else f", {self.torsion} torsion"
         text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction{law}, bounds differ by {self.gap:.1e})"
-        text += f", {counted(moving, 'block')} moving" + (
+        text += f", {counted(len(moving), 'block')} moving" + (
             "" if self.status is LimitStatus.FOUND else f", {self.status}"
         )
         return f"{text}; {self.caveat}" if self.caveat else text
