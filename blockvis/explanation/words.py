@@ -22,6 +22,9 @@ OPEN = 4.0
 #: Causes that the command line lists.
 LISTED = 6
 
+#: Causes beside the first that one sentence names.
+NAMED = 3
+
 
 def amount_text(value: float, unit: str) -> str:
     """Write an amount: a length in mm, an angle in mrad.
@@ -97,7 +100,9 @@ def verdict(found: Explanation) -> str:
     if none and len(none) == int((found.observations.widths > 0.0).sum()) and not len(found.observations.points):
         return "No candidate makes any of the observed cracks"
     if others:
-        more = " or ".join(cause_text(cause) for cause in others)
+        named = [cause_text(cause) for cause in others[:NAMED]]
+        rest = len(others) - len(named)
+        more = " or ".join([*named, *([counted(rest, "other")] if rest else [])])
         return f"{_capital(cause_with_range(best))}, or else {more}: the observations cannot tell these apart"
     return _capital(cause_with_range(best))
 
