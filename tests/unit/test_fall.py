@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 import shapely
-from structures import box, parted, report_of, wall
+from structures import box, parted, rectangle, report_of, wall
 
 import blockvis
 import solver
@@ -114,7 +114,7 @@ def test_a_free_fall_is_that_of_gravity():
 
 @pytest.mark.slow
 def test_a_lintel_falls_between_its_piers_to_their_feet():
-    blocks = [wall_of(0.0, 0.0, 0.5, 1.0), wall_of(1.5, 0.0, 2.0, 1.0), wall_of(0.3, 1.0, 1.7, 1.3)]
+    blocks = [rectangle(0.0, 0.0, 0.5, 1.0), rectangle(1.5, 0.0, 2.0, 1.0), rectangle(0.3, 1.0, 1.7, 1.3)]
     assembly = solver.Assembly.from_outlines(blocks, roles=["fixed", "moving", "free"])
     apart = solver.Settlement(direction=(1.0, 0.0), increment=0.02, limit=0.5)
     response = solver.settle(assembly, apart, friction_coefficient=0.6)
@@ -123,10 +123,6 @@ def test_a_lintel_falls_between_its_piers_to_their_feet():
     assert fall.ground == pytest.approx(0.0, abs=0.01)
     corners = mechanics.moved_vertices(assembly, fall.pose(len(fall) - 1))[assembly.block_of_vertex == 2]
     assert corners[:, 1].min() == pytest.approx(fall.ground, abs=1e-3)
-
-
-def wall_of(left, low, right, high):
-    return [(left, low), (right, low), (right, high), (left, high)]
 
 
 def test_the_same_bytes_twice(tmp_path):
