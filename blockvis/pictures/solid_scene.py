@@ -13,7 +13,8 @@ from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 from PIL import Image
-from vtkmodules.vtkCommonCore import vtkLogger
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkFloatArray, vtkLogger
 from vtkmodules.vtkCommonDataModel import vtkPlane
 
 import solver
@@ -374,7 +375,13 @@ class SolidScene:
 
     def _hidden_by(self, points: np.ndarray) -> np.ndarray:
         """(n,) array [m]: how far before points (n, 3) [m] what is seen at their pixels lies; nothing lies at -inf."""
-        depth = np.nan_to_num(np.asarray(self._plotter.get_image_depth(reset_camera_clipping_range=False)), nan=-np.inf)
+        buffer, window = vtkFloatArray(), self._plotter.render_window
+        width, height = window.GetSize()
+        # PyVista's own depth image draws everything once more.
+        window.GetZbufferData(0, 0, width - 1, height - 1, buffer)
+        part = vtk_to_numpy(buffer).reshape(height, width)[::-1]
+        near, far = self._plotter.camera.clipping_range
+        depth = np.where(part < 1.0, -near - part * (far - near), -np.inf)
         column, row = np.floor(self._over * self.at_pixel(points)).astype(int).T
         inside = (column >= 0) & (row >= 0) & (column < depth.shape[1]) & (row < depth.shape[0])
         found = np.full(len(points), -np.inf)
