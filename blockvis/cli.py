@@ -297,7 +297,7 @@ def _add_render(verbs: Any) -> None:
     render = verbs.add_parser("render", help="draw again from a results folder, without solving")
     render.add_argument("results", metavar="OUT")
     render.add_argument(
-        "--animation", default="collapse.mp4", help=".mp4, .gif, .webp, a folder such as frames/, or none"
+        "--animation", default="collapse.mp4", help="in OUT: .mp4, .gif, .webp, a folder such as frames/, or none"
     )
     render.add_argument("--magnification", type=float, default=1.0, help="of the displacements")
     render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")

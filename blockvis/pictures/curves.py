@@ -43,6 +43,9 @@ MOST_DOTS = 25
 #: The diagram of one limit load goes so far, as a part of the structure's size: as far as its mechanism is drawn.
 SMALL = 0.05
 
+#: Words beside a collapse take so much of the width.
+WORDS = 0.35
+
 #: Height of the text of the file [points].
 TEXT = 11.0
 
@@ -363,10 +366,8 @@ def _mark_collapse(
     collapse = response.collapse
     assert collapse is not None
     red = palette.hexadecimal(palette.WARNING)
-    # A capacity that is lost ends at the foot of the diagram.
-    above = collapse.lost == "capacity"
     lost = lost_text(response)
-    what = "no capacity" if above else lost.removeprefix("a ").replace(" is", "")
+    what = "no capacity" if collapse.lost == "capacity" else lost.removeprefix("a ").replace(" is", "")
     places = collapse_places(response)
     assert places is not None
     low, middle, high = places.tolist()
@@ -374,6 +375,10 @@ def _mark_collapse(
     axes.axvline(middle, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
     axes.plot(total[-1:], reactions[-1:], "X", color=red, markersize=9 if words else 6, zorder=4)
     if words:
+        # On the side that the curve leaves free.
+        beside = reactions[(total >= middle - WORDS * (total[-1] - total[0])) & np.isfinite(reactions)]
+        foot, head = axes.get_ylim()
+        above = len(beside) > 0 and head - beside.max() > beside.min() - foot
         axes.annotate(
             f"{what} at {collapse.displacement:.5g} {collapse.unit}\n"
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}",
@@ -385,6 +390,7 @@ def _mark_collapse(
             va="top" if above else "bottom",
             fontsize=0.9 * text,
             color=red,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )
 
 
