@@ -177,8 +177,8 @@ class Interfaces:
     scatter : JointScatter, optional
         Factors on the friction of each pair of blocks; without it joints of the same materials are alike.
     ground : mapping from str to float [Pa/m]
-        Stiffness of the ground under supports, by their names, or those of which they are numbered pieces: joints with
-        them have it for their normal stiffness, and neither tension nor cohesion.
+        Stiffness of the ground under supports, by their names; a name that none has is that of numbered pieces. Joints
+        with them have it for their normal stiffness, and neither tension nor cohesion.
     """
 
     default: InterfaceLaw = field(default_factory=InterfaceLaw)
@@ -214,9 +214,11 @@ class Interfaces:
 
     def ground_stiffness(self, assembly: Assembly) -> np.ndarray:
         """(n_blocks,) array [Pa/m]: stiffness of the ground under each block that is a support with one, else nan."""
+        cut = {name: stiffness for name, stiffness in self.ground.items() if name not in assembly.names}
         whole = (name.rstrip("0123456789").removesuffix(" ") for name in assembly.names)
         named = zip(assembly.names, whole, strict=True)
-        return np.array([self.ground.get(name, self.ground.get(one, np.nan)) for name, one in named])
+        found = np.array([self.ground.get(name, cut.get(one, np.nan)) for name, one in named])
+        return np.where(assembly.free, np.nan, found)
 
     @property
     def laws(self) -> tuple[InterfaceLaw, ...]:

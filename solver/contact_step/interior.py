@@ -139,7 +139,7 @@ class _Iterate:
         forces = self.forces(self.normal_stiffness * normal_target, shear_of(self.shear_stiffness * slip_target))
         motion, multiplier = self.solve(self.unbalanced + p.rows.resultant(forces)), 0.0
         if self.by_live is not None and p.control is not None:
-            multiplier = (self.control_error - float(p.control @ motion)) / float(p.control @ self.by_live)
+            multiplier = float((self.control_error - p.control @ motion) / (p.control @ self.by_live))
             motion = motion + multiplier * self.by_live
         relative = p.rows.relative(motion)
         normal = self.normal_stiffness * (normal_target - relative[:, 0])

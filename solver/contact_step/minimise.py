@@ -46,6 +46,7 @@ def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplie
     return replace(solution, factorisations=iterations + solution.factorisations)
 
 
+@np.errstate(all="ignore")  # A live load that no joint resists moves nothing along the control.
 def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float) -> tuple[StepSolution | None, int]:
     """Semismooth Newton steps from trial forces: the solution, None where they lead too far, and factorisations."""
     motion = np.zeros_like(problem.load)
@@ -73,7 +74,7 @@ def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float)
         imbalance = float(np.abs(unbalanced).max())
         if imbalance < BALANCED * max(1.0, abs(multiplier)) and abs(missing) <= 1e-12 + BALANCED * problem.size:
             return StepSolution(motion, forces, trial, multiplier, 0), factorisations
-        if not (from_start or imbalance <= NEAR):
+        if not (imbalance <= NEAR or (from_start and imbalance < np.inf)):
             break
         before, status = status, problem.status(trial)
         # Where no point has changed, the factors serve once more.
@@ -118,5 +119,5 @@ def _direction(
         return change, 0.0
     by_live = solve(problem.live)
     missing = problem.control_target - float(problem.control @ (motion + change))
-    multiplier_change = missing / float(problem.control @ by_live)
+    multiplier_change = float(missing / (problem.control @ by_live))
     return change + multiplier_change * by_live, multiplier_change

@@ -131,8 +131,10 @@ class Reports:
 
     def no_step(self, reason: str) -> str:
         """Message of a step that was not solved."""
+        live = self.model.live is not None
+        turns = "it may have its largest value there: control another point or direction, or " if live else ""
         return (
-            f"steps of the {self.driver.what}, however small, lead no further {reason}; repeat the analysis with "
+            f"steps of the {self.driver.what}, however small, lead no further {reason}; {turns}repeat the analysis with "
             "another increment, and send the case to the developers if it stays"
         )
 

@@ -172,3 +172,14 @@ def test_the_end_of_a_pushover_is_told_where_blocks_are_a_little_out_of_balance(
     assert response.stop is solver.Status.COLLAPSED
     assert response.collapse.displacement == pytest.approx(0.0797, rel=0.01)
     assert response.path[-1].certificate.equilibrium_residual < 1e-8
+
+
+def test_the_lift_of_a_corner_is_followed_to_where_it_is_largest():
+    """A block on one corner: tan of the angle that its diagonal has left, and the lift by geometry."""
+    assembly = block()
+    control = solver.ControlDisplacement("block", (0.0, 1.0), point=(0.0, 1.0), increment=0.01, limit=0.5)
+    response = pushover(assembly, control, loads=sideways(assembly), friction_coefficient=0.9)
+    turned = np.arctan(0.2) - np.arctan([i.load_multiplier for i in response.path])
+    lift = 0.2 * np.sin(turned) + np.cos(turned) - 1.0
+    assert [i.parameter for i in response.path] == pytest.approx(lift, abs=1e-6)
+    assert response.path[-1].parameter == pytest.approx(np.hypot(0.2, 1.0) - 1.0, rel=1e-3)

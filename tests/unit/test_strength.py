@@ -207,3 +207,14 @@ def test_the_summary_tells_what_the_ground_carries(tmp_path, capsys):
         assert float(force) == pytest.approx(2.4 * 0.4 * 2000.0 * solver.GRAVITY / 2.0, rel=1e-2)
         assert float(pressure) == pytest.approx(float(force) / 0.1, rel=1e-3)
         assert float(tilt) == pytest.approx(0.005, rel=0.03)
+
+
+def test_ground_gives_under_the_support_of_its_name_alone():
+    """One that is numbered beside it is rigid, pieces into which a support was cut are not."""
+    outlines = [rectangle(-1.0, -1.0, 0.5, 0.0), rectangle(0.5, -1.0, 2.0, 0.0), rectangle(0.0, 0.0, 1.0, 1.0)]
+    roles = ["fixed", "fixed", "free"]
+    beside = solver.Assembly.from_outlines(outlines, names=["ground", "ground 2", "ground 3"], roles=roles)
+    pieces = solver.Assembly.from_outlines(outlines, names=["ground 1", "ground 2", "ground 3"], roles=roles)
+    soft = solver.Interfaces(ground={"ground": 1e5})
+    assert np.nan_to_num(soft.ground_stiffness(beside)).tolist() == [1e5, 0.0, 0.0]
+    assert np.nan_to_num(soft.ground_stiffness(pieces)).tolist() == [1e5, 1e5, 0.0]
