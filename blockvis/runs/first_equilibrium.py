@@ -66,25 +66,13 @@ def first_equilibrium(case: Case, assembly: solver.Assembly) -> FirstEquilibrium
     first, ending = _first_of(case, assembly)
     seconds = time.perf_counter() - started
     if ending is None and first is not None and first.status != solver.Status.FALLING:
-        note = settled_note(assembly, first)
-        return FirstEquilibrium(True, note or f"it stands: first equilibrium found in {seconds:.1f} s")
+        found = f"it stands: first equilibrium found in {seconds:.1f} s"
+        return FirstEquilibrium(True, "; ".join(first.notes) or found)
     message = "no first equilibrium was found" if ending is None else ending.message
     cause = _cause(case, assembly) if seconds < PATIENCE else ""
     says = f"{message.partition(';')[0]}; {cause}" if cause else message
     falling = [] if first is None else mechanics.falling_blocks(assembly, first.velocity).tolist()
     return FirstEquilibrium(False, says, tuple(falling))
-
-
-def settled_note(assembly: solver.Assembly, first: solver.Increment) -> str:
-    """Say where the blocks as drawn were in no equilibrium and found one a little further; "" where they were."""
-    moved = np.linalg.norm(first.pose.positions - assembly.centroids, axis=1)
-    block = int(np.argmax(moved))
-    if first.status != solver.Status.EQUILIBRIUM or moved[block] <= AS_DRAWN * assembly.block_size:
-        return ""
-    return (
-        f"before any settlement '{assembly.names[block]}' moved by {moved[block]:.3g} m until it came to rest: as "
-        "drawn the blocks do not stand; look for gaps between them (joint_thickness) or a missing support"
-    )
 
 
 def _first_of(case: Case, assembly: solver.Assembly) -> tuple[solver.Increment | None, mechanics.Ending | None]:

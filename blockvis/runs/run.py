@@ -26,7 +26,6 @@ from blockvis.system.atomic_files import PARTIAL
 from solver import mechanics
 
 from .budget import Budget, IncrementTooLong
-from .first_equilibrium import settled_note
 from .outputs import Clock, Drawing, Output, viewer_format
 from .plan import planned
 from .progress import Progress
@@ -276,10 +275,6 @@ def _follow(
             with clock.counting("write"):
                 results.add(increment)
             run.recorded(results.increments)
-            # What stands after a settlement that is not reported has moved with it.
-            as_drawn = bool(case.settlements) == bool(run.course.settlements)
-            if len(results.increments) == 1 and as_drawn and (note := settled_note(results.assembly, increment)):
-                warnings.warn(note, stacklevel=2)
             for note in increment.notes:
                 warnings.warn(note, stacklevel=2)
             progress.increment(increment)

@@ -135,6 +135,8 @@ class Path:
                 # Joints that the drawing leaves open close.
                 closed = self.fall.relaxed(place, JUMP)
                 if closed is not None:
+                    if self.fall.movements(place, closed).max() > MECHANISM:
+                        self.reports.notes = [Note(0.0, self.reports.settled(start, closed.pose))]
                     # Those that have mortar are the ones that are closed then, or a settlement before has left.
                     closed = self.stepper.mortar.renamed(closed, self.stepper.contacts(closed.pose))
                     closed = replace(closed, contacts=None, velocity=None)

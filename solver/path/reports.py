@@ -134,8 +134,15 @@ class Reports:
         live = self.model.live is not None
         turns = "it may have its largest value there: control another point or direction, or " if live else ""
         return (
-            f"steps of the {self.driver.what}, however small, lead no further {reason}; {turns}repeat the analysis with "
-            "another increment, and send the case to the developers if it stays"
+            f"steps of the {self.driver.what}, however small, lead no further {reason}; {turns}repeat the analysis "
+            "with another increment, and send the case to the developers if it stays"
+        )
+
+    def settled(self, start: Pose, end: Pose) -> str:
+        """Message of blocks that do not stand as drawn and came to rest nearby."""
+        return (
+            f"{self.jump(start, end)}: as drawn the blocks do not stand; look for gaps between them (joint_thickness) "
+            "or a missing support"
         )
 
     def jump(self, start: Pose, end: Pose) -> str:

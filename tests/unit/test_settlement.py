@@ -505,3 +505,12 @@ def test_no_brick_falls_into_another_where_little_drag_holds_it():
         shapes = [shapely.Polygon(corners) for corners in moved]
         shared = [a.intersection(b).area for a, b in combinations(shapes, 2) if a.intersects(b)]
         assert max(shared, default=0.0) < 1e-6 * max(shape.area for shape in shapes)
+
+
+@pytest.mark.parametrize(("gap", "told"), [(4e-4, 0), (5e-3, 1)])
+def test_blocks_that_do_not_stand_as_drawn_are_told(gap, told):
+    outlines = [[[-5, -1], [5, -1], [5, 0], [-5, 0]], [[0, gap], [1, gap], [1, 1 + gap], [0, 1 + gap]]]
+    assembly = solver.Assembly.from_outlines(outlines, names=["ground", "block"], roles=["moving", "free"])
+    response = solver.settle(assembly, solver.Settlement(direction=(0, -1), increment=0.01, limit=0.01))
+    assert len(response.notes) == told
+    assert all("'block' moved by up to 0.005 m at once" in note and "as drawn" in note for note in response.notes)
