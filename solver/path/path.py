@@ -15,7 +15,7 @@ from solver.loads import GRAVITY
 from solver.program.model import Model
 from solver.results.increment import Bonds, Increment, Status
 from solver.ties import TieForces, is_member
-from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, FRICTION_MEMORY, JUMP
+from solver.tolerances import CLOSING_GAP, COMPLIANCE, COMPUTED_GAP, FRICTION_MEMORY, JUMP
 
 from .collapse import MECHANISM, Fall
 from .controls import Controls, Ending
@@ -53,6 +53,9 @@ REFINED = 1e-3
 
 #: Tolerances beyond a bound that has an equilibrium after all in which the viscosity stays reduced.
 ENCLOSED = 8.0
+
+#: Time, in units of √(block size / g), in which what viscosity retards comes to rest at once.
+STANDSTILL = 1e3
 
 #: Movement, in block sizes, of blocks that have fallen when the first one has moved farthest.
 FALLEN = 0.1
@@ -270,7 +273,8 @@ class Path:
 
     def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
-        place, reaction = state.place, self._reaction(state.place)
+        place = self._without_viscosity(state.place)
+        reaction = self._reaction(place)
         check = self.checks.check(place, reaction)
         carries = check.bounds.in_equilibrium and (self.model.live is None or check.bounds.high > 0.0)
         if carries and self.model.live is None and abs(check.measured - reaction) > self.tolerance * abs(reaction):
@@ -288,6 +292,16 @@ class Path:
             state = self._continue_from(state, resting)
         self.state = state = replace(state, history=(replace(resting, works=place.works),), ended=ended)
         yield self._report(state, check if carries else self._check(resting, reaction))
+
+    def _without_viscosity(self, place: Place) -> Place:
+        """The place once the supports have stood still: joints of given stiffness have given by their forces alone."""
+        if not (self.stepper.mortar.points(place, self.stepper.contacts_at(place)).give > COMPLIANCE).any():
+            return place
+        try:
+            still, _, error = self.stepper.step(replace(place, velocity=None), STANDSTILL, in_time=True, exact=True)
+        except NotSolved:
+            return place
+        return place if error.moved > JUMP else replace(still, velocity=place.velocity, works=place.works)
 
     def _report(self, state: PathState, check: EquilibriumCheck) -> Increment:
         """The increment of an equilibrium, with the state as its checkpoint."""

@@ -1,7 +1,5 @@
 """Mortar along a path, and ground that gives: what statics says by hand of the point model."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -232,9 +230,6 @@ def test_a_block_that_leans_on_springs_tips_about_its_edge(interfaces):
         found = structure.limit_load(pose=sunk.pose, bonds_at=sunk.bonds, **more)
         assert found.multiplier == pytest.approx(expected, rel=1e-6)
         assert holds(found)
-    # By its gaps alone the right pad, which carries less than at rest, has let go of the block.
-    rigid = replace(sunk.bonds, left=0.0 * sunk.bonds.left, rest=0.0 * sunk.bonds.rest)
-    assert structure.limit_load(pose=sunk.pose, bonds_at=rigid).status is solver.LimitStatus.NO_EQUILIBRIUM
     control = solver.ControlDisplacement("block", (1.0, 0.0), point=(0.0, 1.5), limit=2e-3, increment=1e-3)
     # The bounds of the path, with the live load for their objective, are the same program.
     pushed = structure.pushover(control, pose=sunk.pose, bonds_at=sunk.bonds)
@@ -289,7 +284,7 @@ def test_crushing_is_not_followed():
 def test_a_footing_that_settles_tilts_the_beam_on_springs():
     """Three footings with K = k A each, the right one's ground settles by s: v = s/3, θ = s / (2 ℓ + 3 w²/(4 ℓ)).
 
-    A footing of width w carries at its two ends. The rest of the difference is the viscosity, 1 % of the weight.
+    A footing of width w carries at its two ends.
     """
     arm, width, stiffness, settlement = 1.0, 0.1, 2e6, 0.02
     pads = [rectangle(x - width / 2, -0.3, x + width / 2, 0.0) for x in (-arm, 0.0, arm)]
@@ -306,9 +301,9 @@ def test_a_footing_that_settles_tilts_the_beam_on_springs():
     weight, spring = mechanics.total_weight(assembly), stiffness * width * 0.5
     assert first.support_forces[1:, 1] == pytest.approx([-weight / 3.0] * 3, rel=1e-6)
     tilt = settlement * arm / (2.0 * arm**2 + 3.0 * width**2 / 4.0)
-    assert -last.pose.rotations[0, 0] == pytest.approx(tilt, rel=0.03)
-    assert 0.2 - last.pose.positions[0, 1] == pytest.approx(settlement / 3.0, rel=0.03)
-    assert -last.support_forces[2, 1] == pytest.approx(weight / 3.0 + spring * settlement / 3.0, rel=0.02)
+    assert -last.pose.rotations[0, 0] == pytest.approx(tilt, rel=3e-3)
+    assert 0.2 - last.pose.positions[0, 1] == pytest.approx(settlement / 3.0, rel=3e-3)
+    assert -last.support_forces[2, 1] == pytest.approx(weight / 3.0 + spring * settlement / 3.0, rel=0.01)
     assert last.certificate.equilibrium_residual < 1e-6
 
 
@@ -463,3 +458,19 @@ def test_a_wall_with_mortar_goes_on_from_its_checkpoint_bit_for_bit():
     again = list(mechanics.settlement_increments(assembly, phases, interfaces=interfaces, loads=loads, resume=stored))
     assert [one.reaction for one in again] == [one.reaction for one in whole[2:]]
     assert (again[-1].pose.positions == whole[-1].pose.positions).all()
+
+
+@pytest.mark.path
+@pytest.mark.parametrize("settlement", [2e-4, 2e-3])
+def test_a_block_on_two_elastic_joints_tilts_as_on_springs(settlement):
+    """Four springs k A / 4 under a block of weight W: the right pair sinks, and the weight leans with the tilt."""
+    outlines = [rectangle(-1.0, -1.0, 0.5, 0.0), rectangle(0.5, -1.0, 2.0, 0.0), rectangle(0.0, 0.0, 1.0, 1.0)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "moving", "free"])
+    joints = solver.Interfaces(solver.InterfaceLaw(0.6, normal_stiffness=1e7, shear_stiffness=1e7))
+    down = solver.Settlement(direction=(0.0, -1.0), increment=2e-4, limit=settlement)
+    response = solver.settle(assembly, down, interfaces=joints)
+    weight, spring = response.total_weight, 0.25e7
+    tilt = settlement / (1.0 - weight / spring)
+    last = response.path[-1]
+    assert -last.pose.rotations[2, 0] == pytest.approx(tilt, rel=0.01)
+    assert last.reaction == pytest.approx(weight / 2.0 - spring * (settlement - tilt / 2.0), rel=3e-4)
