@@ -218,15 +218,19 @@ def summary(name: str, differences: Sequence[Difference]) -> None:
     """Shares over all walls."""
     reactions = np.concatenate([one.reactions for one in differences])
     positions = np.concatenate([one.positions for one in differences])
+    # A brick that slips a little later in one run parts the two until it has.
+    again = [np.minimum(one.reactions, np.append(one.reactions[1:], np.inf)) for one in differences]
     if not len(reactions):
         print(f"{name}: no settlement told")
         return
     collapses = [one.collapse for one in differences if one.collapse is not None]
     print(
         f"{name}: {len(differences)} walls, {len(reactions)} told settlements: R within 1 % at "
-        f"{100.0 * np.mean(reactions <= SAME):.1f} %, median {per_cent(float(np.median(reactions)))} %, largest "
-        f"{per_cent(float(reactions.max()))} %; positions within 5 % at {100.0 * np.mean(positions <= SAME_PLACE):.1f} "
-        f"%; endings the same {sum(one.same_ending for one in differences)} of {len(differences)}; collapse within 1 % "
+        f"{100.0 * np.mean(reactions <= SAME):.1f} %, there or at the next one told at "
+        f"{100.0 * np.mean(np.concatenate(again) <= SAME):.1f} %, median {per_cent(float(np.median(reactions)))} %, "
+        f"largest {per_cent(float(reactions.max()))} %; positions within 5 % at "
+        f"{100.0 * np.mean(positions <= SAME_PLACE):.1f} %; endings the same "
+        f"{sum(one.same_ending for one in differences)} of {len(differences)}; collapse within 1 % "
         f"{sum(one <= SAME for one in collapses)} of {len(collapses)}"
     )
 
