@@ -1082,6 +1082,11 @@ def _parameter(given: str) -> tuple[str, Any]:
     return key.strip(), toml_value(value)
 
 
+def _levels(fill: solver.Backfill) -> str:
+    low = f"from {fill.base:g} m " if np.isfinite(fill.base) else ""
+    return f"{low}up to {fill.surface:g} m"
+
+
 def _in_words(response: solver.Response, folder: Path) -> str:
     """Sum up a run in words."""
     from .kinds.kinds import KINDS
@@ -1098,7 +1103,7 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         f"{counted(assembly.n_blocks, 'block')}{' in space' if deep else ''} ({int(assembly.free.sum())} free), "
         f"{size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high, weight {weight:.6g} N, "
         f"largest block {across:.3g} m across",
-        *(f"fill up to {fill.surface:g} m, weight {fill.weight(assembly):.6g} N" for fill in response.loads.fills),
+        *(f"fill {_levels(fill)}, weight {fill.weight(assembly):.6g} N" for fill in response.loads.fills),
         f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} "
         f"programs, {sum(i.seconds for i in response.increments):.2f} s of solver time",
     ]

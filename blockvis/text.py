@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -12,6 +13,22 @@ import numpy as np
 
 #: What stands before a unit of force, and from which number on.
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
+
+#: No length, force or stiffness is smaller or larger; products of some of them still fit a double.
+SMALLEST, LARGEST = 1e-30, 1e30
+
+
+def refuse_magnitude(value: float) -> str:
+    """Say what to give instead of a number that is finite, but smaller or larger than something real; else "".
+
+    Examples
+    --------
+    >>> refuse_magnitude(1e200), refuse_magnitude(0.0)
+    ('give a number of 1e-30 to 1e+30', '')
+    """
+    # Neither NaN nor infinity is out of range: that they are no finite numbers is said elsewhere.
+    out = 0 < abs(value) < SMALLEST or LARGEST < abs(value) < math.inf
+    return f"give a number of {SMALLEST:g} to {LARGEST:g}" if out else ""
 
 
 def length_text(length: float) -> str:

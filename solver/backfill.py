@@ -31,12 +31,15 @@ class Backfill:
         Horizontal pressure as a part of the vertical one.
     thickness : (n,) array [m], optional
         In the plane, out of it.
+    base : float [m]
+        Where it lies on other fill, the surface of that.
 
     Notes
     -----
     At every pose a piece carries the column of fill between where it is then and the surface: on an area dA with the
     outward normal n, z below the surface, the force unit_weight · z · (-k n_horizontal, -n_vertical) dA with k the
-    pressure coefficient. Where z or the upward part of n is negative there is none.
+    pressure coefficient. Where z or the upward part of n is negative there is none. Of the column what is below the
+    base is left out.
     """
 
     pieces: np.ndarray
@@ -45,6 +48,7 @@ class Backfill:
     unit_weight: float
     pressure_coefficient: float = 0.0
     thickness: np.ndarray | None = None
+    base: float = -np.inf
 
     def corners(self, assembly: Assembly, pose: Pose) -> np.ndarray:
         """(n, d, d) array [m]: corners of the pieces at a pose."""
@@ -64,7 +68,9 @@ class Backfill:
         along = -areas * np.where(np.arange(d) < d - 1, self.pressure_coefficient, 1.0)
         along[areas[:, -1] <= 0.0] = 0.0
         places = _PLACES[d]
-        pressures = self.unit_weight * np.maximum(self.surface - corners[:, :, -1], 0.0) @ places.T / d
+        level = corners[:, :, -1]
+        depth = np.maximum(self.surface - level, 0.0) - np.maximum(self.base - level, 0.0)
+        pressures = self.unit_weight * depth @ places.T / d
         points = np.einsum("pk,nkj->npj", places, corners)
         load = np.zeros((assembly.n_blocks, d + pose.rotations.shape[1]))
         for place in range(d):
@@ -85,4 +91,5 @@ class Backfill:
 
     def shifted(self, by: np.ndarray) -> Backfill:
         """Return the fill in a drawing moved by (d,) [m]."""
-        return replace(self, pieces=self.pieces + by, surface=self.surface + float(by[-1]))
+        up = float(by[-1])
+        return replace(self, pieces=self.pieces + by, surface=self.surface + up, base=self.base + up)

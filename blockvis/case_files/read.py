@@ -25,7 +25,7 @@ from blockvis.cases.toml_table import Table, shortened, toml_value
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats import FORMATS
 from blockvis.kinds.kinds import KINDS
-from blockvis.text import files_like
+from blockvis.text import as_key, files_like
 from solver import mechanics
 
 from . import case_keys as keys
@@ -131,7 +131,6 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     """Make a case of the values of a parsed TOML text; paths in it are relative to the folder of ``source``."""
     top = Table(values, "", source)
     geometry = _geometry(top.table("geometry"))
-    materials = top.table("materials")
     phases = [keys.SETTLEMENT.read(table) for table in top.tables("settlement")]
     motions = [_settlement(table, one) for table, one in zip(top.tables("settlement"), phases, strict=True)]
     analysis = top.table("analysis")
@@ -149,7 +148,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         role_places=read_places(top.table("roles")),
         supports=tuple(_support(table) for table in top.tables("supports")),
         **_material(top.table("material")),
-        densities={name: keys.MATERIALS.read(materials.table(name))["density"] for name in materials.values},
+        densities=_densities(top.table("materials")),
         interfaces=dict(_interface(table) for table in top.tables("interfaces")),
         imperfections=_imperfections(top),
         settlements=tuple(settlement for settlement, _ in motions),
@@ -285,6 +284,16 @@ def _material(table: Table) -> dict[str, Any]:
     return values
 
 
+def _densities(materials: Table) -> dict[str, Any]:
+    """Read the tables [materials.NAME]; the keys of [material] are easily put there."""
+    for name, value in materials.values.items():
+        if not isinstance(value, Mapping):
+            known = name in [key.name for key in keys.MATERIAL.keys]
+            remedy = f"write [material] {name}" if known else f"write [materials.{as_key(name)}] density"
+            raise materials.error(name, f"is {shortened(value)}; [materials] has a table for each material: {remedy}")
+    return {name: keys.MATERIALS.read(materials.table(name))["density"] for name in materials.values}
+
+
 def _checked_law(table: Table, values: Mapping[str, Any]) -> solver.InterfaceLaw:
     try:
         return solver.InterfaceLaw(**values)
@@ -364,6 +373,11 @@ def _load(table: Table) -> LoadCase:
                 raise table.error(key, "does not go with positions: the force acts on the topmost block at each")
     elif load.weight_fraction is None and load.pressure is None and not (load.has_force or load.has_moment):
         raise table.error("force", "is missing or zero; give force, moment, weight_fraction or pressure")
+    if load.point is not None and not (load.has_force or load.has_moment):
+        raise table.error(
+            "point",
+            "is that of a force or moment; pressure and weight_fraction act all over: leave it out, or give force",
+        )
     return load
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -64,7 +64,7 @@ def read_backfill(table: Table) -> BackfillCase:
 
 
 def backfills(entries: Sequence[BackfillCase], assembly: solver.Assembly, source: Path) -> tuple[solver.Backfill, ...]:
-    """Make the fills of a case.
+    """Make the fills of a case, over blocks that several of them name one on another.
 
     Parameters
     ----------
@@ -76,9 +76,10 @@ def backfills(entries: Sequence[BackfillCase], assembly: solver.Assembly, source
     Raises
     ------
     ValueError
-        For a name that no free block has, a surface below the extrados of a block, blocks of which none sees it.
+        For a name that no free block has, a surface below the extrados of a block, blocks of which none sees it, and
+        two fills over a block up to the same surface.
     """
-    return tuple(
+    laid = [
         lay_backfill(
             assembly,
             entry.over,
@@ -88,7 +89,37 @@ def backfills(entries: Sequence[BackfillCase], assembly: solver.Assembly, source
             where=f"{source}: [{entry.where}]",
         )
         for entry in entries
-    )
+    ]
+    for number, fill in enumerate(laid):
+        for other in range(number):
+            same = np.intersect1d(fill.block, laid[other].block)
+            if len(same) and fill.surface == laid[other].surface:
+                raise ValueError(
+                    f"{source}: [{entries[other].where}] and [{entries[number].where}] both fill up to "
+                    f"{fill.surface:g} m over block '{assembly.names[same[0]]}'; leave the block out of one, or give "
+                    "another surface"
+                )
+    return tuple(part for fill in laid for part in _on_lower(fill, laid))
+
+
+def _on_lower(fill: solver.Backfill, laid: Sequence[solver.Backfill]) -> list[solver.Backfill]:
+    """Cut a fill into the part that lies on the blocks and those that lie on lower fills, each above their surface.
+
+    What lies on another fill presses sideways as that which touches the block does.
+    """
+    base = np.full(len(fill.block), -np.inf)
+    coefficient = np.full(len(fill.block), fill.pressure_coefficient)
+    for other in sorted(laid, key=lambda other: -other.surface):
+        under = np.isin(fill.block, other.block) & (other.surface < fill.surface)
+        base[under] = np.maximum(base[under], other.surface)
+        coefficient[under] = other.pressure_coefficient
+    parts = []
+    for level, k in np.unique(np.column_stack([base, coefficient]), axis=0).tolist():
+        own = (base == level) & (coefficient == k)
+        thickness = None if fill.thickness is None else fill.thickness[own]
+        part = replace(fill, pieces=fill.pieces[own], block=fill.block[own], thickness=thickness)
+        parts.append(replace(part, base=level, pressure_coefficient=k))
+    return parts
 
 
 def lay_backfill(

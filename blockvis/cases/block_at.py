@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -36,6 +37,30 @@ def distances_to(assembly: solver.Assembly, point: ArrayLike) -> np.ndarray:
     found = np.full(assembly.n_blocks, np.inf)
     np.minimum.at(found, parts.block_of_part, of_part)
     return np.maximum(found, 0.0)
+
+
+def note_outside(assembly: solver.Assembly, point: Sequence[float], block: int, where: str, role: str) -> None:
+    """Warn of a point further outside the block that goes with it than a block is large.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    point : (d,) sequence [m]
+    block : int
+    where : str
+        File, table and key.
+    role : str
+        What the block does, as "on which the force acts".
+    """
+    corners = assembly.vertices[assembly.block_of_vertex == block]
+    apart = float(np.linalg.norm(point - np.clip(point, corners.min(axis=0), corners.max(axis=0))))
+    if apart > assembly.block_size:
+        place = ", ".join(f"{x:g}" for x in point)
+        warnings.warn(
+            f"{where} ({place}) lies {apart:.3g} m outside block '{assembly.names[block]}', {role} all the same: "
+            "is it in m?",
+            stacklevel=3,
+        )
 
 
 def block_at(

@@ -125,6 +125,7 @@ def bonded(
             names = [f"wall {number} {name}" if several else name for name in stones.names]
             notes += [*stones.notes, _told(region, len(openings), stones, bonding.pattern)]
             more: dict[str, Any] = {"thickness": [bonding.thickness or np.nan] * stones.n_blocks}
+            more["laid"] = [True] * stones.n_blocks
             layers = [region.layer] * stones.n_blocks
             rest = rest.with_more(stones.blocks, names=names, groups=layers, materials=stones.materials, **more)
     return sorted_out(_without_nan(rest, notes))

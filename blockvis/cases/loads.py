@@ -13,7 +13,7 @@ import numpy as np
 import solver
 from blockvis.text import force_text, nearest
 
-from .block_at import block_at
+from .block_at import block_at, note_outside
 from .topmost import load_on_top_in_space
 
 
@@ -178,16 +178,7 @@ def _loaded(load: LoadCase, chosen: np.ndarray, assembly: solver.Assembly, where
     if load.point is not None and len(chosen) > 1:
         return [block_at(assembly, load.point, chosen, load.force, f"{where} point")]
     if load.point is not None:
-        block = int(chosen[0])
-        corners, point = assembly.vertices[assembly.block_of_vertex == block], np.array(load.point)
-        apart = float(np.linalg.norm(point - np.clip(point, corners.min(axis=0), corners.max(axis=0))))
-        if apart > assembly.block_size:
-            place = ", ".join(f"{x:g}" for x in load.point)
-            warnings.warn(
-                f"{where} point ({place}) lies {apart:.3g} m outside block '{assembly.names[block]}', on which the "
-                "force acts all the same: is it in m?",
-                stacklevel=2,
-            )
+        note_outside(assembly, load.point, int(chosen[0]), f"{where} point", "on which the force acts")
     if load.has_force and len(chosen) > 1:
         total = len(chosen) * float(np.linalg.norm(load.force))
         warnings.warn(

@@ -14,7 +14,7 @@ from blockvis.layout.left_out import LeftOut, in_words, matches
 from blockvis.text import nearest
 from solver import mechanics
 
-from .block_at import ON_EDGE, block_at, distances_to
+from .block_at import ON_EDGE, block_at, distances_to, note_outside
 from .key import NOT_NEGATIVE, POSITIVE, TEXT, TRUE_OR_FALSE, VECTOR, Key, Section, ValueKind, one_of, whole
 from .toml_table import Table, shortened
 
@@ -374,7 +374,9 @@ def _holding(
             raise ValueError(
                 f"{where}: no block is called '{end.block}'{near}; the layout has {', '.join(assembly.names[:12])}"
             )
-        return assembly.index(end.block)
+        block = assembly.index(end.block)
+        note_outside(assembly, point, block, where, "which holds this end")
+        return block
     every = np.arange(assembly.n_blocks)
     apart = distances_to(assembly, point)
     if apart.min() > ON_EDGE * assembly.block_size:

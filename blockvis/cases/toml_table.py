@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from blockvis.text import nearest
+from blockvis.text import nearest, refuse_magnitude
 
 
 class Table:
@@ -36,9 +36,13 @@ class Table:
         self.known: list[str] = []
 
     def take(self, key: str, default: Any = None) -> Any:
-        """Read a value of any kind."""
+        """Read a value of any kind, in which no number is smaller or larger than something real can be."""
         self.known.append(key)
-        return self.values.get(key, default)
+        value = self.values.get(key, default)
+        for number in _numbers_in(value):
+            if remedy := refuse_magnitude(number):
+                raise self.error(key, f"{'is' if number is value else 'holds'} {shortened(number)}; {remedy}")
+        return value
 
     def number(self, key: str, default: float | None = None, *, positive: bool = False) -> Any:
         """Read a finite number as a float; None if it is missing and has no default."""
@@ -156,6 +160,15 @@ class Table:
             if key not in self.known:
                 keys = ", ".join(dict.fromkeys(self.known))
                 raise self.error(key, f"is not a key here{nearest(key, self.known)}; keys are {keys}")
+
+
+def _numbers_in(value: object) -> Iterator[float]:
+    """List the numbers of a value and of lists in it; those of tables are found where these are read."""
+    if isinstance(value, list | tuple):
+        for one in value:
+            yield from _numbers_in(one)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield value
 
 
 def toml_value(text: str) -> Any:

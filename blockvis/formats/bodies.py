@@ -248,8 +248,11 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
         changed.append((volume(points, faces) / drawn - 1.0, body.name))
         solids.append((points[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if lying else points, faces))
     said = _plane_faces_said(warped, changed)
-    if lying and view is None:
-        said.append(f'{found.up_says}: its (x, y, z) were read as (x, -z, y); give view = "xz" if z is up')
+    if found.up_says and view is None:
+        taken = "its (x, y, z) were read as (x, -z, y)" if lying else "z was taken as up"
+        said.append(
+            f'{found.up_says}: {taken}; give view = "{"xz" if lying else "xy"}" if {"z" if lying else "y"} is up'
+        )
     layout = Layout(
         blocks=tuple(solids),
         names=tuple(body.name for body in asked.bodies),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,15 +16,22 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import FLAT, spread_of
 from blockvis.layout.solids import Solid, area_vectors, prism, triangles_of
 from blockvis.system.extras import MissingExtra
+from solver.mechanics import counted
 
 from . import dae
-from .bodies import Bodies
+from .bodies import Bodies, Body
 from .cells import layout_of_cells, merged
 from .closed_surfaces import enclosed
 from .reading import Reading
 
-#: Programs that write coordinates to .glb as they are, with z up, in small letters.
-Z_IS_UP = ("trimesh",)
+#: Programs that write coordinates to .glb as they are, whichever of them is up, in small letters.
+AS_THEY_ARE = ("trimesh",)
+
+#: Corners this near to the lowest, in sizes of the whole, are in the face on which a body stands.
+LEVEL = 1e-3
+
+#: Of what is upright no more than this part of the bodies stands on the ground; of what lies on its side all may.
+STANDING = 0.5
 
 #: Largest description of a .glb file that is looked into [bytes].
 LARGEST_HEADER = 64 * 2**20
@@ -43,7 +51,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         by_name = {row.get("name"): row for row in rows}
         rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
-    return Bodies(tuple(bodies), tuple(known), drawn.unit, tuple(closed.notes), up=drawn.up, up_says=drawn.up_says)
+    up, up_says = _up(path, bodies, size) if suffix == ".glb" else (drawn.up, drawn.up_says)
+    return Bodies(tuple(bodies), tuple(known), drawn.unit, tuple(closed.notes), up=up, up_says=up_says)
 
 
 def _scene(path: Path, suffix: str) -> dae.Drawn:
@@ -72,7 +81,7 @@ def _scene(path: Path, suffix: str) -> dae.Drawn:
     if suffix != ".glb":
         return dae.Drawn(parts, "", "z", "", _own_rows(path))
     rows = [mesh.metadata.get("blockvis") for _, mesh in _placed(scene, path) if len(mesh.faces)]
-    return dae.Drawn(parts, "m", *_up(path), rows if all(isinstance(row, dict) for row in rows) else [])
+    return dae.Drawn(parts, "m", "y", "", rows if all(isinstance(row, dict) for row in rows) else [])
 
 
 def _dae(path: Path) -> dae.Drawn:
@@ -120,15 +129,44 @@ def _description(path: Path) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def _up(path: Path) -> tuple[str, str]:
-    """Find the coordinate that points up in a .glb file: y, as the format has it, but of programs that write z."""
+def _up(path: Path, bodies: Sequence[Body], size: float) -> tuple[str, str]:
+    """Find the coordinate that points up in a .glb file: y, as the format has it, unless its program does not care.
+
+    Of a program that writes coordinates as they are, z, which is up in most of them; y where the bodies stand along it
+    on level faces, and fewer do than along z: what lies on its side does so with most of its bodies.
+    """
     try:
         generator = str(_description(path).get("asset", {}).get("generator", ""))
     except AttributeError:
         generator = ""
-    if any(word in generator.lower() for word in Z_IS_UP):
-        return "z", ""
-    return "y", f"y is up in .glb files{f' ({generator})' if generator else ''}"
+    program = next((word for word in AS_THEY_ARE if word in generator.lower()), "")
+    if not program:
+        return "y", f"y is up in .glb files{f' ({generator})' if generator else ''}"
+    along_y, along_z = (_standing(bodies, axis, size) for axis in (1, 2))
+    writes = f"{program} writes coordinates as they are"
+    if along_y and along_y <= STANDING * len(bodies) and (along_y < along_z or not along_z):
+        found = f"{along_z} would" if along_z else "none would"
+        return (
+            "y",
+            f"{writes}, and {counted(along_y, 'body stands', 'bodies stand')} on a level if y is up, {found} if z is",
+        )
+    return "z", f"{writes}, z up in most files"
+
+
+def _standing(bodies: Sequence[Body], axis: int, size: float) -> int:
+    """Count the bodies with a face in the lowest level along an axis; 0 if the middle of all is not above them."""
+    import shapely
+
+    corners = [body.points for body in bodies]
+    lowest = min(float(points[:, axis].min()) for points in corners)
+    feet = [points[points[:, axis] <= lowest + LEVEL * size] for points in corners]
+    feet = [foot for foot in feet if len(foot) > 2]
+    if not feet:
+        return 0
+    plan = [k for k in range(3) if k != axis]
+    middle = np.mean([points.mean(axis=0) for points in corners], axis=0)
+    ground = shapely.MultiPoint(np.concatenate(feet)[:, plan]).convex_hull
+    return len(feet) if ground.covers(shapely.Point(middle[plan])) else 0
 
 
 def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:

@@ -11,7 +11,7 @@ import solver
 from blockvis.layout.outlines import without_collinear
 from solver import mechanics
 
-from .dimensions import MOST_VOUSSOIRS, above_zero, whole
+from .dimensions import MOST_VOUSSOIRS, above_zero, thickness_over_radius, whole
 
 
 def arch(
@@ -50,11 +50,11 @@ def arch(
     >>> arch(voussoirs=12).n_blocks
     14
     """
-    if not 0.0 < embrace <= 180.0:
+    radius, embrace = above_zero("radius", radius), above_zero("embrace", embrace, "degrees")
+    if embrace > 180.0:
         raise ValueError(f"embrace is {embrace:g} degrees; give an angle above 0 and up to 180")
     voussoirs = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)
-    if not 0.0 < thickness_ratio < 2.0:
-        raise ValueError(f"thickness_ratio is {thickness_ratio:g}; give thickness / radius between 0 and 2")
+    thickness_ratio = thickness_over_radius(thickness_ratio)
     half = math.radians(embrace) / 2.0
     angles = np.linspace(math.pi / 2 + half, math.pi / 2 - half, voussoirs + 1)
     thickness = thickness_ratio * radius
@@ -308,6 +308,6 @@ def _on_springers(
         names=[*(f"voussoir {i + 1}" for i in range(n)), "left springer", "right springer"],
         roles=[mechanics.FREE] * n + [mechanics.FIXED, mechanics.MOVING],
         materials=["stone"] * n + ["ground"] * 2,
-        density=density,
-        thickness=depth,
+        density=above_zero("density", density, "kg/m³"),
+        thickness=above_zero("depth", depth),
     )

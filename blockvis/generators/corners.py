@@ -64,7 +64,7 @@ def l_corner(
         ("ground", mechanics.FIXED, box((-wide, -wide, -height), (n * length + wide, width, 0.0))),
         ("cross ground", mechanics.MOVING, box((-wide, width, -height), (width + wide, m * length + wide, 0.0))),
     ]
-    return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"), material="brick")
+    return assembled(stones, grounds, density=density, material="brick")
 
 
 def t_corner(
@@ -126,7 +126,7 @@ def t_corner(
             box((-width / 2.0 - wide, width, -height), (width / 2.0 + wide, far + wide, 0.0)),
         ),
     ]
-    return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"), material="brick")
+    return assembled(stones, grounds, density=density, material="brick")
 
 
 def two_leaf_wall(
@@ -197,7 +197,7 @@ def two_leaf_wall(
         ("front ground", mechanics.FIXED, box((-wide, -wide, -height), (n * length + wide, middle, 0.0))),
         ("back ground", mechanics.MOVING, box((-wide, middle, -height), (n * length + wide, deep + wide, 0.0))),
     ]
-    return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"), material="brick")
+    return assembled(stones, grounds, density=density, material="brick")
 
 
 def _brick(length: float, height: float) -> tuple[float, float, float]:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from blockvis.text import refuse_magnitude
+
 #: Most blocks in a layout, or along a side of it: more than can be solved.
 MOST_BLOCKS = 100_000
 
@@ -15,13 +17,15 @@ MOST_VOUSSOIRS = 2_000
 
 
 def finite(name: str, value: Any, unit: str = "m") -> float:
-    """Return the value as a float if it is a finite number."""
+    """Return the value as a float if it is a finite number, and as small and large as something real can be."""
     try:
         number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
         raise ValueError(f"{name} is {str(value)[:60]!r}; give a finite number{f' in {unit}' if unit else ''}")
+    if remedy := refuse_magnitude(number):
+        raise ValueError(f"{name} is {number:g}{f' {unit}' if unit else ''}; {remedy}")
     return number
 
 
@@ -39,6 +43,14 @@ def at_least_zero(name: str, value: Any, unit: str = "m") -> float:
     if number < 0.0:
         raise ValueError(f"{name} is {number:g}{f' {unit}' if unit else ''}; give a number of at least 0")
     return number
+
+
+def thickness_over_radius(value: float) -> float:
+    """Return the thickness of a shell over the radius of its middle as a float if its inner radius is above zero."""
+    ratio = above_zero("thickness_ratio", value, "")
+    if ratio >= 2.0:
+        raise ValueError(f"thickness_ratio is {ratio:g}; give thickness / radius between 0 and 2")
+    return ratio
 
 
 def whole(name: str, value: Any, least: int, most: int = MOST_BLOCKS) -> int:

@@ -10,7 +10,7 @@ import solver
 from blockvis.layout.solids import Solid, between
 from solver import mechanics
 
-from .dimensions import above_zero, whole
+from .dimensions import above_zero, thickness_over_radius, whole
 from .solids import assembled
 
 #: Most stones around a dome.
@@ -59,15 +59,13 @@ def dome(
     >>> dome(lunes=8, courses=6).n_blocks
     57
     """
-    radius, density = above_zero("radius", radius), above_zero("density", density, "kg/m³")
+    radius, thickness = above_zero("radius", radius), thickness_over_radius(thickness_ratio) * radius
+    cap, springing = above_zero("cap", cap, "degrees"), above_zero("springing", springing, "degrees")
     n, rings = whole("lunes", lunes, 3, MOST_LUNES), whole("courses", courses, 1)
-    if not 0.0 < thickness_ratio < 2.0:
-        raise ValueError(f"thickness_ratio is {thickness_ratio:g}; give thickness / radius between 0 and 2")
-    if not 0.0 < cap < springing <= 90.0:
+    if not cap < springing <= 90.0:
         raise ValueError(
             f"cap is {cap:g} and springing {springing:g} degrees; give 0 < cap < springing, and at most 90"
         )
-    thickness = thickness_ratio * radius
     inner, outer = radius - thickness / 2.0, radius + thickness / 2.0
     beds = np.radians(np.linspace(springing, cap, rings + 1))
     around = 2.0 * math.pi * np.arange(n) / n

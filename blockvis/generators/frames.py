@@ -55,8 +55,8 @@ def column(
         names=[*(f"block {i + 1}" for i in range(n)), "ground"],
         roles=[mechanics.FREE] * n + [mechanics.MOVING],
         materials=["stone"] * n + ["ground"],
-        density=density,
-        thickness=depth,
+        density=above_zero("density", density, "kg/m³"),
+        thickness=above_zero("depth", depth),
     )
 
 
@@ -269,6 +269,6 @@ def _on_two_feet(
         names=[name for name, _ in named],
         roles=[mechanics.FREE] * n + [mechanics.FIXED, mechanics.MOVING],
         materials=["stone"] * n + ["ground"] * 2,
-        density=density,
-        thickness=depth,
+        density=above_zero("density", density, "kg/m³"),
+        thickness=above_zero("depth", depth),
     )

@@ -67,7 +67,7 @@ def cross_vault(
         (f"springer {quarter + 1}", mechanics.MOVING if quarter == 0 else mechanics.FIXED, _turned(corner, quarter))
         for quarter in range(4)
     ]
-    return assembled(stones, springers, density=above_zero("density", density, "kg/m³"))
+    return assembled(stones, springers, density=density)
 
 
 def church_bay(
@@ -128,7 +128,7 @@ def church_bay(
         foot = box((inner - wide, inner - wide, levels[0] - wide), (*[inner + side + wide] * 2, float(levels[0])))
         role = mechanics.MOVING if quarter == 0 else mechanics.FIXED
         grounds.append((f"ground {quarter + 1}", role, _turned(foot, quarter)))
-    return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"))
+    return assembled(stones, grounds, density=density)
 
 
 def _crossing(arc: _Arc, width: float, stone: float, bonded: bool) -> list[tuple[str, Solid]]:
@@ -218,7 +218,7 @@ def pavilion_vault(
         (f"springer {side + 1}", mechanics.MOVING if side == 0 else mechanics.FIXED, _turned(between(low, high), side))
         for side in range(4)
     ]
-    return assembled(stones, springers, density=above_zero("density", density, "kg/m³"))
+    return assembled(stones, springers, density=density)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,8 @@ import solver
 from blockvis.layout.solids import Solid
 from solver import mechanics
 
+from .dimensions import above_zero
+
 
 def assembled(
     free: Sequence[tuple[str, Solid]],
@@ -31,5 +33,5 @@ def assembled(
         names=[name for name, _ in free] + [name for name, _, _ in supports],
         roles=[mechanics.FREE] * len(free) + [role for _, role, _ in supports],
         materials=[material] * len(free) + ["ground"] * len(supports),
-        density=density,
+        density=above_zero("density", density, "kg/m³"),
     )

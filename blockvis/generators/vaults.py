@@ -113,12 +113,12 @@ def _vault(
 ) -> solver.Assembly:
     """Extrude the circular arch of these dimensions, cut along y in stones and springers."""
     plane = arch(
-        radius=above_zero("radius", radius),
+        radius=radius,
         thickness_ratio=thickness_ratio,
         embrace=embrace,
         voussoirs=voussoirs,
-        density=above_zero("density", density, "kg/m³"),
-        depth=above_zero("depth", length),
+        density=density,
+        depth=length,
     )
     straight = length * np.linspace(-0.5, 0.5, stones + 1)
     broken = np.unique(np.concatenate([straight[[0, -1]], (straight[1:] + straight[:-1]) / 2.0]))

@@ -111,7 +111,12 @@ def wall(
         materials.append("ground")
         roles.append(role)
     return solver.Assembly.from_outlines(
-        outlines, names=names, roles=roles, materials=materials, density=density, thickness=depth
+        outlines,
+        names=names,
+        roles=roles,
+        materials=materials,
+        density=above_zero("density", density, "kg/m³"),
+        thickness=above_zero("depth", depth),
     )
 
 

@@ -119,6 +119,7 @@ def assemble(
         anchored=anchored,
         closing=closing,
         mortar=drawn_mortar(layout),
+        laid=np.array(layout.laid),
     )
     for note in repairs:
         warnings.warn(f"{where}: {note}", stacklevel=2)

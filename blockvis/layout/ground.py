@@ -250,8 +250,10 @@ def _as_in_a_run(found: Inspection) -> list[np.ndarray]:
     lowest = np.flatnonzero(low <= low.min() + 2.0 * float(np.median(high - low)))
     assembly = solver.Assembly.from_outlines([outlines[k] for k in lowest])
     anchored = np.zeros(len(lowest), dtype=bool)
+    laid = np.array([found.layout.laid[found.kept[k]] for k in lowest])
+    thickness = found.joint_thickness
     try:
-        closed = repaired(assembly, joint_thickness=found.joint_thickness, overlap_tolerance=None, anchored=anchored)[0]
+        closed = repaired(assembly, joint_thickness=thickness, overlap_tolerance=None, anchored=anchored, laid=laid)[0]
     except ValueError:
         # What cannot be closed is told where the case is built.
         return outlines

@@ -199,7 +199,7 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
     width = float(np.median(assembly.widths))
     outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
     finer = simplified(outlines, default_tolerance(outlines))[1]
-    proposal = proposed(outlines)
+    proposal = proposed(outlines, laid=np.array(layout.laid))
     smallest = SMALLEST_JOINT * width
     return {
         "sizes": assembly.areas,
@@ -253,6 +253,7 @@ def _in_space(layout: Layout, free: np.ndarray) -> dict[str, Any]:
         assembly = solver.Assembly.from_solids(facing.solids, names=layout.names)
         overlapping = overlaps(assembly, tolerance)
         gaps = _open_joints(assembly, float(np.median([width_of(*solid) for solid in layout.solids])))
+        gaps = [(i, j, gap) for i, j, gap in gaps if not (layout.laid[i] and layout.laid[j])]
     except ValueError as error:
         refused = str(error)
     thickness = _closing_thickness(gaps)

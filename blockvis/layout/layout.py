@@ -58,6 +58,8 @@ class Layout:
         What the file draws beside its blocks.
     looks : tuple of tuples of str
         Kind of entity and colour of each block in a drawing, by which it can be left out.
+    laid : tuple of bool
+        Whether a bond laid the block: two of them touch or stand apart as they are, and have no mortar between them.
     """
 
     blocks: tuple[Outline | Solid, ...]
@@ -72,6 +74,7 @@ class Layout:
     source: str = ""
     left_out: tuple[LeftOut, ...] = ()
     looks: tuple[tuple[str, ...], ...] = ()
+    laid: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that there is one word of each kind per block, and replace broken characters."""
@@ -82,6 +85,8 @@ class Layout:
                 raise ValueError(f"{self.n_blocks} blocks but {len(getattr(self, kind))} {kind}; give one per block")
         if not self.looks:
             object.__setattr__(self, "looks", ((),) * self.n_blocks)
+        if not self.laid:
+            object.__setattr__(self, "laid", (False,) * self.n_blocks)
         # A file in another encoding than it states leaves halves of characters, which cannot be written to a file.
         note = "characters that the file's encoding does not have are shown as \ufffd"
         for kind in _WORDS:
@@ -142,14 +147,15 @@ class Layout:
         """Take only these blocks, in this order."""
         keep = [int(i) for i in blocks]
         taken: dict[str, Any] = {}
-        for kind in ("blocks", *_WORDS, "looks", "thickness", "density"):
+        for kind in ("blocks", *_WORDS, "looks", "laid", "thickness", "density"):
             of = getattr(self, kind)
             taken[kind] = tuple(of[i] for i in keep) if isinstance(of, tuple) else of if of is None else of[keep]
         return replace(self, **taken)
 
     def with_more(self, blocks: Sequence[Outline | Solid], **of_blocks: Sequence[Any]) -> Layout:
-        """Add blocks, with what is known of them: names, roles, materials, density, thickness."""
+        """Add blocks, with what is known of them: names, roles, materials, density, thickness, laid."""
         taken: dict[str, Any] = {"blocks": self.blocks + tuple(blocks), "looks": self.looks + ((),) * len(blocks)}
+        taken["laid"] = self.laid + tuple(of_blocks.get("laid", (False,) * len(blocks)))
         for kind in _WORDS:
             taken[kind] = getattr(self, kind) + tuple(of_blocks.get(kind, ("",) * len(blocks)))
         for kind in ("density",) if self.dimension == 3 else ("density", "thickness"):

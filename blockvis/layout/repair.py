@@ -105,6 +105,7 @@ def repaired(
     anchored: np.ndarray,
     closing: str = "auto",
     mortar: Sequence[LeftOut] = (),
+    laid: np.ndarray | None = None,
 ) -> tuple[list[np.ndarray], list[str]]:
     """Resolve the overlaps of the outlines of an assembly and close its joints.
 
@@ -122,6 +123,8 @@ def repaired(
         How joints are closed; see :func:`blockvis.layout.joints.close.close_joints`.
     mortar : sequence of LeftOut
         Surfaces of mortar as drawn, with the stones as their holes.
+    laid : (n_blocks,) bool array, optional
+        Blocks between which a gap is no joint.
 
     Returns
     -------
@@ -144,12 +147,16 @@ def repaired(
         raise ValueError(f"overlap_tolerance is {tolerance:g} m; it must be a length of at least 0")
     found = [(i, j, d) for i, j, d in overlaps(assembly, ROUNDING * width) if not (anchored[i] and anchored[j])]
     refuse_overlaps(assembly, found, tolerance)
-    thickness, closing, notes = _thickness(joint_thickness, closing, [outlines[i] for i in np.flatnonzero(free)], width)
+    laid = np.zeros(assembly.n_blocks, dtype=bool) if laid is None else laid
+    measured = [outlines[i] for i in np.flatnonzero(free)]
+    thickness, closing, notes = _thickness(joint_thickness, closing, measured, laid[free], width)
     if not found and thickness == 0:
         return outlines, notes
     depth = min(tolerance, 1.01 * found[0][2]) if found else 0.0
     try:
-        closed = close_joints(outlines, thickness, overlap=depth, anchored=anchored, method=closing, mortar=mortar)
+        closed = close_joints(
+            outlines, thickness, overlap=depth, anchored=anchored, method=closing, mortar=mortar, laid=laid
+        )
     except FoldedOutline as error:
         raise ValueError(
             f"closing the joints of block {error.block} ('{assembly.names[error.block]}') face by face folds its "
@@ -160,13 +167,13 @@ def repaired(
 
 
 def _thickness(
-    asked: float | str, closing: str, outlines: list[np.ndarray], width: float
+    asked: float | str, closing: str, outlines: list[np.ndarray], laid: np.ndarray, width: float
 ) -> tuple[float, str, list[str]]:
     """Find the joint thickness [m] and the way of closing, and what to say of them."""
     if isinstance(asked, str):
         if asked.strip().lower() != "auto":
             raise ValueError(f"joint_thickness is '{asked}'; give a length in m or \"auto\"")
-        found = proposed(outlines, closing)
+        found = proposed(outlines, closing, laid)
         notes = [f'joint_thickness "auto" found {found.thickness:g} m' + (f": {found.note}" if found.note else "")]
         # Faces that turn out not to close edge by edge may still be closed in the other way.
         return found.thickness, closing if found.method == "faces" else found.method, notes

@@ -115,6 +115,8 @@ def fill_bodies(response: solver.Response, shown: solver.Pose, gone: np.ndarray 
     feet, tops = [np.zeros((0, d, d))], [np.zeros(0)]
     for fill in response.loads.fills:
         kept = fill if gone is None else fill.without(gone)
-        feet.append(kept.corners(response.assembly, shown))
+        foot = kept.corners(response.assembly, shown)
+        foot[:, :, -1] = np.maximum(foot[:, :, -1], kept.base)
+        feet.append(foot)
         tops.append(np.full(len(kept.block), kept.surface))
     return FillBodies(np.concatenate(feet), np.concatenate(tops))

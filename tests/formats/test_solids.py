@@ -1,5 +1,7 @@
 """Bodies in space: prisms become outlines with a thickness, everything else is refused."""
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -33,6 +35,30 @@ def test_named_objects_may_touch(tmp_path):
     assembly = read(tmp_path / "a.glb")
     assert assembly.names == tuple(f"brick {k}" for k in range(4))
     assert assembly.centroids[2] == pytest.approx([2, 0.4], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "up", "says"),
+    [
+        (
+            "two-leaf wall",
+            "y",
+            r"2 bodies stand on a level if y is up, none would if z is: .* as \(x, -z, y\); .*\"xz\"",
+        ),
+        ("barrel vault", "y", r"2 bodies stand on a level if y is up, 14 would if z is: .*view = \"xz\" if z is up"),
+        ("barrel vault", "z", r"writes coordinates as they are, z up in most files: z was .*view = \"xy\" if y is up"),
+    ],
+)
+def test_where_a_program_may_write_either_axis_up_it_is_the_one_on_which_the_blocks_stand(tmp_path, name, up, says):
+    layout = layout_of(generators.build(name))
+    scene = trimesh.Scene()
+    for stone, (points, faces) in zip(layout.names, layout.solids, strict=True):
+        drawn = points if up == "z" else points[:, [0, 2, 1]] * [1, 1, -1]
+        scene.add_geometry(trimesh.Trimesh(drawn, fans(faces), process=False), node_name=stone, geom_name=stone)
+    scene.export(tmp_path / "a.glb")
+    found = read_layout(tmp_path / "a.glb", dimension=3)
+    np.testing.assert_allclose(np.ptp(found.points, axis=0), np.ptp(layout.points, axis=0), rtol=1e-6)
+    assert any(re.search(says, note) for note in found.notes)
 
 
 @pytest.mark.parametrize("suffix", ["stl", "ply"])

@@ -43,7 +43,7 @@ blocks = "right springer"
 kind = "dead"
 blocks = "*"
 weight_fraction = [0.1, 0.0]
-force = [0.0, 0.0]
+force = [0.0, -10.0]
 point = [0.0, 1.0]
 moment = 0.0
 [analysis]

@@ -10,6 +10,7 @@ from structures import alike, assembly_of, box, case_from, pixels, rectangle
 
 import solver
 from blockvis import draw_still, lay_backfill
+from blockvis.cases.build import case_assembly, case_loads
 
 WEIGHT = 10.0
 
@@ -92,6 +93,35 @@ def test_fill_that_cannot_be_is_refused_in_one_line(change: dict[str, str], word
     with pytest.raises(ValueError, match=words) as error:
         assembly_of(case_from(f"{CASE}[[backfill]]\n{keys}\n"))
     assert "\n" not in str(error.value)
+
+
+def test_fills_over_the_same_blocks_lie_one_on_another() -> None:
+    def filled(*tables: dict[str, str]) -> tuple[solver.Assembly, solver.Loads]:
+        texts = ["\n".join(f"{key} = {value}" for key, value in (FILL | table).items()) for table in tables]
+        case = case_from(CASE + "".join(f"[[backfill]]\n{text}\n" for text in texts))
+        assembly = case_assembly(case)
+        return assembly, case_loads(case, assembly)
+
+    pressing = {"pressure_coefficient": "0.3"}
+    assembly, whole = filled(pressing)
+    start = solver.Pose.initial(assembly)
+    sunk = solver.Pose(start.positions - [0.02, 0.05], start.rotations + 0.1)
+    for layers in ((pressing | {"surface": "1.4"}, {}), ({}, pressing | {"surface": "1.4"})):
+        loads = filled(*layers)[1]
+        for pose in (start, sunk):
+            np.testing.assert_allclose(loads.dead_at(assembly, pose), whole.dead_at(assembly, pose), atol=1e-9)
+    heavy, light = (fill.weight(assembly) for fill in filled({"surface": "1.4"}, {"unit_weight": "9000.0"})[1].fills)
+    (low,) = (fill.weight(assembly) for fill in filled({"surface": "1.4"})[1].fills)
+    (all_light,) = (fill.weight(assembly) for fill in filled({"unit_weight": "9000.0"})[1].fills)
+    assert (heavy, heavy + light) == pytest.approx((low, all_light + low / 2))
+
+
+def test_fills_up_to_the_same_surface_over_a_block_are_refused() -> None:
+    text = "".join("[[backfill]]\n" + "\n".join(f"{key} = {value}" for key, value in FILL.items()) + "\n" for _ in "ab")
+    with pytest.raises(
+        ValueError, match=r"\[backfill 1\] and \[backfill 2\] both fill up to 2 m over block 'voussoir 1'"
+    ):
+        assembly_of(case_from(CASE + text))
 
 
 def test_fill_over_covered_blocks_is_refused() -> None:

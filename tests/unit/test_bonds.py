@@ -262,6 +262,20 @@ def test_a_case_fills_the_wall_and_closes_its_joints(facade):
     assert {"lintel 1", "ground"} <= set(assembly.names)
 
 
+def test_a_gap_between_stones_of_a_bond_is_no_joint_and_one_between_drawn_stones_is(tmp_path):
+    window = arched(0.8, 0.4, 1.2, 0.9, 0.6, n=8)
+    pier = [("pier", shapely.box(6, low, 6.5, low + 0.5)) for low in (0.0, 0.51)]
+    drawing = drawn(tmp_path / "arch.dxf", ("A-WALL", WALL), ("A-WIN", window), *pier)
+    case = CASE + 'openings = ["A-WIN"]\n'
+    drawn_open, closed = (
+        assembly_of(case.replace("[[supports]]", f"joint_thickness = {width}\n[[supports]]"), drawing)
+        for width in (0.0, 0.15)
+    )
+    wall = drawn_open.centroids[drawn_open.block_of_vertex, 0] < 6
+    np.testing.assert_allclose(closed.vertices[wall], drawn_open.vertices[wall], atol=1e-9)
+    assert closed.areas[closed.centroids[:, 0] > 6].sum() == pytest.approx(0.505, rel=1e-9)
+
+
 def test_walls_side_by_side_have_bonds_of_their_own(tmp_path):
     jambs = [shapely.box(2.0, 0.8, 2.2, 1.7), shapely.box(3.0, 0.8, 3.2, 1.7)]
     drawing = drawn(
@@ -330,13 +344,13 @@ def test_info_and_run_say_that_the_wall_wants_a_bond(facade, capsys):
 
 
 def test_new_writes_the_bond_into_the_case(tmp_path):
-    drawing = drawn(
-        tmp_path / "small.dxf", ("A-WALL", shapely.box(0, 0, 1.5, 0.9)), ("A-WIN", shapely.box(0.5, 0.2, 1, 0.5))
-    )
+    window = arched(0.4, 0.2, 0.6, 0.2, 0.3, n=8)
+    drawing = drawn(tmp_path / "small.dxf", ("A-WALL", shapely.box(0, 0, 1.5, 0.9)), ("A-WIN", window))
     case = tmp_path / "new.toml"
     assert main(["new", str(drawing), "-o", str(case)]) == 0
     values = tomllib.loads(case.read_text(encoding="utf-8"))
     assert values["bond"] == [{"walls": ["A-WALL"], "bond": "running", "brick": [0.25, 0.075]}]
+    assert "joint_thickness" not in values["geometry"]
     assert [support["role"] for support in values["supports"]] == ["fixed", "moving"]
 
 

@@ -1,5 +1,7 @@
 """What a new user gets wrong is named with its place and its remedy."""
 
+import re
+
 import pytest
 
 import blockvis
@@ -19,11 +21,51 @@ def test_a_decimal_comma_is_named(tmp_path):
         blockvis.read_case(written(tmp_path, ARCH + "increment = 0,01  # m\n"))
 
 
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("limit = 1e-320\n", r"\[settlement\] limit is 1e-320; give a number of 1e-30 to 1e\+30"),
+        ("[[loads]]\nforce = [0.0, -1e300]\n", r"\[loads\] force holds -1e\+300; give a number of 1e-30 to 1e\+30"),
+        (
+            'profile = { supports = { "right springer" = [0.0, -1e300] } }\n',
+            r"\[settlement\.profile\.supports\] right springer holds -1e\+300",
+        ),
+        ("[geometry.parameters]\ndensity = 1e308\n", r"\[geometry\] layout: density is 1e\+308 kg/m³; give a number"),
+    ],
+)
+def test_numbers_too_small_or_too_large_for_anything_real_are_refused_by_their_key(tmp_path, capsys, lines, said):
+    assert main(["run", str(written(tmp_path, ARCH + lines)), "-o", str(tmp_path / "out")]) == 2
+    assert re.search(said, capsys.readouterr().err)
+
+
 @pytest.mark.parametrize(("name", "said"), [("voussoir 1", "are no moving supports"), ("nobody", "no block is named")])
 def test_blocks_that_a_settlement_cannot_move_are_named(tmp_path, name, said):
     case = written(tmp_path, ARCH + f'blocks = ["{name}"]\n')
     with pytest.raises(ValueError, match=rf"case\.toml: \[settlement\] blocks.*{said}.*right springer"):
         blockvis.run_case(case, tmp_path / "out", outputs=())
+
+
+@pytest.mark.parametrize("acts", ["pressure = 1000", "weight_fraction = [0.1, 0]"])
+def test_a_point_of_what_acts_all_over_is_refused(tmp_path, capsys, acts):
+    case = written(tmp_path, ARCH + f"[[loads]]\n{acts}\npoint = [0, 1.0]\n")
+    assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 2
+    assert "case.toml: [loads] point is that of a force or moment; pressure and weight" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            "friction_coefficient=20",
+            "is 20; [materials] has a table for each material: write [material] friction_coeff",
+        ),
+        ("brick=1800", "is 1800; [materials] has a table for each material: write [materials.brick] density"),
+    ],
+)
+def test_a_key_of_all_blocks_among_those_of_one_material_is_led_to_its_table(tmp_path, capsys, change, said):
+    case = written(tmp_path, ARCH)
+    assert main(["run", str(case), "-o", str(tmp_path / "out"), "--set", f"materials.{change}"]) == 2
+    assert f"case.toml: [materials] {change.partition('=')[0]} {said}" in capsys.readouterr().err
 
 
 def test_a_verb_that_does_not_exist_names_the_nearest(capsys):

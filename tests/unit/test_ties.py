@@ -98,6 +98,12 @@ def test_what_cannot_be_a_tie_is_refused_in_a_line(tmp_path, change, words):
     assert words in refused(tmp_path, tie)
 
 
+def test_an_end_far_outside_its_named_block_is_told(tmp_path):
+    far = TIE | {"from": {"block": "left", "point": [-100.0, 1.5]}}
+    with pytest.warns(UserWarning, match=r"'iron' from \(-100, 1\.5\) lies 100 m outside block 'left', which holds"):
+        ties_of(tmp_path, far)
+
+
 def test_a_name_used_twice_is_refused(tmp_path):
     assert "[ties 2 'iron'] name is there twice" in refused(tmp_path, TIE, TIE)
 

@@ -88,7 +88,7 @@ class Proposal:
         return ""
 
 
-def proposed(outlines: Sequence[np.ndarray], method: str = "auto") -> Proposal:
+def proposed(outlines: Sequence[np.ndarray], method: str = "auto", laid: np.ndarray | None = None) -> Proposal:
     """Propose how the joints of a drawing are closed.
 
     Parameters
@@ -96,13 +96,16 @@ def proposed(outlines: Sequence[np.ndarray], method: str = "auto") -> Proposal:
     outlines : sequence of (n, 2) arrays [m]
         Counter-clockwise.
     method : {"auto", "faces", "voronoi"}
+    laid : (n_blocks,) bool array, optional
+        Blocks between which a gap is no joint.
     """
-    thickness, found = proposed_thickness(outlines)
+    thickness, found = proposed_thickness(outlines, laid)
     if method == "auto":
         method = chosen_method(outlines, found)
     if method == "faces":
         return Proposal(thickness, method, search_reach(outlines), found)
-    gap, reach = proposed_gap(outlines)
+    drawn = [ring for k, ring in enumerate(outlines) if laid is None or not laid[k]]
+    gap, reach = proposed_gap(drawn) if drawn else (0.0, 0.0)
     return Proposal(rounded_up(gap) if gap else 0.0, method, reach, found)
 
 
@@ -146,6 +149,7 @@ def close_joints(
     anchored: np.ndarray | None = None,
     method: str = "faces",
     mortar: Sequence[LeftOut] = (),
+    laid: np.ndarray | None = None,
 ) -> Closing:
     """Move facing edges onto the line midway between them, or give the mortar to the nearest stone.
 
@@ -165,6 +169,8 @@ def close_joints(
         edges that move would fold an outline.
     mortar : sequence of LeftOut
         Surfaces of mortar as drawn, with the stones as their holes; the nearest stone takes all of it, however wide.
+    laid : (n_blocks,) bool array, optional
+        Blocks between which a gap is no joint.
 
     Raises
     ------
@@ -175,16 +181,17 @@ def close_joints(
     if method == "auto":
         # Judged as far as joints may reach: corners too blunt for this thickness count, too.
         reach = max(thickness, search_reach(outlines))
-        method = chosen_method(outlines, facing_edges(outlines, reach)) if thickness else "faces"
+        method = chosen_method(outlines, facing_edges(outlines, reach, laid=laid)) if thickness else "faces"
         if method == "faces":
-            closing = _between_faces(outlines, thickness, overlap, anchored)
+            closing = _between_faces(outlines, thickness, overlap, anchored, laid)
             whole = _folded(outlines, closing.outlines) is None
             if not thickness or (whole and _pockets(outlines, closing.outlines, thickness) <= POCKETS):
                 return closing
         method = "voronoi"
     if method == "voronoi":
-        return _to_nearest_stone(outlines, thickness, overlap, anchored, mortar)
-    closing = _between_faces(outlines, thickness, overlap, anchored)
+        # Pockets between stones of a bond are none of mortar.
+        return _to_nearest_stone(outlines, thickness, overlap, anchored if laid is None else anchored | laid, mortar)
+    closing = _between_faces(outlines, thickness, overlap, anchored, laid)
     folded = _folded(outlines, closing.outlines)
     if folded is not None:
         raise FoldedOutline(folded)
@@ -235,13 +242,15 @@ def _to_nearest_stone(
     return Closing(tuple(closed), n_open, 0, float(found.gaps.max(initial=0.0)), 0.0, "voronoi")
 
 
-def _between_faces(outlines: Sequence[np.ndarray], thickness: float, overlap: float, anchored: np.ndarray) -> Closing:
+def _between_faces(
+    outlines: Sequence[np.ndarray], thickness: float, overlap: float, anchored: np.ndarray, laid: np.ndarray | None
+) -> Closing:
     """Move facing edges onto the line midway between them."""
     origin = np.concatenate(outlines).mean(axis=0)
     rings = [ring - origin for ring in outlines]
     edges = edges_of(rings)
     scale = float(np.ptp(edges.start, axis=0).max())
-    found = facing_edges(rings, thickness, overlap)
+    found = facing_edges(rings, thickness, overlap, laid)
     found = found.chosen(~(anchored[edges.block[found.edge_a]] & anchored[edges.block[found.edge_b]]))
     closed = CLOSED * scale
     n_open = int((np.abs(found.gaps).max(axis=1) > closed).sum()) if len(found) else 0
@@ -252,7 +261,7 @@ def _between_faces(outlines: Sequence[np.ndarray], thickness: float, overlap: fl
     final = extended_to_lines(base, edges, found, uncommon, lines, anchored, max(thickness, overlap))
     final = separated(_without_repeats(final, closed), anchored, max(thickness, overlap), 10.0 * closed)
     final = _without_repeats(final, closed)
-    remaining = facing_edges(final, thickness, max(overlap, closed))
+    remaining = facing_edges(final, thickness, max(overlap, closed), laid)
     residual = float(np.abs(remaining.gaps).max()) if len(remaining) else 0.0
     return Closing(
         outlines=tuple(outlines[i] if anchored[i] else ring + origin for i, ring in enumerate(final)),

@@ -97,7 +97,9 @@ def edges_of(outlines: Sequence[np.ndarray]) -> Edges:
     return Edges(start, start[following], np.repeat(np.arange(len(counts)), counts), offsets)
 
 
-def facing_edges(outlines: Sequence[np.ndarray], reach: float, overlap: float = 0.0) -> Facing:
+def facing_edges(
+    outlines: Sequence[np.ndarray], reach: float, overlap: float = 0.0, laid: np.ndarray | None = None
+) -> Facing:
     """Find the stretches along which edges of different blocks face each other.
 
     Parameters
@@ -108,6 +110,8 @@ def facing_edges(outlines: Sequence[np.ndarray], reach: float, overlap: float = 
         Widest gap.
     overlap : float [m]
         Deepest overlap.
+    laid : (n_blocks,) bool array, optional
+        Blocks between which a gap is no joint.
 
     Notes
     -----
@@ -164,6 +168,9 @@ def facing_edges(outlines: Sequence[np.ndarray], reach: float, overlap: float = 
     gaps = np.stack([hb - ha for _, ha, hb in ends], axis=1)
     keep &= (gaps <= reach * (1 + 2e-6) + 1e-12).all(axis=1) & (gaps >= -overlap * (1 + 2e-6) - 1e-12).all(axis=1)
     middle = np.stack([origin + at[:, None] * axis + ((ha + hb) / 2)[:, None] * normal for at, ha, hb in ends], axis=1)
+    if laid is not None:
+        scale = float(np.ptp(edges.start, axis=0).max())
+        keep &= ~(laid[edges.block[a]] & laid[edges.block[b]] & (gaps.max(axis=1) > CLOSED * scale))
     found = Facing(a[keep], b[keep], gaps[keep], middle[keep], (last - first)[keep])
     return _nearest(found, edges)
 
@@ -189,13 +196,15 @@ def _nearest(found: Facing, edges: Edges) -> Facing:
     return found.chosen(keep)
 
 
-def proposed_thickness(outlines: Sequence[np.ndarray]) -> tuple[float, Facing]:
+def proposed_thickness(outlines: Sequence[np.ndarray], laid: np.ndarray | None = None) -> tuple[float, Facing]:
     """Propose the joint thickness that closes the mortar joints of a drawing.
 
     Parameters
     ----------
     outlines : sequence of (n, 2) arrays [m]
         Counter-clockwise.
+    laid : (n_blocks,) bool array, optional
+        Blocks between which a gap is no joint.
 
     Returns
     -------
@@ -211,7 +220,7 @@ def proposed_thickness(outlines: Sequence[np.ndarray]) -> tuple[float, Facing]:
     bevelled corner to another, says nothing of them. Of the joints, the share JOINTS of their length bounds the
     thickness, and wedges up to WEDGE times wider still belong to it. The thickness is rounded up to two digits.
     """
-    found = facing_edges(outlines, search_reach(outlines))
+    found = facing_edges(outlines, search_reach(outlines), laid=laid)
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
     widest = found.gaps.max(axis=1)
     found = found.chosen(widest > 10 * CLOSED * scale)
