@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image, ImageDraw
 
 import solver
-from blockvis.results.about import about, collapse_mechanism, counts_text
+from blockvis.results.about import about, collapse_mechanism, collapse_phase, counts_text, in_phase
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.results.ties import TieForceCurves, known_ties, tie_force_curves
 from blockvis.system.atomic_files import atomic_file
@@ -368,8 +368,9 @@ def _mark_collapse(
     red = palette.hexadecimal(palette.WARNING)
     lost = lost_text(response)
     what = "no capacity" if collapse.lost == "capacity" else lost.removeprefix("a ").replace(" is", "")
-    places = collapse_places(response)
+    places, phase = collapse_places(response), collapse_phase(response)
     assert places is not None
+    assert phase is not None
     low, middle, high = places.tolist()
     axes.axvspan(low, high, color=red, alpha=0.25, linewidth=0)
     axes.axvline(middle, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
@@ -380,7 +381,7 @@ def _mark_collapse(
         foot, head = axes.get_ylim()
         above = len(beside) > 0 and head - beside.max() > beside.min() - foot
         axes.annotate(
-            f"{what} at {collapse.displacement:.5g} {collapse.unit}\n"
+            f"{what} at {collapse.displacement:.5g} {collapse.unit}{in_phase(response, phase)}\n"
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}",
             (middle, 0.96 if above else 0.04),
             xycoords=("data", "axes fraction"),

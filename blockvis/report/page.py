@@ -237,8 +237,7 @@ def _drawn_ties(response: solver.Response, shown: list[solver.Increment]) -> lis
 
 def tie_rows(response: solver.Response) -> list[tuple[str, str, str]]:
     """List name and kind of ties, their largest forces and where, and what became of them."""
-    unit = response.settlements[-1].unit if response.settlements else response.parameter.unit
-    return [tie_texts(course, unit) for course in tie_courses(response)]
+    return [tie_texts(course, response) for course in tie_courses(response)]
 
 
 def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> list[_Frame]:
