@@ -1086,6 +1086,7 @@ def _parameter(given: str) -> tuple[str, Any]:
 def _in_words(response: solver.Response, folder: Path) -> str:
     """Sum up a run in words."""
     from .kinds.kinds import KINDS
+    from .results.about import certified
     from .results.ties import tie_courses, tie_texts
 
     kind = KINDS[response.analysis]
@@ -1107,7 +1108,7 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         lines.append(response.message)
     lines += kind.lines(response)
     lines += [": ".join(filter(None, tie_texts(course, response))) for course in tie_courses(response)]
-    worst = mechanics.worst_of(i.certificate for i in response.path)
+    worst = mechanics.worst_of(i.certificate for i in certified(response))
     if worst is not None:
         measures = {
             "equilibrium residual {:.1e} W": worst.equilibrium_residual,

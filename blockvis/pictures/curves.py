@@ -190,6 +190,7 @@ def _draw(
         over_weight.set_ylabel("reaction / weight W", fontsize=text)
         over_weight.tick_params(labelsize=0.9 * text)
     if not response.parameter.is_path:
+        _mark_unproved(axes, response, factor, text if events else None)
         _mark_lowest(axes, response, text, events)
         if events and len(known):
             _mark_unbounded(axes, total, values, text)
@@ -338,6 +339,19 @@ def _mark_unbounded(axes: Axes, total: np.ndarray, values: np.ndarray, text: flo
             ha="left" if right else "right", va="top", xytext=(6 if right else -6, 0), textcoords="offset points",
             fontsize=0.9 * text, color=grey,
         )  # fmt: skip
+
+
+def _mark_unproved(axes: Axes, response: solver.Response, factor: float, text: float | None) -> None:
+    """Mark positions of a load whose value is no limit load, with words of the size of ``text``."""
+    grey = palette.hexadecimal(palette.FAINT)
+    found = [state for limit, state in response.limit_states if limit.status is solver.LimitStatus.NOT_CONVERGED]
+    for number, state in enumerate(state for state in found if np.isfinite(state.measured)):
+        place = (state.parameter, state.measured / factor)
+        axes.plot(*place, "o", mfc="white", mec=grey, mew=1.6, markersize=5 if text is None else 8, zorder=5)
+        if number == 0 and text is not None:
+            axes.annotate(
+                "not converged", place, xytext=(8, 5), textcoords="offset points", fontsize=0.9 * text, color=grey
+            )
 
 
 def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool) -> None:

@@ -146,6 +146,17 @@ def losses_in_phases(response: solver.Response) -> list[tuple[int, solver.LocalL
     return sorted(found, key=lambda one: (one[0], one[1].settlement))
 
 
+def certified(response: solver.Response) -> tuple[solver.Increment, ...]:
+    """Give the increments whose certificate is that of the result: of states that stand by themselves what governs.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    governing = response.governing
+    return response.path if response.parameter.is_path or governing is None else (governing,)
+
+
 def collapse_mechanism(response: solver.Response) -> mechanics.Mechanism | None:
     """Find the collapse mechanism at the last equilibrium: what words, tables, curves, pictures and pages count.
 

@@ -79,7 +79,9 @@ def settled_note(assembly: solver.Assembly, first: solver.Increment) -> str:
     """Say where the blocks as drawn were in no equilibrium and found one a little further; "" where they were."""
     moved = np.linalg.norm(first.pose.positions - assembly.centroids, axis=1)
     block = int(np.argmax(moved))
-    if first.status != solver.Status.EQUILIBRIUM or moved[block] <= AS_DRAWN * assembly.block_size:
+    # The first of which something is asked may be reached by a settlement.
+    at_rest = first.status == solver.Status.EQUILIBRIUM and first.phase == 0 and first.parameter == 0.0
+    if not at_rest or moved[block] <= AS_DRAWN * assembly.block_size:
         return ""
     return (
         f"before any settlement '{assembly.names[block]}' moved by {moved[block]:.3g} m until it came to rest: as "
