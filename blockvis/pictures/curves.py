@@ -194,10 +194,9 @@ def _draw(
         _mark_lowest(axes, response, text, events)
         if events and len(known):
             _mark_unbounded(axes, total, values, text)
-    if events and response.settlements:
-        _mark_phases(axes, response, total, text)
+    lines = _mark_phases(axes, response, total, text) if events and response.settlements else 0
     if response.collapse is not None and len(path):
-        _mark_collapse(axes, response, total, values, text, events)
+        _mark_collapse(axes, response, total, values, text, events, lines)
     if response.stop is solver.Status.SOLVER_FAILED:
         _mark_failure(axes, response, total, values, text, events)
 
@@ -232,9 +231,9 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
     axes.legend(loc="best", fontsize=0.9 * TEXT, frameon=False, ncols=min(3, len(ties.names)))
 
 
-def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text: float) -> None:
-    """Mark where a settlement begins and what changes before it."""
-    path, grey = response.path, palette.hexadecimal(palette.FAINT)
+def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text: float) -> int:
+    """Mark where a settlement begins and what changes before it; returns the most lines of words at the top."""
+    path, grey, lines = response.path, palette.hexadecimal(palette.FAINT), 0
     for k in range(1, len(path)):
         if path[k].phase == path[k - 1].phase:
             continue
@@ -251,6 +250,8 @@ def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text:
             "\n".join(words), (total[k - 1], 0.98), xycoords=("data", "axes fraction"), xytext=(5, 0),
             textcoords="offset points", va="top", fontsize=0.85 * text, color=grey,
         )  # fmt: skip
+        lines = max(lines, len(words))
+    return lines
 
 
 def _draw_band(
@@ -375,8 +376,15 @@ def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool
 
 
 def _mark_collapse(
-    axes: Axes, response: solver.Response, total: np.ndarray, reactions: np.ndarray, text: float, words: bool
+    axes: Axes,
+    response: solver.Response,
+    total: np.ndarray,
+    reactions: np.ndarray,
+    text: float,
+    words: bool,
+    taken: int = 0,
 ) -> None:
+    """Mark the collapse, with words below so many lines that are taken at the top."""
     collapse = response.collapse
     assert collapse is not None
     red = palette.hexadecimal(palette.WARNING)
@@ -399,7 +407,7 @@ def _mark_collapse(
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}",
             (middle, 0.96 if above else 0.04),
             xycoords=("data", "axes fraction"),
-            xytext=(-6, 0),
+            xytext=(-6, -1.2 * text * taken if above else 0),
             textcoords="offset points",
             ha="right",
             va="top" if above else "bottom",

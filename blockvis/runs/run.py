@@ -280,8 +280,9 @@ def _follow(
             as_drawn = bool(case.settlements) == bool(run.course.settlements)
             if len(results.increments) == 1 and as_drawn and (note := settled_note(results.assembly, increment)):
                 warnings.warn(note, stacklevel=2)
+            phase = f"phase {increment.phase + 1}, " if len(run.course.settlements) > 1 else ""
             for note in increment.notes:
-                warnings.warn(note, stacklevel=2)
+                warnings.warn(f"{phase}{note}", stacklevel=2)
             progress.increment(increment)
             budget.next()
         ending = run.steps.ending

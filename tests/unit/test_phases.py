@@ -221,5 +221,7 @@ def test_places_along_several_settlements_are_told_with_their_phase(
     assert f"yields by {iron['yields_at']:.4g} m in phase {iron['yields_in_phase']}" in said
     # It carries nothing, as its ends part, and is there from the second settlement on.
     assert (shore["largest_force"], shore["largest_force_at"], shore["phase"]) == (0.0, 0.0, 2)
-    rows = dict(summary_rows(blockvis.open_results(tmp_path / "out")))
+    response = blockvis.open_results(tmp_path / "out")
+    assert " m in phase 2" in blockvis.draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
+    rows = dict(summary_rows(response))
     assert rows["collapse displacement"].endswith(" m in phase 2")
