@@ -773,7 +773,8 @@ def _say_range(options: argparse.Namespace, run: Run) -> None:
     from .runs.step_check import stored_case
 
     # What has no path has no range, and says why.
-    stopped = run.response.stop in (solver.Status.NO_INITIAL_EQUILIBRIUM, solver.Status.SOLVER_FAILED)
+    failed = run.response.stop in (solver.Status.NO_INITIAL_EQUILIBRIUM, solver.Status.SOLVER_FAILED)
+    stopped = failed or not run.response.path
     asked = options.range or wants_range(stored_case(run.folder))
     if stopped or not asked or (run.had_finished and not options.range and (run.folder / RANGE).is_file()):
         return
@@ -1090,6 +1091,7 @@ def _levels(fill: solver.Backfill) -> str:
 def _in_words(response: solver.Response, folder: Path) -> str:
     """Sum up a run in words."""
     from .kinds.kinds import KINDS
+    from .results.about import certified
     from .results.ties import tie_courses, tie_texts
 
     kind = KINDS[response.analysis]
@@ -1110,9 +1112,8 @@ def _in_words(response: solver.Response, folder: Path) -> str:
     if response.message and not kind.covers_message(response):
         lines.append(response.message)
     lines += kind.lines(response)
-    unit = response.settlements[-1].unit if response.settlements else response.parameter.unit
-    lines += [": ".join(filter(None, tie_texts(course, unit))) for course in tie_courses(response)]
-    worst = mechanics.worst_of(i.certificate for i in response.path)
+    lines += [": ".join(filter(None, tie_texts(course, response))) for course in tie_courses(response)]
+    worst = mechanics.worst_of(i.certificate for i in certified(response))
     if worst is not None:
         measures = {
             "equilibrium residual {:.1e} W": worst.equilibrium_residual,

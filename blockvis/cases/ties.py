@@ -295,7 +295,7 @@ def drawn_ties(entries: Sequence[TieCase], lines: Sequence[LeftOut]) -> list[Tie
                     f"({last[0]:.6g}, {last[1]:.6g}) is bent; draw each tie as a straight line"
                 )
             ends = tuple(TieEnd(tuple(map(float, point))) for point in (first, last))
-            found.append(replace(entry, name=f"{entry.name} {number}", ends=ends, layer=""))
+            found.append(replace(entry, name=f"{entry.name} {number}", ends=ends))
     names = [one.name for one in found]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -333,7 +333,7 @@ def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> solver.Tie:
             f"{where}: a {entry.kind} has no length: both ends are at {_written(points[0])}; give two places"
         )
     blocks = tuple(
-        _holding(end, points[k], np.subtract(points[k], points[1 - k]), assembly, f"{where} {('from', 'to')[k]}")
+        _holding(end, points[k], np.subtract(points[k], points[1 - k]), assembly, f"{where} {('from', 'to')[k]}", entry)
         for k, end in enumerate(entry.ends)
     )
     if blocks[0] == blocks[1]:
@@ -363,7 +363,7 @@ def _place(point: tuple[float, ...], assembly: solver.Assembly, where: str) -> t
 
 
 def _holding(
-    end: TieEnd, point: tuple[float, ...], away: np.ndarray, assembly: solver.Assembly, where: str
+    end: TieEnd, point: tuple[float, ...], away: np.ndarray, assembly: solver.Assembly, where: str, entry: TieCase
 ) -> int | None:
     """Find the block that holds an end; None for the ground."""
     if end.fixed:
@@ -381,9 +381,18 @@ def _holding(
     apart = distances_to(assembly, point)
     if apart.min() > ON_EDGE * assembly.block_size:
         near = assembly.names[int(apart.argmin())]
+        fixed = "{ fixed = [" + ", ".join(f"{x:g}" for x in point) + "] }"
+        remedy = f"move it there, or hold it by the ground, {fixed}"
+        if entry.layer:
+            # Lines have no words at their ends that could name the ground.
+            other = "from" if where.endswith(" to") else "to"
+            remedy = (
+                "move it there in the drawing, or hold it by the ground: leave layer out and write "
+                f"{where.rpartition(' ')[2]} = {fixed} and {other}; the line itself goes to another layer"
+            )
         raise ValueError(
             f"{where} {_written(point)} m lies in no block; the nearest is '{near}', {apart.min():.3g} m away"
-            f"{_in_metres(point, assembly)}; move it there, or hold it by the ground, {{ fixed = [x, y] }}"
+            f"{_in_metres(point, assembly)}; {remedy}"
         )
     # Where several blocks meet, it is the one behind the anchor.
     return block_at(assembly, point, every, away.tolist(), where)

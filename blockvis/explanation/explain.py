@@ -18,7 +18,7 @@ from blockvis.cases.contents import Case
 from blockvis.kinds.kind import needs_no_crushing
 from blockvis.kinds.kinds import KINDS
 from blockvis.runs.plan import refuse_ties
-from blockvis.runs.progress import StudyProgress
+from blockvis.runs.progress import RunsProgress
 from solver import mechanics
 
 from .candidates import (
@@ -82,7 +82,7 @@ def explain(
     runs : dict, optional
         ``Explanation.runs`` of an earlier explanation: those that fit are not followed again, new ones are added.
     progress : bool
-        Whether a bar counts the runs.
+        Whether a bar, and lines where stderr is no terminal, count the runs and name their causes.
 
     Returns
     -------
@@ -121,8 +121,8 @@ def explain(
     if not len(observations.points):
         first = [one for one in first if opens_cracks(ground.assembly, one)]
     about = 3 * len(first)
-    with workers_for(about, workers, scheduler) as processes:
-        search.carry_out(first, processes, progress)
+    with workers_for(about, workers, scheduler) as processes, RunsProgress(shown=progress) as bar:
+        search.carry_out(first, processes, bar)
     causes = search.ranked()
     by_best = by_any = observations.widths > 0.0
     if causes:
@@ -234,15 +234,15 @@ class _Search:
         frictions = (self.frictions[0], self.frictions[2])
         return [(trial.candidate, Variant(*both)) for both in zip(frictions, heavier_sides, strict=True)]
 
-    def carry_out(self, first: Sequence[Candidate], processes: Executor | None, progress: bool) -> None:
+    def carry_out(self, first: Sequence[Candidate], processes: Executor | None, bar: RunsProgress) -> None:
         """Follow candidates, others around the best of them, and the likeliest with other coefficients of friction."""
-        self.follow([pair for one in first for pair in self.usual(one)], processes, progress)
+        self.follow([pair for one in first for pair in self.usual(one)], processes, bar)
         worth = [c for c in self.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
         around = refined(self.ground, [cause.best.candidate for cause in worth], first)
-        self.follow([pair for one in around for pair in self.usual(one)], processes, progress)
-        self.follow([pair for one in _likeliest(self.ranked()) for pair in self.others(one)], processes, progress)
+        self.follow([pair for one in around for pair in self.usual(one)], processes, bar)
+        self.follow([pair for one in _likeliest(self.ranked()) for pair in self.others(one)], processes, bar)
 
-    def follow(self, pairs: Sequence[tuple[Candidate, Variant]], processes: Executor | None, progress: bool) -> None:
+    def follow(self, pairs: Sequence[tuple[Candidate, Variant]], processes: Executor | None, bar: RunsProgress) -> None:
         """Follow candidates in some variants, and compare them with the observations."""
         for one, _ in pairs:
             if one not in self.candidates:
@@ -250,6 +250,7 @@ class _Search:
         twins = twins_of(self.ground.assembly, self.candidates)
         wanted: list[tuple[Candidate, Variant, Twin, Candidate, Order]] = []
         orders: dict[Any, Order] = {}
+        causes: dict[Any, str] = {}
         for one, variant in pairs:
             if any(t.candidate == one and t.variant == variant for t in self.trials):
                 continue
@@ -260,11 +261,9 @@ class _Search:
             key = self._key(shared, variant)
             if key not in self.runs:
                 orders[key] = order
-        bar = StudyProgress(len(orders), shown=None if progress else False)
-        try:
-            found = all_followed(list(orders.values()), processes, bar)
-        finally:
-            bar.done()
+                causes[key] = f"{shared.cause}, friction {variant.friction:.3g}"
+        bar.add([causes[key] for key in orders])
+        found = all_followed(list(orders.values()), processes, bar)
         self.runs.update(zip(orders, found, strict=True))
         for one, variant, twin, shared, order in wanted:
             factor, unit = per_amount(self.ground.assembly, one)

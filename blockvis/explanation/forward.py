@@ -18,7 +18,7 @@ from blockvis.cases.contents import Case
 from blockvis.kinds.kind import RunInput
 from blockvis.kinds.settlement import SettlementKind
 from blockvis.results.joints import initial_joints, opening_and_slip
-from blockvis.runs.progress import StudyProgress
+from blockvis.runs.progress import RunsProgress
 from blockvis.system.extras import require
 from blockvis.system.processes import cores
 from solver import mechanics
@@ -277,7 +277,7 @@ def _ignore_interrupts() -> None:
 
 
 def all_followed(
-    orders: Sequence[Order], processes: Executor | None, progress: StudyProgress | None = None
+    orders: Sequence[Order], processes: Executor | None, progress: RunsProgress | None = None
 ) -> list[Run]:
     """Carry out runs, in other processes or here.
 
@@ -285,7 +285,7 @@ def all_followed(
     ----------
     orders : sequence of Order
     processes : concurrent.futures.Executor, optional
-    progress : StudyProgress, optional
+    progress : RunsProgress, optional
         Counts them.
 
     Raises

@@ -26,6 +26,12 @@ DECISIVE = 1.0
 #: Causes less probable than this are not worth a measurement, but for the second.
 WORTH_A_WORD = 0.01
 
+#: Causes among which a measurement is to decide, at most.
+MOST_COMPARED = 6
+
+#: Points at which a width that a cause lets expect is sampled, and joints that tell as much but for this part.
+SAMPLES, AS_MUCH = 24, 1e-3
+
 
 @dataclass(frozen=True)
 class Cause:
@@ -212,33 +218,32 @@ def unexplained(
 
 
 def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measurement | None:
-    """Find the joint whose width tells the most probable causes apart best; None where none does.
+    """Find the joint whose width tells most about which cause it is; None where none tells them apart.
 
     Parameters
     ----------
     comparison : Comparison
     causes : sequence of Cause
-        In the order of their probability.
+        In the order of their probability. The width is to decide among those that the observations cannot tell apart,
+        whatever it would tell about the others; where the first is told apart, between that and the next ones.
     """
     if len(causes) < 2:
         return None
-    chosen = [cause for k, cause in enumerate(causes[:4]) if k < 2 or cause.probability > WORTH_A_WORD]
+    chosen = alike(causes)[:MOST_COMPARED]
+    if len(chosen) < 2:
+        chosen = [cause for k, cause in enumerate(causes[:4]) if k < 2 or cause.probability > WORTH_A_WORD]
     table = np.array([_expected(comparison, cause) for cause in chosen])
     mean, spread = table[:, 0], table[:, 1]
     sigma = np.sqrt(spread**2 + (comparison.trust.model * mean) ** 2 + LEAST_UNCERTAINTY**2)
     weights = np.array([max(cause.probability, WORTH_A_WORD) for cause in chosen])
-    n = len(comparison.joints.block_a)
-    gain, apart = np.zeros(n), np.zeros(n)
-    for a in range(len(chosen)):
-        for b in range(a):
-            difference = np.abs(mean[a] - mean[b]) / np.hypot(sigma[a], sigma[b])
-            gain += weights[a] * weights[b] * np.minimum(difference, 2.0 * EXPLAINED)
-            apart = np.maximum(apart, difference)
+    apart = (np.abs(mean[:, None] - mean) / np.hypot(sigma[:, None], sigma)).max(axis=(0, 1))
     # Where somebody has measured already nothing new is to be found.
-    gain[comparison.own] = 0.0
-    best = int(np.argmax(gain))
-    if gain[best] <= 0.0 or apart[best] < DECISIVE:
+    apart[comparison.own] = 0.0
+    gain = np.where(apart < DECISIVE, 0.0, _information(mean, sigma, weights / weights.sum()))
+    if not gain.max(initial=0.0) > 0.0:
         return None
+    # Where several joints tell all there is to tell, rounding would choose.
+    best = int(np.argmax(np.where(gain < (1.0 - AS_MUCH) * gain.max(), 0.0, apart)))
     assembly, joints = comparison.assembly, comparison.joints
     return Measurement(
         joint=best,
@@ -247,6 +252,26 @@ def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measure
         widths=tuple((cause.name, float(mean[k, best])) for k, cause in enumerate(chosen)),
         deviations=float(apart[best]),
     )
+
+
+def _information(mean: np.ndarray, sigma: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(n_joints,) array: what a width is expected to tell about which of the causes it is, in nats.
+
+    Parameters
+    ----------
+    mean, sigma : (n_causes, n_joints) arrays [m]
+        Of the width, normally distributed under each cause.
+    weights : (n_causes,) array
+        Probabilities of the causes, with sum 1.
+    """
+    nodes, shares = np.polynomial.hermite_e.hermegauss(SAMPLES)
+    told = np.zeros(mean.shape[1])
+    for weight, middle, deviation in zip(weights, mean, sigma, strict=True):
+        for node, share in zip(nodes, shares / shares.sum(), strict=True):
+            away = (middle + node * deviation - mean) / sigma
+            any_cause = logsumexp(-0.5 * away**2 - np.log(sigma), axis=0, b=weights[:, None])
+            told += weight * share * (-0.5 * node**2 - np.log(deviation) - any_cause)
+    return told
 
 
 def _expected(comparison: Comparison, cause: Cause) -> tuple[np.ndarray, np.ndarray]:

@@ -83,14 +83,16 @@ def cause_text(cause: Cause) -> str:
     return f"{cause.name}{f', {cause.detail}' if cause.detail else ''}"
 
 
-def measurement_text(measurement: Measurement) -> str:
-    """Say which joint to measure next, and what each cause has there."""
+def measurement_text(measurement: Measurement | None) -> str:
+    """Say which joint to measure next, and what each cause has there, or that none tells the causes apart."""
+    if measurement is None:
+        return "no joint of the model tells the first causes apart; measure how the supports themselves have moved"
     there = "; ".join(f"{width_text(width)} mm if {name}" for name, width in measurement.widths)
     return f"the joint {measurement.name} at {place_text(measurement.place, 3)} m: {there}"
 
 
 def verdict(found: Explanation) -> str:
-    """Say what the observations point at, in one sentence."""
+    """Say what the observations point at, in one sentence, which begins with names of supports as they are."""
     if not found.causes:
         if not found.stands:
             return "No candidate stands at any amount: the structure does not stand as drawn"
@@ -103,8 +105,8 @@ def verdict(found: Explanation) -> str:
         named = [cause_text(cause) for cause in others[:NAMED]]
         rest = len(others) - len(named)
         more = " or ".join([*named, *([counted(rest, "other")] if rest else [])])
-        return f"{_capital(cause_with_range(best))}, or else {more}: the observations cannot tell these apart"
-    return _capital(cause_with_range(best))
+        return f"{cause_with_range(best)}, or else {more}: the observations cannot tell these apart"
+    return cause_with_range(best)
 
 
 def in_words(found: Explanation) -> str:
@@ -123,7 +125,7 @@ def in_words(found: Explanation) -> str:
     if len(found.causes) > LISTED:
         lines.append(f"and {len(found.causes) - LISTED} less probable causes")
     lines += unexplained_texts(found)
-    if found.next_measurement is not None and len(found.causes) > 1:
+    if len(found.causes) > 1:
         lines.append(f"measure next: {measurement_text(found.next_measurement)}")
     return "\n".join(lines)
 
@@ -136,10 +138,6 @@ def unexplained_texts(found: Explanation) -> list[str]:
         whom = "no candidate makes it" if k in found.made_by_none else "the first cause does not make it"
         lines.append(f"unexplained: {width}; {whom}")
     return lines
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def values_of(found: Explanation) -> dict[str, Any]:

@@ -100,11 +100,7 @@ def explanation_html(found: Explanation, picture: bytes) -> str:
         alike=_alike(found),
         problems="".join(f"<li>{html.escape(text)}</li>" for text in problems)
         or "<li>Every open joint is explained by the first cause, within what observations and model leave open.</li>",
-        measurement=html.escape(
-            measurement_text(found.next_measurement)
-            if found.next_measurement is not None
-            else "no joint of the model tells the causes apart; measure how the supports themselves have moved"
-        ),
+        measurement=html.escape(measurement_text(found.next_measurement)),
         observations=_observations(found),
         points=_points(found),
         assumed="".join(f"<li>{html.escape(text)}</li>" for text in _assumed(found)),

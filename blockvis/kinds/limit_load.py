@@ -17,6 +17,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
+from blockvis.results.about import collapse_phase, in_phase, unit_in
 from blockvis.results.swinging import swing_factors, swung_increment
 from blockvis.text import force_text
 from solver import mechanics
@@ -52,6 +53,12 @@ SWINGING_FRAMES, SWING = 30, 0.05
 #: Displacement within which joints that a settlement has opened may close, in block sizes. It changes nothing for an
 #: arch whose hinges have opened; without it the capacity of a wall of many bricks is that of its loosest brick.
 CLOSING = 1e-3
+
+#: Part of a multiplier by which that of joints that stay open has to differ to be told.
+NOTABLE = 0.01
+
+#: Positions of a load that a note lists.
+MOST_LISTED = 8
 
 
 @dataclass(frozen=True)
@@ -273,8 +280,11 @@ class LimitLoadKind(AnalysisKind):
         if not response.parameter.is_path and len(path) > 1:
             lines.append(f"the lowest of {len(path)} positions: load at x = {state.parameter:.6g} m")
         elif response.settlements:
-            place = f"{state.parameter:12.6g} {response.settlements[-1].unit}"
-            lines.append(f"after a settlement of{place}   before it {path[0].load_multiplier:.6g}")
+            place = f"{unit_in(response, state.phase)}{in_phase(response, state.phase)}"
+            before = _before(response)
+            drawn = "" if before is None else f"   before it {before:.6g}"
+            lines.append(f"after a settlement of{state.parameter:12.6g} {place}{drawn}")
+        lines += [f"note: {note}" for note in (_unconverged_note(response),) if note]
         if response.collapse is not None:
             lines.append(response.message)
         else:
@@ -295,7 +305,9 @@ class LimitLoadKind(AnalysisKind):
         """Describe the limit load that governs: its values, and where it is."""
         rows, path, state, c = [], response.path, response.governing, response.collapse
         if c is not None:
-            place = f"{c.displacement:.6g} {c.unit}, between {c.bracket[0]:.6g} and {c.bracket[1]:.6g}"
+            phase = collapse_phase(response)
+            where = f"{c.unit}{in_phase(response, 0 if phase is None else phase)}"
+            place = f"{c.displacement:.6g} {where}, between {c.bracket[0]:.6g} and {c.bracket[1]:.6g}"
             rows.append(("settlement alone: collapse at", place))
         if state is None or not np.isfinite(state.load_multiplier):
             return rows
@@ -313,9 +325,38 @@ class LimitLoadKind(AnalysisKind):
         if not response.parameter.is_path and len(path) > 1:
             rows.append(("lowest of", f"{len(path)} positions, at x = {state.parameter:.5g} m"))
         elif response.settlements:
-            rows.append(("after a settlement of", f"{state.parameter:.6g} {response.settlements[-1].unit}"))
-            rows.append(("before it", f"{path[0].load_multiplier:.6g}"))
+            place = f"{unit_in(response, state.phase)}{in_phase(response, state.phase)}"
+            rows.append(("after a settlement of", f"{state.parameter:.6g} {place}"))
+            before = _before(response)
+            if before is not None:
+                rows.append(("before it", f"{before:.6g}"))
+        rows += [("note", note) for note in (_unconverged_note(response),) if note]
         return rows
+
+
+def _before(response: solver.Response) -> float | None:
+    """Give the multiplier before any settlement; None where it was not asked for."""
+    first = response.path[0]
+    return first.load_multiplier if first.phase == 0 and first.parameter == 0.0 else None
+
+
+def _unconverged_note(response: solver.Response) -> str:
+    """Say at which of several positions of a load no limit load is known; empty where one is at all."""
+    states = response.limit_states
+    if response.parameter.is_path or len(states) < 2:
+        return ""
+    places = [state.parameter for limit, state in states if limit.status is solver.LimitStatus.NOT_CONVERGED]
+    return _unconverged(places, len(states))
+
+
+def _unconverged(places: Sequence[float], number: int) -> str:
+    if not places:
+        return ""
+    listed = ", ".join(f"{x:.6g}" for x in places[:MOST_LISTED]) + ", ..." * (len(places) > MOST_LISTED)
+    return (
+        f"{len(places)} of {number} positions did not converge: x = {listed} m; what is carried there may be less than "
+        "the lowest that was found"
+    )
 
 
 def _displacement_without_settlement(case: Case) -> ValueError:
@@ -376,6 +417,8 @@ def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, foun
         elif _wanted(case, increment):
             # In equilibrium under the dead load: the settlement has proved it.
             state = _limit_state(run, run.given.loads, increment.pose, increment, programs)
+            if shown is None or _is_last_wanted(case, increment):
+                state = replace(state, notes=(*state.notes, *_closing_note(run, state, increment, shown is None)))
             shown, programs = replace(state, status=solver.Status.EQUILIBRIUM), 0
             reached = increment.checkpoint
             yield replace(shown, checkpoint=None if reached is None else _checkpoint(run, settlement=reached))
@@ -417,6 +460,8 @@ def _over_places(
         else:
             loads = replace(standing, live=standing.live + live(number))
             state = replace(_limit_state(run, loads, pose, None, programs, ties, bonds), parameter=float(x))
+            if number == 0 and (words := _closing_words(run)):
+                state = replace(state, notes=(*state.notes, words))
             programs = 0
         multiplier = float(np.nan_to_num(state.load_multiplier, nan=-np.inf, posinf=np.inf))
         if shown is None or multiplier < least:
@@ -427,7 +472,10 @@ def _over_places(
     run.given = replace(run.given, loads=replace(standing, live=standing.live + live(chosen)))
     assert shown is not None
     yield from _swinging(run.given.assembly, shown)
-    return _limit_ending(run.limits[chosen])
+    ending = _limit_ending(run.limits[chosen])
+    failed = [limit.status is solver.LimitStatus.NOT_CONVERGED for limit in run.limits]
+    note = _unconverged([float(x) for x, lacks in zip(places, failed, strict=False) if lacks], len(places))
+    return replace(ending, message="; ".join(filter(None, (ending.message, note))))
 
 
 def _read_for_multipliers(increment: solver.Increment) -> solver.Increment:
@@ -456,6 +504,47 @@ def _wanted(case: Case, increment: solver.Increment) -> bool:
     return increment.phase == last and any(abs(increment.parameter - s) <= reach for s in case.settings.capacity_at)
 
 
+def _is_last_wanted(case: Case, increment: solver.Increment) -> bool:
+    """Whether no capacity is asked for beyond an increment of the settlement."""
+    last = case.settlements[-1]
+    asked = case.settings.capacity_at
+    end = last.limit if asked is None else max(asked)
+    return increment.phase == len(case.settlements) - 1 and increment.parameter >= end - 2e-9 * last.increment
+
+
+def _closing_words(run: AnalysisRun) -> str:
+    """Say within which displacement joints that a settlement has opened may close; empty where they stay open."""
+    within = _displacement(run.given.case, run.given.assembly)
+    if within == 0.0:
+        return ""
+    return f"joints that are open may close by up to {within:.4g} m for the live load ([analysis] displacement)"
+
+
+def _closing_note(run: AnalysisRun, state: solver.Increment, at: solver.Increment, first: bool) -> list[str]:
+    """Say within which displacement open joints may close, at the first state, and what is carried where they do not.
+
+    Parameters
+    ----------
+    run : AnalysisRun
+    state : solver.Increment
+        The limit state.
+    at : solver.Increment
+        Of the settlement.
+    first : bool
+        Whether it is the first state.
+    """
+    case, words = run.given.case, _closing_words(run)
+    if not words:
+        return []
+    # Without dilatancy it takes many programs, not one more.
+    if case.settings.flow == FLOWS[0] and np.isfinite(state.load_multiplier):
+        least = _limit(run, run.given.loads, at.pose, at.ties, at.bonds, 0.0).multiplier
+        if np.isfinite(least) and abs(state.load_multiplier - least) > NOTABLE * abs(state.load_multiplier):
+            where = f"{at.parameter:.6g} {case.settlements[at.phase].unit}"
+            return [f"at a settlement of {where} α = {state.load_multiplier:.6g}, {least:.6g} without: {words}"]
+    return [words] if first else []
+
+
 def _limit_state(
     run: AnalysisRun,
     loads: solver.Loads,
@@ -465,20 +554,9 @@ def _limit_state(
     ties: mechanics.TieForces | None = None,
     bonds: mechanics.Bonds | None = None,
 ) -> solver.Increment:
-    case, assembly = run.given.case, run.given.assembly
     started = time.perf_counter()
-    try:
-        limit = solver.Structure(assembly, run.given.interfaces, loads, ties=run.given.ties).limit_load(
-            pose=pose,
-            ties_at=ties if at is None else at.ties,
-            bonds_at=bonds if at is None else at.bonds,
-            flow=case.settings.flow,
-            torsion=case.settings.torsion,
-            displacement=_displacement(case, assembly),
-            overlap_tolerance=case.controls.overlap_tolerance,
-        )
-    except ValueError as error:
-        raise ValueError(f"{case.source}: {error}") from None
+    ties, bonds = (ties, bonds) if at is None else (at.ties, at.bonds)
+    limit = _limit(run, loads, pose, ties, bonds, _displacement(run.given.case, run.given.assembly))
     run.limits.append(limit)
     state = limit.increment
     return replace(
@@ -488,6 +566,30 @@ def _limit_state(
         programs=state.programs + programs,
         seconds=time.perf_counter() - started + (0.0 if at is None else at.seconds),
     )
+
+
+def _limit(
+    run: AnalysisRun,
+    loads: solver.Loads,
+    pose: solver.Pose | None,
+    ties: mechanics.TieForces | None,
+    bonds: mechanics.Bonds | None,
+    displacement: float,
+) -> solver.LimitLoad:
+    """Find a limit load whose open joints may close within a displacement [m]."""
+    case, assembly = run.given.case, run.given.assembly
+    try:
+        return solver.Structure(assembly, run.given.interfaces, loads, ties=run.given.ties).limit_load(
+            pose=pose,
+            ties_at=ties,
+            bonds_at=bonds,
+            flow=case.settings.flow,
+            torsion=case.settings.torsion,
+            displacement=displacement,
+            overlap_tolerance=case.controls.overlap_tolerance,
+        )
+    except ValueError as error:
+        raise ValueError(f"{case.source}: {error}") from None
 
 
 def _displacement(case: Case, assembly: solver.Assembly) -> float:
@@ -510,4 +612,6 @@ def _swinging(assembly: solver.Assembly, state: solver.Increment) -> Iterator[so
     """Pseudo-motion: the mechanism of a limit state, followed to first order, out of scale."""
     factors = swing_factors(assembly, state, SWING, np.linspace(0.0, 1.0, SWINGING_FRAMES + 1)[1:])
     if factors.any():
+        # What the state has to tell it tells itself.
+        state = replace(state, notes=())
         yield from (swung_increment(state, state.velocity * factor) for factor in factors)

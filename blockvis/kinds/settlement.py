@@ -13,7 +13,15 @@ import solver
 from blockvis.cases.contents import Case
 from blockvis.cases.key import TRUE_OR_FALSE, Key
 from blockvis.cases.toml_table import Table
-from blockvis.results.about import least_reaction, loss_of, mechanism_text
+from blockvis.results.about import (
+    collapse_phase,
+    in_phase,
+    least_reaction,
+    loss_of,
+    losses_in_phases,
+    mechanism_text,
+    unit_in,
+)
 from blockvis.results.bearing import bearings
 from blockvis.text import force_text
 from solver import mechanics
@@ -100,9 +108,9 @@ class SettlementKind(AnalysisKind):
         """Give the first and last reaction, and the settlement at collapse."""
         path, weight = response.path, response.total_weight
 
-        def reaction(value: float, increment: solver.Increment) -> str:
-            value = value if abs(value) > NOTHING * _size(response, increment) else 0.0
-            if _is_moment(response, increment):
+        def reaction(value: float, phase: int) -> str:
+            value = value if abs(value) > NOTHING * _size(response, phase) else 0.0
+            if _is_moment(response, phase):
                 return f"{value:12.6g} N·m"
             return f"{value:12.6g} N   {value / weight:.6f} W"
 
@@ -111,20 +119,24 @@ class SettlementKind(AnalysisKind):
             lines.append("increments by linear program: reactions are the least that equilibrium allows")
         if path:
             first = least_reaction(path[0])
-            lines.append(f"first reaction       {reaction(first, path[0])}")
+            lines.append(f"first reaction       {reaction(first, path[0].phase)}")
             if _rests_elsewhere(response):
                 lines[-1] += "   the least that equilibrium allows"
-                lines.append(f"reaction at rest     {reaction(path[0].reaction, path[0])}   before anything moves")
-            if path[0].reaction < -NOTABLE * _size(response, path[0]):
+                lines.append(
+                    f"reaction at rest     {reaction(path[0].reaction, path[0].phase)}   before anything moves"
+                )
+            if path[0].reaction < -NOTABLE * _size(response, path[0].phase):
                 lines[-1] += "   against the movement: by itself the structure would push these supports the other way"
             if _is_idle(response):
                 lines.append("no free block touches the supports that move: nothing follows them")
         if response.collapse is not None:
             low, high = response.collapse.bracket
-            at = response.collapse.displacement
+            at = f"{response.collapse.displacement:12.6g} {_unit_and_phase(response)}"
+            # Where the structure falls at once nothing has been in equilibrium, and there is no reaction.
+            if path:
+                lines.append(f"last reaction        {reaction(response.collapse.reaction, path[-1].phase)}")
             lines += [
-                f"last reaction        {reaction(response.collapse.reaction, path[-1])}",
-                f"collapse displacement{at:12.6g} {response.collapse.unit}   between {low:.6g} and {high:.6g}",
+                f"collapse displacement{at}   between {low:.6g} and {high:.6g}",
                 f"mechanism: {mechanism_text(response)}",
             ]
             loss = loss_of(response)
@@ -133,8 +145,9 @@ class SettlementKind(AnalysisKind):
                 lines.append(f"at once: {response.message.partition('; ')[0]}")
         elif len(path) > 1:
             last = path[-1]
-            lines.append(f"last reaction        {reaction(last.reaction, last)}")
-            lines.append(f"last settlement      {last.parameter:12.6g} {response.settlements[last.phase].unit}")
+            lines.append(f"last reaction        {reaction(last.reaction, last.phase)}")
+            place = f"{unit_in(response, last.phase)}{in_phase(response, last.phase)}"
+            lines.append(f"last settlement      {last.parameter:12.6g} {place}")
         return lines + [str(bearing) for bearing in (bearings(response, path[-1]) if path else [])]
 
     def title(self, response: solver.Response) -> str:
@@ -142,7 +155,7 @@ class SettlementKind(AnalysisKind):
         if response.collapse is not None:
             loss = loss_of(response)
             what = "Local loss" if loss is not None and loss.local else "Collapse"
-            return f"{what} at a settlement of {response.collapse.displacement:.5g} {response.collapse.unit}"
+            return f"{what} at a settlement of {response.collapse.displacement:.5g} {_unit_and_phase(response)}"
         return {
             solver.Status.LIMIT_REACHED: "Standing at the end of the settlement",
             solver.Status.NO_INITIAL_EQUILIBRIUM: "No equilibrium before any settlement",
@@ -153,33 +166,42 @@ class SettlementKind(AnalysisKind):
         """Give the settlement at collapse, first and last reaction."""
         path, weight, c = response.path, response.total_weight, response.collapse
 
-        def reaction(value: float, increment: solver.Increment) -> str:
-            moment = _is_moment(response, increment)
+        def reaction(value: float, phase: int) -> str:
+            moment = _is_moment(response, phase)
             over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
             return force_text(value, moment) + over
 
         rows = [("loss", note) for note in losses_of(response)]
         if c is not None:
-            rows.append(("collapse displacement", f"{c.displacement:.6g} {c.unit}"))
-            rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
+            place = _unit_and_phase(response)
+            rows.append(("collapse displacement", f"{c.displacement:.6g} {place}"))
+            rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {place}"))
         if path:
-            rows.append(("first reaction", reaction(least_reaction(path[0]), path[0])))
+            rows.append(("first reaction", reaction(least_reaction(path[0]), path[0].phase)))
             if _rests_elsewhere(response):
-                rows.append(("reaction at rest", reaction(path[0].reaction, path[0])))
-            rows.append(("last reaction", reaction(path[-1].reaction, path[-1])))
+                rows.append(("reaction at rest", reaction(path[0].reaction, path[0].phase)))
+            rows.append(("last reaction", reaction(path[-1].reaction, path[-1].phase)))
         return rows
 
 
 def losses_of(response: solver.Response) -> list[str]:
     """Say where blocks left for good while the structure stood, which, and what they weigh."""
-    unit = response.settlements[0].unit if response.settlements else "m"
     said = []
-    for loss in response.losses:
+    for phase, loss in losses_in_phases(response):
         names, more = ", ".join(loss.blocks[:4]), len(loss.blocks) - 4
         names += f" and {more} more" if more > 0 else ""
         weight = f"{force_text(loss.weight)}, {100.0 * loss.share:.2g} % of the weight"
-        said.append(f"{names} at {loss.settlement:.6g} {unit}, {weight}; the structure stands without")
+        place = f"{loss.settlement:.6g} {unit_in(response, phase)}{in_phase(response, phase)}"
+        said.append(f"{names} at {place}, {weight}; the structure stands without")
     return said
+
+
+def _unit_and_phase(response: solver.Response) -> str:
+    """Write the unit of the settlement at collapse, and in which of several settlements it is."""
+    phase = collapse_phase(response)
+    assert response.collapse is not None
+    assert phase is not None
+    return f"{response.collapse.unit}{in_phase(response, phase)}"
 
 
 def settlement_course(settlements: tuple[solver.Settlement, ...]) -> Course:
@@ -199,7 +221,7 @@ def stored_settlements(summary: Mapping[str, Any]) -> tuple[solver.Settlement, .
 def _rests_elsewhere(response: solver.Response) -> bool:
     """Whether the reaction at rest is notably above the least that equilibrium allows there."""
     first = response.path[0]
-    return abs(first.reaction - least_reaction(first)) > NOTABLE * _size(response, first)
+    return abs(first.reaction - least_reaction(first)) > NOTABLE * _size(response, first.phase)
 
 
 def _is_idle(response: solver.Response) -> bool:
@@ -210,14 +232,14 @@ def _is_idle(response: solver.Response) -> bool:
     return not response.ties and not response.assembly.moving[pairs].any()
 
 
-def _size(response: solver.Response, increment: solver.Increment) -> float:
+def _size(response: solver.Response, phase: int) -> float:
     """Weight of the structure [N], at a block's length [N·m] where what resists the supports is a moment."""
-    return response.total_weight * (response.assembly.block_size if _is_moment(response, increment) else 1.0)
+    return response.total_weight * (response.assembly.block_size if _is_moment(response, phase) else 1.0)
 
 
-def _is_moment(response: solver.Response, increment: solver.Increment) -> bool:
-    """Whether the supports rotate in the phase of an increment: what resists them is a moment."""
-    return response.settlements[increment.phase].unit == "rad"
+def _is_moment(response: solver.Response, phase: int) -> bool:
+    """Whether the supports rotate in a phase: what resists them is a moment."""
+    return unit_in(response, phase) == "rad"
 
 
 def _method(response: solver.Response) -> str | None:

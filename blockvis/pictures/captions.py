@@ -8,7 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.dynamics.fall import CAPTION
-from blockvis.results.about import loss_of
+from blockvis.results.about import collapse_phase, loss_of
 from blockvis.text import force_text, padded_text
 from solver import mechanics
 
@@ -147,7 +147,8 @@ def collapse_places(response: solver.Response) -> np.ndarray | None:
     if collapse is None or not path:
         return None
     per_length, _ = parameter_unit(response)
-    start = response.parameters[-1] * per_length - per_length * path[-1].parameter
+    begun = path[-1].parameter if collapse_phase(response) == path[-1].phase else 0.0
+    start = per_length * (response.parameters[-1] - begun)
     return start + per_length * np.array([collapse.bracket[0], collapse.displacement, collapse.bracket[1]])
 
 

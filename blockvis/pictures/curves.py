@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image, ImageDraw
 
 import solver
-from blockvis.results.about import about, collapse_mechanism, counts_text
+from blockvis.results.about import about, collapse_mechanism, collapse_phase, counts_text, in_phase
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.results.ties import TieForceCurves, known_ties, tie_force_curves
 from blockvis.system.atomic_files import atomic_file
@@ -190,13 +190,13 @@ def _draw(
         over_weight.set_ylabel("reaction / weight W", fontsize=text)
         over_weight.tick_params(labelsize=0.9 * text)
     if not response.parameter.is_path:
+        _mark_unproved(axes, response, factor, text if events else None)
         _mark_lowest(axes, response, text, events)
         if events and len(known):
             _mark_unbounded(axes, total, values, text)
-    if events and response.settlements:
-        _mark_phases(axes, response, total, text)
+    lines = _mark_phases(axes, response, total, text) if events and response.settlements else 0
     if response.collapse is not None and len(path):
-        _mark_collapse(axes, response, total, values, text, events)
+        _mark_collapse(axes, response, total, values, text, events, lines)
     if response.stop is solver.Status.SOLVER_FAILED:
         _mark_failure(axes, response, total, values, text, events)
 
@@ -231,9 +231,9 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
     axes.legend(loc="best", fontsize=0.9 * TEXT, frameon=False, ncols=min(3, len(ties.names)))
 
 
-def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text: float) -> None:
-    """Mark where a settlement begins and what changes before it."""
-    path, grey = response.path, palette.hexadecimal(palette.FAINT)
+def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text: float) -> int:
+    """Mark where a settlement begins and what changes before it; returns the most lines of words at the top."""
+    path, grey, lines = response.path, palette.hexadecimal(palette.FAINT), 0
     for k in range(1, len(path)):
         if path[k].phase == path[k - 1].phase:
             continue
@@ -250,6 +250,8 @@ def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text:
             "\n".join(words), (total[k - 1], 0.98), xycoords=("data", "axes fraction"), xytext=(5, 0),
             textcoords="offset points", va="top", fontsize=0.85 * text, color=grey,
         )  # fmt: skip
+        lines = max(lines, len(words))
+    return lines
 
 
 def _draw_band(
@@ -340,6 +342,19 @@ def _mark_unbounded(axes: Axes, total: np.ndarray, values: np.ndarray, text: flo
         )  # fmt: skip
 
 
+def _mark_unproved(axes: Axes, response: solver.Response, factor: float, text: float | None) -> None:
+    """Mark positions of a load whose value is no limit load, with words of the size of ``text``."""
+    grey = palette.hexadecimal(palette.FAINT)
+    found = [state for limit, state in response.limit_states if limit.status is solver.LimitStatus.NOT_CONVERGED]
+    for number, state in enumerate(state for state in found if np.isfinite(state.measured)):
+        place = (state.parameter, state.measured / factor)
+        axes.plot(*place, "o", mfc="white", mec=grey, mew=1.6, markersize=5 if text is None else 8, zorder=5)
+        if number == 0 and text is not None:
+            axes.annotate(
+                "not converged", place, xytext=(8, 5), textcoords="offset points", fontsize=0.9 * text, color=grey
+            )
+
+
 def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool) -> None:
     lowest = response.governing
     if lowest is None or not np.isfinite(lowest.measured):
@@ -361,15 +376,23 @@ def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool
 
 
 def _mark_collapse(
-    axes: Axes, response: solver.Response, total: np.ndarray, reactions: np.ndarray, text: float, words: bool
+    axes: Axes,
+    response: solver.Response,
+    total: np.ndarray,
+    reactions: np.ndarray,
+    text: float,
+    words: bool,
+    taken: int = 0,
 ) -> None:
+    """Mark the collapse, with words below so many lines that are taken at the top."""
     collapse = response.collapse
     assert collapse is not None
     red = palette.hexadecimal(palette.WARNING)
     lost = lost_text(response)
     what = "no capacity" if collapse.lost == "capacity" else lost.removeprefix("a ").replace(" is", "")
-    places = collapse_places(response)
+    places, phase = collapse_places(response), collapse_phase(response)
     assert places is not None
+    assert phase is not None
     low, middle, high = places.tolist()
     axes.axvspan(low, high, color=red, alpha=0.25, linewidth=0)
     axes.axvline(middle, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
@@ -380,11 +403,11 @@ def _mark_collapse(
         foot, head = axes.get_ylim()
         above = len(beside) > 0 and head - beside.max() > beside.min() - foot
         axes.annotate(
-            f"{what} at {collapse.displacement:.5g} {collapse.unit}\n"
+            f"{what} at {collapse.displacement:.5g} {collapse.unit}{in_phase(response, phase)}\n"
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}",
             (middle, 0.96 if above else 0.04),
             xycoords=("data", "axes fraction"),
-            xytext=(-6, 0),
+            xytext=(-6, -1.2 * text * taken if above else 0),
             textcoords="offset points",
             ha="right",
             va="top" if above else "bottom",

@@ -40,7 +40,7 @@ from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.marks import STEEPEST, WIDEST
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.pictures.ties import DrawnTies
-from blockvis.results.about import about, counts_text, loss_of
+from blockvis.results.about import about, certified, counts_text, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
@@ -237,8 +237,7 @@ def _drawn_ties(response: solver.Response, shown: list[solver.Increment]) -> lis
 
 def tie_rows(response: solver.Response) -> list[tuple[str, str, str]]:
     """List name and kind of ties, their largest forces and where, and what became of them."""
-    unit = response.settlements[-1].unit if response.settlements else response.parameter.unit
-    return [tie_texts(course, unit) for course in tie_courses(response)]
+    return [tie_texts(course, response) for course in tie_courses(response)]
 
 
 def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> list[_Frame]:
@@ -524,8 +523,8 @@ def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tu
 
 
 def certificate_rows(response: solver.Response) -> list[tuple[str, str]]:
-    """List the largest residuals of all equilibria, in words and with their units."""
-    worst = mechanics.worst_of(i.certificate for i in response.path or response.increments)
+    """List the largest residuals of all equilibria, or of the position that governs, in words and with their units."""
+    worst = mechanics.worst_of(i.certificate for i in certified(response) or response.increments)
     if worst is None:
         return []
     rows = [

@@ -6,7 +6,7 @@ import contextlib
 import json
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import solver
@@ -80,6 +80,83 @@ def least_reaction(first: solver.Increment) -> float:
     return float(first.least if math.isfinite(first.least) else first.reaction)
 
 
+def in_phase(response: solver.Response, phase: int) -> str:
+    """Say in which of several settlements a place is, which counts from its beginning; empty where there is but one.
+
+    Parameters
+    ----------
+    response : solver.Response
+    phase : int
+        Number of the settlement, from 0.
+    """
+    return f" in phase {phase + 1}" if len(response.settlements) > 1 else ""
+
+
+def unit_in(response: solver.Response, phase: int) -> str:
+    """Give the unit of the parameter in a phase, by its number from 0: "m" or "rad" of a settlement."""
+    settlements = response.settlements
+    return settlements[min(phase, len(settlements) - 1)].unit if settlements else response.parameter.unit
+
+
+def collapse_phase(response: solver.Response) -> int | None:
+    """Find the number of the settlement, from 0, in which a structure collapses; None where it does not.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    collapse, path = response.collapse, response.path
+    if collapse is None:
+        return None
+    falling = next((i.phase for i in response.increments if i.status == solver.Status.FALLING), None)
+    if falling is not None or not path:
+        return falling or 0
+    # What falls as soon as a phase begins has its last equilibrium at the end of the one before.
+    return path[-1].phase + int(collapse.bracket[1] < path[-1].parameter)
+
+
+def losses_in_phases(response: solver.Response) -> list[tuple[int, solver.LocalLoss]]:
+    """List the blocks that left for good while the structure stood, with the number of the settlement, from 0.
+
+    Parameters
+    ----------
+    response : solver.Response
+
+    Returns
+    -------
+    list of (int, solver.LocalLoss)
+        In the order in which they fell.
+    """
+    losses, found = response.losses, []
+    if len(response.settlements) < 2:
+        return [(0, loss) for loss in losses]
+    ends = {increment.phase: increment for increment in response.path} if losses else {}
+    gone = {phase: end.fallen for phase, end in ends.items()}
+    assembly = response.assembly
+    for loss in losses:
+        blocks = [assembly.index(name) for name in loss.blocks]
+        phases = [next(phase for phase, fallen in gone.items() if fallen[block]) for block in blocks]
+        # Settlements count from the beginning of each phase: the same number may be that of two.
+        for phase in sorted(set(phases)):
+            own = [block for block, there in zip(blocks, phases, strict=True) if there == phase]
+            weight = float(assembly.masses[own].sum() * solver.GRAVITY)
+            names = tuple(assembly.names[block] for block in own)
+            share = weight / response.total_weight
+            found.append((phase, replace(loss, blocks=names, weight=weight, share=share)))
+    return sorted(found, key=lambda one: (one[0], one[1].settlement))
+
+
+def certified(response: solver.Response) -> tuple[solver.Increment, ...]:
+    """Give the increments whose certificate is that of the result: of states that stand by themselves what governs.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    governing = response.governing
+    return response.path if response.parameter.is_path or governing is None else (governing,)
+
+
 def collapse_mechanism(response: solver.Response) -> mechanics.Mechanism | None:
     """Find the collapse mechanism at the last equilibrium: what words, tables, curves, pictures and pages count.
 
@@ -92,10 +169,10 @@ def collapse_mechanism(response: solver.Response) -> mechanics.Mechanism | None:
     solver.mechanics.Mechanism or None
         None where nothing collapses.
     """
-    collapse, path = response.collapse, response.path
-    if collapse is None or not path or not collapse.mechanism.any():
+    collapse, last = response.collapse, _last_before(response)
+    if collapse is None or last is None or not collapse.mechanism.any():
         return None
-    return mechanics.mechanism_of(response.assembly, mechanics.with_motion(path[-1], collapse.mechanism))
+    return mechanics.mechanism_of(response.assembly, mechanics.with_motion(last, collapse.mechanism))
 
 
 def mechanism_text(response: solver.Response) -> str:
@@ -162,7 +239,12 @@ def loss_of(response: solver.Response) -> Loss | None:
     ----------
     response : solver.Response
     """
-    collapse, path = response.collapse, response.path
-    if collapse is None or collapse.lost != "equilibrium" or not path or not collapse.mechanism.any():
+    collapse, last = response.collapse, _last_before(response)
+    if collapse is None or collapse.lost != "equilibrium" or last is None or not collapse.mechanism.any():
         return None
-    return loss_in(response.assembly, mechanics.with_motion(path[-1], collapse.mechanism))
+    return loss_in(response.assembly, mechanics.with_motion(last, collapse.mechanism))
+
+
+def _last_before(response: solver.Response) -> solver.Increment | None:
+    """Give the last equilibrium before a collapse, or where the fall begins where there is none."""
+    return next(iter((*response.path[-1:], *response.increments[:1])), None)

@@ -13,7 +13,7 @@ import numpy as np
 import solver
 from solver import mechanics
 
-from .about import collapse_mechanism, least_reaction, loss_of, mechanism_text
+from .about import collapse_mechanism, collapse_phase, least_reaction, loss_of, losses_in_phases, mechanism_text
 from .record import Record
 
 #: Measures of the certificate of an increment.
@@ -57,7 +57,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
     own : mapping
         What the kind of analysis adds.
     """
-    path, collapse = response.path, response.collapse
+    path, collapse, phase = response.path, response.collapse, collapse_phase(response)
     worst = mechanics.worst_of(i.certificate for i in path)
     residuals = {name: getattr(worst, name, math.nan) for name in MEASURES}
     return {
@@ -65,6 +65,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "message": response.message,
         "notes": list(response.notes),
         "collapse_displacement": collapse.displacement if collapse else None,
+        "collapse_phase": None if phase is None else phase + 1,
         "collapse_bracket": list(collapse.bracket) if collapse else None,
         "settlement_unit": response.settlements[-1].unit if response.settlements else response.parameter.unit,
         "initial_reaction": _initial_reaction(response),
@@ -74,7 +75,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "mechanism": mechanism_text(response) if collapse else None,
         **_joint_counts(response),
         **_loss(response),
-        "losses": [asdict(loss) for loss in response.losses],
+        "losses": [{**asdict(loss), "phase": phase + 1} for phase, loss in losses_in_phases(response)],
         "removed": _removed(response),
         "analysis": response.analysis,
         "parameter": response.parameter.name,

@@ -14,6 +14,7 @@ from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text
 from solver import mechanics
 
+from .about import in_phase, unit_in
 from .increments import folder_of
 from .npz import packed, unpacked
 
@@ -124,6 +125,8 @@ class TieCourse:
         Of it, from 1.
     yields_at, breaks_at : float or None [m or rad]
         First settlement at which it does.
+    yields_in, breaks_in : int or None
+        Phase of it, from 1.
     last : float [N]
         Force at the last equilibrium.
     state : str
@@ -137,6 +140,8 @@ class TieCourse:
     phase: int
     yields_at: float | None
     breaks_at: float | None
+    yields_in: int | None
+    breaks_in: int | None
     last: float
     state: str
 
@@ -150,6 +155,8 @@ class TieCourse:
             "phase": self.phase,
             "yields_at": self.yields_at,
             "breaks_at": self.breaks_at,
+            "yields_in_phase": self.yields_in,
+            "breaks_in_phase": self.breaks_in,
             "last_force": self.last,
             "last_state": self.state,
         }
@@ -171,11 +178,12 @@ class TieCourses:
         """Take an increment into account."""
         if not self.ties or increment.status != solver.Status.EQUILIBRIUM:
             return
-        found, at = increment.ties, float(increment.parameter)
+        found, at, phase = increment.ties, float(increment.parameter), increment.phase + 1
         largest = float(np.abs(increment.forces).max(initial=0.0))
         if not self._found:
             self._found = [
-                TieCourse(t.name, t.kind, 0.0, at, increment.phase + 1, None, None, 0.0, "") for t in self.ties
+                TieCourse(t.name, t.kind, 0.0, at, phase, None, None, None, None, 0.0, STATE_WORDS[mechanics.ABSENT])
+                for t in self.ties
             ]
         for k, (before, force, state) in enumerate(zip(self._found, found.forces, found.states, strict=True)):
             tie = self.ties[k]
@@ -186,14 +194,20 @@ class TieCourses:
                 force = 0.0
             # A tie that yields has carried the same, up to rounding, since it began to.
             larger = abs(force) - abs(before.force) > NEGLIGIBLE * largest
+            # One that never carries is told where it begins to be there.
+            here = larger or (before.state == STATE_WORDS[mechanics.ABSENT] and state != mechanics.ABSENT)
+            yields = before.yields_at is None and state == mechanics.YIELDING
+            breaks = before.breaks_at is None and state == mechanics.BROKEN
             self._found[k] = TieCourse(
                 before.name,
                 before.kind,
                 float(force) if larger else before.force,
-                at if larger else before.at,
-                increment.phase + 1 if larger else before.phase,
-                at if before.yields_at is None and state == mechanics.YIELDING else before.yields_at,
-                at if before.breaks_at is None and state == mechanics.BROKEN else before.breaks_at,
+                at if here else before.at,
+                phase if here else before.phase,
+                at if yields else before.yields_at,
+                at if breaks else before.breaks_at,
+                phase if yields else before.yields_in,
+                phase if breaks else before.breaks_in,
                 0.0 if state == mechanics.BROKEN else float(force),
                 STATE_WORDS[state],
             )
@@ -248,24 +262,26 @@ def tie_force_curves(response: solver.Response) -> TieForceCurves | None:
     return TieForceCurves(tuple(ties[k].name for k in chosen), forces[:, chosen], states[:, chosen])
 
 
-def tie_texts(course: TieCourse, unit: str = "m") -> tuple[str, str, str]:
+def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, str]:
     """Say what a tie is, its largest force and where, and what became of it.
 
     Parameters
     ----------
     course : TieCourse
-    unit : str
-        Of settlements.
+    response : solver.Response
+        Which says in what unit and in how many phases the supports move.
     """
+
+    def place(at: float, phase: int) -> str:
+        return f"{at:.4g} {unit_in(response, phase - 1)}{in_phase(response, phase - 1)}"
+
     sense = "tension" if course.force > 0.0 else "compression"
     # It breaks between two increments.
-    at = "by" if course.at == course.breaks_at else "at"
-    largest = f"{force_text(abs(course.force))} {sense} {at} {course.at:.4g} {unit}" if course.force else "no force"
-    fate = [
-        f"{word} by {first:.4g} {unit}"
-        for word, first in (("yields", course.yields_at), ("breaks", course.breaks_at))
-        if first is not None
-    ]
+    at = "by" if (course.at, course.phase) == (course.breaks_at, course.breaks_in) else "at"
+    where = f"{sense} {at} {place(course.at, course.phase)}"
+    largest = f"{force_text(abs(course.force))} {where}" if course.force else "no force"
+    fates = (("yields", course.yields_at, course.yields_in), ("breaks", course.breaks_at, course.breaks_in))
+    fate = [f"{word} by {place(at, phase)}" for word, at, phase in fates if at is not None and phase is not None]
     # What yields and breaks was told.
     said = {"yielding": course.yields_at, "broken": course.breaks_at}.get(course.state)
     if said is None:

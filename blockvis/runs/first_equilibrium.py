@@ -103,4 +103,7 @@ def _cause(case: Case, assembly: solver.Assembly) -> str:
         return (
             f"they slide: with more friction than {case.friction_coefficient:g}, or their gaps closed, they would stand"
         )
-    return "they tip or drop whatever the friction is: look for gaps below them, a missing stone or a missing support"
+    return (
+        "they tip or drop whatever the friction is: look for gaps below them, a missing stone or a missing support; "
+        "what overhangs needs a tie, a prop or a support"
+    )

@@ -14,6 +14,7 @@ import solver
 from blockvis.cases.build import case_assembly
 from blockvis.cases.contents import Case
 from blockvis.kinds.kinds import KINDS
+from blockvis.results.about import collapse_phase
 from blockvis.results.folder import stored_assembly
 from blockvis.system.worker import Say, Worker, WorkerEnded, end_with_caller, serve
 from solver import mechanics
@@ -45,6 +46,8 @@ class Traced:
     collapse : float, optional [m or rad]
         Parameter at collapse.
     stop : str
+    collapse_phase : int
+        Number of the phase of the collapse, from 0.
     """
 
     phases: np.ndarray
@@ -53,6 +56,7 @@ class Traced:
     positions: np.ndarray
     collapse: float | None
     stop: str
+    collapse_phase: int = 0
 
     def same_places(self, other: Traced) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the increments of this path and of another that are at the same parameter."""
@@ -132,6 +136,7 @@ def traced(response: solver.Response) -> Traced:
         positions=np.array([i.pose.positions for i in path]).reshape(-1, *assembly.centroids.shape),
         collapse=None if response.collapse is None else response.collapse.displacement,
         stop=str(response.stop),
+        collapse_phase=collapse_phase(response) or 0,
     )
 
 

@@ -90,7 +90,7 @@ class PathRange:
     @property
     def collapse(self) -> tuple[float, float | None] | None:
         """Least and largest displacement at collapse [m or rad]; without the largest where a run stands to its end."""
-        falls = sorted((int(run.phases[-1]), run.collapse) for run in self.followed if run.collapse is not None)
+        falls = sorted((run.collapse_phase, run.collapse) for run in self.followed if run.collapse is not None)
         if not falls:
             return None
         return falls[0][1], falls[-1][1] if len(falls) == len(self.followed) else None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from typing import TextIO
 
 import numpy as np
@@ -181,6 +182,51 @@ class Progress:
         self._ended.set()
         with self._writing:
             self._line.clear()
+
+
+class RunsProgress:
+    """A line that counts runs of which each may take long, and names the one that is waited for.
+
+    Parameters
+    ----------
+    shown : bool
+        Whether anything is written.
+    stream : text stream, optional
+        stderr by default.
+    """
+
+    def __init__(self, *, shown: bool = True, stream: TextIO | None = None) -> None:
+        self.names: list[str] = []
+        self.count = 0
+        self._line, self._ended = _Line(stream), threading.Event()
+        self._thread = threading.Thread(target=self._keep_telling, daemon=True) if shown else None
+
+    def __enter__(self) -> RunsProgress:
+        """Begin to write now and then."""
+        if self._thread is not None:
+            self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Write no more."""
+        self._ended.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._line.clear()
+
+    def add(self, names: Sequence[str]) -> None:
+        """Count on so many runs more, by what each is of."""
+        self.names.extend(names)
+
+    def finished(self) -> None:
+        """Count a run."""
+        self.count += 1
+
+    def _keep_telling(self) -> None:
+        while not self._ended.wait(REDRAW):
+            number, total = self.count, len(self.names)
+            if self._line.due and number < total:
+                self._line.write(f"run {number + 1} of {total}: {self.names[number]}", number / total)
 
 
 class StudyProgress:

@@ -275,8 +275,9 @@ def _follow(
             with clock.counting("write"):
                 results.add(increment)
             run.recorded(results.increments)
+            phase = f"phase {increment.phase + 1}, " if len(run.course.settlements) > 1 else ""
             for note in increment.notes:
-                warnings.warn(note, stacklevel=2)
+                warnings.warn(f"{phase}{note}", stacklevel=2)
             progress.increment(increment)
             budget.next()
         ending = run.steps.ending

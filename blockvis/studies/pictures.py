@@ -23,7 +23,7 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from .fragility import CONFIDENCE, Fragility, fragility_of
-from .sensitivity import Swing, first_order, outcome, swings
+from .sensitivity import Swing, first_order, outcome, stood_as_far, swings
 from .study_file import Study
 from .study_folder import NO_RESULT, StudyFolder
 from .summary import classes_of, curve_name, independent_rows, is_sample, is_single
@@ -131,7 +131,9 @@ def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Pat
     left.margins(x=0.22)
     left.set_yticks(range(len(names)), [textwrap.shorten(name, 40) for name in names], fontsize=0.95 * TEXT)
     left.set_ylim(len(names) - 0.4, -0.6)
-    left.set_xlabel(f"mean collapse displacement [{unit}]", fontsize=TEXT)
+    stood = int(stood_as_far(table).sum())
+    bound = f", at least: {counted(stood, 'run')} stood" if stood else ""
+    left.set_xlabel(f"mean collapse displacement [{unit}]{bound}", fontsize=TEXT)
     extreme = "fifth of the values" if study.method != "grid" else "value"
     left.set_title(f"mean of the runs with the lowest and the highest {extreme}", **HEADING)
     for place, name in enumerate(names):
@@ -157,10 +159,11 @@ def _draw_swing(axes: Axes, place: int, swing: Swing, centre: float, factor: flo
     """Draw the bar of a parameter to both sides of the mean of all runs, with its values at the ends."""
     ends = ((swing.low, swing.low_value, swing.low_error, "#9bc0e0"),
             (swing.high, swing.high_value, swing.high_error, palette.hexadecimal(palette.FORCE)))  # fmt: skip
-    for mean, value, error, colour in ends:
+    for side, (mean, value, error, colour) in zip((-1, 1), ends, strict=True):
         axes.barh(place, factor * mean - centre, left=centre, color=colour, height=0.52, zorder=2)
         axes.errorbar(factor * mean, place, xerr=factor * error, color="#333333", linewidth=1.0, capsize=3, zorder=3)
-        outwards = 1 if factor * mean >= centre else -1
+        # Of a parameter without effect the two values stand to both sides.
+        outwards = side if np.isclose(factor * mean, centre, rtol=1e-9) else 1 if factor * mean > centre else -1
         edge = factor * (mean + outwards * (0.0 if np.isnan(error) else error))
         axes.annotate(
             _short(value), (edge, place), xytext=(6 * outwards, 0), textcoords="offset points", va="center",
@@ -181,7 +184,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     figure = Figure(figsize=(width, 4.6 + 0.2 * lines), layout="constrained")
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
     y = factor * outcome(table)
-    stood = table["collapse_displacement"].isna().to_numpy(dtype=bool) & np.isfinite(y)
+    stood = stood_as_far(table)
     kind = table["mechanism_class"].to_numpy(dtype=object)
     for axes, name in zip(panels, names, strict=True):
         x = table[name].to_numpy(dtype=float)

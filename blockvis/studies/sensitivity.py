@@ -36,6 +36,8 @@ class Swing:
         Mean outcome of the runs with the lowest and with the highest values.
     low_error, high_error : float [m or rad]
         Half the 95 % interval of these means.
+    at_least : (bool, bool)
+        Whether runs of the one and of the other stood as far as they were followed: their means may be larger.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Swing:
     high: float
     low_error: float
     high_error: float
+    at_least: tuple[bool, bool] = (False, False)
 
     @property
     def size(self) -> float:
@@ -63,6 +66,11 @@ def outcome(table: pd.DataFrame) -> np.ndarray:
     return value
 
 
+def stood_as_far(table: pd.DataFrame) -> np.ndarray:
+    """(n_rows,) bool array: runs with a result that stood as far as they were followed."""
+    return np.asarray(table["collapse_displacement"].isna() & ~table["status"].isin(NO_RESULT), dtype=bool)
+
+
 def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
     """Compute the swing of every parameter.
 
@@ -75,39 +83,39 @@ def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
     Returns
     -------
     list of Swing
-        The largest first.
+        The largest first; empty where no run collapsed, whose outcomes are no more than how far they were followed.
     """
     y = outcome(table)
     table, y = table[np.isfinite(y)], y[np.isfinite(y)]
-    found = []
+    stood, found = stood_as_far(table), []
+    if stood.all():
+        return []
     for parameter in study.parameters:
         x = table[parameter.name].to_numpy()
         few = parameter.distribution is None
         pairs: list[tuple[float | str, np.ndarray]] = []
         if few and not parameter.numeric:
-            groups = {str(value): y[x == value] for value in dict.fromkeys(x.tolist())}
-            groups = {value: group for value, group in groups.items() if len(group)}
-            ends = sorted(groups, key=lambda value: float(groups[value].mean()))
+            groups = {str(value): np.flatnonzero(x == value) for value in dict.fromkeys(x.tolist())}
+            ends = sorted(groups, key=lambda value: float(y[groups[value]].mean()))
             if len(ends) > 1:
                 pairs = [(ends[0], groups[ends[0]]), (ends[-1], groups[ends[-1]])]
         elif few:
             x = x.astype(float)
             if len(x) and np.ptp(x) > 0:
-                pairs = [(float(v), y[x == v]) for v in (x.min(), x.max())]
+                pairs = [(float(v), np.flatnonzero(x == v)) for v in (x.min(), x.max())]
         else:
             x = x.astype(float)
             order = np.argsort(x, kind="stable")
             n = max(1, round(FIFTH * len(x)))
             if len(x) > 1:
-                pairs = [(float(x[k].mean()), y[k]) for k in (order[:n], order[-n:])]
+                pairs = [(float(x[k].mean()), k) for k in (order[:n], order[-n:])]
         if not pairs:
             continue
-        (low_value, low), (high_value, high) = pairs
-        found.append(
-            Swing(
-                parameter.name, low_value, high_value, float(low.mean()), float(high.mean()), _error(low), _error(high)
-            )
-        )
+        (low_value, lowest), (high_value, highest) = pairs
+        low, high = y[lowest], y[highest]
+        means, errors = (float(low.mean()), float(high.mean())), (_error(low), _error(high))
+        at_least = bool(stood[lowest].any()), bool(stood[highest].any())
+        found.append(Swing(parameter.name, low_value, high_value, *means, *errors, at_least))
     return sorted(found, key=lambda swing: -swing.size)
 
 
@@ -124,7 +132,7 @@ def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, flo
     -------
     dict
         The index and half its 95 % interval by name of the parameter, for a "saltelli" study also of all imperfections
-        together; empty if there are too few runs, or the outcome is the same in all.
+        together; empty if there are too few runs, none collapsed, or the outcome is the same in all.
 
     Notes
     -----
@@ -135,6 +143,8 @@ def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, flo
     """
     y = np.full(study.n_runs, np.nan)
     y[table["run"].to_numpy(dtype=int)] = outcome(table)
+    if stood_as_far(table).sum() == np.isfinite(y).sum():
+        return {}
     few = np.isfinite(y).sum() < FEWEST_RUNS and study.method != "grid"
     if few or not np.isfinite(y).any() or np.nanstd(y) <= 1e-9 * max(abs(float(np.nanmean(y))), 1e-300):
         return {}

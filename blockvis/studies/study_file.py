@@ -263,7 +263,11 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
 def _check(study: Study, where: str) -> None:
     base = case_of(study.values, study.case_source)
     if not KINDS[base.analysis].in_studies:
-        raise ValueError(f"{base.source}: a study follows settlements, but [analysis] kind is '{base.analysis}'")
+        raise ValueError(
+            f"{base.source}: a study follows settlements, but [analysis] kind is '{base.analysis}'; leave it out, or "
+            f"vary the {base.analysis} in a loop, as blockvis run {base.source.name} --set "
+            "material.friction_coefficient=0.5 -o out-0.5"
+        )
     if study.method == "grid":
         _check_grid(study, where)
     try:

@@ -89,7 +89,12 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
         "furthest_settlement": curve.furthest,
         "first_order_indices": {} if is_single(study) else {k: list(v) for k, v in first_order(study, table).items()},
         "swings": [
-            {"parameter": s.name, "at": [s.low_value, s.high_value], "mean": [s.low, s.high]}
+            {
+                "parameter": s.name,
+                "at": [s.low_value, s.high_value],
+                "mean": [s.low, s.high],
+                "at_least": list(s.at_least),
+            }
             for s in swings(study, table)
         ],
         "mechanism_classes": classes_of(table),
@@ -145,14 +150,17 @@ def in_words(summary: dict[str, Any]) -> str:
         ]
         lines.append(f"{summary['curve']}: {', '.join(quantiles)}")
     elif summary["n_stood"]:
-        lines.append(f"no run collapsed up to {summary['furthest_settlement']:.4g} {unit}")
+        farther = "what each parameter does is not known: let settlement.limit be larger"
+        lines.append(f"no run collapsed up to {summary['furthest_settlement']:.4g} {unit}; {farther}")
     for swing in () if summary["line"] else summary["swings"]:
         (low_at, high_at), (low, high) = swing["at"], swing["mean"]
         index = summary["first_order_indices"].get(swing["parameter"])
         share = f", {100 * index[0]:.0f} ± {100 * index[1]:.0f} % of the variance" if index else ""
+        # A study of an earlier version has not stored which means are bounds.
+        least = ["at least " * bool(bound) for bound in swing.get("at_least", (False, False))]
         lines.append(
-            f"{swing['parameter']}: {low:.4g} {unit} on average at {_value(low_at)}, {high:.4g} {unit} at "
-            f"{_value(high_at)}{share}"
+            f"{swing['parameter']}: {least[0]}{low:.4g} {unit} on average at {_value(low_at)}, {least[1]}{high:.4g} "
+            f"{unit} at {_value(high_at)}{share}"
         )
     listed = {swing["parameter"] for swing in summary["swings"]}
     for name, (share, error) in summary["first_order_indices"].items():

@@ -190,6 +190,6 @@ def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
     falling = falling_blocks(assembly, motion)
     return (
         f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
-        f"({assembly.listed(falling, 8)}); look for gaps between blocks (joint_thickness), a missing support or too "
-        "little friction"
+        f"({assembly.listed(falling, 8)}); look for gaps between blocks (joint_thickness), a missing support, too "
+        "little friction, or blocks that overhang and tip, which need a tie, a prop or a support"
     )

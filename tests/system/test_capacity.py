@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import tempfile
 from dataclasses import replace
 
@@ -205,6 +206,37 @@ animation = false
     response, _ = solved(text.replace("capacity_at", "# ") + SIDEWAYS, tmp_path)
     assert len(response.path) > 4
     assert response.load_multiplier == pytest.approx(np.tan(np.arctan(0.2) - response.settlement), rel=1e-6)
+
+
+def test_the_capacity_of_a_wall_is_told_with_and_without_joints_that_close(tmp_path, capsys):
+    text = """
+[geometry]
+layout = "wall"
+parameters = { bricks = 3, courses = 3, settling = [0.375, 0.75], brick_length = 0.25 }
+[settlement]
+direction = [0, -1]
+increment = 0.002
+limit = 0.004
+[analysis]
+kind = "limit load"
+capacity_at = [0.004]
+"""
+    summary = ran(text + SIDEWAYS, tmp_path)[1]
+    said = capsys.readouterr()
+    # Nothing was asked of the wall as drawn.
+    assert re.search(r"after a settlement of +0\.004 m\n", said.out)
+    (note,) = summary["notes"]
+    assert note in said.err
+    closing, apart = (
+        ran(text.replace("[0.004]", f"[0.004]\ndisplacement = {within}") + SIDEWAYS, tmp_path, "--force")[1]
+        for within in (0.00015, 0.0)
+    )
+    with_it, without = (f"{one['limit_load_multiplier']:.6g}" for one in (closing, apart))
+    assert note.startswith(
+        f"at a settlement of 0.004 m α = {with_it}, {without} without: joints that are open may close"
+    )
+    assert "by up to 0.00015 m" in note
+    assert apart["notes"] == []
 
 
 @pytest.mark.thorough

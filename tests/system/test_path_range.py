@@ -133,7 +133,7 @@ def test_ctrl_c_leaves_the_range(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(path_range, "find_range", interrupted)
     (tmp_path / "out").mkdir()
     monkeypatch.setattr("blockvis.runs.step_check.stored_case", lambda _: SimpleNamespace(settings=True))
-    response = SimpleNamespace(stop=solver.Status.COLLAPSED, increments=())
+    response = SimpleNamespace(stop=solver.Status.COLLAPSED, increments=(), path=(None,))
     run = SimpleNamespace(response=response, folder=tmp_path / "out", had_finished=False)
     _say_range(Namespace(range=False), run)
     assert capsys.readouterr().err == "blockvis: range not known: interrupted; everything else is written\n"

@@ -34,7 +34,7 @@ from blockvis.explanation.forward import (
 )
 from blockvis.explanation.likelihood import Comparison, Trust
 from blockvis.explanation.observations import read_observations
-from blockvis.explanation.ranking import ranked
+from blockvis.explanation.ranking import next_measurement, ranked
 from solver import mechanics
 
 CASE = structures.Path("case.toml")
@@ -366,6 +366,34 @@ def test_twins_are_one_cause_for_cracks_and_two_for_displaced_points():
     (cause,) = ranked([one, other], apart=False)
     assert (cause.name, cause.also) == ("left moves left", ("right moves right",))
     assert len(ranked([one, other], apart=True)) == 2
+
+
+def causes_opening(compared, *openings):
+    """Causes of given evidence that open some joints of the arch by given widths [m]."""
+    trials = []
+    for number, (evidence, widths) in enumerate(openings):
+        gaps = np.zeros((1, len(compared.joints.block_a), 2))
+        for joint, width in widths.items():
+            gaps[:, joint] = width
+        one = trial(f"cause {number}", evidence)
+        one.openings = lambda amounts, gaps=gaps: np.repeat(flat(gaps), len(amounts), axis=0)
+        trials.append(one)
+    return ranked(trials, apart=False)
+
+
+def test_a_measurement_is_to_part_the_causes_that_cannot_be_told_apart():
+    compared = comparison([{"joint": "voussoir 3 | voussoir 4", "width": 0.004}])
+    measured = int(compared.own[0])
+    first, second = [joint for joint in range(len(compared.joints.block_a)) if joint != measured][:2]
+    unlikely = (np.log(0.04), {first: 0.05})
+    causes = causes_opening(compared, (0.0, {}), (np.log(0.3), {second: 0.003, measured: 0.05}), unlikely)
+    found = next_measurement(compared, causes)
+    assert (found.joint, [name for name, _ in found.widths]) == (second, ["cause 0", "cause 1"])
+    # What parts the first from another that is much less probable does not help.
+    alike = causes_opening(compared, (0.0, {}), (np.log(0.3), {measured: 0.05}), unlikely)
+    assert next_measurement(compared, alike) is None
+    # Where the first is told apart, it is to be confirmed against the next.
+    assert next_measurement(compared, causes_opening(compared, (0.0, {}), unlikely)).joint == first
 
 
 TIED = '[[ties]]\nname = "iron"\nfrom = [-0.9, 0.3]\nto = [0.9, 0.3]\nstiffness = 1e7\n'

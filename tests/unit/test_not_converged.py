@@ -1,8 +1,12 @@
 """A limit load that has not converged says what to do."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import blockvis
 import solver
 from blockvis import generators
 from blockvis.cli import main
@@ -29,6 +33,31 @@ def test_the_upper_bound_is_named(tmp_path, monkeypatch, capsys):
     (said,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("status"))
     assert "not converged" in said
     assert 'flow = "associative" gives a proved upper bound' in said
+
+
+def test_positions_without_a_limit_load_are_told_and_the_certificate_is_of_the_one_that_governs(
+    tmp_path, monkeypatch, capsys
+):
+    limit_load, found = solver.Structure.limit_load, []
+
+    def second_fails(self, **options):
+        found.append(limit_load(self, **options))
+        if len(found) == 2:
+            worse = replace(found[1].certificate, equilibrium_residual=0.5)
+            return replace(found[1], status=solver.LimitStatus.NOT_CONVERGED, certificate=worse)
+        return found[-1]
+
+    monkeypatch.setattr(solver.Structure, "limit_load", second_fails)
+    moving = CASE.replace("weight_fraction = [1, 0]", "force = [0, -1000]\npositions = [-0.5, 0.5, 3]")
+    (tmp_path / "case.toml").write_text(moving, encoding="utf-8")
+    assert main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out")], outputs=()) == 0
+    said, words = capsys.readouterr().out, "1 of 3 positions did not converge: x = 0 m"
+    assert f"note: {words}" in said
+    assert "certificate: equilibrium residual 5.0e-01" not in said
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert words in summary["message"]
+    response = blockvis.open_results(tmp_path / "out")
+    assert "not converged" in blockvis.draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

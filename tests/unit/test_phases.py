@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from structures import assembly_of, case_from, rectangle
 
+import blockvis
 import solver
+from blockvis.cli import main
+from blockvis.kinds.kinds import KINDS
+from blockvis.report.page import summary_rows
 from solver import mechanics
 
 DOWN = solver.Settlement([0.0, -1.0], increment=1e-3, limit=1e-3)
@@ -86,7 +92,7 @@ def test_a_structure_that_stands_no_more_collapses_before_the_settlement() -> No
 
 
 @pytest.mark.slow
-def test_what_falls_at_once_is_told_as_a_loss() -> None:
+def test_what_falls_at_once_is_told_as_a_loss(tmp_path: Path) -> None:
     structure = beam_on_a_prop()
     # Without the beam its load falls; another block stands.
     stone = solver.Assembly.from_outlines(
@@ -100,6 +106,10 @@ def test_what_falls_at_once_is_told_as_a_loss() -> None:
     response = wider.settle([DOWN, DOWN], changes=[taken_away(wider, 1, "prop", "beam")], controls=controls)
     assert response.stop is solver.Status.LIMIT_REACHED
     assert [loss.blocks for loss in response.losses] == [("load",)]
+    assert KINDS["settlement"].lines(response)[0].startswith("loss: load at 0 m in phase 2, ")
+    blockvis.write(response, tmp_path / "out")
+    (told,) = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["losses"]
+    assert (told["settlement"], told["phase"]) == (0.0, 2)
 
 
 SETTLEMENT = """
@@ -159,3 +169,59 @@ def test_a_change_that_cannot_be_is_refused_in_one_line(more: str, words: str) -
     with pytest.raises(ValueError, match=words) as error:
         run()
     assert "\n" not in str(error.value)
+
+
+ARCH = """
+[geometry]
+layout = "arch"
+parameters = { voussoirs = 5 }
+[material]
+friction_coefficient = 0.8
+"""
+SPREADING = "[[settlement]]\ndirection = [1, 0]\nincrement = 0.05\nlimit = 0.1\ntolerance = 1e-3\n"
+
+
+def run_told(folder: Path, case: str, capsys: pytest.CaptureFixture[str]) -> tuple[str, dict[str, Any]]:
+    """Run a case without pictures; returns what it says and its summary."""
+    (folder / "case.toml").write_text(case, encoding="utf-8")
+    capsys.readouterr()
+    assert main(["run", str(folder / "case.toml"), "-o", str(folder / "out"), "--no-check-steps"], outputs=()) == 0
+    return capsys.readouterr().out, json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("ranged", ["", "[analysis]\nrange = true\n"])
+def test_what_falls_before_anything_moves_is_a_collapse_at_no_settlement(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], ranged: str
+) -> None:
+    removed = '[[remove]]\nphase = 1\nblocks = "voussoir 3"\n'
+    said, summary = run_told(tmp_path, ARCH + SPREADING + removed + ranged, capsys)
+    assert "collapse displacement           0 m   between 0 and 0\n" in said
+    assert "last reaction" not in said
+    assert "at once: block 'voussoir 3' taken away before settlement 1" in said
+    assert (summary["status"], summary["collapse_displacement"]) == ("collapsed", 0.0)
+    # Both neighbours of the stone fall, of five that weigh alike.
+    assert summary["falling_share"] == pytest.approx(0.4)
+    assert main(["report", str(tmp_path / "out")]) == 0
+
+
+def test_places_along_several_settlements_are_told_with_their_phase(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ties = "".join(
+        f'[[ties]]\nname = "{name}"\nkind = "{kind}"\nfrom = {{ block = "left springer", point = [-1, 0] }}\n'
+        f'to = {{ block = "right springer", point = [1, 0] }}\nstiffness = 1e5\nphase = {phase}\n{strength}'
+        for name, kind, phase, strength in (("iron", "tie", 1, "strength = 6000\n"), ("shore", "prop", 2, ""))
+    )
+    said, summary = run_told(tmp_path, ARCH + SPREADING + SPREADING.replace("0.1", "0.5") + ties, capsys)
+    place = f"{summary['collapse_displacement']:.6g} m in phase 2   between"
+    assert f"collapse displacement{place:>{len(place) + 12 - len(place.split()[0])}}" in said
+    assert summary["collapse_phase"] == 2
+    iron, shore = summary["ties"]
+    assert f"iron (tie): 6 kN tension at {iron['largest_force_at']:.4g} m in phase {iron['phase']}: yields by " in said
+    assert f"yields by {iron['yields_at']:.4g} m in phase {iron['yields_in_phase']}" in said
+    # It carries nothing, as its ends part, and is there from the second settlement on.
+    assert (shore["largest_force"], shore["largest_force_at"], shore["phase"]) == (0.0, 0.0, 2)
+    response = blockvis.open_results(tmp_path / "out")
+    assert " m in phase 2" in blockvis.draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
+    rows = dict(summary_rows(response))
+    assert rows["collapse displacement"].endswith(" m in phase 2")

@@ -13,11 +13,12 @@ from blockvis.cases.value_paths import parse_path, put
 from blockvis.cli import main
 from blockvis.studies import campaign
 from blockvis.studies.fragility import fragility, fragility_of, wilson
-from blockvis.studies.pictures import runs_counted
+from blockvis.studies.pictures import draw_sensitivity, runs_counted
 from blockvis.studies.sampling import METHODS, designed
 from blockvis.studies.sensitivity import IMPERFECTIONS, first_order, swings
 from blockvis.studies.study_file import read_study
 from blockvis.studies.summary import in_words, is_sample, is_single, summary_of
+from solver import mechanics
 
 CASE = """
 [geometry]
@@ -446,3 +447,38 @@ def test_swings_compare_the_lowest_and_the_highest_fifth():
     # What the other parameter adds scatters: three times its deviation over the root of 51 runs on either side.
     assert first.high - first.low == pytest.approx(1.6, abs=3 * np.sqrt(2 / 12 / 51))
     assert second.high - second.low == pytest.approx(0.8, abs=3 * np.sqrt(2 * 4 / 12 / 51))
+
+
+def test_a_study_in_which_nothing_collapses_says_nothing_of_a_collapse(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(CASE.replace("limit = 0.3", "limit = 0.001"), encoding="utf-8")
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY.replace("runs = 8", "runs = 2"), encoding="utf-8")
+    assert main(["sweep", str(path), "-o", str(tmp_path / "out"), "--workers", "1"]) == 0
+    said = capsys.readouterr().out
+    assert (
+        "no run collapsed up to 0.001 m; what each parameter does is not known: let settlement.limit be larger" in said
+    )
+    assert "average" not in said
+    assert not (tmp_path / "out" / "sensitivity.png").exists()
+
+
+def test_means_with_runs_that_stood_are_the_least_that_they_may_be(tmp_path):
+    study = _study(runs=10)
+    table = _table(study, np.linspace(0.1, 0.2, 10))
+    stood = table["a"] > 0.85
+    table["status"] = np.where(stood, "limit reached", table["status"])
+    table["last_settlement"] = 0.3
+    table.loc[stood, "collapse_displacement"] = np.nan
+    said = in_words(summary_of(study, table))
+    assert re.search(r"^a: 0\.\d+ m on average at 0\.\d+, at least 0\.\d+ m at ", said, re.M)
+    drawn = draw_sensitivity(study, table, tmp_path / "sensitivity.svg").read_text(encoding="utf-8")
+    assert f"at least: {mechanics.counted(int(stood.sum()), 'run')} stood" in drawn
+
+
+def test_a_limit_load_is_no_case_of_a_study_and_the_way_is_told(study_file, capsys):
+    live = '[analysis]\nkind = "limit load"\n[[loads]]\nkind = "live"\nweight_fraction = [1, 0]\n'
+    (study_file.parent / "case.toml").write_text(CASE + live, encoding="utf-8")
+    assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "a study follows settlements, but [analysis] kind is 'limit load'" in said
+    assert "blockvis run case.toml --set material.friction_coefficient=0.5" in said

@@ -199,6 +199,12 @@ def test_lines_of_an_svg_are_ties(tmp_path):
     [
         ([((0.25, 1.5), (1.5, 1.7), (2.75, 1.5))], {}, [OF_LAYER], "is bent; draw each tie as a straight line"),
         ([((0.25, 1.5), (1.5, 1.5))], {}, [OF_LAYER], "'TIES 1' to (1.5, 1.5) m lies in no block; the nearest is"),
+        (
+            [((0.25, 1.5), (1.5, 1.5))],
+            {},
+            [OF_LAYER],
+            "leave layer out and write to = { fixed = [1.5, 1.5] } and from;",
+        ),
         ([], {}, [OF_LAYER], "no line lies on the layer 'TIES'"),
         ([((0.25, 1.5), (2.75, 1.5))], {}, [TIE], "names the layer 'TIES', and no [[ties]] says what its lines are"),
         ([], {"file": "piers.json"}, [OF_LAYER], "ties are lines of a .dxf or .svg, and 'piers.json' has none"),
