@@ -592,7 +592,7 @@ class Drawer:
             words += [width_text(crack.width) for crack in cracks]
             colours += [palette.OPEN] * len(cracks)
         if words:
-            dots = np.concatenate([dots, *self._along_arrows.values()])
+            dots = np.concatenate([dots, *self._along_arrows.values(), self.ties.along(increment, shown)])
             places, dots = self.scene.at_pixel(points), self.scene.at_pixel(dots)
             write_labels(picture, places, words, self.sheet.text, dots, colours)
 
