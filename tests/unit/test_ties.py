@@ -4,7 +4,6 @@ import csv
 import json
 import re
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,8 @@ import solver
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cli import main
+from blockvis.pictures import palette
 from blockvis.runs.plan import planned
-from solver import mechanics
 
 #: Two piers of a block each, 0.5 m wide and 2 m high, 2 m apart, on a ground; the right one stands on what moves.
 PIERS = {
@@ -313,8 +312,6 @@ def test_a_broken_tie_has_carried_its_strength_and_a_slack_one_carries_nothing(t
 
 
 def test_a_picture_draws_the_tie_in_the_colour_of_its_state(run, tmp_path):
-    from blockvis.pictures import palette
-
     picture = Image.open(
         blockvis.draw_still(run.response, run.response.path[-1], tmp_path / "last.png", size=(480, 360))
     )
@@ -322,22 +319,7 @@ def test_a_picture_draws_the_tie_in_the_colour_of_its_state(run, tmp_path):
     assert palette.YIELDING in colours
 
 
-def test_in_a_fall_the_label_says_what_the_colour_does(run, monkeypatch):
-    from blockvis.pictures import drawer as drawing
-
-    written = []
-    monkeypatch.setattr(drawing, "write_labels", lambda picture, places, words, *_: written.extend(words))
-    last = run.response.path[-1]
-    drawer = drawing.Drawer(run.response, drawing.Look(), (480, 360), (last,))
-    for force, state in ((0.0, mechanics.SLACK), (900.0, mechanics.ELASTIC)):
-        ties = replace(last.ties, forces=np.array([force]), states=np.array([state]))
-        drawer.picture(replace(last, status=solver.Status.FALLING).with_arrays(ties=ties))
-    assert written == ["iron slack", "iron in tension"]
-
-
 def test_the_label_of_a_tie_leaves_its_line_free(run, tmp_path):
-    from blockvis.pictures import palette
-
     still = blockvis.draw_still(run.response, 0, tmp_path / "first.png", size=(960, 720), joints=False, forces="none")
     line = structures.alike(structures.pixels(still), palette.TIE).sum(axis=1).argmax()
     found = np.flatnonzero(structures.alike(structures.pixels(still)[line], palette.TIE))
