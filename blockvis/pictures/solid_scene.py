@@ -124,7 +124,9 @@ class SolidScene:
         self._plotter = _plotter((self._over * size[0], self._over * size[1]))
         if fine and opacity == 1.0:
             extent = float(framed(assembly, [solver.Pose.initial(assembly)], axes=view.axes[:2]).size.max())
-            self._plotter.enable_ssao(radius=SHADE_REACH * extent, bias=SHADE_HAIR * extent, kernel_size=16)
+            # Depths are rounded by the whole, which wide supports make larger than what is shown.
+            whole = max(extent, float(np.ptp(assembly.vertices, axis=0).max()))
+            self._plotter.enable_ssao(radius=SHADE_REACH * extent, bias=SHADE_HAIR * whole, kernel_size=16)
         self._hidden_hinges = hidden_hinges
         #: Diagonal of the largest support [m].
         self._support = _largest_support(assembly)

@@ -372,6 +372,10 @@ def test_supports_that_go_beyond_the_picture_fade_there(tmp_path):
     picture = pixels(draw_still(settled_piers(20.0), -1, tmp_path / "still.png", size=(960, 540), view="above"))
     assert alike(picture[:, [0, -1]], palette.PAPER).all()
     assert not alike(picture[:, 30], palette.PAPER).all(), "they reach there"
+    # However wide they are: plane faces have one colour.
+    face = picture[100:440, 40:920]
+    grain = np.abs(np.diff(face, axis=0)).max(axis=2)
+    assert ((grain > 1) & (grain < 12)).mean() < 0.1
 
 
 def test_supports_reach_down_to_the_ground_of_a_fall_which_has_no_end(tmp_path):
