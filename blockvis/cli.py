@@ -877,6 +877,7 @@ def _convert(options: argparse.Namespace) -> int:
 
 def _convert_results(options: argparse.Namespace, target: Path) -> int:
     """Write a results folder as one file: a series, an animation, or the blocks where they are at the end."""
+    from .pictures.captions import loss_words
     from .results.fall_files import known_fall
     from .runs.reopen import open_results
 
@@ -886,6 +887,7 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
             f"--{given[0].replace('_', '-')} is of layout files; '{options.source}' holds results: leave it out"
         )
     response = open_results(options.source)
+    gone = ", ".join(loss_words(response.path[-1])) if response.path else ""
     if target.suffix.lower() == ".vtkhdf":
         from .results.vtkhdf import write_vtkhdf
 
@@ -897,16 +899,20 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
         from .pictures.animated_glb import write_animated_glb
 
         write_animated_glb(response, target, known_fall(response))
-        print(f"{counted(response.assembly.n_blocks, 'block')} that move written to {target}")
+        vanishing = f"; vanishing on the way: {gone}" if gone else ""
+        print(f"{counted(response.assembly.n_blocks, 'block')} that move written to {target}{vanishing}")
         return 0
-    from .formats.read import save_layout
+    from .formats.read import write_layout
+    from .layout.layout import layout_of
 
     if not response.path:
         raise ValueError(f"there is no deformed layout: {response.message or response.stop}")
     last = response.path[-1]
-    save_layout(response.assembly, target, pose=last.pose)
+    layout = layout_of(response.assembly, pose=last.pose).chosen(np.flatnonzero(~last.fallen))
+    write_layout(layout, target)
     where = f"{response.parameter.name} {last.parameter:.6g} {response.parameter.unit}".rstrip()
-    print(f"{counted(response.assembly.n_blocks, 'block')} written to {target}, as they are at {where}")
+    left_out = f"; left out: {gone}" if gone else ""
+    print(f"{counted(layout.n_blocks, 'block')} written to {target}, as they are at {where}{left_out}")
     return 0
 
 

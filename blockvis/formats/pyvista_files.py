@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 #: VTK's type of cell with a volume that lists its faces, which do not follow from the type.
 POLYHEDRON = 42
 
+#: The cell array by which files of an increment say which blocks have left for good.
+GONE = "fallen"
+
 #: zlib compresses at most 1032 to 1: a file cannot hold more than this many numbers per byte.
 MOST_PER_BYTE = 1100
 
@@ -285,16 +288,32 @@ def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | 
         return _found_in_parts(data, path, view)
     grid = _as_cells(data, path)
     types = np.asarray(grid.celltypes)
+    gone = _gone(grid)
+    if gone.all():
+        raise ValueError(
+            f"'{path}': all {len(gone)} blocks are gone by the cell array '{GONE}'; give a file before that"
+        )
+    note = (Note(LEFT_OUT, f"left out: {counted(int(gone.sum()), 'block')} taken away or lost (array '{GONE}')"),)
+    notes = note if gone.any() else ()
     if np.isin(types, [*VTK_SOLIDS, POLYHEDRON]).any():
-        return _bodies_of_solids(grid, path)
+        found: Layout | Bodies = _bodies_of_solids(grid, path, ~gone)
+        return replace(found, notes=found.notes + notes)
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
-    surface = np.flatnonzero(np.isin(types, list(VTK)))
+    surface = np.flatnonzero(np.isin(types, list(VTK)) & ~gone)
     rings = []
     for cell in surface:
         nodes = connectivity[offset[cell] : offset[cell + 1]].astype(np.int64)
         rings.append(ring_of_nodes(nodes, VTK[int(types[cell])]))
     cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
-    return layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path, view)
+    found = layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path, view)
+    return replace(found, notes=found.notes + notes)
+
+
+def _gone(grid: Any) -> np.ndarray:
+    """(n_cells,) bool array: cells of blocks that had left for good at the increment whose file this is."""
+    if GONE not in grid.cell_data or "falls" not in grid.cell_data:
+        return np.zeros(grid.n_cells, dtype=bool)
+    return np.asarray(grid.cell_data[GONE]).reshape(grid.n_cells, -1)[:, 0] == 1
 
 
 def _found_in_parts(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:
@@ -342,10 +361,10 @@ def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
     return data.cast_to_unstructured_grid()
 
 
-def _bodies_of_solids(grid: Any, path: Path | str) -> Bodies:
-    """Read the bodies of the cells with a volume; surface cells beside them are their skin."""
+def _bodies_of_solids(grid: Any, path: Path | str, stands: np.ndarray) -> Bodies:
+    """Read the bodies of the cells with a volume that stand; surface cells beside them are their skin."""
     types = np.asarray(grid.celltypes)
-    solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, POLYHEDRON]))
+    solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, POLYHEDRON]) & stands)
     data = {str(key): np.asarray(grid.cell_data[key])[solid] for key in grid.cell_data}
     key = block_array(data)
     if key is not None:

@@ -25,6 +25,9 @@ from . import palette
 #: Seconds in which the path passes, that the last equilibrium and the end stand, and of a frame of pseudo-time.
 PATH, STANDS, FRAME = 6.0, 0.5, 0.1
 
+#: Seconds between two states at one parameter.
+AT_ONCE = 1e-3
+
 #: Radius of ties, in block sizes.
 TIE_RADIUS = 0.03
 
@@ -50,7 +53,8 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     -----
     The path takes six seconds in proportion to its parameter. Between two poses glTF turns each block about its
     centroid, and no corner takes a short cut. Blocks in the plane are extruded by their thickness. Ties are rods from
-    end to end; one that is broken, or not there yet, has no size.
+    end to end. What is gone has no size from then on: a block that was taken away or lost, a tie that is broken or not
+    there yet.
 
     Raises
     ------
@@ -60,7 +64,7 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     if not response.increments:
         raise ValueError(f"there is no motion to write to '{path}': {response.message or response.stop}")
     ties = known_ties(response)
-    times, poses, tied = _played(response, fall)
+    times, poses, tied, stands = _played(response, fall)
     moves = [_as_gltf(pose, response.assembly.dimension) for pose in poses]
     places, turns = np.array([place for place, _ in moves]), np.array([turn for _, turn in moves])
     # Of the two quaternions of a rotation the one next to the last: players go the short way.
@@ -72,25 +76,21 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     clock = buffer.added(times, "SCALAR")
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
-    for block, name in enumerate(_node_names(response.assembly)):
-        for what, values in (("translation", places[:, block]), ("rotation", turns[:, block])):
+    sizes = np.repeat(stands[:, :, None].astype(float), 3, axis=2)
+    rods = _rods(response, ties, poses, tied)
+    names = [*_node_names(response.assembly), *map(_rod_name, ties)]
+    for what, of_blocks, of_rods in zip(
+        ("translation", "rotation", "scale"), (places, turns, sizes), rods, strict=True
+    ):
+        for name, values in zip(names, np.moveaxis(np.concatenate([of_blocks, of_rods], axis=1), 1, 0), strict=True):
             tree["nodes"][numbers[name]][what] = values[0].tolist()
             if np.abs(values - values[0]).max() == 0.0:
                 continue
-            kind = "VEC3" if what == "translation" else "VEC4"
+            output = buffer.added(values, "VEC4" if what == "rotation" else "VEC3")
             channels.append({"sampler": len(samplers), "target": {"node": numbers[name], "path": what}})
-            samplers.append({"input": clock, "output": buffer.added(values, kind), "interpolation": "LINEAR"})
-    rods = _rods(response, ties, poses, tied)
-    for k, tie in enumerate(ties):
-        for what, values, kind in zip(
-            ("translation", "rotation", "scale"), rods, ("VEC3", "VEC4", "VEC3"), strict=True
-        ):
-            node = numbers[_rod_name(tie)]
-            tree["nodes"][node][what] = values[0, k].tolist()
-            channels.append({"sampler": len(samplers), "target": {"node": node, "path": what}})
-            # Rods come and go at once.
-            moves_how = "STEP" if what == "scale" else "LINEAR"
-            samplers.append({"input": clock, "output": buffer.added(values[:, k], kind), "interpolation": moves_how})
+            # Blocks and rods come and go at once.
+            how = "STEP" if what == "scale" else "LINEAR"
+            samplers.append({"input": clock, "output": output, "interpolation": how})
     if channels:
         tree["animations"] = [{"name": response.analysis, "samplers": samplers, "channels": channels}]
     return write_atomic(path, buffer.packed())
@@ -98,11 +98,15 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
 
 def _played(
     response: solver.Response, fall: Fall | None
-) -> tuple[np.ndarray, list[solver.Pose], list[mechanics.TieForces]]:
-    """Seconds, (n,), at which the blocks are at which poses, and what ties do then."""
+) -> tuple[np.ndarray, list[solver.Pose], list[mechanics.TieForces], np.ndarray]:
+    """Seconds, (n,), at which the blocks are at which poses, what ties do then, and which blocks, (n, n_blocks), stand.
+
+    What has gone by the last equilibrium does not come back for what follows.
+    """
     path, along = response.path, response.parameters
     initial = solver.Pose.initial(response.assembly)
     poses = [increment.pose for increment in path] or [initial]
+    stands = [~increment.fallen for increment in path] or [np.ones(response.assembly.n_blocks, dtype=bool)]
     tied = [increment.ties for increment in path] or [mechanics.TieForces()]
     reach = float(along[-1]) if len(along) else 0.0
     times = list(PATH * along / reach) if reach > 0.0 else [0.1 * k for k in range(len(poses))]
@@ -119,8 +123,10 @@ def _played(
         poses += [frame.pose for frame in frames]
         tied += [frame.ties for frame in frames]
     times, poses, tied = [*times, times[-1] + STANDS], [*poses, poses[-1]], [*tied, tied[-1]]
-    kept = np.flatnonzero(np.diff(np.array(times), prepend=-1.0) > 1e-6)
-    return np.array(times)[kept], [poses[k] for k in kept.tolist()], [tied[k] for k in kept.tolist()]
+    stands += stands[-1:] * (len(times) - len(stands))
+    # What changes between two settlements does so at one parameter; players want times that grow.
+    clock = np.array(times)
+    return clock + AT_ONCE * np.cumsum(np.diff(clock, prepend=-1.0) <= 1e-6), poses, tied, np.array(stands)
 
 
 def _rods(

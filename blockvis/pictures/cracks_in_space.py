@@ -15,7 +15,7 @@ from blockvis.results.joints import carried_faces
 from blockvis.text import width_text
 
 from . import palette
-from .drawer import WHOLE, alike
+from .drawer import MARGIN, WHOLE, alike
 from .frame import Key, Sheet, framed, write_labels, write_words
 from .paired_scenes import WORDS
 from .solid_scene import SolidScene
@@ -85,9 +85,10 @@ class CracksInSpace:
         width, height = self._sheet.inside_size
         below = round(WORDS * self._sheet.text) if len(self._views) > 1 else 0
         size = width // len(self._views), height - below
-        fill = palette.pale(palette.role_colours(assembly), np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
+        roles = palette.role_colours(assembly)
+        fill = palette.pale(roles, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
         frames = [
-            framed(assembly, [solver.Pose.initial(assembly)], 0.02, 0.3, view.axes[:2], WHOLE, plane)
+            framed(assembly, [solver.Pose.initial(assembly)], MARGIN, 0.3, view.axes[:2], WHOLE, plane)
             for view in self._views
         ]
         which = np.searchsorted(limits, self._openings)
@@ -95,7 +96,7 @@ class CracksInSpace:
         for view, frame in zip(self._views, alike(frames), strict=True):
             outlined = hiding_supports(assembly, view)
             scene = SolidScene(
-                assembly, view, frame, size, fill, fine=True, cut=plane, outlined=outlined,
+                assembly, view, frame, size, roles, fine=True, cut=plane, outlined=outlined,
                 outline=palette.PALE_OUTLINE,
             )  # fmt: skip
             scene.hide(gone)

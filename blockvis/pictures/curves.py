@@ -46,6 +46,9 @@ SMALL = 0.05
 #: Words beside a collapse take so much of the width.
 WORDS = 0.35
 
+#: The word in a band that takes less of the width than this stands upright.
+WIDE_BAND = 0.2
+
 #: Height of the text of the file [points].
 TEXT = 11.0
 
@@ -328,17 +331,16 @@ def _draw_single(axes: Axes, response: solver.Response, known: np.ndarray, text:
 
 
 def _mark_unbounded(axes: Axes, total: np.ndarray, values: np.ndarray, text: float) -> None:
-    """Shade where no load is too much, as far as the neighbours that have a limit, and say so beside each."""
+    """Shade where no load is too much, as far as the neighbours that have a limit, and say so in each."""
     grey, unbounded = palette.hexadecimal(palette.FAINT), ~np.isfinite(values)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], unbounded, [False]]).astype(int)))
     for first, stop in edges.reshape(-1, 2).tolist():
         low, high = total[max(first - 1, 0)], total[min(stop, len(total) - 1)]
         axes.axvspan(low, high, color=grey, alpha=0.15, linewidth=0)
-        right = high < total[0] + 0.75 * (total[-1] - total[0])
+        wide = high - low > WIDE_BAND * (total[-1] - total[0])
         axes.annotate(
-            "unbounded", (high if right else low, 0.86), xycoords=("data", "axes fraction"),
-            ha="left" if right else "right", va="top", xytext=(6 if right else -6, 0), textcoords="offset points",
-            fontsize=0.9 * text, color=grey,
+            "unbounded", ((low + high) / 2.0, 0.5), xycoords=("data", "axes fraction"), ha="center", va="center",
+            rotation=0 if wide else 90, fontsize=0.9 * text, color=grey,
         )  # fmt: skip
 
 

@@ -65,6 +65,12 @@ CELL, CELL_IN_SPACE = 0.07, 0.09
 #: Arrows of a mechanism shorter than this fraction of the picture are specks, and left out.
 SPECK = 0.01
 
+#: Empty border around free blocks in space, as a part of the larger side of the picture.
+MARGIN = 0.03
+
+#: Pictures in space grow downwards by so much of their larger side to show the ground of a fall.
+FLOOR = 0.15
+
 #: Supports in space are shown whole where the picture is no larger for it than this many times the blocks: part of a
 #: slab that ends just outside looks like a mistake.
 WHOLE = 1.4
@@ -219,7 +225,7 @@ class Drawer:
         ends = np.concatenate([self.live.tails, heads, *self._arrow_tips(extra), tied])
         if self._plane is not None:
             ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
-        frame = frame.holding(self._projected(ends))
+        frame = self._with_floor(frame.holding(self._projected(ends)))
         # Supports in the plane are hatched, and an outline stays where those that move were; of limit loads none moves.
         plain = self._flat or not response.settlements
         self.fill = (
@@ -252,7 +258,15 @@ class Drawer:
     def _framed(self, poses: Iterable[solver.Pose]) -> Frame:
         if not self._views:
             return framed(self.assembly, poses)
-        return framed(self.assembly, poses, margin=0.02, supports=0.3, axes=self._axes, whole=WHOLE, cut=self._plane)
+        return framed(self.assembly, poses, margin=MARGIN, supports=0.3, axes=self._axes, whole=WHOLE, cut=self._plane)
+
+    def _with_floor(self, frame: Frame) -> Frame:
+        """Grow a frame downwards, not by much, to show where blocks in space stand on the ground of a fall."""
+        if self._flat or self.fall is None:
+            return frame
+        feet = self._projected(self.assembly.vertices * [1.0, 1.0, 0.0] + [0.0, 0.0, self.fall.ground])
+        lowest = frame.low - [0.0, FLOOR * float(frame.size.max())]
+        return frame.holding(np.clip(feet, lowest, frame.high)[feet[:, 1] < frame.low[1]])
 
     @property
     def _axes(self) -> np.ndarray:
@@ -291,7 +305,7 @@ class Drawer:
         ]
         for solid in scenes:
             # From below it would hide everything.
-            if self.fall is not None and solid.view.axes[2, 2] > 0.0:
+            if self.fall is not None and solid.view.above >= 0.0:
                 solid.show_ground(self.fall.ground)
         if not several:
             return scenes[0]
@@ -427,6 +441,8 @@ class Drawer:
             weight = volumes[blocks] / volumes[blocks].sum()
             tails[k] = weight @ pose.positions[blocks]
             tips[k] = mechanics.carried(tails[[k]], blocks[:1], pose, swing.displaced)[0]
+        into = self._into_sight(tails)
+        tails, tips = tails + into, tips + into
         lengths = np.linalg.norm(self._projected(tips - tails)[:, :2], axis=1)
         shown = lengths >= min(SPECK * float(self.scene.frame.size.max()), lengths.max(initial=0.0))
         tails, tips = tails[shown], tips[shown]
@@ -436,10 +452,12 @@ class Drawer:
 
     def _blocks_with_arrows(self, swing: Swing) -> list[np.ndarray]:
         """List the blocks that each arrow of a mechanism stands for: a part, or one of those in a cell of a grid."""
+        kept = self._kept(swing.increment.pose)
         if swing.n_parts <= MOST_PARTS:
-            return [np.flatnonzero(swing.parts == part) for part in range(swing.n_parts)]
+            parts = [np.flatnonzero(swing.parts == part) for part in range(swing.n_parts)]
+            return [part for part in parts if kept[part].any()]
         positions = swing.increment.pose.positions
-        moves = np.flatnonzero(swing.parts >= 0)
+        moves = np.flatnonzero((swing.parts >= 0) & kept)
         width = (CELL if self._flat else CELL_IN_SPACE) * self.scene.frame.size.max()
         place = self._projected(positions[moves])[:, :2] / width
         cell = np.floor(place)
@@ -450,12 +468,28 @@ class Drawer:
         _, first = np.unique(cell, axis=0, return_index=True)
         return [moves[[k]] for k in first]
 
+    def _kept(self, pose: solver.Pose) -> np.ndarray:
+        """(n_blocks,) bool array: blocks of which a section leaves something."""
+        kept = np.ones(self.assembly.n_blocks, dtype=bool)
+        if self._plane is not None:
+            inside = (mechanics.moved_vertices(self.assembly, pose) - self._plane[0]) @ self._plane[1] > 0.0
+            kept = np.bincount(self.assembly.block_of_vertex, inside, self.assembly.n_blocks) > 0
+        return kept
+
+    def _into_sight(self, points: np.ndarray) -> np.ndarray:
+        """(n, d) array [m]: the way from points (n, d) [m] to the plane of a section, of those that it leaves out."""
+        if self._plane is None:
+            return np.zeros_like(points)
+        depths = np.minimum((points - self._plane[0]) @ self._plane[1], 0.0)
+        return np.asarray(-depths[:, None] * self._plane[1])
+
     def keys(self) -> list[Key]:
         """Return what is marked in any of the increments, each with its place in the legends of all pictures."""
         if self._keys is None:
             keys = [*self._keys_of_tints(), *self._keys_of_joints(), *self._keys_of_forces(), *self.ties.keys()]
             if not self._flat and self.response.settlements and self.assembly.moving.any():
-                keys.append(Key("area", "moving support", palette.MOVING))
+                solid = self.assembly.moving & ~hiding_supports(self.assembly, self._views[0])
+                keys.append(Key("area" if solid.any() else "line", "moving support", palette.MOVING))
             if self.response.loads.fills:
                 kind = "area" if self._flat else "line"
                 keys.append(
@@ -592,7 +626,7 @@ class Drawer:
             words += [width_text(crack.width) for crack in cracks]
             colours += [palette.OPEN] * len(cracks)
         if words:
-            dots = np.concatenate([dots, *self._along_arrows.values()])
+            dots = np.concatenate([dots, *self._along_arrows.values(), self.ties.along(increment, shown)])
             places, dots = self.scene.at_pixel(points), self.scene.at_pixel(dots)
             write_labels(picture, places, words, self.sheet.text, dots, colours)
 
@@ -668,7 +702,10 @@ class Drawer:
         if not phases:
             return np.zeros((0, self.assembly.dimension)), np.zeros((0, self.assembly.dimension))
         phase = phases[min(increment.phase, len(phases) - 1)]
-        _, places, directions = settlement_arrows(self.assembly, phase, shown, seen)
+        blocks, places, directions = settlement_arrows(self.assembly, phase, shown, seen)
+        kept = self._kept(shown)[blocks]
+        places, directions = places[kept], directions[kept]
+        places = places + self._into_sight(places)
         half = 0.5 * self._arrow * directions
         return (places - half, places + half) if self._flat else (places, places + 2.0 * half)
 

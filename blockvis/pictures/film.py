@@ -84,7 +84,7 @@ def poster_of(drawer: Drawer) -> Image.Image:
 
 
 def state_at(response: solver.Response, at: float) -> solver.Increment:
-    """Find what is shown at a parameter over all phases [m or rad]: between two increments blocks move evenly.
+    """Find what is shown at a parameter over all phases [m or rad]: between two increments everything changes evenly.
 
     Parameters
     ----------
@@ -102,21 +102,67 @@ def _state_at(path: Sequence[solver.Increment], total: np.ndarray, at: float) ->
 
 
 def _between(before: solver.Increment, after: solver.Increment, part: float) -> solver.Increment:
-    """Make the state at a part of the way from one increment to the next; joints and forces are those before."""
+    """Make the state at a part of the way from one increment to the next: numbers, blocks and forces go evenly.
+
+    Which joints slide and hinge is that of the one before.
+    """
     a, b = before.pose, after.pose
     pose = solver.Pose(
         a.positions + part * (b.positions - a.positions), a.rotations + part * (b.rotations - a.rotations)
     )
     start = before.parameter if before.phase == after.phase else 0.0
-    contacts = before.contacts
-    points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, a, pose)
     numbers = {
         name: getattr(before, name) + part * (getattr(after, name) - getattr(before, name))
         for name in ("measured", "reaction", "load_multiplier")
     }
-    return replace(
-        before, parameter=start + part * (after.parameter - start), phase=after.phase, checkpoint=None, **numbers
-    ).with_arrays(pose=pose, contacts=replace(contacts, points=points))
+    parameter = start + part * (after.parameter - start)
+    state = replace(before, parameter=parameter, phase=after.phase, checkpoint=None, **numbers)
+    return _with_forces_between(state, before, after, part, pose)
+
+
+def _with_forces_between(
+    state: solver.Increment, before: solver.Increment, after: solver.Increment, part: float, pose: solver.Pose
+) -> solver.Increment:
+    """Put blocks to a pose between two increments, and the forces of both on them, each by its part."""
+    early, late = (
+        replace(c, points=mechanics.carried_between(c.points, c.block_a, c.block_b, one.pose, pose))
+        for c, one in ((before.contacts, before), (after.contacts, after))
+    )
+    number, known = mechanics.matched_contacts(late, early)
+    forces, new = (1.0 - part) * before.forces, part * after.forces
+    np.add.at(forces, number[known], new[known])
+    more = np.flatnonzero(~known & (after.forces[:, 0] > 0.0))
+    # Points that touch later carry their part of the force, and no joint hinges or slides by them.
+    added = replace(late[more], gaps=np.full(len(more), np.inf))
+    friction = np.concatenate([before.friction, after.friction[more]])
+    state = state.with_arrays(
+        pose=pose,
+        contacts=mechanics.joined_contacts([early, added]),
+        forces=np.concatenate([forces, new[more]]),
+        friction=friction,
+        ties=_ties_between(before.ties, after.ties, part),
+        **{
+            name: np.append(of, np.zeros(len(more)))
+            for name, of in vars(before.state).items()
+            if name in ("intact", "bonded", "unloaded") and len(of)
+        },
+    )
+    rates = mechanics.with_motion(state, before.velocity).displacements[len(early) :]
+    return state.with_arrays(displacements=np.concatenate([before.displacements, rates]))
+
+
+def _ties_between(before: mechanics.TieForces, after: mechanics.TieForces, part: float) -> mechanics.TieForces:
+    """Make what members do between two increments; those that break or are put in are what they were before."""
+    if len(before.states) != len(after.states):
+        return before
+    gone = (mechanics.ABSENT, mechanics.BROKEN)
+    stay = ~(np.isin(before.states, gone) | np.isin(after.states, gone))
+    forces, elongations = (
+        np.where(stay, a + part * (b - a), a)
+        for a, b in ((before.forces, after.forces), (before.elongations, after.elongations))
+    )
+    states = np.where(stay & (before.states != after.states), mechanics.ELASTIC, before.states)
+    return replace(before, forces=forces, elongations=elongations, states=states)
 
 
 def _along(drawer: Drawer, path: list[solver.Increment], n: int, pause: int, told: int) -> list[Draw]:
@@ -157,11 +203,16 @@ def _losses_told(
         gone = np.flatnonzero(increment.fallen & ~before)
         before = increment.fallen
         if len(gone):
-            fate = "TAKEN AWAY" if increment.removed[gone].all() else "LOST"
-            name = response.assembly.names[gone[0]] if len(gone) == 1 else f"{len(gone)} blocks"
+            removed = increment.removed[gone]
+            fates = (("TAKEN AWAY", gone[removed]), ("LOST", gone[~removed]))
+            told = "; ".join(f"{fate} · {_named(response, blocks)}" for fate, blocks in fates if len(blocks))
             first = int(np.searchsorted(places, at))
-            words[first : first + lasting] = [f"{fate} · {name}"] * len(words[first : first + lasting])
+            words[first : first + lasting] = [told] * len(words[first : first + lasting])
     return words
+
+
+def _named(response: solver.Response, blocks: np.ndarray) -> str:
+    return response.assembly.names[blocks[0]] if len(blocks) == 1 else f"{len(blocks)} blocks"
 
 
 def _falling(drawer: Drawer, fps: float) -> list[Draw]:

@@ -50,8 +50,15 @@ SAME_DEPTH = 0.005
 #: Layers by how far in front of what lies at the same place they are drawn; what is in front of all hides nothing.
 IN_FRONT_OF_ALL = 1_000_000.0
 
-#: Radius of the ground of a fall, in extents of the structure.
-GROUND = 1.6
+#: Radius of the ground of a fall, in larger sides of the picture, the part of it from where on it fades, and the least
+#: sine of the angle of views that decides where its middle is.
+GROUND, FADES, SLANTED = 0.75, 0.45, 0.2
+
+#: Ground and supports that go beyond a picture fade over this part of its smaller side: free blocks end before it.
+EDGE = 0.028
+
+#: Faces look down or up where their normals do by this much.
+LEVEL = 0.5
 
 #: The arrows of a mechanism are longer than the way it is drawn by, to be seen on the blocks.
 LONGER = 1.6
@@ -87,7 +94,7 @@ class SolidScene:
     cut : (2, 3) array, optional
         A point [m] of a plane and its unit normal towards what is kept of the blocks.
     outlined : (n_blocks,) bool array, optional
-        Blocks of which the edges alone are drawn.
+        Blocks of which the edges alone are drawn, in their colours.
     hidden_hinges : bool
         Whether hinges behind blocks are dashed.
     outline : (int, int, int)
@@ -117,7 +124,9 @@ class SolidScene:
         self._plotter = _plotter((self._over * size[0], self._over * size[1]))
         if fine and opacity == 1.0:
             extent = float(framed(assembly, [solver.Pose.initial(assembly)], axes=view.axes[:2]).size.max())
-            self._plotter.enable_ssao(radius=SHADE_REACH * extent, bias=SHADE_HAIR * extent, kernel_size=16)
+            # Depths are rounded by the whole, which wide supports make larger than what is shown.
+            whole = max(extent, float(np.ptp(assembly.vertices, axis=0).max()))
+            self._plotter.enable_ssao(radius=SHADE_REACH * extent, bias=SHADE_HAIR * whole, kernel_size=16)
         self._hidden_hinges = hidden_hinges
         #: Diagonal of the largest support [m].
         self._support = _largest_support(assembly)
@@ -126,12 +135,12 @@ class SolidScene:
         self._overlays: dict[str, _Arrows] = {}
         self._look_at()
         self._cut = cut
-        triangles, blocks = triangles_of(assembly.polyhedra)
-        solid = np.ones(len(blocks), dtype=bool) if outlined is None else ~outlined[blocks]
-        self._triangles, self._block = triangles[solid], blocks[solid]
-        self._fill = block_fill
-        self._surface = pv.PolyData.from_regular_faces(np.array(assembly.vertices), self._triangles)
-        self._surface.cell_data["colour"] = block_fill[self._block]
+        self._outlined = np.zeros(assembly.n_blocks, dtype=bool) if outlined is None else outlined
+        self._triangles, self._block = triangles_of(assembly.polyhedra)
+        solid = ~self._outlined[self._block]
+        self._faced, self._fill = self._block[solid], block_fill
+        self._surface = pv.PolyData.from_regular_faces(np.array(assembly.vertices), self._triangles[solid])
+        self._surface.cell_data["colour"] = block_fill[self._faced]
         surface = self._plotter.add_mesh(
             self._surface, scalars="colour", rgb=True, ambient=AMBIENT, diffuse=DIFFUSE, specular=0.0,
             interpolation="flat", opacity=opacity, reset_camera=False, render=False, show_scalar_bar=False,
@@ -139,10 +148,18 @@ class SolidScene:
         self._clip(surface)
         #: (n, 2) int array: vertices at both ends of the edges that are drawn.
         self.edges = sharp_edges(assembly.polyhedra)
-        self._edges = pv.PolyData(np.array(assembly.vertices), lines=_line_cells(self.edges))
-        self._shadow: tuple[pv.PolyData, float] | None = None
+        traced = self._outlined[assembly.block_of_vertex[self.edges[:, 0]]]
+        self._edges, self._traces = (
+            pv.PolyData(np.array(assembly.vertices), lines=_line_cells(self.edges[of])) for of in (~traced, traced)
+        )
+        self._shadow: pv.PolyData | None = None
+        # Height of the ground of a fall, and vertices under supports that stand on it.
+        self._floor, self._feet = np.inf, np.zeros(0, dtype=int)
         width = float(np.clip(assembly.block_size / self.pixel / 40.0, 0.6, size[1] / 700.0))
         self._add("edges", self._edges, outline, width=width, forward=1.0)
+        if traced.any():
+            # What is seen of a block by its edges alone has its colour there.
+            self._add("traces", self._traces, block_fill[assembly.block_of_vertex], width=2.0 * width, forward=1.0)
 
     def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
         """Put the blocks where they are drawn.
@@ -154,29 +171,31 @@ class SolidScene:
             New colours.
         """
         corners = mechanics.moved_vertices(self.assembly, shown)
+        corners[self._feet, 2] = np.minimum(corners[self._feet, 2], self._floor)
         if self._gone.any():
             # What is a point has no faces to draw.
             owner = self.assembly.block_of_vertex
             corners = np.where(self._gone[owner][:, None], shown.positions[owner], corners)
         self._surface.points = corners
-        self._edges.points = corners
+        self._edges.points = self._traces.points = corners
         if self._shadow is not None:
-            mesh, height = self._shadow
             # Supports that reach below the ground throw theirs into it.
             flat = np.array(corners)
-            flat[:, 2] = np.minimum(corners[:, 2], height)
-            mesh.points = flat
+            flat[:, 2] = np.minimum(corners[:, 2], self._floor)
+            self._shadow.points = flat
         if block_fill is not None:
             self._fill = block_fill
-            self._surface.cell_data["colour"] = block_fill[self._block]
+            self._surface.cell_data["colour"] = block_fill[self._faced]
         if self._cut is not None:
-            faces, owners = section_of(corners, self._triangles, self._block, *self._cut)
+            outlines, owners = section_of(corners, self._triangles, self._block, *self._cut)
+            edges = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in outlines]
+            ends = np.concatenate([np.zeros((0, 2, 3)), *edges])
+            self.lines("section edge", ends, palette.INK, max(2.0 * self._thin, 1.2), forward=2.0)
+            faces = [ring for ring, owner in zip(outlines, owners.tolist(), strict=True) if not self._outlined[owner]]
+            owners = owners[~self._outlined[owners]]
             shades = (CUT_SHADE * self._fill[owners]).astype(np.uint8)
             colours = np.repeat(shades, [len(face) for face in faces], axis=0)
             self.polygons("section", faces, colours, forward=1.0)
-            edges = [np.stack([face, np.roll(face, -1, axis=0)], axis=1) for face in faces]
-            ends = np.concatenate([np.zeros((0, 2, 3)), *edges])
-            self.lines("section edge", ends, palette.INK, max(2.0 * self._thin, 1.2), forward=2.0)
 
     def hide(self, gone: np.ndarray) -> None:
         """Leave blocks, (n_blocks,) bool array, out from the next pose on."""
@@ -189,22 +208,37 @@ class SolidScene:
     def show_ground(self, height: float) -> None:
         """Draw the ground of a fall, with the shadows of the blocks under a light from above.
 
+        It has no end but fades, and supports below the structure reach down to it: they are ground as well.
+
         Parameters
         ----------
         height : float [m]
         """
+        # Where the middle of the picture looks at; a level view has it nowhere.
+        eye, radius = self.view.axes[2], GROUND * float(self.frame.size.max())
+        middle = (self.frame.low + self.frame.high) / 2.0 @ self.view.axes[:2]
+        middle += (height - middle[2]) / max(float(eye[2]), SLANTED) * eye
+        plane = pv.Disc(center=(*middle[:2], height), inner=0.0, outer=radius, normal=(0, 0, 1), r_res=48, c_res=96)
+        away = np.linalg.norm(plane.points[:, :2] - middle[:2], axis=1) / radius
+        left = np.clip((1.0 - away) / (1.0 - FADES), 0.0, 1.0)[:, None] ** 2
+        plane.point_data["colour"] = np.rint(
+            left * np.array(palette.GROUND) + (1.0 - left) * np.array(palette.PAPER)
+        ).astype(np.uint8)
         corners = np.array(self.assembly.vertices)
-        middle, size = corners.mean(axis=0), float(np.ptp(corners, axis=0).max())
-        plane = pv.Disc(
-            center=(middle[0], middle[1], height), inner=0.0, outer=GROUND * size, normal=(0, 0, 1), c_res=96
-        )
         shadow = self._surface.copy()
         shadow.clear_data()
         shadow.points = corners * (1.0, 1.0, 0.0) + (0.0, 0.0, height)
-        self._shadow = shadow, height
-        for mesh, colour, forward in ((plane, palette.GROUND, -2.0), (shadow, palette.SHADOW, -1.0)):
+        shadow.point_data["colour"] = np.tile(np.array(palette.SHADOW, dtype=np.uint8), (len(corners), 1))
+        self._shadow, self._floor, self._feet = shadow, height, _feet(self.assembly)
+        for mesh, forward in ((plane, -2.0), (shadow, -1.0)):
             actor = self._plotter.add_mesh(
-                mesh, color=palette.hexadecimal(colour), lighting=False, reset_camera=False, render=False
+                mesh,
+                scalars="colour",
+                rgb=True,
+                lighting=False,
+                reset_camera=False,
+                render=False,
+                show_scalar_bar=False,
             )
             mapper = actor.GetMapper()
             mapper.SetResolveCoincidentTopologyToPolygonOffset()
@@ -353,7 +387,10 @@ class SolidScene:
         picture = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
         if self._over > 1:
             picture = picture.reduce(self._over)
-        return _painted(picture, [shape for arrows in self._overlays.values() for shape in self._shapes(arrows)])
+        return _painted(
+            _fading(picture, round(EDGE * min(picture.size))),
+            [shape for arrows in self._overlays.values() for shape in self._shapes(arrows)],
+        )
 
     def _shapes(self, arrows: _Arrows) -> list[tuple[tuple[int, int, int], np.ndarray]]:
         """Polygons, (k, 2) pixels each, of arrows in the last picture, with their colours."""
@@ -496,6 +533,17 @@ def _largest_support(assembly: solver.Assembly) -> float:
     return max((float(np.linalg.norm(span)) for span in spans), default=0.0)
 
 
+def _feet(assembly: solver.Assembly) -> np.ndarray:
+    """(n,) int array: vertices under the supports that reach below all free blocks, as ground does."""
+    shapes, owner, heights = assembly.polyhedra, assembly.block_of_vertex, assembly.vertices[:, 2]
+    lowest = np.full(assembly.n_blocks, np.inf)
+    np.minimum.at(lowest, owner, heights)
+    ground = ~assembly.free & (lowest < lowest[assembly.free].min(initial=np.inf))
+    upwards = shapes.faces(shapes.vertices).normals[shapes.face_of_corner, 2]
+    down, up = (np.unique(shapes.corners[way * upwards > LEVEL]) for way in (-1.0, 1.0))
+    return np.setdiff1d(down[ground[owner[down]]], up)
+
+
 def _line_cells(ends: np.ndarray) -> np.ndarray:
     return np.column_stack([np.full(len(ends), 2), ends]).ravel()
 
@@ -529,6 +577,15 @@ def _rimmed_arrows(
     for grown, paint in ((0.35 * thick, palette.PAPER), (0.0, colour)):
         shapes += [(paint, polygon) for kind in arrow_shapes(tails, tips, thick, grown) for polygon in kind]
     return shapes
+
+
+def _fading(picture: Image.Image, wide: int) -> Image.Image:
+    """Let what is cut off at the edges of a picture fade over a strip so many pixels ``wide``."""
+    pixels = np.array(picture)
+    left = np.arange(wide)[:, None, None] / wide
+    for strip in (pixels[:wide], pixels[::-1][:wide], pixels.swapaxes(0, 1)[:wide], pixels.swapaxes(0, 1)[::-1][:wide]):
+        strip[...] = np.rint(left * strip + (1.0 - left) * np.array(palette.PAPER))
+    return Image.fromarray(pixels)
 
 
 def _painted(picture: Image.Image, shapes: list[tuple[tuple[int, int, int], np.ndarray]]) -> Image.Image:

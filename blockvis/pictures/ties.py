@@ -45,6 +45,9 @@ EARTH = 3.0
 #: What a tie carries at rest is, below this part of the largest force, how the joints give and no number to tell.
 SMALLEST_TOLD = 1e-4
 
+#: Points along a tie that labels leave free.
+ALONG = 24
+
 #: Most ties that are named in a picture: those with the largest forces.
 MOST_NAMED = 6
 
@@ -104,6 +107,12 @@ class DrawnTies:
             mechanics.tie_ends(self._ties, self._assembly, pose).reshape(-1, self._assembly.dimension) for pose in poses
         ]
         return np.concatenate([np.zeros((0, self._assembly.dimension)), *found])
+
+    def along(self, increment: solver.Increment, shown: solver.Pose) -> np.ndarray:
+        """(n, d) array [m]: points along what is drawn of an increment, which labels leave free."""
+        ends = mechanics.tie_ends(self._ties, self._assembly, shown)[self._states(increment) != mechanics.ABSENT]
+        shares = np.linspace(0.0, 1.0, ALONG)[:, None, None]
+        return ((1.0 - shares) * ends[:, 0] + shares * ends[:, 1]).reshape(-1, self._assembly.dimension)
 
     def strands(self, increment: solver.Increment, shown: solver.Pose, dash: float) -> list[Strands]:
         """List what is drawn of an increment, back to front; in a fall no stubs of what has broken.
@@ -186,7 +195,9 @@ class DrawnTies:
         tie = self._ties[k]
         if state in (mechanics.SLACK, mechanics.BROKEN):
             return f"{tie.name} {WORDS[state]}"
-        sense = "" if tie.kind != mechanics.BAR else " compression" if state == PRESSED else " tension"
+        # A colour that changes in a fall without a number says why: a slack tie comes taut.
+        sense = "compression" if state == PRESSED else "tension"
+        sense = f" in {sense}" if size is None else f" {sense}" if tie.kind == mechanics.BAR else ""
         force = "" if size is None else f" {force_text(size)}"
         return f"{tie.name}{force}{', yielding' if state == mechanics.YIELDING else sense}"
 

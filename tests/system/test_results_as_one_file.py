@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import pyvista as pv
-from structures import arch_response, vault_response
+from structures import arch_response, box, dropped_brick, rectangle, vault_response
 from vtkmodules.vtkIOGeometry import vtkGLTFReader
 
 import blockvis
@@ -110,6 +110,44 @@ def test_the_deformed_layout_is_that_of_the_last_equilibrium(suffix, folder, tmp
     layout = blockvis.read_layout(file)
     corners = np.concatenate(layout.outlines)
     np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)], at_the_end(arch_response()), atol=1e-6)
+
+
+def prop_taken_away(in_space):
+    """A block on two supports, and one in the air between them that is taken away before the second settlement."""
+    boxes = [(0, -1, 1, 0), (1, -1, 2, 0), (0, 0, 0.8, 0.5), (1.2, 0, 2, 0.9)]
+    shapes = [box((x, 0, z), (xx, 1, zz)) if in_space else rectangle(x, z, xx, zz) for x, z, xx, zz in boxes]
+    make = solver.Assembly.from_solids if in_space else solver.Assembly.from_outlines
+    assembly = make(shapes, roles=["fixed", "moving", "free", "free"])
+    down = solver.Settlement((0, 0, -1) if in_space else (0, -1), increment=0.01, limit=0.01)
+    change = solver.PhaseChange(1, np.array([False, False, False, True]))
+    return solver.Structure(assembly, friction_coefficient=0.6).settle([down, down], changes=[change])
+
+
+@pytest.mark.parametrize("in_space", [False, True])
+def test_blocks_taken_away_are_left_out_of_layouts_and_vanish_from_animations(in_space, tmp_path, capsys):
+    folder = blockvis.write(prop_taken_away(in_space), tmp_path / "out")
+    deformed = converted(folder, tmp_path / "deformed.json")
+    assert "3 blocks written" in capsys.readouterr().out
+    last = max((folder / "increments").glob("blocks_*.vtu"))
+    same = converted(last, tmp_path / "same.json")
+    assert "left out: 1 block taken away or lost (array 'fallen')" in capsys.readouterr().err
+    for file in (deformed, same):
+        layout = blockvis.read_layout(file)
+        assert layout.n_blocks == 3
+        assert layout.points[:, -1].max() == pytest.approx(0.5, abs=1e-6)
+    assert blockvis.read_layout(min((folder / "increments").glob("blocks_*.vtu"))).n_blocks == 4
+    film = converted(folder, tmp_path / "out.glb")
+    assert "4 blocks that move written" in (said := capsys.readouterr().out)
+    assert "vanishing on the way: 1 block taken away" in said
+    assert played(film, 2.9)[1][1, 1] == pytest.approx(0.9, abs=0.02)
+    assert played(film, 3.1)[1][1, 1] == pytest.approx(0.5, abs=0.02)
+
+
+def test_lost_blocks_are_left_out_of_the_deformed_layout(tmp_path, capsys):
+    folder = blockvis.write(dropped_brick(0.05), tmp_path / "out")
+    layout = blockvis.read_layout(converted(folder, tmp_path / "deformed.json"))
+    assert "left out: 1 block lost" in capsys.readouterr().out
+    assert "brick" not in layout.names
 
 
 def test_options_of_layout_files_are_refused_for_results(folder, tmp_path, capsys):

@@ -342,6 +342,59 @@ def test_a_section_in_a_joint_closes_the_stones_behind_it(tmp_path):
     assert (np.abs(joint - beside).max(axis=2) > 40).mean() < 1e-3
 
 
+def piers_on_slabs(reach, thick=0.5):
+    """Two piers on slabs that reach ``reach`` [m] to both sides, under a lintel; the right slab sinks."""
+    slabs = [box((x, -reach, -thick), (x + 3, reach, 0)) for x in (0, 3)]
+    piers = [box((x, -0.5, 0), (x + 1, 0.5, 2)) for x in (1, 4)]
+    lintel = box((1.2, -0.5, 2), (4.8, 0.5, 2.5))
+    return solver.Assembly.from_solids([*slabs, *piers, lintel], roles=["fixed", "moving", *["free"] * 3])
+
+
+def settled_piers(reach):
+    down = solver.Settlement(direction=(0, 0, -1), increment=0.1, limit=0.1)
+    return solver.settle(piers_on_slabs(reach), down, friction_coefficient=0.6)
+
+
+def test_a_section_from_below_closes_supports_and_shows_which_moves_and_where_to(tmp_path):
+    """Supports that hide the structure are drawn by their edges: those of the cut, too, and in their colours."""
+    # The middle of the support lies in the half that is left out.
+    response, seen = settled_piers(1.0), {"section": "y = 0.2", "size": (960, 540)}
+    below = pixels(draw_still(response, -1, tmp_path / "below.png", view="below", **seen))[60:480]
+    assert alike(below, palette.MOVING).sum() > 100
+    assert alike(below, palette.SETTLEMENT).sum() > 30, "the arrow of the support"
+    upwards = pixels(draw_still(response, -1, tmp_path / "up.png", view="bottom", **seen))[60:480]
+    columns = ink_in(upwards)[1]
+    across = (upwards.max(axis=2) < 150).any(axis=0)[columns.min() : columns.max()]
+    assert across.mean() > 0.95, "the cut is closed from end to end"
+
+
+def test_supports_that_go_beyond_the_picture_fade_there(tmp_path):
+    picture = pixels(draw_still(settled_piers(20.0), -1, tmp_path / "still.png", size=(960, 540), view="above"))
+    assert alike(picture[:, [0, -1]], palette.PAPER).all()
+    assert not alike(picture[:, 30], palette.PAPER).all(), "they reach there"
+    # However wide they are: plane faces have one colour.
+    face = picture[100:440, 40:920]
+    grain = np.abs(np.diff(face, axis=0)).max(axis=2)
+    assert ((grain > 1) & (grain < 12)).mean() < 0.1
+
+
+def test_supports_reach_down_to_the_ground_of_a_fall_which_has_no_end(tmp_path):
+    """A lintel slides off when the right slab has sunk by more than the left one is thick."""
+    down = solver.Settlement(direction=(0, 0, -1), increment=0.1, limit=2.0)
+    response = solver.settle(piers_on_slabs(1.0, thick=0.2), down, friction_coefficient=0.2)
+    assert response.collapse.displacement > 0.4
+    eye = {"azimuth": -90, "elevation": 20}
+    frames = animate(response, tmp_path / "frames", size=(960, 540), fps=2, seconds=1.0, view=eye)
+    first, last = (pixels(frame)[60:480] for frame in (min(frames.iterdir()), max(frames.iterdir())))
+    dark = (first < 215).any(axis=2)
+    columns = np.flatnonzero(dark.any(axis=0))
+    left, right = columns.min() + 10, columns.max() - 10
+    foot = [np.flatnonzero(dark[:, column]).max() for column in (left, right)]
+    assert foot[0] == pytest.approx(foot[1], abs=2), "both stand on the ground"
+    for picture in (first, last):
+        assert np.abs(np.diff(picture[:, :40], axis=0)).max() < 12, "the ground has no edge"
+
+
 def test_corners_of_a_still_lie_in_shade(tmp_path):
     """Where two faces meet at a hollow corner both are darker than away from it."""
     step = [box((0, 0, 0), (4, 4, 1)), box((0, 2, 1), (4, 4, 3))]

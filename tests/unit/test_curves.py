@@ -9,7 +9,8 @@ from structures import arch_response, parted, pixels, wall
 
 import blockvis
 import solver
-from blockvis import draw_curve
+from blockvis import draw_curve, generators
+from solver import mechanics
 
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):
@@ -138,3 +139,22 @@ def test_phases_in_other_units_share_no_axis(tmp_path):
     assert {"settlement [rad]", "reaction [kN·m]"} <= set(told) or {"settlement [rad]", "reaction [N·m]"} <= set(told)
     assert any(line.endswith("phase 2 of 2") for line in told)
     assert "reaction / weight W" not in told
+
+
+@pytest.mark.parametrize(("positions", "upright"), [(17, True), (5, False)])
+def test_what_is_unbounded_is_said_inside_its_band(positions, upright, tmp_path):
+    arch = generators.arch()
+    limit = solver.limit_load(arch, loads=replace(solver.self_weight(arch), live=solver.point_load(arch, 3, (0, -1))))
+    values = np.where(np.arange(positions) == positions // 2, np.inf, limit.multiplier)
+    states = [replace(limit.increment, parameter=float(x), measured=values[x]) for x in range(positions)]
+    response = solver.Response(
+        assembly=arch, settlements=(), interfaces=solver.Interfaces(), loads=limit.response.loads,
+        increments=tuple(states), stop=solver.Status.COLLAPSED, analysis="limit load", limits=(limit,) * positions,
+        parameter=mechanics.LOAD_POSITION, measured=mechanics.LOAD_MULTIPLIER,
+    )  # fmt: skip
+    text = draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
+    found = re.search(r"<!-- unbounded -->\s*<g [^>]*translate\(([\d.]+) [\d.]+\)( rotate\(-90\))?", text)
+    assert bool(found[2]) is upright
+    # Baseline of what is upright; of what lies, its left end.
+    (band,) = re.findall(r'd="M ([\d.]+) [\d.]+ \nL [\d.]+ [\d.]+ \nL ([\d.]+) .*?opacity: 0.15', text, re.DOTALL)
+    assert float(band[0]) < float(found[1]) < float(band[1])

@@ -23,6 +23,7 @@ from blockvis.pictures.solid_view import chosen_view
 from blockvis.pictures.video import write_film
 from blockvis.results.folder import VIDEO_SUFFIXES
 from blockvis.runs.outputs import Drawing
+from solver import mechanics
 
 SIZE = (320, 180)
 
@@ -85,6 +86,26 @@ def test_a_film_tells_what_is_taken_away_between_settlements():
     assert not any(gone for _, gone in told[:first])
 
 
+def test_a_film_tells_what_is_taken_away_apart_from_what_falls_with_it():
+    """A stone that is taken away from under two others, which are lost before the settlement begins."""
+    outlines = [
+        rectangle(0.0, -1.0, 2.0, 0.0),
+        rectangle(2.0, -1.0, 4.0, 0.0),
+        brick(0.0, 0.0, 3.0, 2.0),
+        *(brick(3.5, y, 0.1, height) for y, height in ((0.0, 1.8), (1.8, 0.1), (1.9, 0.1))),
+    ]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "moving", *["free"] * 4])
+    down = solver.Settlement((0, -1), increment=0.01, limit=0.01)
+    change = solver.PhaseChange(1, np.arange(6) == 3)
+    response = solver.Structure(assembly, friction_coefficient=0.6).settle([down, down], changes=[change])
+    assert response.path[-1].fallen.sum() == 3
+    drawer = Drawer(response, Look(forces="none"), SIZE, response.path)
+    told = []
+    drawer.picture = lambda state, badge=None: told.append(badge)
+    list(film_of(drawer, 10.0, 4.0)[1])
+    assert set(told) == {None, f"TAKEN AWAY · {assembly.names[3]}; LOST · 2 blocks"}
+
+
 def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
     response = sideways_block()
     loads = LiveLoads(response, response.path, 1.0)
@@ -97,6 +118,36 @@ def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
     assert lengths == pytest.approx([lengths[0]] * 3)
     assert state.load_multiplier == pytest.approx((before.load_multiplier + after.load_multiplier) / 2.0)
     assert len(list(animate(response, tmp_path / "frames", size=SIZE, fps=5, seconds=1.0).iterdir())) == 5 + 4
+
+
+def test_forces_between_increments_are_those_of_the_reaction_that_the_title_tells():
+    response = arch_response()
+    moving = int(np.flatnonzero(response.assembly.moving)[0])
+    for before, after in list(pairwise(response.path))[1:]:
+        state = state_at(response, before.parameter + 0.75 * (after.parameter - before.parameter))
+        assert state.reaction == pytest.approx(0.25 * before.reaction + 0.75 * after.reaction)
+        push = mechanics.block_forces(state.contacts, state.pose, state.forces)[moving, 0]
+        assert push == pytest.approx(state.reaction, rel=0.02)
+        assert push != pytest.approx(before.reaction, rel=1e-4)
+        joints = [one.contacts[one.forces[:, 0] > 0.0].joints()[0] for one in (state, before)]
+        np.testing.assert_array_equal(*joints)
+
+
+def test_ties_between_increments_carry_what_lies_between_theirs():
+    """A block rises off its prop, and sinks back upon it."""
+    outlines = [rectangle(0, -1, 1, 0), rectangle(0, 0, 1, 1)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
+    prop = solver.Tie("shore", (1, None), ((0.5, 0.9), (0.5, 0.0)), stiffness=1e6, kind=mechanics.PROP)
+    up, down = (solver.Settlement((0, way), increment=0.008, limit=limit) for way, limit in ((1, 0.004), (-1, 0.008)))
+    response = solver.Structure(assembly, friction_coefficient=0.6, ties=[prop]).settle([up, down])
+    before, after = response.path[-2:]
+    assert before.ties.states[0] == mechanics.SLACK
+    assert after.ties.states[0] == mechanics.ELASTIC
+    ties = state_at(response, response.parameters[-2] + 0.25 * after.parameter).ties
+    assert ties.forces[0] == pytest.approx(0.25 * after.ties.forces[0])
+    stretched = 0.75 * before.ties.elongations[0] + 0.25 * after.ties.elongations[0]
+    assert ties.elongations[0] == pytest.approx(stretched)
+    assert ties.states[0] == mechanics.ELASTIC
 
 
 @pytest.mark.slow

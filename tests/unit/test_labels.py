@@ -7,11 +7,12 @@ from functools import cache
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, parted, wall
+from structures import arch_response, parted, rectangle, wall
 
 import solver
 from blockvis import draw_mechanism, generators
 from blockvis.dynamics.fall import fall_of
+from blockvis.pictures import drawer as drawing
 from blockvis.pictures import palette
 from blockvis.pictures.captions import FAILED_BADGE, FALL_BADGE
 from blockvis.pictures.drawer import Drawer, Look
@@ -165,8 +166,6 @@ def test_every_frame_names_what_it_draws_and_nothing_else(monkeypatch):
 
 
 def test_widths_are_written_of_cracks_that_count(monkeypatch, tmp_path):
-    from blockvis.pictures import drawer as drawing
-
     written, response = [], arch_response()
     monkeypatch.setattr(drawing, "write_labels", lambda picture, places, words, *_: written.extend(words))
     widest = drawing.cracks_of(response.assembly, response.path[-1].pose)[0]
@@ -174,6 +173,20 @@ def test_widths_are_written_of_cracks_that_count(monkeypatch, tmp_path):
     monkeypatch.setattr(drawing, "cracks_of", lambda *_: cracks)
     draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL)
     assert written == ["40 mm", "4 mm"]
+
+
+def test_in_a_fall_the_label_of_a_tie_says_what_its_colour_does(monkeypatch):
+    assembly = solver.Assembly.from_outlines([rectangle(0, -1, 1, 0), rectangle(0, 0, 1, 1)], roles=["moving", "free"])
+    iron = solver.Tie("iron", (1, None), ((0.5, 0.9), (0.5, 2.0)), stiffness=1e6)
+    down = solver.Settlement((0, -1), increment=0.004, limit=0.004)
+    response = solver.Structure(assembly, friction_coefficient=0.6, ties=[iron]).settle(down)
+    written, last = [], response.path[-1]
+    monkeypatch.setattr(drawing, "write_labels", lambda picture, places, words, *_: written.extend(words))
+    drawer = Drawer(response, Look(), SMALL, (last,))
+    for force, state in ((0.0, mechanics.SLACK), (900.0, mechanics.ELASTIC)):
+        ties = replace(last.ties, forces=np.array([force]), states=np.array([state]))
+        drawer.picture(replace(last, status=solver.Status.FALLING).with_arrays(ties=ties))
+    assert written == ["iron slack", "iron in tension"]
 
 
 def test_widths_leave_hinges_free_where_there_is_room():
@@ -186,8 +199,6 @@ def test_widths_leave_hinges_free_where_there_is_room():
 
 
 def test_picture_film_and_page_count_the_last_equilibrium_alike(monkeypatch):
-    from blockvis.pictures import drawer as drawing
-
     marked = []
     found = drawing.marks_of
 

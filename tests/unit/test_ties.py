@@ -16,6 +16,7 @@ import solver
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cli import main
+from blockvis.pictures import palette
 from blockvis.runs.plan import planned
 
 #: Two piers of a block each, 0.5 m wide and 2 m high, 2 m apart, on a ground; the right one stands on what moves.
@@ -323,13 +324,18 @@ def test_a_broken_tie_has_carried_its_strength_and_a_slack_one_carries_nothing(t
 
 
 def test_a_picture_draws_the_tie_in_the_colour_of_its_state(run, tmp_path):
-    from blockvis.pictures import palette
-
     picture = Image.open(
         blockvis.draw_still(run.response, run.response.path[-1], tmp_path / "last.png", size=(480, 360))
     )
     colours = {colour for _, colour in picture.convert("RGB").getcolors(picture.width * picture.height)}
     assert palette.YIELDING in colours
+
+
+def test_the_label_of_a_tie_leaves_its_line_free(run, tmp_path):
+    still = blockvis.draw_still(run.response, 0, tmp_path / "first.png", size=(960, 720), joints=False, forces="none")
+    line = structures.alike(structures.pixels(still), palette.TIE).sum(axis=1).argmax()
+    found = np.flatnonzero(structures.alike(structures.pixels(still)[line], palette.TIE))
+    assert len(found) > 0.95 * np.ptp(found)
 
 
 @pytest.mark.slow

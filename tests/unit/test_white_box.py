@@ -36,7 +36,7 @@ WHITE_BOX = {
     "unit/test_fall.py": 9,
     "unit/test_films.py": 10,
     "unit/test_kinds.py": 7,
-    "unit/test_labels.py": 13,
+    "unit/test_labels.py": 12,
     "unit/test_marks.py": 12,
     "unit/test_observations.py": 1,
     "unit/test_programs.py": 17,
