@@ -225,3 +225,13 @@ def test_places_along_several_settlements_are_told_with_their_phase(
     assert " m in phase 2" in blockvis.draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
     rows = dict(summary_rows(response))
     assert rows["collapse displacement"].endswith(" m in phase 2")
+
+
+def test_a_collapse_before_the_supports_turn_is_read_back_in_metres(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    turning = "[[settlement]]\nrotation_centre = [1, 0]\nrotation = 1\nincrement = 0.01\nlimit = 0.01\n"
+    _, summary = run_told(tmp_path, ARCH + SPREADING.replace("0.1", "0.5") + turning, capsys)
+    assert (summary["status"], summary["collapse_phase"]) == ("collapsed", 1)
+    rows = dict(summary_rows(blockvis.open_results(tmp_path / "out")))
+    assert rows["collapse displacement"] == f"{summary['collapse_displacement']:.6g} m in phase 1"
