@@ -9,8 +9,7 @@ import pytest
 from structures import alike, assembly_of, box, case_from, pixels, rectangle
 
 import solver
-from blockvis import draw_still, lay_backfill
-from blockvis.cases.build import case_assembly, case_loads
+from blockvis import draw_still, lay_backfill, run_case
 
 WEIGHT = 10.0
 
@@ -74,6 +73,7 @@ parameters = { span = 4.0, rise = 1.0, voussoirs = 5 }
 [settlement]
 direction = [1, 0]
 """
+SHORT = "increment = 0.001\nlimit = 0.001\n"
 FILL = {"over": '"voussoir *"', "surface": "2.0", "unit_weight": "18000.0"}
 
 
@@ -95,12 +95,12 @@ def test_fill_that_cannot_be_is_refused_in_one_line(change: dict[str, str], word
     assert "\n" not in str(error.value)
 
 
-def test_fills_over_the_same_blocks_lie_one_on_another() -> None:
+def test_fills_over_the_same_blocks_lie_one_on_another(tmp_path: Path) -> None:
     def filled(*tables: dict[str, str]) -> tuple[solver.Assembly, solver.Loads]:
         texts = ["\n".join(f"{key} = {value}" for key, value in (FILL | table).items()) for table in tables]
-        case = case_from(CASE + "".join(f"[[backfill]]\n{text}\n" for text in texts))
-        assembly = case_assembly(case)
-        return assembly, case_loads(case, assembly)
+        case = case_from(CASE + SHORT + "".join(f"[[backfill]]\n{text}\n" for text in texts))
+        response = run_case(case, tmp_path, overwrite=True, outputs=[]).response
+        return response.assembly, response.loads
 
     pressing = {"pressure_coefficient": "0.3"}
     assembly, whole = filled(pressing)

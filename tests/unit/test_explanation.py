@@ -13,6 +13,7 @@ import blockvis
 import solver
 from blockvis import generators
 from blockvis.cases.explain_settings import ExplainSettings
+from blockvis.explanation import ranking
 from blockvis.explanation.candidates import (
     candidates_of,
     ground_of,
@@ -34,7 +35,6 @@ from blockvis.explanation.forward import (
 )
 from blockvis.explanation.likelihood import Comparison, Trust
 from blockvis.explanation.observations import read_observations
-from blockvis.explanation.ranking import next_measurement, ranked
 from solver import mechanics
 
 CASE = structures.Path("case.toml")
@@ -346,26 +346,26 @@ def trial(cause, evidence, *, shared=None, prior=1.0, detail="", refines=""):
 
 
 def test_probabilities_are_those_of_bayes():
-    causes = ranked([trial("a", 0.0), trial("b", np.log(0.25)), trial("c", -np.inf)], apart=False)
+    causes = ranking.ranked([trial("a", 0.0), trial("b", np.log(0.25)), trial("c", -np.inf)], apart=False)
     assert [(c.name, round(c.probability, 6)) for c in causes] == [("a", 0.8), ("b", 0.2)]
-    half = ranked([trial("a", 0.0, prior=0.5), trial("b", 0.0)], apart=False)
+    half = ranking.ranked([trial("a", 0.0, prior=0.5), trial("b", 0.0)], apart=False)
     assert [(c.name, round(c.probability, 6)) for c in half] == [("b", 0.666667), ("a", 0.333333)]
 
 
 def test_what_a_cause_leaves_open_is_averaged_and_refinements_share_a_weight():
     coarse = [trial("trough", 0.0, detail="x"), trial("trough", -np.inf, detail="y"), trial("other", 0.0)]
-    assert ranked(coarse, apart=False)[0].name == "other"
-    assert ranked(coarse, apart=False)[0].probability == pytest.approx(2.0 / 3.0)
+    assert ranking.ranked(coarse, apart=False)[0].name == "other"
+    assert ranking.ranked(coarse, apart=False)[0].probability == pytest.approx(2.0 / 3.0)
     finer = [*coarse, trial("trough", 0.0, detail="x2", refines="x")]
-    assert ranked(finer, apart=False)[0].probability == pytest.approx(2.0 / 3.0)
+    assert ranking.ranked(finer, apart=False)[0].probability == pytest.approx(2.0 / 3.0)
 
 
 def test_twins_are_one_cause_for_cracks_and_two_for_displaced_points():
     one = trial("left moves left", 0.0)
     other = trial("right moves right", 0.0, shared=one.candidate)
-    (cause,) = ranked([one, other], apart=False)
+    (cause,) = ranking.ranked([one, other], apart=False)
     assert (cause.name, cause.also) == ("left moves left", ("right moves right",))
-    assert len(ranked([one, other], apart=True)) == 2
+    assert len(ranking.ranked([one, other], apart=True)) == 2
 
 
 def causes_opening(compared, *openings):
@@ -378,7 +378,7 @@ def causes_opening(compared, *openings):
         one = trial(f"cause {number}", evidence)
         one.openings = lambda amounts, gaps=gaps: np.repeat(flat(gaps), len(amounts), axis=0)
         trials.append(one)
-    return ranked(trials, apart=False)
+    return ranking.ranked(trials, apart=False)
 
 
 def test_a_measurement_is_to_part_the_causes_that_cannot_be_told_apart():
@@ -387,13 +387,13 @@ def test_a_measurement_is_to_part_the_causes_that_cannot_be_told_apart():
     first, second = [joint for joint in range(len(compared.joints.block_a)) if joint != measured][:2]
     unlikely = (np.log(0.04), {first: 0.05})
     causes = causes_opening(compared, (0.0, {}), (np.log(0.3), {second: 0.003, measured: 0.05}), unlikely)
-    found = next_measurement(compared, causes)
+    found = ranking.next_measurement(compared, causes)
     assert (found.joint, [name for name, _ in found.widths]) == (second, ["cause 0", "cause 1"])
     # What parts the first from another that is much less probable does not help.
     alike = causes_opening(compared, (0.0, {}), (np.log(0.3), {measured: 0.05}), unlikely)
-    assert next_measurement(compared, alike) is None
+    assert ranking.next_measurement(compared, alike) is None
     # Where the first is told apart, it is to be confirmed against the next.
-    assert next_measurement(compared, causes_opening(compared, (0.0, {}), unlikely)).joint == first
+    assert ranking.next_measurement(compared, causes_opening(compared, (0.0, {}), unlikely)).joint == first
 
 
 TIED = '[[ties]]\nname = "iron"\nfrom = [-0.9, 0.3]\nto = [0.9, 0.3]\nstiffness = 1e7\n'

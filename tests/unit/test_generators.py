@@ -12,7 +12,6 @@ from structures import small_layout
 
 import solver
 from blockvis import generators
-from blockvis.generators.catalogue import described
 
 #: Layouts in the plane; those in space have tests of their own.
 PLANE = [name for name in generators.LAYOUTS if generators.dimension_of(name) == 2]
@@ -337,7 +336,7 @@ NO_LENGTHS = ("settling_from", "cavity")
 @pytest.mark.parametrize("bad", [-1.0, 0.0, math.nan, math.inf, 1e200, 1e-200, "wide"])
 @pytest.mark.parametrize("name", generators.LAYOUTS)
 def test_every_length_of_every_layout_is_refused_by_its_name_unless_it_is_one(name, bad):
-    quantities = [key for key, (kind, _) in described(name).items() if kind.startswith("float")]
+    quantities = [key for key, value in generators.parameters_of(name).items() if isinstance(value, float)]
     for key in set(quantities).difference(NO_LENGTHS):
         with pytest.raises(ValueError, match=rf"^{key} is .*; give "):
             generators.build(name, (SMALL if name == "facade" else {}) | {key: bad})

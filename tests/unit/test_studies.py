@@ -11,9 +11,8 @@ import scipy.stats as st
 from blockvis.case_files.read import case_of
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.cli import main
-from blockvis.studies import campaign
+from blockvis.studies import campaign, pictures
 from blockvis.studies.fragility import fragility, fragility_of, wilson
-from blockvis.studies.pictures import draw_sensitivity, runs_counted
 from blockvis.studies.sampling import METHODS, designed
 from blockvis.studies.sensitivity import IMPERFECTIONS, first_order, swings
 from blockvis.studies.study_file import read_study
@@ -371,7 +370,7 @@ def test_title_and_words_count_what_collapsed_and_what_never_stood_apart():
     assert (summary["n_collapsed"], summary["n_never_stood"], summary["n_local"]) == (4, 2, 1)
     assert "4 collapsed, 2 no initial equilibrium" in in_words(summary)
     assert "1 of the collapses is a local loss: a few blocks fall, the structure stands" in in_words(summary)
-    title = runs_counted(fragility_of(table), table, 1e3, "mm")
+    title = pictures.runs_counted(fragility_of(table), table, 1e3, "mm")
     assert title.startswith("7 runs, 4 collapsed (1 of a few blocks only), 2 never stood, 1 stood")
 
 
@@ -471,7 +470,7 @@ def test_means_with_runs_that_stood_are_the_least_that_they_may_be(tmp_path):
     table.loc[stood, "collapse_displacement"] = np.nan
     said = in_words(summary_of(study, table))
     assert re.search(r"^a: 0\.\d+ m on average at 0\.\d+, at least 0\.\d+ m at ", said, re.M)
-    drawn = draw_sensitivity(study, table, tmp_path / "sensitivity.svg").read_text(encoding="utf-8")
+    drawn = pictures.draw_sensitivity(study, table, tmp_path / "sensitivity.svg").read_text(encoding="utf-8")
     assert f"at least: {mechanics.counted(int(stood.sum()), 'run')} stood" in drawn
 
 
