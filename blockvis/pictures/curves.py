@@ -196,10 +196,9 @@ def _draw(
         _mark_lowest(axes, response, text, events)
         if events and len(known):
             _mark_unbounded(axes, total, values, text)
-    if events and response.settlements:
-        _mark_phases(axes, response, total, text)
+    lines = _mark_phases(axes, response, total, text) if events and response.settlements else 0
     if response.collapse is not None and len(path):
-        _mark_collapse(axes, response, total, values, text, events)
+        _mark_collapse(axes, response, total, values, text, events, lines)
     if response.stop is solver.Status.SOLVER_FAILED:
         _mark_failure(axes, response, total, values, text, events)
 
@@ -207,7 +206,7 @@ def _draw(
 def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> None:
     """Draw the forces of ties, tension positive, where they yield and where they break."""
     total = response.parameters * parameter_unit(response)[0]
-    factor, unit = unit_for(float(np.abs(ties.forces).max(initial=0.0)))
+    factor, unit = unit_for(float(np.nanmax(np.abs(ties.forces), initial=0.0)))
     for name, forces, states, shade in zip(ties.names, ties.forces.T, ties.states.T, palette.TIE_SHADES, strict=False):
         colour = palette.hexadecimal(shade)
         axes.plot(
@@ -234,9 +233,9 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
     axes.legend(loc="best", fontsize=0.9 * TEXT, frameon=False, ncols=min(3, len(ties.names)))
 
 
-def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text: float) -> None:
-    """Mark where a settlement begins and what changes before it."""
-    path, grey = response.path, palette.hexadecimal(palette.FAINT)
+def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text: float) -> int:
+    """Mark where a settlement begins and what changes before it; returns the most lines that are written at one."""
+    path, grey, lines = response.path, palette.hexadecimal(palette.FAINT), 0
     for k in range(1, len(path)):
         if path[k].phase == path[k - 1].phase:
             continue
@@ -253,6 +252,8 @@ def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text:
             "\n".join(words), (total[k - 1], 0.98), xycoords=("data", "axes fraction"), xytext=(5, 0),
             textcoords="offset points", va="top", fontsize=0.85 * text, color=grey,
         )  # fmt: skip
+        lines = max(lines, len(words))
+    return lines
 
 
 def _draw_band(
@@ -363,8 +364,15 @@ def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool
 
 
 def _mark_collapse(
-    axes: Axes, response: solver.Response, total: np.ndarray, reactions: np.ndarray, text: float, words: bool
+    axes: Axes,
+    response: solver.Response,
+    total: np.ndarray,
+    reactions: np.ndarray,
+    text: float,
+    words: bool,
+    lines: int,
 ) -> None:
+    """Mark the collapse, its words below so many ``lines`` that say what changes."""
     collapse = response.collapse
     assert collapse is not None
     red = palette.hexadecimal(palette.WARNING)
@@ -386,7 +394,7 @@ def _mark_collapse(
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}",
             (middle, 0.96 if above else 0.04),
             xycoords=("data", "axes fraction"),
-            xytext=(-6, 0),
+            xytext=(-6, -1.25 * text * lines if above else 0),
             textcoords="offset points",
             ha="right",
             va="top" if above else "bottom",
