@@ -207,7 +207,7 @@ def _draw(
 def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> None:
     """Draw the forces of ties, tension positive, where they yield and where they break."""
     total = response.parameters * parameter_unit(response)[0]
-    factor, unit = unit_for(float(np.abs(ties.forces).max(initial=0.0)))
+    factor, unit = unit_for(float(np.nanmax(np.abs(ties.forces), initial=0.0)))
     for name, forces, states, shade in zip(ties.names, ties.forces.T, ties.states.T, palette.TIE_SHADES, strict=False):
         colour = palette.hexadecimal(shade)
         axes.plot(
@@ -235,7 +235,7 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
 
 
 def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text: float) -> int:
-    """Mark where a settlement begins and what changes before it; returns the most lines of words at the top."""
+    """Mark where a settlement begins and what changes before it; returns the most lines that are written at one."""
     path, grey, lines = response.path, palette.hexadecimal(palette.FAINT), 0
     for k in range(1, len(path)):
         if path[k].phase == path[k - 1].phase:
@@ -384,9 +384,9 @@ def _mark_collapse(
     reactions: np.ndarray,
     text: float,
     words: bool,
-    taken: int = 0,
+    lines: int,
 ) -> None:
-    """Mark the collapse, with words below so many lines that are taken at the top."""
+    """Mark the collapse, its words below so many ``lines`` that say what changes."""
     collapse = response.collapse
     assert collapse is not None
     red = palette.hexadecimal(palette.WARNING)
@@ -409,7 +409,7 @@ def _mark_collapse(
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}",
             (middle, 0.96 if above else 0.04),
             xycoords=("data", "axes fraction"),
-            xytext=(-6, -1.2 * text * taken if above else 0),
+            xytext=(-6, -1.25 * text * lines if above else 0),
             textcoords="offset points",
             ha="right",
             va="top" if above else "bottom",

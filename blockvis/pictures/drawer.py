@@ -65,6 +65,9 @@ CELL, CELL_IN_SPACE = 0.07, 0.09
 #: Arrows of a mechanism shorter than this fraction of the picture are specks, and left out.
 SPECK = 0.01
 
+#: Entry of the legend of blocks that the structure has lost.
+LOST = "lost block"
+
 #: Empty border around free blocks in space, as a part of the larger side of the picture.
 MARGIN = 0.03
 
@@ -128,8 +131,8 @@ class _Series:
         Displacement of any free block.
     widest : float [m]
         Opening of any crack in equilibrium.
-    cracks, sliding, hinges : bool
-        Whether there are any anywhere.
+    cracks, sliding, hinges, lost : bool
+        Whether there are any anywhere; of blocks that are lost.
     largest_force : float [N]
     forces : list of arrays [N]
         Sizes, of the increments sampled.
@@ -141,6 +144,7 @@ class _Series:
     cracks: bool = False
     sliding: bool = False
     hinges: bool = False
+    lost: bool = False
     largest_force: float = 0.0
     forces: list[np.ndarray] = field(default_factory=list)
 
@@ -331,6 +335,7 @@ class Drawer:
         for number, increment in enumerate(self.increments):
             seen.largest = max(seen.largest, largest_displacement(self.assembly, increment))
             self.ties.survey(increment)
+            seen.lost |= bool((increment.fallen & ~increment.removed).any())
             if look.joints:
                 found = marks_of(self.assembly, self.joints, self._shown(increment), increment.pose)
                 if increment.status != solver.Status.FALLING:
@@ -495,9 +500,9 @@ class Drawer:
                 keys.append(
                     Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",))
                 )
-            if self._loses:
+            if self._loses and (self._seen.lost or self._drawn_at is not None):
                 colour = palette.rgb(palette.pale(self.fill[self.assembly.free][:1], np.ones(1, dtype=bool))[0])
-                keys.append(Key("area", "lost block", colour))
+                keys.append(Key("area", LOST, colour))
             if self.live.largest > 0.0:
                 keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
             if self._drawn_at is not None:
@@ -544,6 +549,8 @@ class Drawer:
         """Return the legend of the picture that the scene holds; what was left out is told where statics has it."""
         falling = increment.status == solver.Status.FALLING
         untinted = [] if self._acts(increment) else self._keys_of_tints()
+        if not (increment.fallen & ~increment.removed).any():
+            untinted += [key for key in self.keys() if key.text == LOST]
         if falling and self.fall is not None and not self._flat:
             # A fall shows blocks and ties, nothing of statics.
             ties = self.ties.keys()

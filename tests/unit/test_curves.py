@@ -141,6 +141,32 @@ def test_phases_in_other_units_share_no_axis(tmp_path):
     assert "reaction / weight W" not in told
 
 
+def test_phases_and_collapse_are_told_apart_and_ties_in_kilonewtons(tmp_path):
+    """The words of both stand at the top, one below the other; a tie that comes later has no force before."""
+    outlines = [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
+    post = solver.Tie("post", (1, None), ((0.0, 0.9), (0.0, 3.0)), stiffness=1e7, phase=2)
+    sinks, tilts = (
+        solver.Settlement(direction=(0, -1), increment=0.002, limit=0.002),
+        solver.Settlement(direction=(1, -0.1), increment=0.002, limit=0.004),
+    )
+    response = solver.Structure(assembly, friction_coefficient=0.6, ties=[post]).settle([sinks, tilts])
+    assert np.isnan(response.path[0].ties.elongations[0])
+    largest = max(float(np.nanmax(np.abs(i.ties.forces))) for i in response.path)
+    assert largest > 1e3
+    assert "force of ties, tension + [kN]" in said(response, tmp_path / "ties.svg")
+    response = arch_response()
+    half = len(response.path) // 2
+    increments = [replace(one, phase=int(k >= half)) for k, one in enumerate(response.increments)]
+    phased = replace(response, increments=tuple(increments), settlements=response.settlements * 2)
+    heights = []
+    for one in (response, phased):
+        text = draw_curve(one, tmp_path / "curve.svg").read_text(encoding="utf-8")
+        heights.append(float(re.search(r"<!-- collapse at .*?translate\([\d.]+ ([\d.]+)\)", text, re.DOTALL)[1]))
+        told = re.search(r"<!-- phase 2 from here on -->\s*<g [^>]*translate\([\d.]+ ([\d.]+)\)", text)
+    assert heights[1] > float(told[1]) + 5.0
+
+
 @pytest.mark.parametrize(("positions", "upright"), [(17, True), (5, False)])
 def test_what_is_unbounded_is_said_inside_its_band(positions, upright, tmp_path):
     arch = generators.arch()

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, parted, rectangle, wall
+from structures import arch_response, dropped_brick, parted, rectangle, wall
 
 import solver
 from blockvis import draw_mechanism, generators
@@ -173,6 +173,15 @@ def test_widths_are_written_of_cracks_that_count(monkeypatch, tmp_path):
     monkeypatch.setattr(drawing, "cracks_of", lambda *_: cracks)
     draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL)
     assert written == ["40 mm", "4 mm"]
+
+
+def test_the_legend_names_lost_blocks_where_there_are_any(words):
+    response = dropped_brick(0.05)
+    lost, drawn = response.path[-1], response.path
+    for increments, increment, named in ((drawn, drawn[0], False), (drawn, lost, True), (drawn[:1], drawn[0], False)):
+        Drawer(response, Look(forces="none"), SMALL, increments).picture(increment)
+        assert ("lost block" in [key.text for key in words[-1]["keys"]]) is named
+    assert "lost block" not in [key.text for key in words[-1]["places"]], "no room is left for it"
 
 
 def test_in_a_fall_the_label_of_a_tie_says_what_its_colour_does(monkeypatch):
