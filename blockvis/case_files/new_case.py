@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,7 @@ from blockvis.case_files import case_keys
 from blockvis.cases.bonds import BOND
 from blockvis.cases.build import DENSITY
 from blockvis.cases.key import Key, Section
-from blockvis.layout.ground import Ground, block_size, ground_of, with_role
+from blockvis.layout.ground import COURSE, Ground, block_size, ground_of, with_role
 from blockvis.layout.inspect import Inspection
 from blockvis.layout.notes import UNIT, UNIT_CLASH, kind_of
 from blockvis.layout.units import better_unit
@@ -37,6 +38,9 @@ WALLS = "The drawing has no stones but outlines with openings: give the size of 
 
 #: Keys of a drawing in the plane, which one in space does not have.
 _IN_THE_PLANE = ("window", "thickness", "closing", "outline_tolerance")
+
+#: Middles of blocks are told apart from this part of the median block on.
+APART = 0.05
 
 #: Characters of a line of comment.
 WIDTH = 100
@@ -179,11 +183,40 @@ def _roles(found: Inspection, ground: Ground) -> str:
     if not said and not ground.roles:
         groups = sorted({word for word in found.layout.groups if word})
         said = [f"{as_key(group)} = {as_toml(mechanics.FIXED)}" for group in groups[:12]]
-    low, right = f"{'xyz'[found.layout.dimension - 1]}={found.low[-1]:.6g}", f'x={found.high[0]:.6g}, role="moving"'
-    lines.append(_comment(f"By their place: below={{{low}}}, touching={{{right}}}."))
-    lines += [section.header if ground.roles else f"# {section.header}"]
+    said += _places(found, ground)
+    lines += [section.header]
     lines += [f"{as_key(name)} = {as_toml(role)}" for name, role in ground.roles.items()]
     return "\n".join([*lines, *(f"# {line}" for line in said), ""])
+
+
+def _places(found: Inspection, ground: Ground) -> list[str]:
+    """Write the key that chooses the supports, or else the lowest course, by the place of their middles, if it can.
+
+    Those to the right of a gap, near the middle of them, move; they are chosen first, as a later place holds.
+    """
+    boxes = [(corners.min(axis=0), corners.max(axis=0)) for corners in map(found.layout.corners, found.kept)]
+    low, high = (np.array(ends) for ends in zip(*boxes, strict=True))
+    middle, height = (low + high) / 2.0, high[:, -1] - low[:, -1]
+    own = [found.roles[i] != mechanics.FREE or found.layout.names[i] in ground.roles for i in found.kept]
+    chosen = np.array(own) if any(own) else low[:, -1] <= low[:, -1].min() + COURSE * np.median(height)
+    least = APART * float(np.median(found.layout.sizes[found.kept]))
+    top, others = float(middle[chosen, -1].max()), middle[~chosen, -1]
+    if not len(others) or others.min() - top < least:
+        return []
+    place = {"xyz"[found.layout.dimension - 1]: _between(top, float(others.min()))}
+    across = np.sort(middle[chosen, 0])
+    gaps = np.diff(across)
+    if gaps.max(initial=0.0) < least:
+        return [f"below = {as_toml(place)}"]
+    wide = np.flatnonzero(gaps >= 0.5 * gaps.max())
+    k = wide[np.abs(across[wide] + across[wide + 1] - across[0] - across[-1]).argmin()]
+    left = {"x": _between(float(across[k]), float(across[k + 1]))} | place
+    return [f"below = [{as_toml(place | {'role': mechanics.MOVING})}, {as_toml(left)}]"]
+
+
+def _between(first: float, last: float) -> float:
+    """Give a number half-way between two, with few digits."""
+    return round((first + last) / 2.0, 1 - math.floor(math.log10(last - first))) + 0.0
 
 
 def _all_but(*names: str, section: Section = case_keys.ANALYSIS) -> tuple[str, ...]:
