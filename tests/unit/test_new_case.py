@@ -11,13 +11,11 @@ from pathlib import Path
 import ezdxf
 import numpy as np
 import pytest
-from structures import case_from, layout_of, run_command
+from structures import assembly_of, case_from, hull_of, run_command
 
-from blockvis import generators, inspect, read, read_case, save_layout, write_layout
-from blockvis.case_files.new_case import case_text
-from blockvis.cases.build import case_assembly
+import solver
+from blockvis import generators, read, read_case, save_layout
 from blockvis.cli import main
-from blockvis.layout.layout import Layout
 
 ROOT = Path(__file__).parents[2]
 
@@ -190,17 +188,21 @@ def test_hostile_names_stay_in_their_quotes_and_comments(tmp_path):
 @pytest.mark.parametrize("name", ["column", "portal", "arch on piers", "barrel vault"])
 def test_supports_by_their_place_are_blocks_of_the_lowest_course(tmp_path, name):
     """Also of corners that scatter, of which none lies in a plane with others."""
-    drawn = layout_of(generators.build(name))
-    random = np.random.default_rng(1)
-    free = [k for k, role in enumerate(drawn.roles) if role == "free"]
-    corners = [drawn.corners(k) + 1e-4 * random.uniform(-1, 1, drawn.corners(k).shape) for k in free]
-    if drawn.dimension == 3:
-        corners = [(points, drawn.blocks[k][1]) for points, k in zip(corners, free, strict=True)]
-    path = tmp_path / "drawing.json"
-    write_layout(Layout(blocks=tuple(corners), names=tuple(f"{k}" for k in free)), path)
-    text = re.sub(r"^# (below = )", r"\1", case_text(inspect(path), path.name), flags=re.MULTILINE)
+    built, random = generators.build(name), np.random.default_rng(1)
+    owner, free = built.block_of_vertex, np.flatnonzero(built.free)
+    scattered = built.vertices + 1e-4 * random.uniform(-1.0, 1.0, built.vertices.shape)
+    shapes = [scattered[owner == k] for k in free]
+    names = [str(k) for k in free]
+    if built.dimension == 2:
+        drawn = solver.Assembly.from_outlines(shapes, names=names)
+    else:
+        drawn = solver.Assembly.from_solids([hull_of(shape) for shape in shapes], names=names)
+    save_layout(drawn, tmp_path / "drawing.json")
+    assert main(["new", str(tmp_path / "drawing.json"), "-o", str(tmp_path / "drawing.toml")]) == 0
+    text = (tmp_path / "drawing.toml").read_text(encoding="utf-8")
+    text = re.sub(r"^# (below = )", r"\1", text, flags=re.MULTILINE)
     assert "\nbelow = " in text
-    assembly = case_assembly(case_from(text, tmp_path))
+    assembly = assembly_of(case_from(text, tmp_path))
     low = np.array([assembly.vertices[assembly.block_of_vertex == k].min(axis=0)[-1] for k in range(assembly.n_blocks)])
     drawn_blocks = np.array([not one.startswith("ground") for one in assembly.names])
     course = low < low[drawn_blocks].min() + 0.01
