@@ -208,6 +208,7 @@ animation = false
     assert response.load_multiplier == pytest.approx(np.tan(np.arctan(0.2) - response.settlement), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_capacity_of_a_wall_is_told_with_and_without_joints_that_close(tmp_path, capsys):
     text = """
 [geometry]

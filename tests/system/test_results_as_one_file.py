@@ -143,6 +143,7 @@ def test_blocks_taken_away_are_left_out_of_layouts_and_vanish_from_animations(in
     assert played(film, 3.1)[1][1, 1] == pytest.approx(0.5, abs=0.02)
 
 
+@pytest.mark.slow
 def test_lost_blocks_are_left_out_of_the_deformed_layout(tmp_path, capsys):
     folder = blockvis.write(dropped_brick(0.05), tmp_path / "out")
     layout = blockvis.read_layout(converted(folder, tmp_path / "deformed.json"))

@@ -112,6 +112,7 @@ def test_results_reach_meshio_as_the_manual_says(response, tmp_path, monkeypatch
     np.testing.assert_allclose(moved, increment.pose.positions - assembly.centroids, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_faces_of_joints_are_those_of_the_voussoirs():
     response = vault_response()
     joints = initial_joints(response.assembly)
@@ -355,6 +356,7 @@ def settled_piers(reach):
     return solver.settle(piers_on_slabs(reach), down, friction_coefficient=0.6)
 
 
+@pytest.mark.slow
 def test_a_section_from_below_closes_supports_and_shows_which_moves_and_where_to(tmp_path):
     """Supports that hide the structure are drawn by their edges: those of the cut, too, and in their colours."""
     # The middle of the support lies in the half that is left out.
@@ -368,6 +370,7 @@ def test_a_section_from_below_closes_supports_and_shows_which_moves_and_where_to
     assert across.mean() > 0.95, "the cut is closed from end to end"
 
 
+@pytest.mark.slow
 def test_supports_that_go_beyond_the_picture_fade_there(tmp_path):
     picture = pixels(draw_still(settled_piers(20.0), -1, tmp_path / "still.png", size=(960, 540), view="above"))
     assert alike(picture[:, [0, -1]], palette.PAPER).all()
@@ -378,6 +381,7 @@ def test_supports_that_go_beyond_the_picture_fade_there(tmp_path):
     assert ((grain > 1) & (grain < 12)).mean() < 0.1
 
 
+@pytest.mark.slow
 def test_supports_reach_down_to_the_ground_of_a_fall_which_has_no_end(tmp_path):
     """A lintel slides off when the right slab has sunk by more than the left one is thick."""
     down = solver.Settlement(direction=(0, 0, -1), increment=0.1, limit=2.0)

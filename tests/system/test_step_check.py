@@ -216,7 +216,7 @@ class Done:
 def test_a_path_with_a_quarter_of_the_tolerance_says_the_errors(
     tmp_path, monkeypatch, settled, reaction, collapse, told
 ):
-    fallen = replace(settled, collapse=SimpleNamespace(displacement=0.3))
+    fallen = replace(settled, collapse=SimpleNamespace(displacement=0.3, bracket=(0.3, 0.3)))
     monkeypatch.setattr(step_check, "OnceMore", Done)
     Done.path = replace(traced(fallen), collapse=collapse)
     Done.path.measured[1] *= reaction

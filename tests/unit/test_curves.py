@@ -141,6 +141,7 @@ def test_phases_in_other_units_share_no_axis(tmp_path):
     assert "reaction / weight W" not in told
 
 
+@pytest.mark.slow
 def test_phases_and_collapse_are_told_apart_and_ties_in_kilonewtons(tmp_path):
     """The words of both stand at the top, one below the other; a tie that comes later has no force before."""
     outlines = [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]]

@@ -112,6 +112,7 @@ def test_a_free_fall_is_that_of_gravity():
     assert 9.5 - engine.pose.positions[0, 1] == pytest.approx(solver.GRAVITY * 0.5**2 / 2.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_lintel_falls_between_its_piers_to_their_feet():
     blocks = [rectangle(0.0, 0.0, 0.5, 1.0), rectangle(1.5, 0.0, 2.0, 1.0), rectangle(0.3, 1.0, 1.7, 1.3)]
     assembly = solver.Assembly.from_outlines(blocks, roles=["fixed", "moving", "free"])

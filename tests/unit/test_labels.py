@@ -175,6 +175,7 @@ def test_widths_are_written_of_cracks_that_count(monkeypatch, tmp_path):
     assert written == ["40 mm", "4 mm"]
 
 
+@pytest.mark.slow
 def test_the_legend_names_lost_blocks_where_there_are_any(words):
     response = dropped_brick(0.05)
     lost, drawn = response.path[-1], response.path

@@ -153,6 +153,7 @@ def test_the_mark_of_a_brick_that_slides_beside_a_large_stone_stays_with_the_bri
     assert np.hypot(*(lines[0, 1] - lines[0, 0])) <= 0.2, "the brick is 0.2 m thick, the stone 4 m wide"
 
 
+@pytest.mark.slow
 def test_joints_that_hardly_slide_are_not_marked():
     response = arch_response()
     last, joints = response.path[-1], initial_joints(response.assembly)

@@ -185,7 +185,10 @@ def test_hostile_names_stay_in_their_quotes_and_comments(tmp_path):
     assert set(values) == {"geometry", "roles", "material", "settlement", "output"}
 
 
-@pytest.mark.parametrize("name", ["column", "portal", "arch on piers", "barrel vault"])
+@pytest.mark.parametrize(
+    "name",
+    ["portal", *(pytest.param(one, marks=pytest.mark.slow) for one in ("column", "arch on piers", "barrel vault"))],
+)
 def test_supports_by_their_place_are_blocks_of_the_lowest_course(tmp_path, name):
     """Also of corners that scatter, of which none lies in a plane with others."""
     built, random = generators.build(name), np.random.default_rng(1)

@@ -35,6 +35,7 @@ def test_the_upper_bound_is_named(tmp_path, monkeypatch, capsys):
     assert 'flow = "associative" gives a proved upper bound' in said
 
 
+@pytest.mark.slow
 def test_positions_without_a_limit_load_are_told_and_the_certificate_is_of_the_one_that_governs(
     tmp_path, monkeypatch, capsys
 ):

@@ -203,6 +203,7 @@ def test_what_falls_before_anything_moves_is_a_collapse_at_no_settlement(
     assert main(["report", str(tmp_path / "out")]) == 0
 
 
+@pytest.mark.slow
 def test_places_along_several_settlements_are_told_with_their_phase(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -225,6 +226,7 @@ def test_places_along_several_settlements_are_told_with_their_phase(
     assert re.search(r"collapse displacement.{1,40} m in phase 2<", report_of(response))
 
 
+@pytest.mark.slow
 def test_a_collapse_before_the_supports_turn_is_read_back_in_metres(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

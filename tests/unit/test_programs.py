@@ -465,6 +465,7 @@ def test_a_ray_that_does_not_prove_it_counts_for_nothing():
     program.raise_if_unbounded(np.zeros(program.matrix.shape[1]))
 
 
+@pytest.mark.slow
 def test_a_wall_squeezed_between_its_supports_is_locked():
     """520 bricks that cannot give way: proved by our own ray, for which HiGHS takes ten times as long."""
     standing = wall(30, 17)

@@ -35,6 +35,7 @@ def arch(increment):
     return pushover(assembly, control, loads=sideways(assembly), friction_coefficient=2.0, controls=controls)
 
 
+@pytest.mark.slow
 def test_every_increment_of_an_arch_proves_itself():
     response = arch(0.005)
     assert response.stop is solver.Status.COLLAPSED

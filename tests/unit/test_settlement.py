@@ -250,6 +250,7 @@ def test_support_that_moves_away_from_what_it_carried_takes_few_steps():
     assert max(increment.programs for increment in response.increments) < 60
 
 
+@pytest.mark.slow
 def test_a_speck_that_tumbles_between_large_stones_makes_no_step_short():
     stones = [rectangle(0, 0, 4, 3), rectangle(4, 0, 8, 3), rectangle(8, 0, 12, 3)]
     lintels = [rectangle(1, 3, 5.9, 4), rectangle(5.9005, 3, 11, 4)]

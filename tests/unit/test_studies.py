@@ -448,6 +448,7 @@ def test_swings_compare_the_lowest_and_the_highest_fifth():
     assert second.high - second.low == pytest.approx(0.8, abs=3 * np.sqrt(2 * 4 / 12 / 51))
 
 
+@pytest.mark.slow
 def test_a_study_in_which_nothing_collapses_says_nothing_of_a_collapse(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(CASE.replace("limit = 0.3", "limit = 0.001"), encoding="utf-8")
     path = tmp_path / "study.toml"

@@ -102,7 +102,9 @@ def test_the_other_direction_of_a_symmetric_wall(name):
     assert limit.mechanism[:, 0].min() == pytest.approx(-1.0, abs=0.5)
 
 
-@pytest.mark.parametrize("name", [pytest.param("W1", marks=pytest.mark.thorough), "W2", "W3"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("W1", marks=pytest.mark.thorough), pytest.param("W2", marks=pytest.mark.slow), "W3"]
+)
 def test_without_dilatancy_a_wall_carries_no_more(name):
     assembly = wall(WALLS[name][0])
     limit = limit_load(assembly, loads=sideways(assembly), friction_coefficient=0.65, flow="non-associative")
