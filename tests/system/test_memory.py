@@ -130,6 +130,7 @@ def test_results_are_read_one_at_a_time(use, folder, tmp_path, monkeypatch):
     assert max(most) <= AT_LEAST + 1, most
 
 
+@pytest.mark.slow
 def test_a_few_small_increments_are_read_once(folder, monkeypatch):
     numbers = []
     read = StoredIncrements._read

@@ -154,6 +154,7 @@ def test_a_thousand_blocks_and_sixty_frames_stay_below_two_megabytes(tmp_path):
     assert write_report(response, tmp_path / "report.html").stat().st_size < 2_000_000
 
 
+@pytest.mark.slow
 def test_notebook_player_is_a_frame_with_the_page():
     shown = show(arch_response(), height=500)._repr_html_()
     page = html.unescape(re.search(r'srcdoc="(.*?)" style', shown, re.DOTALL).group(1))

@@ -343,6 +343,7 @@ def test_info_and_run_say_that_the_wall_wants_a_bond(facade, capsys):
         blockvis.read(facade)
 
 
+@pytest.mark.slow
 def test_new_writes_the_bond_into_the_case(tmp_path):
     window = arched(0.4, 0.2, 0.6, 0.2, 0.3, n=8)
     drawing = drawn(tmp_path / "small.dxf", ("A-WALL", shapely.box(0, 0, 1.5, 0.9)), ("A-WIN", window))
