@@ -89,7 +89,7 @@ def test_an_svg_with_layers_of_roles(tmp_path, capsys):
     )
     case, values = _written(path)
     assert "supports" not in values
-    assert "roles" not in values, "what the drawing says is not said again"
+    assert not values["roles"], "what the drawing says is not said again"
     assert '# "' in case.read_text(encoding="utf-8")
     assert _ran(case, capsys)["initial_reaction"] > 0
 
