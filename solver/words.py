@@ -5,6 +5,12 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
+#: What to look for where blocks do not stand as drawn.
+REMEDY = (
+    "look for gaps between blocks (joint_thickness), a missing support, too little friction, or blocks that overhang "
+    "and tip, which need a tie, a prop or a support"
+)
+
 
 def counted(number: int, one: str, many: str = "") -> str:
     """Write a number of things: of one in the singular.

@@ -14,7 +14,7 @@ from solver.loads import GRAVITY
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Increment, State, Status
 from solver.ties import is_member
-from solver.words import counted
+from solver.words import REMEDY, counted
 
 from .controls import Ending
 from .equilibrium_check import on_supports
@@ -190,6 +190,5 @@ def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
     falling = falling_blocks(assembly, motion)
     return (
         f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
-        f"({assembly.listed(falling, 8)}); look for gaps between blocks (joint_thickness), a missing support, too "
-        "little friction, or blocks that overhang and tip, which need a tie, a prop or a support"
+        f"({assembly.listed(falling, 8)}); {REMEDY}"
     )

@@ -17,7 +17,7 @@ from solver.loads import GRAVITY, Loads, Settlement
 from solver.phases import PhaseChange, loads_in
 from solver.ties import Tie
 from solver.views import Shown, views
-from solver.words import counted
+from solver.words import REMEDY, counted
 
 from .certificate import Certificate
 from .increment import HasState, Increment, State, Status, StoredState
@@ -438,7 +438,8 @@ class LimitLoad(HasState, Shown):
         moving = np.flatnonzero(np.abs(self.mechanism).max(axis=1) > 0.01)
         if self.status is LimitStatus.NO_EQUILIBRIUM:
             named = f" ({self.analysed[0].listed(moving, 4)})" if self.analysed else ""
-            return f"no equilibrium under the dead load: {counted(len(moving), 'block falls', 'blocks fall')}{named}"
+            falling = counted(len(moving), "block falls", "blocks fall")
+            return f"no equilibrium under the dead load: {falling}{named}; {REMEDY}"
         if self.status is LimitStatus.UNBOUNDED:
             return "unbounded: no live load of this pattern brings the structure down"
         law = "" if self.torsion == "points" else f", {self.torsion} torsion"
