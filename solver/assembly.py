@@ -97,7 +97,8 @@ class Assembly(Shown):
                 f"block {i} ('{names[i]}') has an area of {abs(areas[i]):.3g} m² for a perimeter of "
                 f"{perimeter[i]:.3g} m; it is a line, not a block: remove it or redraw it"
             )
-        rings = [ring if area > 0 else ring[::-1] for ring, area in zip(rings, areas, strict=True)]
+        # The first corner stays the first, from which edges are counted.
+        rings = [ring if area > 0 else np.roll(ring[::-1], 1, axis=0) for ring, area in zip(rings, areas, strict=True)]
         vertices = np.concatenate(rings)
         for i, (j, k) in self_crossings(vertices, offsets).items():
             a, b = vertices[offsets[i] + j], vertices[offsets[i] + k]
