@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -359,8 +359,8 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
         return self_weight(assembly)
     shape = _no_load(assembly).shape
     components = "fx, fy, moment" if assembly.dimension == 2 else "fx, fy, fz, mx, my, mz"
-    for name, given in (("dead", loads.dead), ("live", loads.live)):
-        array = np.asarray(given)
+    loads = replace(loads, dead=np.asarray(loads.dead, dtype=float), live=np.asarray(loads.live, dtype=float))
+    for name, array in (("dead", loads.dead), ("live", loads.live)):
         if array.shape != shape:
             raise ValueError(f"{name} loads have shape {array.shape}; give {shape}: {components}")
         if not np.isfinite(array).all():
