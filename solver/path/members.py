@@ -14,6 +14,7 @@ from solver.ties import (
     ABSENT,
     BROKEN,
     TieForces,
+    held_ties,
     installed_lengths,
     is_member,
     member_contacts,
@@ -48,11 +49,7 @@ class Members:
         self.brittle = np.array([tie.brittle for tie in self.ties], dtype=bool)
         # In units of the program.
         self.compliance = model.force / (self.stiffness * model.length)
-        fallen = model.fallen
-        self.held = np.array(
-            [fallen is None or not any(b is not None and fallen[b] for b in tie.blocks) for tie in self.ties],
-            dtype=bool,
-        )
+        self.held = held_ties(self.ties, np.zeros(len(model.load)) if model.fallen is None else model.fallen)
 
     def installed(self, place: Place, phase: int, told: TieForces | None = None) -> Place:
         """Install the members of a phase, from 0, at the geometry of a place, or all as an increment tells of them."""

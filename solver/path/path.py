@@ -122,8 +122,9 @@ class Path:
         before: PathState | None = None,
         ties_at: TieForces | None = None,
         bonds_at: Bonds | None = None,
+        fallen: np.ndarray | None = None,
     ) -> PathState:
-        """The state at the start of the phase: of the drawing at rest, or after the phase before."""
+        """The state at the start of the phase: of a pose at rest, without fallen blocks, or after the phase before."""
         fell_at = np.zeros(0)
         if before is not None:
             # Joints keep the forces of the phase before, blocks not their velocity.
@@ -131,6 +132,9 @@ class Path:
             self._remove_blocks(fell_at)
             place = self.stepper.members.installed(place, self.number)
         else:
+            if fallen is not None and np.any(fallen):
+                fell_at = np.where(fallen, -np.inf, np.nan)
+                self._remove_blocks(fell_at)
             place = self.stepper.unloaded(start, self.number, ties_at, bonds_at)
             drawn = bonds_at is None
             resting = self._at_rest(place, drawn)

@@ -69,6 +69,34 @@ def test_springs_keep_what_has_compressed_them_when_something_apart_is_taken_awa
     assert found[1] == pytest.approx(found[0], abs=1e-4 * mechanics.total_weight(assembly))
 
 
+def test_the_capacity_of_a_pose_is_that_of_the_blocks_that_are_left() -> None:
+    """A tower against a buttress, pushed with 10 kN at mid-height; without it, it tips at W b/2 = α F h/2."""
+    outlines = [rectangle(0, -1, 9, 0), rectangle(2, 0, 3, 3), rectangle(3, 0, 5, 3), rectangle(9, -1, 10, 0)]
+    assembly = solver.Assembly.from_outlines(
+        [*outlines, rectangle(9, 0, 10, 1)],
+        roles=["fixed", "free", "free", "moving", "free"],
+        names=["ground", "tower", "buttress", "pad", "stone"],
+    )
+    prop = solver.Tie("prop", (1, 2), ((2.5, 2.9), (4.0, 2.9)), stiffness=1e8, kind="prop")
+    structure = solver.Structure(assembly, friction_coefficient=0.6, ties=[prop])
+    last = structure.settle(DOWN, changes=[taken_away(structure, 0, "buttress")]).path[-1]
+    assert last.fallen.tolist() == [False, False, True, False, False]
+    pushed = structure.with_live(solver.point_load(assembly, 1, (1e4, 0.0)))
+    left, alone = {"pose": last.pose, "fallen": last.fallen}, assembly.masses[1] * solver.GRAVITY * 0.5 / (1e4 * 1.5)
+    limit = pushed.limit_load(**left)
+    assert limit.multiplier == pytest.approx(alone, rel=1e-9)
+    assert limit.increment.fallen.tolist() == last.fallen.tolist()
+    assert pushed.limit_load(pose=last.pose).multiplier > 2.0 * alone
+    control = solver.ControlDisplacement("tower", increment=0.01, limit=0.01)
+    response = pushed.pushover(control, **left, ties_at=last.ties)
+    assert response.path[0].load_multiplier == pytest.approx(alone, rel=1e-6)
+    assert all(increment.fallen[2] for increment in response.path)
+    with pytest.raises(ValueError, match="control block 'buttress' has left the structure; name a free block"):
+        pushed.pushover(solver.ControlDisplacement("buttress"), **left)
+    with pytest.raises(ValueError, match="fallen is .*; give a bool for each of the 5 blocks"):
+        pushed.limit_load(pose=last.pose, fallen=np.array([2]))
+
+
 def test_a_load_acts_from_its_phase_on() -> None:
     structure = beam_on_a_prop()
     dead = np.zeros((6, 3))
