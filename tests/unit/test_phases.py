@@ -93,7 +93,7 @@ def test_the_capacity_of_a_pose_is_that_of_the_blocks_that_are_left() -> None:
     assert all(increment.fallen[2] for increment in response.path)
     with pytest.raises(ValueError, match="control block 'buttress' has left the structure; name a free block"):
         pushed.pushover(solver.ControlDisplacement("buttress"), **left)
-    with pytest.raises(ValueError, match="fallen is .*; give a bool for each of the 5 blocks"):
+    with pytest.raises(ValueError, match=r"fallen is .*; give a bool for each of the 5 blocks"):
         pushed.limit_load(pose=last.pose, fallen=np.array([2]))
 
 

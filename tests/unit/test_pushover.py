@@ -157,7 +157,9 @@ def test_far_from_the_origin_a_pushover_is_what_it_is_near():
         ends = tuple(map(tuple, np.array([[0.0, 1.0], [-1.0, 1.0]]) + origin))
         ties = [solver.Tie("stay", (0, None), ends, stiffness=1e5, strength=1e3)]
         structure = solver.Structure(assembly, friction_coefficient=0.6, loads=sideways(assembly), ties=ties)
-        control = solver.ControlDisplacement("block 0", (1, 0), origin + [0.25, 1.0], increment=0.02, limit=0.02)
+        control = solver.ControlDisplacement(
+            "block 0", (1, 0), tuple(origin + np.array([0.25, 1.0])), increment=0.02, limit=0.02
+        )
         response = structure.pushover(control)
         first, last = response.path
         again = structure.pushover(control, pose=last.pose, ties_at=last.ties).path[0]
