@@ -3,7 +3,7 @@
 from .analysis.increments import Increments
 from .analysis.pushover import pushover_increments
 from .analysis.settlement import check_settlement, model_of, settlement_increments
-from .assembly import FIXED, FREE, MOVING, ROLES, find_contacts, measure_contacts
+from .assembly import FIXED, FREE, MOVING, ROLES, Shapes, find_contacts, measure_contacts
 from .contact_step.minimise import minimise
 from .contact_step.problem import ContactProblem
 from .contact_step.stiffness import ContactRows
@@ -13,7 +13,6 @@ from .geometry.outlines import overlap_depths
 from .geometry.planar_contacts import corners_and_edges, features_of
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
-from .geometry.shapes import Shapes
 from .interfaces import steep_note
 from .kinematics import (
     carried,

@@ -17,7 +17,7 @@ from .spatial_overlaps import overlap_depths_in_space
 
 @dataclass(frozen=True)
 class Polyhedra(Solids):
-    """Blocks in space: :class:`Shapes` whose corners have three coordinates."""
+    """Blocks in space: their corners have three coordinates."""
 
     @cached_property
     def sizes(self) -> np.ndarray:
@@ -53,6 +53,10 @@ class Polyhedra(Solids):
     def entered(
         self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
     ) -> Contacts:
-        """Contact points that would have kept blocks apart: see :class:`Shapes`."""
+        """Contact points beside those given that would have kept apart what a movement has put into each other.
+
+        Measured before it, of corners (n_vertices, d) [m] before and after, of overlaps of more than ``tolerance`` [m]
+        with useful blocks.
+        """
         movement = Movement(self.parts.placed(before), self.parts.placed(after))
         return entered_points(movement, self.widths, useful, tolerance, contacts)
