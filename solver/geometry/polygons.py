@@ -16,11 +16,6 @@ class Polygons(Outlines):
     """Blocks in the plane: their corners have two coordinates."""
 
     @property
-    def sizes(self) -> np.ndarray:
-        """(n_blocks,) array [m]: edge of the square as large as each block."""
-        return np.sqrt(self.areas)
-
-    @property
     def gyration(self) -> np.ndarray:
         """(n_blocks,) array [m²]: square of the radius of gyration of each block about its centroid, as drawn."""
         corner = self.vertices - self.centroids[self.block_of_vertex]

@@ -19,11 +19,6 @@ from .spatial_overlaps import overlap_depths_in_space
 class Polyhedra(Solids):
     """Blocks in space: their corners have three coordinates."""
 
-    @cached_property
-    def sizes(self) -> np.ndarray:
-        """(n_blocks,) array [m]: edge of the cube as large as each block."""
-        return np.cbrt(self.volumes)
-
     def size(self, chosen: np.ndarray) -> float:
         """Edge of the cube as large as the mean of the chosen blocks, (n_blocks,) bool, [m]."""
         return float(np.cbrt(self.volumes[chosen].mean()))
