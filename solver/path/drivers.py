@@ -38,6 +38,13 @@ class Driver(Protocol):
     lever: float
     stops: tuple[float, ...]
 
+    def next_stop(self, s: float) -> float:
+        """Next parameter that is reported: a multiple of the increment, one of the stops, or the limit."""
+        near = 1e-9 * self.increment
+        multiple = float(np.floor(s / self.increment + 1e-9) + 1.0) * self.increment
+        stop = min([multiple, *(stop for stop in self.stops if stop > s + near)])
+        return self.limit if self.limit - stop < near else stop
+
     def supports(self, s: float) -> Pose:
         """Pose of the supports; that of free blocks has no meaning."""
 
