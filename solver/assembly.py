@@ -295,7 +295,6 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
 
     Parameters
     ----------
-    assembly : Assembly
     overlap_tolerance : float, optional [m]
         Overlap that is accepted; a thousandth of the width of the thinnest block by default.
 

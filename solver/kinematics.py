@@ -224,8 +224,6 @@ def relative_velocities(contacts: Contacts, pose: Pose, velocity: np.ndarray) ->
 
     Parameters
     ----------
-    contacts : Contacts
-    pose : Pose
     velocity : (n_blocks, n_dof) array
         Of the centroids, and angular, in any scale.
     """
@@ -253,8 +251,6 @@ def moving_together(
 
     Parameters
     ----------
-    n_blocks : int
-    contacts : Contacts
     apart : (n_contacts,) array [m]
         Relative movement of each contact point.
     spins : (n_blocks, n_rot) array [m]

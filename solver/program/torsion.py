@@ -48,7 +48,6 @@ class Faces:
 
         Parameters
         ----------
-        contacts : Contacts
         length : float [m]
             Block size.
         """
@@ -68,9 +67,6 @@ def face_wrench_matrix(contacts: Contacts, faces: Faces, pose: Pose, length: flo
 
     Parameters
     ----------
-    contacts : Contacts
-    faces : Faces
-    pose : Pose
     length : float [m]
         Moments are divided by it.
 
@@ -106,8 +102,6 @@ def point_forces(contacts: Contacts, faces: Faces, forces: np.ndarray) -> np.nda
 
     Parameters
     ----------
-    contacts : Contacts
-    faces : Faces
     forces : (n_contacts, 4) array
         As columns of :func:`face_wrench_matrix`; any unit of force.
     """

@@ -194,14 +194,12 @@ class Solution:
     x : (n,) array
     row_dual : (m,) array
         Multipliers of the rows.
-    objective, dual_objective : float
     primal_violation : float
         Largest violation of a row, of a cone or of x ≥ 0.
     dual_violation : float
         How far the reduced costs leave the dual cones or go below 0 at most.
     route : str
         How it was found.
-    iterations : int
     """
 
     x: np.ndarray
