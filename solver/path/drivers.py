@@ -141,12 +141,6 @@ class ControlDisplacement:
         moved_by = pose.positions[block] + turned - assembly.centroids[block] - arm
         return float(moved_by @ self._along(assembly))
 
-    def speed(self, assembly: Assembly, pose: Pose, velocity: np.ndarray) -> float:
-        """Rate of the control displacement in a velocity (n_blocks, n_dof) of the blocks."""
-        block, arm = self._place(assembly)
-        point = pose.positions[[block]] + arm @ rotation_matrices(pose.rotations[[block]])[0].T
-        return float((point_velocities(point, np.array([block]), pose, velocity) @ self._along(assembly))[0])
-
     def weights(self, assembly: Assembly, pose: Pose) -> np.ndarray:
         """(n_blocks, n_dof) array: gradient of the control displacement by movements of the blocks."""
         block, arm = self._place(assembly)
