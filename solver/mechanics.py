@@ -14,16 +14,7 @@ from .geometry.planar_contacts import corners_and_edges, features_of
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
 from .interfaces import steep_note
-from .kinematics import (
-    carried,
-    carried_between,
-    motion_size,
-    moved,
-    moved_vertices,
-    point_velocities,
-    swung,
-    turned,
-)
+from .kinematics import carried, carried_between, motion_size, moved, moved_vertices, point_velocities, swung, turned
 from .path.controls import INCREMENTS, Ending
 from .path.reports import falling_blocks
 from .path.state import PathState, Place
