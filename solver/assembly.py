@@ -15,10 +15,12 @@ from .geometry.contacts import Contacts
 from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
-from .geometry.shapes import Shapes
 from .geometry.surfaces import SMALLEST_SHAPE_FACTOR, polyhedra_of, refuse_infinite
 from .tolerances import DRAWN_GAP
 from .views import Shown
+
+#: The shapes of all blocks, in the plane or in space: their sizes, and their contact points.
+Shapes = Polygons | Polyhedra
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 
@@ -294,7 +296,6 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
 
     Parameters
     ----------
-    assembly : Assembly
     overlap_tolerance : float, optional [m]
         Overlap that is accepted; a thousandth of the width of the thinnest block by default.
 

@@ -179,10 +179,6 @@ class Settlement:
         scaled = {name: tuple((motion / largest).tolist()) for name, motion in motions.items()}
         object.__setattr__(self, "profile", scaled)
 
-    def step_to_stop(self, s: float) -> float:
-        """Distance from s to the next stop, infinite after the last; 1e-9 increments before a stop count as on it."""
-        return min((stop - s for stop in self.stops if stop - s > 1e-9 * self.increment), default=np.inf)
-
     @property
     def unit(self) -> str:
         """Unit of the parameter s: "m", or "rad" for a pure rotation."""

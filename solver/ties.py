@@ -234,10 +234,6 @@ def plastic_forces(
 
     Parameters
     ----------
-    ties : sequence of Tie
-    assembly : Assembly
-    pose : Pose
-    contacts : Contacts
     forces : (n_contacts, d) array [N]
     before : (n_ties,) int array
         Numbers as in :class:`TieForces`: what is absent or broken stays it.

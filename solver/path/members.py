@@ -63,13 +63,13 @@ class Members:
         now = installed_lengths(self.ties, tie_ends(self.ties, self.model.assembly, place.pose))
         return replace(place, tie_lengths=np.where(new[:, None], now, lengths))
 
-    def contacts(self, pose: Pose, lengths: np.ndarray) -> Contacts | None:
-        """The contact points of the members that are there; None where there are none."""
+    def beside(self, contacts: Contacts, pose: Pose, lengths: np.ndarray) -> Contacts:
+        """The contact points of blocks, then those of the members that are there."""
         if not len(lengths):
-            return None
+            return contacts
         rest = np.where(self.held, lengths[:, 1], np.nan)
         features = present_members(self.ties, rest)
-        return member_contacts(self.ties, self.model.assembly, pose, rest, features) if len(features) else None
+        return joined_contacts([contacts, member_contacts(self.ties, self.model.assembly, pose, rest, features)])
 
     def measured(self, contacts: Contacts, pose: Pose, lengths: np.ndarray) -> Contacts:
         """The same contact points at another pose."""
@@ -116,8 +116,3 @@ class Members:
         state = np.where(np.isnan(lengths[:, 1]), BROKEN, state)
         state = np.where(np.isnan(lengths[:, 0]) | ~self.held, ABSENT, state)
         return TieForces(force * self.model.force, tie_lengths(ends) - lengths[:, 0], lengths[:, 1], state, ends)
-
-
-def with_members(contacts: Contacts, members: Contacts | None) -> Contacts:
-    """Contact points of blocks and members, in this order."""
-    return contacts if members is None else joined_contacts([contacts, members])

@@ -459,7 +459,7 @@ def test_a_heap_of_thrown_stones_comes_to_rest_without_overlaps_and_loses_energy
     weight = np.append(solver.self_weight(assembly).dead, np.zeros((1, 6)), axis=0)
     velocity = np.append(rng.uniform(-2.0, 2.0, (8, 6)), np.zeros((1, 6)), axis=0)
     engine = Engine(whole, weight, solver.Interfaces(solver.InterfaceLaw(0.6)), pose, velocity)
-    sizes, energies = np.where(whole.free, whole.shapes.sizes, np.inf), [engine.energies.sum()]
+    sizes, energies = np.where(whole.free, np.cbrt(whole.shapes.volumes), np.inf), [engine.energies.sum()]
     for _ in range(100):
         engine.advance(0.04)
         energies.append(engine.energies.sum())
