@@ -298,7 +298,8 @@ class LimitLoadKind(AnalysisKind):
             return response.message or f"Limit load: {response.stop}"
         where = ""
         if len(response.path) > 1:
-            where = f" at {response.parameter.name} {state.parameter:.5g} {response.parameter.unit}"
+            place = f"{unit_in(response, state.phase)}{in_phase(response, state.phase)}"
+            where = f" at {response.parameter.name} {state.parameter:.5g} {place}"
         return f"Limit load: α = {state.load_multiplier:.5g}{where}"
 
     def rows(self, response: solver.Response) -> list[tuple[str, str]]:

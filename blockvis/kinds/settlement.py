@@ -102,14 +102,9 @@ class SettlementKind(AnalysisKind):
         """Complete the response by the settlements of the summary."""
         course = settlement_course(stored_settlements(summary))
         response = super().restored(response, summary)
-        response = replace(
+        return replace(
             response, settlements=course.settlements, parameter=course.parameter, measured=course.measured
         )
-        phase = collapse_phase(response)
-        if response.collapse is None or phase is None:
-            return response
-        # Stored is the unit of the last settlement, which may turn where the one before moves.
-        return replace(response, collapse=replace(response.collapse, unit=unit_in(response, phase)))
 
     def lines(self, response: solver.Response) -> list[str]:
         """Give the first and last reaction, and the settlement at collapse."""
