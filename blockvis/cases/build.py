@@ -14,7 +14,7 @@ import solver
 from blockvis import generators
 from blockvis.formats.read import overlap_remedy, read_layout, read_outlines
 from blockvis.layout import layout
-from blockvis.layout.assemble import assemble
+from blockvis.layout.assemble import assemble, supports_of
 from blockvis.layout.facing import DEFAULT_FACING
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.repair import DeepOverlap
@@ -74,6 +74,10 @@ def case_assembly(case: Case) -> solver.Assembly:
     _note_density(case, sketch)
     if case.densities:
         sketch = _with_densities(case, sketch)
+    try:
+        supports_of(case.supports, sketch.dimension)
+    except ValueError as error:
+        raise ValueError(f"{case.source}: [[supports]] {error}") from None
     try:
         assembly = assemble(
             sketch,

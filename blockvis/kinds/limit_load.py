@@ -152,6 +152,11 @@ class LimitLoadKind(AnalysisKind):
         needs_live_load(case)
         if case.settlements:
             needs_no_crushing(case, " after a settlement")
+        elif case.controls.increments == mechanics.INCREMENTS[1]:
+            raise ValueError(
+                f'{case.source}: [analysis] increments = "{case.controls.increments}" is of settlements, and the case '
+                "has none; leave it out"
+            )
         settings: LimitLoadSettings = case.settings
         if settings.displacement is not None and not case.settlements:
             raise _displacement_without_settlement(case)

@@ -102,9 +102,7 @@ class SettlementKind(AnalysisKind):
         """Complete the response by the settlements of the summary."""
         course = settlement_course(stored_settlements(summary))
         response = super().restored(response, summary)
-        return replace(
-            response, settlements=course.settlements, parameter=course.parameter, measured=course.measured
-        )
+        return replace(response, settlements=course.settlements, parameter=course.parameter, measured=course.measured)
 
     def lines(self, response: solver.Response) -> list[str]:
         """Give the first and last reaction, and the settlement at collapse."""

@@ -107,16 +107,18 @@ def _initial_reaction(response: solver.Response) -> float | None:
 
 
 def _removed(response: solver.Response) -> list[dict[str, Any]]:
-    """Blocks that are taken away before each settlement, its number from 1, and their weight."""
+    """Blocks and ties that are taken away before each settlement, its number from 1, and the blocks' weight."""
     names, weights = response.assembly.names, response.assembly.masses * solver.GRAVITY
+    blocks = [np.flatnonzero(() if change.removed is None else change.removed) for change in response.changes]
     return [
         {
             "phase": change.phase + 1,
-            "blocks": [names[k] for k in np.flatnonzero(change.removed)],
-            "weight": float(weights[change.removed].sum()),
+            "blocks": [names[k] for k in taken],
+            "ties": list(change.ties),
+            "weight": float(weights[taken].sum()),
         }
-        for change in response.changes
-        if change.removed is not None
+        for change, taken in zip(response.changes, blocks, strict=True)
+        if len(taken) or change.ties
     ]
 
 

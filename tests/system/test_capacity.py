@@ -404,6 +404,7 @@ MOVING = '[[loads]]\nkind = "live"\nforce = [0.0, -1.0]\npositions = {}\n'
         (LIMIT + SIDEWAYS + '[control]\nblock = "block 1"\n', ['[control] belongs to [analysis] kind = "pushover"']),
         (LIMIT + "capacity_at = [0.1]\n" + SIDEWAYS, ["capacity_at asks for limit loads", "along a [settlement]"]),
         (LIMIT + "displacement = 0.1\n" + SIDEWAYS, ["displacement is that of a limit load after a settlement"]),
+        (LIMIT + 'increments = "linear program"\n' + SIDEWAYS, ['"linear program" is of settlements', "leave it out"]),
         (LIMIT + 'flow = "asociative"\n' + SIDEWAYS, ["did you mean 'associative'"]),
         (LIMIT + '[[loads]]\nkind = "live"\n', ["[loads] force is missing or zero"]),
         (LIMIT + '[[loads]]\nkind = "live"\npressure = 1.0\nedge = 9\n', ["edge is 9", "has edges 1 to 4"]),

@@ -188,6 +188,14 @@ def run_told(folder: Path, case: str, capsys: pytest.CaptureFixture[str]) -> tup
     return capsys.readouterr().out, json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
 
 
+def test_a_tie_that_is_taken_away_is_named_in_the_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    iron = '[[ties]]\nname = "iron"\nfrom = { block = "left springer", point = [-1, 0] }\n'
+    iron += 'to = { block = "right springer", point = [1, 0] }\nstiffness = 1e5\n'
+    steps = SPREADING.replace("increment = 0.05\nlimit = 0.1", "increment = 0.002\nlimit = 0.002")
+    _, summary = run_told(tmp_path, ARCH + 2 * steps + iron + '[[remove]]\nphase = 2\nties = "iron"\n', capsys)
+    assert summary["removed"] == [{"phase": 2, "blocks": [], "ties": ["iron"], "weight": 0.0}]
+
+
 @pytest.mark.parametrize("ranged", ["", "[analysis]\nrange = true\n"])
 def test_what_falls_before_anything_moves_is_a_collapse_at_no_settlement(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], ranged: str
