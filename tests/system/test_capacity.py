@@ -305,11 +305,13 @@ def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "zero capacity at" in printed
     assert "first multiplier" in printed
+    assert re.search(r"largest multiplier .* at 0 m, .*, the largest of the told increments\n", printed)
     response = blockvis.open_results(folder)
     assert response.settlements == ()
     assert response.control == solver.ControlDisplacement(**summary["control"])
     assert response.load_multiplier == pytest.approx(alpha)
     page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<td>largest of the told increments, last</td>" in page
     assert "Zero capacity at a control displacement of 0.1961" in page
     assert "control displacement [m]" in page
 
