@@ -18,7 +18,6 @@ from blockvis.results.about import (
     in_phase,
     least_reaction,
     loss_of,
-    losses_in_phases,
     mechanism_text,
     unit_in,
 )
@@ -187,11 +186,11 @@ class SettlementKind(AnalysisKind):
 def losses_of(response: solver.Response) -> list[str]:
     """Say where blocks left for good while the structure stood, which, and what they weigh."""
     said = []
-    for phase, loss in losses_in_phases(response):
+    for loss in response.losses:
         names, more = ", ".join(loss.blocks[:4]), len(loss.blocks) - 4
         names += f" and {more} more" if more > 0 else ""
         weight = f"{force_text(loss.weight)}, {100.0 * loss.share:.2g} % of the weight"
-        place = f"{loss.settlement:.6g} {unit_in(response, phase)}{in_phase(response, phase)}"
+        place = f"{loss.settlement:.6g} {unit_in(response, loss.phase)}{in_phase(response, loss.phase)}"
         said.append(f"{names} at {place}, {weight}; the structure stands without")
     return said
 

@@ -13,7 +13,7 @@ import numpy as np
 import solver
 from solver import mechanics
 
-from .about import collapse_mechanism, collapse_phase, least_reaction, loss_of, losses_in_phases, mechanism_text
+from .about import collapse_mechanism, collapse_phase, least_reaction, loss_of, mechanism_text
 from .record import Record
 
 #: Measures of the certificate of an increment.
@@ -75,7 +75,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "mechanism": mechanism_text(response) if collapse else None,
         **_joint_counts(response),
         **_loss(response),
-        "losses": [{**asdict(loss), "phase": phase + 1} for phase, loss in losses_in_phases(response)],
+        "losses": [{**asdict(loss), "phase": loss.phase + 1} for loss in response.losses],
         "removed": _removed(response),
         "analysis": response.analysis,
         "parameter": response.parameter.name,

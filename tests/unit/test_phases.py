@@ -104,7 +104,8 @@ def test_what_falls_at_once_is_told_as_a_loss(tmp_path: Path) -> None:
     controls = solver.Controls(local_loss=0.5)
     response = wider.settle([DOWN, DOWN], changes=[taken_away(wider, 1, "prop", "beam")], controls=controls)
     assert response.stop is solver.Status.LIMIT_REACHED
-    assert [loss.blocks for loss in response.losses] == [("load",)]
+    assert [(loss.blocks, loss.phase) for loss in response.losses] == [(("load",), 1)]
+    assert any(note.startswith("at 0 m in phase 2: ") for note in response.notes)
     assert "load at 0 m in phase 2, " in report_of(response)
     blockvis.write(response, tmp_path / "out")
     (told,) = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["losses"]
