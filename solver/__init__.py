@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .kinematics import Pose as Pose
     from .loads import GRAVITY as GRAVITY
     from .loads import Loads as Loads
+    from .loads import PointForces as PointForces
     from .loads import Settlement as Settlement
     from .loads import point_load as point_load
     from .loads import self_weight as self_weight
@@ -47,8 +48,11 @@ if TYPE_CHECKING:
     from .structure import limit_load as limit_load
     from .structure import pushover as pushover
     from .structure import settle as settle
+    from .surface_loads import edge_force as edge_force
     from .surface_loads import edge_pressure as edge_pressure
+    from .surface_loads import force_on_top as force_on_top
     from .surface_loads import load_on_top as load_on_top
+    from .surface_loads import surface_forces as surface_forces
     from .surface_loads import surface_pressure as surface_pressure
     from .ties import Tie as Tie
 
@@ -71,6 +75,7 @@ _HOMES = {
     "Loads": "loads",
     "LocalLoss": "results.response",
     "PhaseChange": "phases",
+    "PointForces": "loads",
     "Pose": "kinematics",
     "Response": "results.response",
     "Settlement": "loads",
@@ -78,13 +83,16 @@ _HOMES = {
     "Status": "results.increment",
     "Structure": "structure",
     "Tie": "ties",
+    "edge_force": "surface_loads",
     "edge_pressure": "surface_loads",
+    "force_on_top": "surface_loads",
     "limit_load": "structure",
     "load_on_top": "surface_loads",
     "point_load": "loads",
     "pushover": "structure",
     "self_weight": "loads",
     "settle": "structure",
+    "surface_forces": "surface_loads",
     "surface_pressure": "surface_loads",
     "weight_fraction": "loads",
 }

@@ -22,8 +22,10 @@ from .kinematics import (
     moved,
     moved_vertices,
     point_velocities,
+    rotation_matrices,
     swung,
     turned,
+    turned_moments,
 )
 from .path.controls import INCREMENTS, Ending
 from .path.reports import falling_blocks
@@ -133,6 +135,7 @@ __all__ = [
     "pushover_increments",
     "reaction_to",
     "rigid_parts",
+    "rotation_matrices",
     "settlement_in",
     "settlement_increments",
     "steep_note",
@@ -141,6 +144,7 @@ __all__ = [
     "tie_lengths",
     "total_weight",
     "turned",
+    "turned_moments",
     "with_motion",
     "worst_of",
     "wrench_matrix",
