@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .kinematics import Pose as Pose
     from .loads import GRAVITY as GRAVITY
     from .loads import Loads as Loads
+    from .loads import PointForces as PointForces
     from .loads import Settlement as Settlement
     from .loads import point_load as point_load
     from .loads import self_weight as self_weight
@@ -47,8 +48,11 @@ if TYPE_CHECKING:
     from .structure import limit_load as limit_load
     from .structure import pushover as pushover
     from .structure import settle as settle
+    from .surface_loads import edge_force as edge_force
     from .surface_loads import edge_pressure as edge_pressure
+    from .surface_loads import force_on_top as force_on_top
     from .surface_loads import load_on_top as load_on_top
+    from .surface_loads import surface_forces as surface_forces
     from .surface_loads import surface_pressure as surface_pressure
     from .ties import Tie as Tie
 
@@ -58,7 +62,7 @@ _NAMES = {
     "backfill": "Backfill",
     "interfaces": "InterfaceLaw Interfaces JointScatter",
     "kinematics": "Pose",
-    "loads": "GRAVITY Loads Settlement point_load self_weight weight_fraction",
+    "loads": "GRAVITY Loads PointForces Settlement point_load self_weight weight_fraction",
     "path.controls": "Controls",
     "path.drivers": "ControlDisplacement",
     "phases": "PhaseChange",
@@ -67,7 +71,7 @@ _NAMES = {
     "results.increment": "Increment Status",
     "results.response": "Collapse Envelope LimitLoad LimitStatus LocalLoss Response",
     "structure": "Structure limit_load pushover settle",
-    "surface_loads": "edge_pressure load_on_top surface_pressure",
+    "surface_loads": "edge_force edge_pressure force_on_top load_on_top surface_forces surface_pressure",
     "ties": "Tie",
 }
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}

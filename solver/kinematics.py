@@ -75,6 +75,21 @@ def cross_rows(arms: np.ndarray) -> np.ndarray:
     return np.stack(rows, axis=1)
 
 
+def turned_moments(arms: np.ndarray, pose: Pose) -> np.ndarray:
+    """(n, n_dof) array [N·m]: change of the moments of forces whose points have turned with their blocks.
+
+    Parameters
+    ----------
+    arms : (n, d, d) array [N·m]
+        Sums of arm ⊗ force over the forces on each block as drawn.
+    pose : Pose
+    """
+    d = arms.shape[1]
+    change = (rotation_matrices(pose.rotations) - np.eye(d)) @ arms
+    first, second = ([0], [1]) if d == 2 else ([1, 2, 0], [2, 0, 1])
+    return np.hstack([np.zeros((len(arms), d)), change[:, first, second] - change[:, second, first]])
+
+
 def rotation_matrices(rotations: np.ndarray) -> np.ndarray:
     """(n, d, d) array of rotations by the given vectors, (n, 1) or (n, 3) [rad], counter-clockwise seen from their tip.
 

@@ -14,7 +14,18 @@ from .geometry.planar_contacts import corners_and_edges, features_of
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
 from .interfaces import steep_note
-from .kinematics import carried, carried_between, motion_size, moved, moved_vertices, point_velocities, swung, turned
+from .kinematics import (
+    carried,
+    carried_between,
+    motion_size,
+    moved,
+    moved_vertices,
+    point_velocities,
+    rotation_matrices,
+    swung,
+    turned,
+    turned_moments,
+)
 from .path.controls import INCREMENTS, Ending
 from .path.reports import falling_blocks
 from .path.state import PathState, Place
@@ -65,6 +76,6 @@ __all__ = [
     "joined_contacts", "matched_contacts", "measure_contacts", "mechanism_of", "member_contacts", "member_forces",
     "member_states", "minimise", "model_of", "motion_size", "moved", "moved_vertices", "overlap_depths",
     "path_parameters", "point_velocities", "present_members", "pushover_increments", "reaction_to", "rigid_parts",
-    "settlement_in", "settlement_increments", "steep_note", "swung", "tie_ends", "tie_lengths", "total_weight",
-    "turned", "with_motion", "worst_of", "wrench_matrix"
+    "rotation_matrices", "settlement_in", "settlement_increments", "steep_note", "swung", "tie_ends", "tie_lengths",
+    "total_weight", "turned", "turned_moments", "with_motion", "worst_of", "wrench_matrix"
 ]  # fmt: skip

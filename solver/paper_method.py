@@ -67,8 +67,8 @@ LINEARISATIONS = 10
 #: Cost of unbalanced force beside the reaction: above the speed of any block per speed of the supports.
 UNBALANCED_COST = 1e4
 
-#: Blocks, the laws of their joints, and the (n_blocks, 3) loads on them [N, N, N·m].
-Inputs = tuple[Assembly, Interfaces, np.ndarray]
+#: Blocks, the laws of their joints, and the loads on them.
+Inputs = tuple[Assembly, Interfaces, Loads]
 
 
 class SupportsLocked(Exception):
@@ -126,7 +126,8 @@ def solve_program(
     A c + f + r⁺ - r⁻ = 0. They are dual to the bound ρ of all displacements and cost too much to be used wherever the
     loads can be balanced. Equilibrium holds to a tolerance, so that frictionless blocks do not move at no cost.
     """
-    assembly, interfaces, load = inputs
+    assembly, interfaces, loads = inputs
+    load = loads.dead_at(assembly, pose)
     length, free = assembly.block_size, assembly.free
     units = np.array([length, length, 1.0])
     force = float(np.hypot(*load[free, :2].T).mean())
@@ -232,7 +233,7 @@ class _Phase:
         """Solve a program, by default of the gaps at the pose, with the supports fixed."""
         self.programs += 1
         gaps = np.column_stack([contacts.gaps, np.zeros(len(contacts))])
-        default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.inputs[2]), "trust": self.trust}
+        default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.inputs[2].dead), "trust": self.trust}
         arguments = default | arguments
         try:
             return solve_program(self.inputs, pose, contacts, **arguments)
@@ -377,13 +378,12 @@ def linear_program_increments(
     ValueError
         If no load acts on any free block.
     """
-    load = loads.total()
-    if not np.abs(load[assembly.free, :2]).any():
+    if not np.abs(loads.dead[assembly.free, :2]).any():
         raise ValueError("no load acts on any free block; give them a weight")
     first, pose = (0, Pose.initial(assembly)) if resume is None else (resume.phase, resume.start)
     ending = Ending(Status.LIMIT_REACHED)
     for number, phase in enumerate(phases[first:], start=first):
-        path, reported = _Phase((assembly, interfaces, load), phase, number, pose), resume is not None
+        path, reported = _Phase((assembly, interfaces, loads), phase, number, pose), resume is not None
         step, upper_bound = phase.increment, np.inf
         try:
             if resume is not None:

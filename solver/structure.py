@@ -17,7 +17,7 @@ from .analysis.settlement import settlement_increments
 from .assembly import Assembly
 from .interfaces import InterfaceLaw, Interfaces, uniform
 from .kinematics import Pose
-from .loads import Loads, Settlement, checked_loads, weight_fraction
+from .loads import Loads, PointForces, Settlement, checked_loads, weight_fraction
 from .path.controls import Controls
 from .path.drivers import ControlDisplacement
 from .phases import PhaseChange
@@ -79,12 +79,14 @@ class Structure(Shown):
         """Say how many blocks it has."""
         return f"<Structure of {counted(self.assembly.n_blocks, 'block')}>"
 
-    def with_live(self, live: np.ndarray | None = None, *, acceleration: Sequence[float] | None = None) -> Structure:
+    def with_live(
+        self, live: np.ndarray | PointForces | None = None, *, acceleration: Sequence[float] | None = None
+    ) -> Structure:
         """Put the structure under other live loads.
 
         Parameters
         ----------
-        live : (n_blocks, n_dof) array [N, N·m], optional
+        live : (n_blocks, n_dof) array [N, N·m] or PointForces, optional
         acceleration : (d,) sequence, optional
             Instead: in units of gravity, of every block; (1, 0) pushes to the right with its weight.
         """
@@ -92,7 +94,10 @@ class Structure(Shown):
             raise TypeError("with_live needs either the live loads or an acceleration; give one of them")
         if acceleration is not None:
             live = weight_fraction(self.assembly, acceleration)
-        return replace(self, loads=replace(self.loads, live=np.asarray(live, dtype=float)))
+        if isinstance(live, PointForces):
+            none = replace(self.loads, live=np.zeros_like(self.loads.dead), live_arms=None)
+            return replace(self, loads=none.with_forces(self.assembly, live, "live"))
+        return replace(self, loads=replace(self.loads, live=np.asarray(live, dtype=float), live_arms=None))
 
     def settle(
         self,
@@ -296,7 +301,7 @@ class Structure(Shown):
     def envelope(
         self,
         positions: Sequence[float] | np.ndarray,
-        live: Callable[[float], np.ndarray],
+        live: Callable[[float], np.ndarray | PointForces],
         *,
         pose: Pose | None = None,
         flow: str = "associative",
@@ -311,7 +316,7 @@ class Structure(Shown):
         ----------
         positions : (n,) sequence
         live : callable
-            From a position to the live loads there, an (n_blocks, n_dof) array [N, N·m].
+            From a position to the live loads there, an (n_blocks, n_dof) array [N, N·m] or forces at points.
         pose, flow, torsion, ties_at, bonds_at, fallen
             As in :meth:`limit_load`.
         """

@@ -319,7 +319,7 @@ def case_changes(
     ]
     for phase in sorted({load.phase for load in case.loads} - {1}):
         added = loads_of(case.loads, assembly, case.source, phase)
-        changes.append(solver.PhaseChange(phase - 1, dead=added.dead))
+        changes.append(solver.PhaseChange(phase - 1, dead=added.dead, dead_arms=added.dead_arms))
     return tuple(changes)
 
 

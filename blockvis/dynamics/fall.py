@@ -227,7 +227,8 @@ def engine_of(response: solver.Response, push: float) -> tuple[Engine, float]:
     removed, tied = np.append(end.removed, False), response.path[-1].ties
     gone = np.isin(tied.states, (mechanics.ABSENT, mechanics.BROKEN))
     rest, ties = np.where(gone, np.nan, tied.rest), response.ties
-    return Engine(whole, loads, response.interfaces, pose, velocity, removed, ties, rest, tied.forces), ground
+    arms = response.loads_at(end).dead_arms
+    return Engine(whole, loads, response.interfaces, pose, velocity, removed, ties, rest, tied.forces, arms), ground
 
 
 def falling_increment(response: solver.Response, fall: Fall, time: float) -> solver.Increment:

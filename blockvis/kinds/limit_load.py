@@ -441,7 +441,7 @@ def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, foun
 def _over_places(
     run: AnalysisRun,
     places: np.ndarray,
-    live: Callable[[int], np.ndarray],
+    live: Callable[[int], solver.PointForces],
     resume: LimitLoadCheckpoint | None,
     found: Sequence[solver.Increment],
 ) -> Steps:
@@ -464,7 +464,7 @@ def _over_places(
             # The dead load alone has no equilibrium: nor has it with the live load elsewhere.
             break
         else:
-            loads = replace(standing, live=standing.live + live(number))
+            loads = standing.with_forces(run.given.assembly, live(number), "live")
             state = replace(_limit_state(run, loads, pose, None, programs, ties, bonds), parameter=float(x))
             if number == 0 and (words := _closing_words(run)):
                 state = replace(state, notes=(*state.notes, words))
@@ -475,7 +475,7 @@ def _over_places(
         if number >= len(found):
             yield replace(state, checkpoint=_checkpoint(run, pose=pose, ties=ties, bonds=bonds))
     # A load that moves is kept at the place that governs.
-    run.given = replace(run.given, loads=replace(standing, live=standing.live + live(chosen)))
+    run.given = replace(run.given, loads=standing.with_forces(run.given.assembly, live(chosen), "live"))
     assert shown is not None
     yield from _swinging(run.given.assembly, shown)
     ending = _limit_ending(run.limits[chosen])

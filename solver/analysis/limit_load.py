@@ -139,7 +139,7 @@ def find_limit_load(
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
-    loads = replace(loads, dead=loads.dead_at(assembly, pose), fills=())
+    loads = replace(loads, dead=loads.dead_at(assembly, pose), live=loads.live_at(pose))
     if not (np.isfinite(displacement) and displacement >= 0.0):
         raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
     gone = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else np.asarray(fallen)

@@ -154,6 +154,8 @@ def model_of(
         live=live,
         ties=ties,
         fills=loads.fills,
+        arms=loads.dead_arms,
+        live_arms=loads.live_arms,
         compliance=controls.compliance_factor,
         imperfection=controls.imperfection_factor,
     )

@@ -450,7 +450,7 @@ class Path:
         """Works of dead and live loads, on supports and of friction in a step, with the forces at its end."""
         model, contacts = self.model, after.contacts
         assert contacts is not None
-        live, live_size = model.scaled_live
+        live, live_size = model.scaled_live(after.pose)
         free = model.assembly.free[:, None]
         resultant = (wrench_matrix(contacts, after.pose, model.length) @ after.forces.ravel()).reshape(motion.shape)
         started, members = self.stepper.measured(contacts, before.pose, before.tie_lengths), is_member(contacts)

@@ -46,7 +46,7 @@ class Reports:
         """The increment of an equilibrium and the movement that follows, with the notes since the last one."""
         model, place, contacts, bounds = self.model, check.place, check.contacts, check.bounds
         resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
-        live, live_size = model.scaled_live
+        live, live_size = model.scaled_live(place.pose)
         multiplier = check.measured * live_size if model.live is not None else 0.0
         balance = (resultant + model.scaled_load_at(place.pose) + multiplier * live)[model.assembly.free]
         support_forces = on_supports(model, contacts, place.pose, check.forces)

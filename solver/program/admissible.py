@@ -102,7 +102,7 @@ class StaticProgram:
         given = matrix @ self.least.ravel()
         self.load = model.scaled_load_at(pose).ravel()[free] + given[free]
         self.tolerance = BALANCE_TOLERANCE * model.total_load
-        live, self.live_size = model.scaled_live
+        live, self.live_size = model.scaled_live(pose)
         columns, objective = [balance], np.zeros(self.n)
         if self.live_size > 0.0:
             column = sp.csc_array(live[blocks].reshape(-1, 1))

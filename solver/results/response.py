@@ -181,8 +181,11 @@ class Response(Shown):
 
     def dead_at(self, increment: Increment, pose: Pose | None = None) -> np.ndarray:
         """(n_blocks, n_dof) array [N, N·m]: in the phase of an increment, at its pose or at another."""
-        loads = loads_in(self.loads, self.changes, increment.phase)
-        return loads.dead_at(self.assembly, increment.pose if pose is None else pose)
+        return self.loads_at(increment).dead_at(self.assembly, increment.pose if pose is None else pose)
+
+    def loads_at(self, increment: Increment) -> Loads:
+        """Return the loads in the phase of an increment."""
+        return loads_in(self.loads, self.changes, increment.phase)
 
     @property
     def parameters(self) -> np.ndarray:
