@@ -11,7 +11,7 @@ import numpy as np
 from .assembly import Assembly
 from .backfill import Backfill
 from .kinematics import Pose, composed_rotations, cross_rows, dimension_of, moved, rotation_count, turned
-from .words import refuse_text
+from .words import make_plain
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
@@ -111,7 +111,7 @@ class Settlement:
 
     def __post_init__(self) -> None:
         """Check the values; make the direction a unit vector, and the rotation without one a sign."""
-        refuse_text(self)
+        make_plain(self)
         if self.profile is not None:
             self._check_profile()
         elif self.direction is None and self.rotation_centre is None and self.radial_from is None:
@@ -311,13 +311,13 @@ def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.nd
     -------
     (n_blocks, n_dof) array [N, N·m]
     """
-    load = _no_load(assembly)
+    load, parts = _no_load(assembly), np.asarray(fraction)
     chosen = slice(None) if blocks is None else blocks
-    if len(fraction) != assembly.dimension:
+    if parts.shape != (assembly.dimension,):
         raise ValueError(
-            f"a fraction of the weight is {list(fraction)}; give {assembly.dimension} numbers, one per axis"
+            f"a fraction of the weight is {parts.tolist()}; give {assembly.dimension} numbers, one per axis"
         )
-    load[chosen, : assembly.dimension] = (assembly.masses * GRAVITY)[chosen, None] * np.asarray(fraction, dtype=float)
+    load[chosen, : assembly.dimension] = (assembly.masses * GRAVITY)[chosen, None] * parts
     return load
 
 
