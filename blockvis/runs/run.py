@@ -194,7 +194,10 @@ def resume_run(
     kind = KINDS[case.analysis]
     with _begun(case, outputs):
         parameter, vtu = kind.course(case).parameter, viewer_format(case)
-        results, checkpoint = ResultsFolder.reopened(folder, parameter, kind.checkpoint, vtu)
+        try:
+            results, checkpoint = ResultsFolder.reopened(folder, parameter, kind.checkpoint, vtu)
+        except OSError as error:
+            raise _write_error(folder, error) from None
         run = planned(case, results.assembly, checkpoint, tuple(results.increments), results.ties)
         return _followed(case, results, run, outputs, Clock(), increment_seconds)
 
