@@ -816,8 +816,7 @@ def _say_range(options: argparse.Namespace, run: Run) -> None:
     except KeyboardInterrupt:
         print("blockvis: range not known: interrupted; everything else is written", file=sys.stderr)
         return
-    if (run.folder / "curve.png").is_file():
-        _draw_curve(run.response, run.folder, ("curve.png",))
+    _draw_curve(run.response, run.folder, [n for n in ("curve.png", "curve.svg") if (run.folder / n).is_file()])
     if (run.folder / "report.html").is_file():
         _write_report(run.response, run.folder)
 

@@ -52,42 +52,25 @@ if TYPE_CHECKING:
     from .surface_loads import surface_pressure as surface_pressure
     from .ties import Tie as Tie
 
-#: Public names and where they live; loaded when first used, because scipy takes half a second to import.
-_HOMES = {
-    "Assembly": "assembly",
-    "Backfill": "backfill",
-    "Certificate": "results.certificate",
-    "Collapse": "results.response",
-    "ControlDisplacement": "path.drivers",
-    "Controls": "path.controls",
-    "Envelope": "results.response",
-    "GRAVITY": "loads",
-    "Increment": "results.increment",
-    "InterfaceLaw": "interfaces",
-    "Interfaces": "interfaces",
-    "JointScatter": "interfaces",
-    "LimitLoad": "results.response",
-    "LimitStatus": "results.response",
-    "Loads": "loads",
-    "LocalLoss": "results.response",
-    "PhaseChange": "phases",
-    "Pose": "kinematics",
-    "Response": "results.response",
-    "Settlement": "loads",
-    "SolveError": "programs.problem",
-    "Status": "results.increment",
-    "Structure": "structure",
-    "Tie": "ties",
-    "edge_pressure": "surface_loads",
-    "limit_load": "structure",
-    "load_on_top": "surface_loads",
-    "point_load": "loads",
-    "pushover": "structure",
-    "self_weight": "loads",
-    "settle": "structure",
-    "surface_pressure": "surface_loads",
-    "weight_fraction": "loads",
+#: Modules and their public names; loaded when first used, because scipy takes half a second to import.
+_NAMES = {
+    "assembly": "Assembly",
+    "backfill": "Backfill",
+    "interfaces": "InterfaceLaw Interfaces JointScatter",
+    "kinematics": "Pose",
+    "loads": "GRAVITY Loads Settlement point_load self_weight weight_fraction",
+    "path.controls": "Controls",
+    "path.drivers": "ControlDisplacement",
+    "phases": "PhaseChange",
+    "programs.problem": "SolveError",
+    "results.certificate": "Certificate",
+    "results.increment": "Increment Status",
+    "results.response": "Collapse Envelope LimitLoad LimitStatus LocalLoss Response",
+    "structure": "Structure limit_load pushover settle",
+    "surface_loads": "edge_pressure load_on_top surface_pressure",
+    "ties": "Tie",
 }
+_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = sorted(_HOMES)
 

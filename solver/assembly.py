@@ -16,10 +16,12 @@ from .geometry.contacts import Contacts
 from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
-from .geometry.shapes import Shapes
 from .geometry.surfaces import SMALLEST_SHAPE_FACTOR, polyhedra_of, refuse_infinite
 from .tolerances import DRAWN_GAP
 from .views import Shown
+
+#: The shapes of all blocks, in the plane or in space: their sizes, and their contact points.
+Shapes = Polygons | Polyhedra
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 
@@ -98,7 +100,8 @@ class Assembly(Shown):
                 f"block {i} ('{names[i]}') has an area of {abs(areas[i]):.3g} m² for a perimeter of "
                 f"{perimeter[i]:.3g} m; it is a line, not a block: remove it or redraw it"
             )
-        rings = [ring if area > 0 else ring[::-1] for ring, area in zip(rings, areas, strict=True)]
+        # The first corner stays the first, from which edges are counted.
+        rings = [ring if area > 0 else np.roll(ring[::-1], 1, axis=0) for ring, area in zip(rings, areas, strict=True)]
         vertices = np.concatenate(rings)
         for i, (j, k) in self_crossings(vertices, offsets).items():
             a, b = vertices[offsets[i] + j], vertices[offsets[i] + k]
@@ -294,7 +297,6 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
 
     Parameters
     ----------
-    assembly : Assembly
     overlap_tolerance : float, optional [m]
         Overlap that is accepted; a thousandth of the width of the thinnest block by default.
 

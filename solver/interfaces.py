@@ -190,7 +190,12 @@ class Interfaces:
     ground: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the ground."""
+        """Check the ground, and that no pair has two laws."""
+        for (first, second), law in self.pairs.items():
+            if self.pairs.get((second, first), law) != law:
+                raise ValueError(
+                    f"the interface of '{first}' and '{second}' has another law as '{second}' and '{first}'; give one"
+                )
         for name, stiffness in self.ground.items():
             if not (np.isfinite(stiffness) and stiffness > 0.0):
                 raise ValueError(

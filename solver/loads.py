@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -178,10 +178,6 @@ class Settlement:
         largest = 1.0 if abs(largest - 1.0) < 1e-12 else largest
         scaled = {name: tuple((motion / largest).tolist()) for name, motion in motions.items()}
         object.__setattr__(self, "profile", scaled)
-
-    def step_to_stop(self, s: float) -> float:
-        """Distance from s to the next stop, infinite after the last; 1e-9 increments before a stop count as on it."""
-        return min((stop - s for stop in self.stops if stop - s > 1e-9 * self.increment), default=np.inf)
 
     @property
     def unit(self) -> str:
@@ -359,8 +355,8 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
         return self_weight(assembly)
     shape = _no_load(assembly).shape
     components = "fx, fy, moment" if assembly.dimension == 2 else "fx, fy, fz, mx, my, mz"
-    for name, given in (("dead", loads.dead), ("live", loads.live)):
-        array = np.asarray(given)
+    loads = replace(loads, dead=np.asarray(loads.dead, dtype=float), live=np.asarray(loads.live, dtype=float))
+    for name, array in (("dead", loads.dead), ("live", loads.live)):
         if array.shape != shape:
             raise ValueError(f"{name} loads have shape {array.shape}; give {shape}: {components}")
         if not np.isfinite(array).all():

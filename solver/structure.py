@@ -157,6 +157,7 @@ class Structure(Shown):
         pose: Pose | None = None,
         ties_at: TieForces | None = None,
         bonds_at: Bonds | None = None,
+        fallen: np.ndarray | None = None,
         on_increment: Callable[[Increment], None] | None = None,
     ) -> Response:
         """Follow the structure under growing displacement from its limit load down to where it carries none.
@@ -170,10 +171,12 @@ class Structure(Shown):
         pose : Pose, optional
             Where to start, for instance after a settlement; the drawing by default. Displacements count from there.
         ties_at : TieForces, optional
-            ``ties`` of the increment that the pose is from; new ones by default.
+            ``ties`` of the increment that the pose is from; by default all are new, of whichever phase.
         bonds_at : Bonds, optional
             ``bonds`` of that increment: the strength that joints have left, and where elastic ones have no force,
             without which a pose with cohesion or elastic joints is refused.
+        fallen : (n_blocks,) bool array, optional
+            ``fallen`` of that increment: blocks that have left the structure, which all are a part of by default.
         on_increment : callable, optional
             Called with every :class:`Increment` as it is found.
 
@@ -205,6 +208,7 @@ class Structure(Shown):
             ties=self.ties,
             ties_at=ties_at,
             bonds_at=bonds_at,
+            fallen=fallen,
         )
         found = increments.all(on_increment)
         return self._response(increments, found, "pushover", CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, control=control)
@@ -221,6 +225,7 @@ class Structure(Shown):
         torsion: str = "points",
         ties_at: TieForces | None = None,
         bonds_at: Bonds | None = None,
+        fallen: np.ndarray | None = None,
     ) -> LimitLoad:
         """Find the largest multiplier of the live loads at which the structure can be in equilibrium.
 
@@ -232,7 +237,8 @@ class Structure(Shown):
             Instead of the live loads of the structure: of every block, in units of gravity; the multiplier is then
             the acceleration. For the other direction give minus this one.
         pose : Pose, optional
-            The geometry: that of an increment gives the capacity left after a settlement. The drawing by default.
+            The geometry: that of an increment gives the capacity left after a settlement, with its ``ties``, ``bonds``
+            and ``fallen``. The drawing by default.
         flow : {"associative", "non-associative"}
             Whether sliding joints lift by friction coefficient times slip, or do not lift.
         closed_gap : float, optional [m]
@@ -253,6 +259,8 @@ class Structure(Shown):
         bonds_at : Bonds, optional
             ``bonds`` of that increment: the strength that joints have left, by default all of it in closed ones; and
             where elastic joints have no force, without which a pose with such joints is refused.
+        fallen : (n_blocks,) bool array, optional
+            ``fallen`` of that increment: blocks that have left the structure, which all are a part of by default.
 
         Returns
         -------
@@ -286,6 +294,7 @@ class Structure(Shown):
             ties=self.ties,
             ties_at=ties_at,
             bonds_at=bonds_at,
+            fallen=fallen,
         )
         return replace(found, analysed=(self.assembly, self.interfaces, under.loads, self.ties))
 
@@ -299,6 +308,7 @@ class Structure(Shown):
         torsion: str = "points",
         ties_at: TieForces | None = None,
         bonds_at: Bonds | None = None,
+        fallen: np.ndarray | None = None,
     ) -> Envelope:
         """Limit loads of a live load that moves over the structure.
 
@@ -307,13 +317,14 @@ class Structure(Shown):
         positions : (n,) sequence
         live : callable
             From a position to the live loads there, an (n_blocks, n_dof) array [N, N·m].
-        pose, flow, torsion, ties_at, bonds_at
+        pose, flow, torsion, ties_at, bonds_at, fallen
             As in :meth:`limit_load`.
         """
         positions = np.asarray(positions, dtype=float)
         if positions.ndim != 1 or len(positions) == 0:
             raise ValueError(f"positions have shape {positions.shape}; give at least one number")
-        given: Any = {"pose": pose, "flow": flow, "torsion": torsion, "ties_at": ties_at, "bonds_at": bonds_at}
+        given: Any = {"pose": pose, "flow": flow, "torsion": torsion}
+        given |= {"ties_at": ties_at, "bonds_at": bonds_at, "fallen": fallen}
         limits = (self.with_live(live(float(x))).limit_load(**given) for x in positions)
         return Envelope(positions, tuple(limits))
 

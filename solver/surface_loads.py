@@ -18,7 +18,8 @@ def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) ->
     assembly : Assembly
     block : int
     edge : int
-        Number of the edge within the block: it runs from corner ``edge`` to the next, counter-clockwise.
+        Number of the edge within the block: it runs from corner ``edge`` to the next, counter-clockwise from the
+        first corner that was given.
     pressure : float [Pa]
         Positive into the block.
 

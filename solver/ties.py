@@ -119,6 +119,11 @@ class TieForces:
     ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
 
+def held_ties(ties: Sequence[Tie], gone: np.ndarray) -> np.ndarray:
+    """(n_ties,) bool array: ties whose blocks are all there; some, (n_blocks,) bool array, are gone."""
+    return np.array([not any(b is not None and gone[b] for b in tie.blocks) for tie in ties], dtype=bool)
+
+
 def check_ties(ties: Sequence[Tie], assembly: Assembly, n_phases: int) -> None:
     """Refuse ties that do not belong to an assembly.
 
@@ -231,10 +236,6 @@ def plastic_forces(
 
     Parameters
     ----------
-    ties : sequence of Tie
-    assembly : Assembly
-    pose : Pose
-    contacts : Contacts
     forces : (n_contacts, d) array [N]
     before : (n_ties,) int array
         Numbers as in :class:`TieForces`: what is absent or broken stays it.

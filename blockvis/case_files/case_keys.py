@@ -467,7 +467,7 @@ LOADS = Section(
             otherwise="none"),
         Key("direction", _PUSHES, "Direction in which the pressure pushes", [1.0, 0.0], default=(0.0, -1.0)),
         Key("edge", whole(1), "Number of the edge into which the pressure pushes, counter-clockwise from the first "
-            "corner", 2, otherwise="the faces in the way of direction"),
+            "corner, in whichever sense it is drawn", 2, otherwise="the faces in the way of direction"),
         Key("positions", _PLACES,
             "Places x of a live force that moves over what is topmost there", [-1.9, 1.9, 77], "m", otherwise="none"),
         Key("y", NUMBER, "The y of all positions, of blocks in space", 0.5, "m", otherwise="none"),

@@ -152,6 +152,11 @@ class LimitLoadKind(AnalysisKind):
         needs_live_load(case)
         if case.settlements:
             needs_no_crushing(case, " after a settlement")
+        elif case.controls.increments == mechanics.INCREMENTS[1]:
+            raise ValueError(
+                f'{case.source}: [analysis] increments = "{case.controls.increments}" is of settlements, and the case '
+                "has none; leave it out"
+            )
         settings: LimitLoadSettings = case.settings
         if settings.displacement is not None and not case.settlements:
             raise _displacement_without_settlement(case)
@@ -298,7 +303,8 @@ class LimitLoadKind(AnalysisKind):
             return response.message or f"Limit load: {response.stop}"
         where = ""
         if len(response.path) > 1:
-            where = f" at {response.parameter.name} {state.parameter:.5g} {response.parameter.unit}"
+            place = f"{unit_in(response, state.phase)}{in_phase(response, state.phase)}"
+            where = f" at {response.parameter.name} {state.parameter:.5g} {place}"
         return f"Limit load: α = {state.load_multiplier:.5g}{where}"
 
     def rows(self, response: solver.Response) -> list[tuple[str, str]]:

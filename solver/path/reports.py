@@ -65,7 +65,8 @@ class Reports:
             duality_gap=bounds.gap,
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
-        notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
+        where = f"{self.driver.unit}{f' in phase {self.number + 1}' if self.number else ''}"
+        notes = tuple(f"at {note.s:.6g} {where}: {note.words}" for note in self.notes)
         self.notes = []
         state = self.stepper.mortar.told(state, place)
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)

@@ -31,7 +31,7 @@ from solver.ties import TieForces, is_member
 from solver.tolerances import COMPLIANCE, FRICTION_MEMORY, IMPERFECTION, SHEAR_COMPLIANCE, VELOCITY_MEMORY, VISCOSITY
 
 from .drivers import Driver
-from .members import Members, with_members
+from .members import Members
 from .mortar import JointPoints, Mortar
 from .state import Place
 
@@ -193,7 +193,7 @@ class Stepper:
 
     def contacts_at(self, place: Place) -> Contacts:
         """Return the contact points at a place, those of members last."""
-        return with_members(self.contacts(place.pose), self.members.contacts(place.pose, place.tie_lengths))
+        return self.members.beside(self.contacts(place.pose), place.pose, place.tie_lengths)
 
     def measured(self, contacts: Contacts, pose: Pose, tie_lengths: np.ndarray) -> Contacts:
         """Return the same contact points at another pose, with ties of these lengths."""
@@ -201,7 +201,7 @@ class Stepper:
         if not members.any():
             return measure_contacts(self.model.assembly, vertices, contacts)
         of_blocks = measure_contacts(self.model.assembly, vertices, contacts[~members])
-        return with_members(of_blocks, self.members.measured(contacts[members], pose, tie_lengths))
+        return joined_contacts([of_blocks, self.members.measured(contacts[members], pose, tie_lengths)])
 
     def contacts(self, pose: Pose) -> Contacts:
         """Return the contact points of blocks at a pose; those of the last pose are kept."""

@@ -19,8 +19,6 @@ class Model:
 
     Attributes
     ----------
-    assembly : Assembly
-    interfaces : Interfaces
     load : (n_blocks, n_dof) array [N, N·m]
         Forces and moments with the blocks as drawn, n_dof = 3 in the plane and 6 in space.
     length : float [m]
@@ -32,7 +30,6 @@ class Model:
         Loads whose multiplier is an unknown of every program.
     fallen : (n_blocks,) bool array, optional
         Blocks that have left the structure, without loads and contact points.
-    ties : tuple of Tie
     fills : tuple of Backfill
         Fill whose load as drawn is a part of ``load`` and follows the blocks.
     compliance, imperfection : float

@@ -76,12 +76,15 @@ class LocalLoss:
     weight : float [N]
     share : float
         Of the weight of all free blocks.
+    phase : int
+        Number of the settlement, from 0.
     """
 
     settlement: float
     blocks: tuple[str, ...]
     weight: float
     share: float
+    phase: int = 0
 
 
 class Control(Protocol):
@@ -163,14 +166,17 @@ class Response(Shown):
     @property
     def losses(self) -> tuple[LocalLoss, ...]:
         """Blocks that left for good along the path, in the order in which they fell."""
-        fell_at = self.path[-1].state.fell_at if self.path else np.zeros(0)
-        weights = self.assembly.masses * GRAVITY
-        losses = []
-        for value in np.unique(fell_at[np.isfinite(fell_at)]):
-            fallen = np.flatnonzero(fell_at == value)
-            weight = float(weights[fallen].sum())
-            names = tuple(self.assembly.names[k] for k in fallen)
-            losses.append(LocalLoss(float(value), names, weight, weight / self.total_weight))
+        losses, weights = [], self.assembly.masses * GRAVITY
+        gone = np.zeros(self.assembly.n_blocks, dtype=bool)
+        for phase, end in {increment.phase: increment for increment in self.path}.items():
+            fell_at = end.state.fell_at
+            fell_at = np.where(gone, np.nan, fell_at if len(fell_at) else np.nan)
+            gone |= ~np.isnan(fell_at)
+            for value in np.unique(fell_at[np.isfinite(fell_at)]):
+                fallen = np.flatnonzero(fell_at == value)
+                weight = float(weights[fallen].sum())
+                names = tuple(self.assembly.names[k] for k in fallen)
+                losses.append(LocalLoss(float(value), names, weight, weight / self.total_weight, phase))
         return tuple(losses)
 
     def dead_at(self, increment: Increment, pose: Pose | None = None) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from structures import drawn, rectangle
 
 import blockvis
 import solver
@@ -54,6 +55,20 @@ def test_between_two_blocks_the_force_goes_into_the_one_it_pushes(tmp_path):
         (block,) = np.flatnonzero(loads.any(axis=1))
         blocks[force] = assembly.centroids[block, 1]
     assert blocks["[0, -500]"] < 2 * course < blocks["[0, 500]"]
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_edges_are_counted_from_the_first_corner_in_whichever_sense_it_is_drawn(tmp_path, sense):
+    """Edge 2 of a trapezoid that begins at its lower left corner is its right flank, a metre high."""
+    trapezoid = np.array([[0, 0], [1, 0], [1, 1], [0.2, 1]])
+    stone = trapezoid if sense > 0 else np.roll(trapezoid[::-1], 1, axis=0)
+    drawn(tmp_path / "stone.json", [stone, rectangle(0, -1, 1, 0)], ["stone", "ground"], role=[None, "fixed"])
+    case = '[geometry]\nfile = "stone.json"\n[analysis]\nkind = "limit load"\n[output]\nanimation = false\n'
+    (tmp_path / "case.toml").write_text(
+        case + '[[loads]]\nkind = "live"\npressure = 1000.0\nblocks = "stone"\nedge = 2\n', encoding="utf-8"
+    )
+    live = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=()).response.loads.live
+    np.testing.assert_allclose(live[0, :2], [-1000.0, 0.0])
 
 
 @pytest.mark.slow

@@ -29,6 +29,13 @@ def test_acceleration_at_which_a_block_overturns_or_slides(block, friction, mult
         assert structure.with_live(acceleration=acceleration).limit_load().multiplier == limit.multiplier
 
 
+def test_loads_may_be_lists(block):
+    dead = solver.self_weight(block).dead
+    live = solver.weight_fraction(block, (1, 0))
+    found = solver.limit_load(block, loads=solver.Loads(dead.tolist(), live.tolist()), friction_coefficient=0.7)
+    assert found.multiplier == pytest.approx(0.5, rel=1e-6)
+
+
 def test_friction_is_never_assumed(block):
     with pytest.raises(TypeError, match="either a friction_coefficient or interfaces"):
         solver.Structure(block)
