@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.words import counted
+from solver.words import counted, numbers_of
 
 from .geometry.contacts import Contacts
 from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
@@ -307,6 +308,8 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
     if not assembly.free.any():
         raise ValueError(f"{counted(assembly.n_blocks, 'block')}, all supports; at least one must be free")
     tolerance = DRAWN_GAP * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
+    if not tolerance >= 0.0:
+        raise ValueError(f"overlap_tolerance is {tolerance:g} m; it must be at least 0")
     i, j, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
     real = np.flatnonzero(assembly.free[i] | assembly.free[j])
     if len(real):
@@ -378,7 +381,7 @@ def _labels(
 
 
 def _checked_ring(outline: ArrayLike, name: str) -> np.ndarray:
-    ring = np.asarray(outline, dtype=float)
+    ring = numbers_of(outline, f"the outline of block '{name}'")
     if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3:
         raise ValueError(f"block '{name}' needs an outline of at least three (x, y) corners; its shape is {ring.shape}")
     refuse_infinite(ring, name)
@@ -388,13 +391,12 @@ def _checked_ring(outline: ArrayLike, name: str) -> np.ndarray:
 
 def _refuse_half_characters(words: Sequence[str], what: str) -> None:
     for i, word in enumerate(words):
-        try:
-            word.encode()
-        except UnicodeEncodeError as error:
+        if found := re.search(r"[\0\ud800-\udfff]", word):
+            half = "a NUL" if found[0] == "\0" else "half of a character"
             raise ValueError(
-                f"block {i}: its {what} {word!r} holds half of a character at place {error.start}, which no file can "
+                f"block {i}: its {what} {word!r} holds {half} at place {found.start()}, which no file can "
                 "hold; give whole characters"
-            ) from None
+            )
 
 
 def _unique_names(names: list[str]) -> tuple[str, ...]:
@@ -415,7 +417,7 @@ def _unique_names(names: list[str]) -> tuple[str, ...]:
 
 
 def _positive(value: ArrayLike, n: int, what: str, unit: str, names: Sequence[str]) -> np.ndarray:
-    array = np.asarray(value, dtype=float)
+    array = numbers_of(value, what)
     if array.ndim and array.shape != (n,):
         raise ValueError(f"{what} has shape {array.shape}; give one number or {n}, one per block")
     array = np.broadcast_to(array, (n,)).copy()

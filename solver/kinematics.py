@@ -145,6 +145,8 @@ def moved(pose: Pose, q: np.ndarray) -> Pose:
 
 def moved_vertices(assembly: Assembly, pose: Pose) -> np.ndarray:
     """(n_vertices, d) array [m]: corners of all blocks at a pose."""
+    if (given := np.shape(pose.positions)) != (own := assembly.centroids.shape):
+        raise ValueError(f"the pose is of another structure: its positions have shape {given}, the blocks {own}")
     block = assembly.block_of_vertex
     arms = assembly.vertices - assembly.centroids[block]
     turned = np.einsum("nij,nj->ni", rotation_matrices(pose.rotations)[block], arms)

@@ -20,7 +20,7 @@ from .kinematics import (
     turned,
     turned_moments,
 )
-from .words import refuse_text
+from .words import make_plain
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
@@ -178,7 +178,7 @@ class Settlement:
 
     def __post_init__(self) -> None:
         """Check the values; make the direction a unit vector, and the rotation without one a sign."""
-        refuse_text(self)
+        make_plain(self)
         if self.profile is not None:
             self._check_profile()
         elif self.direction is None and self.rotation_centre is None and self.radial_from is None:
@@ -374,13 +374,13 @@ def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.nd
     -------
     (n_blocks, n_dof) array [N, N·m]
     """
-    load = _no_load(assembly)
+    load, parts = _no_load(assembly), np.asarray(fraction)
     chosen = slice(None) if blocks is None else blocks
-    if len(fraction) != assembly.dimension:
+    if parts.shape != (assembly.dimension,):
         raise ValueError(
-            f"a fraction of the weight is {list(fraction)}; give {assembly.dimension} numbers, one per axis"
+            f"a fraction of the weight is {parts.tolist()}; give {assembly.dimension} numbers, one per axis"
         )
-    load[chosen, : assembly.dimension] = (assembly.masses * GRAVITY)[chosen, None] * np.asarray(fraction, dtype=float)
+    load[chosen, : assembly.dimension] = (assembly.masses * GRAVITY)[chosen, None] * parts
     return load
 
 
@@ -410,6 +410,8 @@ def point_load(
         Of the block as drawn: with :meth:`Loads.with_forces` the point goes with its block.
     """
     load, d = _no_load(assembly), assembly.dimension
+    if d == 3 and np.ndim(moment) == 0 and moment != 0.0:
+        raise ValueError(f"a moment in space is {moment!r}; give three numbers, about x, y and z")
     load[block, d:] = np.asarray(moment, dtype=float)
     if force is None:
         return load

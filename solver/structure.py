@@ -70,6 +70,11 @@ class Structure(Shown):
             raise TypeError("a structure needs either a friction_coefficient or interfaces; give one of them")
         if interfaces is None:
             interfaces = uniform(friction_coefficient or 0.0)
+        if not isinstance(interfaces, Interfaces):
+            raise TypeError(
+                f"interfaces are {interfaces!r}; give solver.Interfaces, or friction_coefficient by its name"
+            )
+        interfaces.check(assembly)
         object.__setattr__(self, "assembly", assembly)
         object.__setattr__(self, "interfaces", interfaces)
         object.__setattr__(self, "loads", checked_loads(assembly, loads))

@@ -79,10 +79,10 @@ def surface_forces(
 
     As :func:`surface_pressure`; each acts where it meets its block, and goes with it.
     """
-    size = float(np.hypot(*np.asarray(direction, dtype=float)))
-    if size == 0.0:
-        raise ValueError("pressure direction is [0, 0]; give the direction in which it pushes")
-    push = np.asarray(direction, dtype=float) / size
+    push = np.asarray(direction, dtype=float)
+    if push.shape != (2,) or not 0.0 < (size := float(np.hypot(*push))) < np.inf:
+        raise ValueError(f"pressure direction is {push.tolist()}; give the direction in which it pushes, two numbers")
+    push = push / size
     across = np.array([-push[1], push[0]])
     chosen = np.zeros(assembly.n_blocks, dtype=bool)
     chosen[assembly.free if blocks is None else blocks] = True

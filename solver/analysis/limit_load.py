@@ -140,8 +140,9 @@ def find_limit_load(
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
     loads = replace(loads, dead=loads.dead_at(assembly, pose), live=loads.live_at(pose))
-    if not (np.isfinite(displacement) and displacement >= 0.0):
-        raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
+    for name, value in (("displacement", displacement), ("closed_gap", closed_gap)):
+        if not (np.isfinite(value) and value >= 0.0):
+            raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
     gone = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else np.asarray(fallen)
     states = np.full(len(ties), ELASTIC) if ties_at is None else ties_at.states
     states = np.where(held_ties(ties, gone), states, ABSENT)

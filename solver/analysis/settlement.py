@@ -11,7 +11,7 @@ import numpy as np
 from solver.assembly import MOVING, Assembly, check_blocks
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose
-from solver.loads import Loads, Settlement
+from solver.loads import Loads, Settlement, checked_loads
 from solver.paper_method import linear_program_increments
 from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
 from solver.path.drivers import SupportMotion
@@ -204,6 +204,10 @@ def _check_changes(
     for change in changes:
         if not 0 <= change.phase < len(phases):
             raise ValueError(f"a change comes before settlement phase {change.phase + 1}; there are {len(phases)}")
+        if change.dead is not None:
+            checked_loads(assembly, Loads(change.dead, change.dead))
+        if change.removed is not None and np.shape(change.removed) != (assembly.n_blocks,):
+            raise ValueError(f"removed has shape {np.shape(change.removed)}; give one per block, {assembly.n_blocks}")
         for name in change.ties:
             if name not in {tie.name for tie in ties if tie.phase <= change.phase}:
                 raise ValueError(

@@ -11,6 +11,7 @@ import numpy as np
 from solver.assembly import Assembly
 from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_count, rotation_matrices
 from solver.loads import Settlement, check_steps
+from solver.words import make_plain
 
 
 class Driver(Protocol):
@@ -114,6 +115,7 @@ class ControlDisplacement:
 
     def __post_init__(self) -> None:
         """Check the numbers; the direction becomes a unit vector."""
+        make_plain(self)
         for name in ("direction", "point"):
             value = getattr(self, name)
             if value is None:

@@ -36,7 +36,7 @@ class Collapse(Shown):
         Last settlement with an equilibrium, first one without.
     reaction : float [N or N·m]
         At the last equilibrium.
-    mechanism : (n_blocks, 3) array
+    mechanism : (n_blocks, n_dof) array
         Direction in which the blocks move when they fall, largest movement 1 (rotations times block size).
     unit : str
     words : str
@@ -233,7 +233,9 @@ class Response(Shown):
 
     @property
     def initial_reaction(self) -> float:
-        """Least reaction [N or N·m] that equilibrium allows before anything moves: what a first movement overcomes."""
+        """Least reaction [N or N·m] that equilibrium allows before anything moves; nan where there is none."""
+        if not self.path:
+            return np.nan
         first = self.path[0]
         return first.least if np.isfinite(first.least) and self.control is None else first.reaction
 

@@ -516,3 +516,14 @@ def test_a_block_in_space_swings_on_a_tie():
         assert mechanics.tie_lengths(mechanics.tie_ends([tie], whole, engine.pose)) < 1.001 * rest
     assert (np.diff(energies) <= 0.0).all()
     assert np.linalg.norm(engine.pose.rotations[0]) > 0.1
+
+
+def test_results_that_replace_those_of_a_collapse_have_no_fall(tmp_path):
+    response = shipped_arch()
+    folder = blockvis.write(response, tmp_path / "out")
+    write_fall(fallen(shipped_arch), response, folder)
+    stands = replace(response, increments=response.path, stop=solver.Status.LIMIT_REACHED, collapse=None)
+    blockvis.write(stands, folder, overwrite=True)
+    assert not list(folder.glob("fall*"))
+    with pytest.raises(ValueError, match="nothing falls here"):
+        blockvis.open_results(folder).fall(1.0)

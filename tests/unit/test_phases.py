@@ -275,3 +275,16 @@ def test_a_collapse_before_the_supports_turn_is_read_back_in_metres(
     assert (summary["status"], summary["collapse_phase"]) == ("collapsed", 1)
     told = report_of(blockvis.open_results(tmp_path / "out"))
     assert f"{summary['collapse_displacement']:.6g} m in phase 1" in told
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"dead": np.full((6, 3), np.nan)}, "dead load on block 'left' is .*; not finite"),
+        ({"dead": np.zeros((6, 2))}, r"dead loads have shape \(6, 2\); give \(6, 3\)"),
+        ({"removed": np.array([3])}, r"removed has shape \(1,\); give one per block, 6"),
+    ],
+)
+def test_changes_that_do_not_fit_the_blocks_are_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        beam_on_a_prop().settle([DOWN, DOWN], changes=[solver.PhaseChange(1, **change)])
