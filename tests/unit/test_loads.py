@@ -170,3 +170,12 @@ def test_what_is_no_number_is_refused_by_its_name(make, message):
 def test_a_pressure_needs_its_direction(direction):
     with pytest.raises(ValueError, match=r"pressure direction is \[.*\]; give the direction in which it pushes"):
         solver.surface_pressure(ASSEMBLY, 1e3, direction)
+
+
+def test_a_moment_in_space_is_three_numbers():
+    """One number would act about all three axes."""
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    faces = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+    cube = solver.Assembly.from_solids([(corners, faces)])
+    with pytest.raises(ValueError, match="moment in space is 5.0; give three numbers"):
+        solver.point_load(cube, 0, moment=5.0)
