@@ -177,5 +177,5 @@ def test_a_moment_in_space_is_three_numbers():
     corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
     faces = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
     cube = solver.Assembly.from_solids([(corners, faces)])
-    with pytest.raises(ValueError, match="moment in space is 5.0; give three numbers"):
+    with pytest.raises(ValueError, match=r"moment in space is 5\.0; give three numbers"):
         solver.point_load(cube, 0, moment=5.0)
