@@ -299,9 +299,7 @@ def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
     return replace(loads, fills=backfills(case.backfills, assembly, case.source))
 
 
-def case_changes(
-    case: Case, assembly: solver.Assembly, ties: Sequence[solver.Tie] = ()
-) -> tuple[solver.PhaseChange, ...]:
+def case_changes(case: Case, assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> tuple[solver.PhaseChange, ...]:
     """Find what changes between the settlements of a case: what is taken away, and loads that begin to act.
 
     Raises
