@@ -187,7 +187,10 @@ class Interfaces:
     ground: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the ground."""
+        """Check that each pair has one law, and the ground."""
+        for one, other in self.pairs:
+            if one != other and (other, one) in self.pairs:
+                raise ValueError(f"the materials '{one}' and '{other}' have two laws; give one, in either order")
         for name, stiffness in self.ground.items():
             if not (np.isfinite(stiffness) and stiffness > 0.0):
                 raise ValueError(

@@ -5,6 +5,7 @@ import re
 import pytest
 
 import blockvis
+import solver
 from blockvis import generators, pyvista_plugin
 from blockvis.cli import main
 
@@ -50,6 +51,26 @@ def test_a_point_of_what_acts_all_over_is_refused(tmp_path, capsys, acts):
     case = written(tmp_path, ARCH + f"[[loads]]\n{acts}\npoint = [0, 1.0]\n")
     assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 2
     assert "case.toml: [loads] point is that of a force or moment; pressure and weight" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["", 'name = "springer"\n', 'name = "voussoir 1"\n'])
+def test_a_support_that_is_called_as_something_else_is_refused(tmp_path, capsys, name):
+    """By its name it has its stiffness, which another had."""
+    under = "".join(
+        f"[[supports]]\n{name}outline = [[{x}, -1], [{x + 1}, -1], [{x + 1}, 0], [{x}, 0]]\nstiffness = 1e7\n"
+        for x in (5, 7)
+    )
+    assert main(["run", str(written(tmp_path, ARCH + under)), "-o", str(tmp_path / "out")]) == 2
+    assert re.search(r"case\.toml: \[supports\] name: '.*' is the name of another support", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("pairs", [['"a", "b"', '"b", "a"'], ['"a", "a"', '"a", "a"']])
+def test_two_laws_of_the_same_materials_are_refused(tmp_path, capsys, pairs):
+    laws = "".join(f"[[interfaces]]\nmaterials = [{pair}]\nfriction_coefficient = 0.3\n" for pair in pairs)
+    assert main(["run", str(written(tmp_path, ARCH + laws)), "-o", str(tmp_path / "out")]) == 2
+    assert re.search(r"case\.toml: \[interfaces 2\] materials .* are there twice; give each", capsys.readouterr().err)
+    with pytest.raises(ValueError, match="the materials 'a' and 'b' have two laws"):
+        solver.Interfaces(pairs=dict.fromkeys((("a", "b"), ("b", "a")), solver.InterfaceLaw()))
 
 
 @pytest.mark.parametrize(
