@@ -314,7 +314,7 @@ def _interfaces(top: Table) -> dict[tuple[str, str], solver.InterfaceLaw]:
         values = _law(keys.INTERFACES.read(entry))
         one, other = values.pop("materials")
         if (one, other) in found or (other, one) in found:
-            raise entry.error("materials", f"'{one}' and '{other}' are there twice; give each pair of materials one table")
+            raise entry.error("materials", f"'{one}' and '{other}' are there twice; give each pair one table")
         found[one, other] = _checked_law(entry, values)
     return found
 
