@@ -100,7 +100,8 @@ class Watch:
 
 def sizes(assembly: solver.Assembly) -> np.ndarray:
     """(n_blocks,) array [m]: infinite for supports, so that those of free blocks count."""
-    return np.where(assembly.free, assembly.shapes.sizes, np.inf)
+    each = [assembly.shapes.size(block) for block in np.eye(assembly.n_blocks, dtype=bool)]
+    return np.where(assembly.free, each, np.inf)
 
 
 def largest_overlap(engine: Engine) -> float:
@@ -119,7 +120,7 @@ def largest_gap(engine: Engine) -> float:
     nearest = np.full(assembly.n_blocks, np.inf)
     for block in (contacts.block_a, contacts.block_b):
         np.minimum.at(nearest, block[met], np.maximum(contacts.gaps[met], 0.0))
-    return float((nearest / assembly.shapes.sizes)[assembly.free].max())
+    return float((nearest / sizes(assembly))[assembly.free].max())
 
 
 def one(name: str) -> dict[str, Any]:

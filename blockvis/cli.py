@@ -112,11 +112,32 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | 
     return code
 
 
+class _Told(io.TextIOWrapper):
+    """What is told beside the output: no run ends as a log of it is full."""
+
+    def write(self, text: str) -> int:
+        """Write what there is room for."""
+        with contextlib.suppress(OSError):
+            super().write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what there is room for."""
+        with contextlib.suppress(OSError):
+            super().flush()
+
+
 def entry() -> None:
     """Console script."""
+    # Streams that were closed beforehand are None.
+    sys.stdout, sys.stderr = (
+        stream or os.fdopen(os.open(os.devnull, os.O_WRONLY), "w") for stream in (sys.stdout, sys.stderr)
+    )
     # Names of blocks may have characters that a console, or what the output goes to, cannot show.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
+    if isinstance(sys.__stderr__, io.TextIOWrapper):
+        sys.stderr = _Told(sys.__stderr__.buffer, sys.__stderr__.encoding, "backslashreplace", line_buffering=True)
     try:
         code = main()
         sys.stdout.flush()
@@ -666,6 +687,8 @@ def _run(options: argparse.Namespace) -> int:
     outputs = options.outputs
     if outputs is None:
         outputs = (Drawing(film=not options.no_film, pictures=not options.no_pictures),)
+    if options.output == "":
+        raise ValueError("-o is empty; name the folder of the results")
     started, seconds = time.perf_counter(), options.increment_seconds
     if seconds is not None:
         seconds = _number(seconds)
@@ -793,8 +816,7 @@ def _say_range(options: argparse.Namespace, run: Run) -> None:
     except KeyboardInterrupt:
         print("blockvis: range not known: interrupted; everything else is written", file=sys.stderr)
         return
-    if (run.folder / "curve.png").is_file():
-        _draw_curve(run.response, run.folder, ("curve.png",))
+    _draw_curve(run.response, run.folder, [n for n in ("curve.png", "curve.svg") if (run.folder / n).is_file()])
     if (run.folder / "report.html").is_file():
         _write_report(run.response, run.folder)
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .kinematics import Pose as Pose
     from .loads import GRAVITY as GRAVITY
     from .loads import Loads as Loads
+    from .loads import PointForces as PointForces
     from .loads import Settlement as Settlement
     from .loads import point_load as point_load
     from .loads import self_weight as self_weight
@@ -47,47 +48,33 @@ if TYPE_CHECKING:
     from .structure import limit_load as limit_load
     from .structure import pushover as pushover
     from .structure import settle as settle
+    from .surface_loads import edge_force as edge_force
     from .surface_loads import edge_pressure as edge_pressure
+    from .surface_loads import force_on_top as force_on_top
     from .surface_loads import load_on_top as load_on_top
+    from .surface_loads import surface_forces as surface_forces
     from .surface_loads import surface_pressure as surface_pressure
     from .ties import Tie as Tie
 
-#: Public names and where they live; loaded when first used, because scipy takes half a second to import.
-_HOMES = {
-    "Assembly": "assembly",
-    "Backfill": "backfill",
-    "Certificate": "results.certificate",
-    "Collapse": "results.response",
-    "ControlDisplacement": "path.drivers",
-    "Controls": "path.controls",
-    "Envelope": "results.response",
-    "GRAVITY": "loads",
-    "Increment": "results.increment",
-    "InterfaceLaw": "interfaces",
-    "Interfaces": "interfaces",
-    "JointScatter": "interfaces",
-    "LimitLoad": "results.response",
-    "LimitStatus": "results.response",
-    "Loads": "loads",
-    "LocalLoss": "results.response",
-    "PhaseChange": "phases",
-    "Pose": "kinematics",
-    "Response": "results.response",
-    "Settlement": "loads",
-    "SolveError": "programs.problem",
-    "Status": "results.increment",
-    "Structure": "structure",
-    "Tie": "ties",
-    "edge_pressure": "surface_loads",
-    "limit_load": "structure",
-    "load_on_top": "surface_loads",
-    "point_load": "loads",
-    "pushover": "structure",
-    "self_weight": "loads",
-    "settle": "structure",
-    "surface_pressure": "surface_loads",
-    "weight_fraction": "loads",
+#: Modules and their public names; loaded when first used, because scipy takes half a second to import.
+_NAMES = {
+    "assembly": "Assembly",
+    "backfill": "Backfill",
+    "interfaces": "InterfaceLaw Interfaces JointScatter",
+    "kinematics": "Pose",
+    "loads": "GRAVITY Loads PointForces Settlement point_load self_weight weight_fraction",
+    "path.controls": "Controls",
+    "path.drivers": "ControlDisplacement",
+    "phases": "PhaseChange",
+    "programs.problem": "SolveError",
+    "results.certificate": "Certificate",
+    "results.increment": "Increment Status",
+    "results.response": "Collapse Envelope LimitLoad LimitStatus LocalLoss Response",
+    "structure": "Structure limit_load pushover settle",
+    "surface_loads": "edge_force edge_pressure force_on_top load_on_top surface_forces surface_pressure",
+    "ties": "Tie",
 }
+_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = sorted(_HOMES)
 

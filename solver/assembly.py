@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,16 +10,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.words import counted
+from solver.words import counted, numbers_of
 
 from .geometry.contacts import Contacts
 from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
-from .geometry.shapes import Shapes
 from .geometry.surfaces import SMALLEST_SHAPE_FACTOR, polyhedra_of, refuse_infinite
 from .tolerances import DRAWN_GAP
 from .views import Shown
+
+#: The shapes of all blocks, in the plane or in space: their sizes, and their contact points.
+Shapes = Polygons | Polyhedra
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 
@@ -97,7 +100,8 @@ class Assembly(Shown):
                 f"block {i} ('{names[i]}') has an area of {abs(areas[i]):.3g} m² for a perimeter of "
                 f"{perimeter[i]:.3g} m; it is a line, not a block: remove it or redraw it"
             )
-        rings = [ring if area > 0 else ring[::-1] for ring, area in zip(rings, areas, strict=True)]
+        # The first corner stays the first, from which edges are counted.
+        rings = [ring if area > 0 else np.roll(ring[::-1], 1, axis=0) for ring, area in zip(rings, areas, strict=True)]
         vertices = np.concatenate(rings)
         for i, (j, k) in self_crossings(vertices, offsets).items():
             a, b = vertices[offsets[i] + j], vertices[offsets[i] + k]
@@ -293,7 +297,6 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
 
     Parameters
     ----------
-    assembly : Assembly
     overlap_tolerance : float, optional [m]
         Overlap that is accepted; a thousandth of the width of the thinnest block by default.
 
@@ -305,6 +308,8 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
     if not assembly.free.any():
         raise ValueError(f"{counted(assembly.n_blocks, 'block')}, all supports; at least one must be free")
     tolerance = DRAWN_GAP * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
+    if not tolerance >= 0.0:
+        raise ValueError(f"overlap_tolerance is {tolerance:g} m; it must be at least 0")
     i, j, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
     real = np.flatnonzero(assembly.free[i] | assembly.free[j])
     if len(real):
@@ -376,7 +381,7 @@ def _labels(
 
 
 def _checked_ring(outline: ArrayLike, name: str) -> np.ndarray:
-    ring = np.asarray(outline, dtype=float)
+    ring = numbers_of(outline, f"the outline of block '{name}'")
     if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3:
         raise ValueError(f"block '{name}' needs an outline of at least three (x, y) corners; its shape is {ring.shape}")
     refuse_infinite(ring, name)
@@ -386,13 +391,12 @@ def _checked_ring(outline: ArrayLike, name: str) -> np.ndarray:
 
 def _refuse_half_characters(words: Sequence[str], what: str) -> None:
     for i, word in enumerate(words):
-        try:
-            word.encode()
-        except UnicodeEncodeError as error:
+        if found := re.search(r"[\0\ud800-\udfff]", word):
+            half = "a NUL" if found[0] == "\0" else "half of a character"
             raise ValueError(
-                f"block {i}: its {what} {word!r} holds half of a character at place {error.start}, which no file can "
+                f"block {i}: its {what} {word!r} holds {half} at place {found.start()}, which no file can "
                 "hold; give whole characters"
-            ) from None
+            )
 
 
 def _unique_names(names: list[str]) -> tuple[str, ...]:
@@ -413,7 +417,7 @@ def _unique_names(names: list[str]) -> tuple[str, ...]:
 
 
 def _positive(value: ArrayLike, n: int, what: str, unit: str, names: Sequence[str]) -> np.ndarray:
-    array = np.asarray(value, dtype=float)
+    array = numbers_of(value, what)
     if array.ndim and array.shape != (n,):
         raise ValueError(f"{what} has shape {array.shape}; give one number or {n}, one per block")
     array = np.broadcast_to(array, (n,)).copy()

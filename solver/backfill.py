@@ -8,6 +8,7 @@ import numpy as np
 
 from .assembly import Assembly
 from .kinematics import Pose, cross_rows, rotation_matrices
+from .words import make_plain
 
 #: Places in a triangle and in a segment at which quadratic functions are summed exactly, each with the same weight.
 _PLACES = {3: (1.0 + 3.0 * np.eye(3)) / 6.0, 2: np.array([[1.0, -1.0], [-1.0, 1.0]]) / np.sqrt(12.0) + 0.5}
@@ -50,6 +51,12 @@ class Backfill:
     thickness: np.ndarray | None = None
     base: float = -np.inf
 
+    def __post_init__(self) -> None:
+        """Make plain values of what is given."""
+        make_plain(self)
+        if (self.thickness is None) == (self.pieces.shape[-1] == 2):
+            raise ValueError("a fill has the thickness of its pieces in the plane, and in space none")
+
     def corners(self, assembly: Assembly, pose: Pose) -> np.ndarray:
         """(n, d, d) array [m]: corners of the pieces at a pose."""
         arms = self.pieces - assembly.centroids[self.block][:, None]
@@ -60,8 +67,7 @@ class Backfill:
         """(n_blocks, n_dof) array [N, N·m]: what the fill does to each block at a pose, moments about its centroid."""
         corners, d = self.corners(assembly, pose), assembly.dimension
         first = corners[:, 1] - corners[:, 0]
-        if d == 2:
-            assert self.thickness is not None
+        if self.thickness is not None:
             areas = self.thickness[:, None] * np.stack([first[:, 1], -first[:, 0]], axis=1)
         else:
             areas = np.cross(first, corners[:, 2] - corners[:, 0]) / 2.0

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .assembly import Assembly
-from .words import refuse_text
+from .words import make_plain
 
 #: Friction coefficient above which it is probably an angle.
 STEEPEST = 3.0
@@ -74,7 +74,7 @@ class InterfaceLaw:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        refuse_text(self)
+        make_plain(self)
         mu = self.friction_coefficient
         if not (np.isfinite(mu) and mu >= 0):
             raise ValueError(f"friction_coefficient is {mu:g}; it must be a finite number of at least 0")
@@ -148,7 +148,10 @@ class JointScatter:
         low, high = np.minimum(block_a, block_b), np.maximum(block_a, block_b)
         number = _mixed(_mixed(_mixed(np.array([self.seed])) ^ low.astype(np.uint64)) ^ high.astype(np.uint64))
         # The 53 bits that a float holds, half a step off both ends.
-        return np.asarray(self.quantile(((number >> np.uint64(11)) + 0.5) * 2.0**-53), dtype=float)
+        found = np.asarray(self.quantile(((number >> np.uint64(11)) + 0.5) * 2.0**-53), dtype=float)
+        for wrong in found[~((found >= 0.0) & (found < np.inf))].tolist():
+            raise ValueError(f"the quantile of a joint's scatter gives the factor {wrong:g}; it must be at least 0")
+        return found
 
 
 def _mixed(number: np.ndarray) -> np.ndarray:
@@ -187,15 +190,26 @@ class Interfaces:
     ground: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check that each pair has one law, and the ground."""
-        for one, other in self.pairs:
-            if one != other and (other, one) in self.pairs:
-                raise ValueError(f"the materials '{one}' and '{other}' have two laws; give one, in either order")
+        """Check the ground, and that no pair has two laws."""
+        for (first, second), law in self.pairs.items():
+            if self.pairs.get((second, first), law) != law:
+                raise ValueError(
+                    f"the interface of '{first}' and '{second}' has another law as '{second}' and '{first}'; give one"
+                )
         for name, stiffness in self.ground.items():
             if not (np.isfinite(stiffness) and stiffness > 0.0):
                 raise ValueError(
                     f"the ground under '{name}' has a stiffness of {stiffness:g} Pa/m; it must be positive"
                 )
+
+    def check(self, assembly: Assembly) -> None:
+        """Raise ``ValueError`` for laws of a material that no block has, and ground under what is no support."""
+        for material in sorted({material for pair in self.pairs for material in pair} - set(assembly.materials)):
+            has = sorted(set(assembly.materials))
+            raise ValueError(f"no block is of the material '{material}' of the pairs of interfaces; there are {has}")
+        for name, stiffness in self.ground.items():
+            if np.isnan(replace(self, ground={name: stiffness}).ground_stiffness(assembly)).all():
+                raise ValueError(f"no support is named '{name}', whose ground has a stiffness; name one")
 
     def friction(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
         """(n,) array: friction coefficient between the blocks of each pair."""

@@ -75,6 +75,21 @@ def cross_rows(arms: np.ndarray) -> np.ndarray:
     return np.stack(rows, axis=1)
 
 
+def turned_moments(arms: np.ndarray, pose: Pose) -> np.ndarray:
+    """(n, n_dof) array [N·m]: change of the moments of forces whose points have turned with their blocks.
+
+    Parameters
+    ----------
+    arms : (n, d, d) array [N·m]
+        Sums of arm ⊗ force over the forces on each block as drawn.
+    pose : Pose
+    """
+    d = arms.shape[1]
+    change = (rotation_matrices(pose.rotations) - np.eye(d)) @ arms
+    first, second = ([0], [1]) if d == 2 else ([1, 2, 0], [2, 0, 1])
+    return np.hstack([np.zeros((len(arms), d)), change[:, first, second] - change[:, second, first]])
+
+
 def rotation_matrices(rotations: np.ndarray) -> np.ndarray:
     """(n, d, d) array of rotations by the given vectors, (n, 1) or (n, 3) [rad], counter-clockwise seen from their tip.
 
@@ -130,6 +145,8 @@ def moved(pose: Pose, q: np.ndarray) -> Pose:
 
 def moved_vertices(assembly: Assembly, pose: Pose) -> np.ndarray:
     """(n_vertices, d) array [m]: corners of all blocks at a pose."""
+    if (given := np.shape(pose.positions)) != (own := assembly.centroids.shape):
+        raise ValueError(f"the pose is of another structure: its positions have shape {given}, the blocks {own}")
     block = assembly.block_of_vertex
     arms = assembly.vertices - assembly.centroids[block]
     turned = np.einsum("nij,nj->ni", rotation_matrices(pose.rotations)[block], arms)
@@ -183,29 +200,18 @@ def swung(pose: Pose, motion: np.ndarray) -> Pose:
     Notes
     -----
     In space the centroid, at velocity v and spin ω, travels on a helix: with θ = |ω|, by
-    v sin θ / θ + ω × v (1 - cos θ) / θ² + ω (ω · v) (θ - sin θ) / θ³; in the plane on an arc about the pole.
+    v sin θ / θ + ω × v (1 - cos θ) / θ² + ω (ω · v) (θ - sin θ) / θ³; in the plane, where ω · v = 0, on an arc about
+    the pole.
     """
     d = pose.positions.shape[1]
     travel, spin = motion[:, :d], motion[:, d:]
-    paths = _arcs(travel, spin[:, 0]) if d == 2 else _helices(travel, spin)
-    return Pose(pose.positions + paths, composed_rotations(pose.rotations, spin))
-
-
-def _arcs(travel: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    turns = np.abs(angle) > 1e-9
-    safe = np.where(turns, angle, 1.0)
-    arm = np.stack([travel[:, 1] / safe, -travel[:, 0] / safe], axis=1)
-    c, s = np.cos(angle) - 1.0, np.sin(angle)
-    arc = np.stack([c * arm[:, 0] - s * arm[:, 1], s * arm[:, 0] + c * arm[:, 1]], axis=1)
-    return np.where(turns[:, None], arc, travel)
-
-
-def _helices(travel: np.ndarray, spin: np.ndarray) -> np.ndarray:
     angle = np.linalg.norm(spin, axis=1)
     first, second = np.sinc(angle / np.pi), np.sinc(angle / (2.0 * np.pi)) ** 2 / 2.0
-    third = np.divide(1.0 - first, angle**2, out=np.full_like(angle, 1.0 / 6.0), where=angle > 1e-4)
-    along = np.einsum("ni,ni->n", spin, travel)
-    return first[:, None] * travel + second[:, None] * np.cross(spin, travel) + (third * along)[:, None] * spin
+    paths = first[:, None] * travel + second[:, None] * np.einsum("nrd,nr->nd", cross_rows(travel), spin)
+    if d == 3:
+        third = np.divide(1.0 - first, angle**2, out=np.full_like(angle, 1.0 / 6.0), where=angle > 1e-4)
+        paths += (third * np.einsum("ni,ni->n", spin, travel))[:, None] * spin
+    return Pose(pose.positions + paths, composed_rotations(pose.rotations, spin))
 
 
 def point_velocities(points: np.ndarray, block: np.ndarray, pose: Pose, velocity: np.ndarray) -> np.ndarray:
@@ -235,8 +241,6 @@ def relative_velocities(contacts: Contacts, pose: Pose, velocity: np.ndarray) ->
 
     Parameters
     ----------
-    contacts : Contacts
-    pose : Pose
     velocity : (n_blocks, n_dof) array
         Of the centroids, and angular, in any scale.
     """
@@ -264,8 +268,6 @@ def moving_together(
 
     Parameters
     ----------
-    n_blocks : int
-    contacts : Contacts
     apart : (n_contacts,) array [m]
         Relative movement of each contact point.
     spins : (n_blocks, n_rot) array [m]

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from .assembly import Assembly
 from .backfill import Backfill
-from .kinematics import Pose, composed_rotations, cross_rows, dimension_of, moved, rotation_count, turned
-from .words import refuse_text
+from .kinematics import (
+    Pose,
+    composed_rotations,
+    cross_rows,
+    dimension_of,
+    moved,
+    rotation_count,
+    turned,
+    turned_moments,
+)
+from .words import make_plain
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
@@ -19,26 +28,43 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Loads:
-    """External loads at the centroids; they keep their direction when the blocks turn.
+    """External loads; they keep their direction when the blocks turn.
 
     Attributes
     ----------
     dead : (n_blocks, n_dof) array [N, N·m]
-        Forces and moments on each block, self-weight included: in the plane fx, fy and the counter-clockwise moment, in
-        space fx, fy, fz, mx, my, mz.
+        Forces and moments about the centroid on each block as drawn, self-weight included: in the plane fx, fy and the
+        counter-clockwise moment, in space fx, fy, fz, mx, my, mz.
     live : (n_blocks, n_dof) array [N, N·m]
         Loads that the load multiplier scales.
     fills : tuple of Backfill
         Fill over the blocks, whose load follows them.
+    dead_arms, live_arms : (n_blocks, d, d) array, optional [N·m]
+        Sums of arm ⊗ force over the forces whose points turn with their block, as :meth:`with_forces` adds them. All
+        other moments stay as they are.
     """
 
     dead: np.ndarray
     live: np.ndarray
     fills: tuple[Backfill, ...] = ()
+    dead_arms: np.ndarray | None = None
+    live_arms: np.ndarray | None = None
 
     def dead_at(self, assembly: Assembly, pose: Pose) -> np.ndarray:
-        """(n_blocks, n_dof) array: dead load with that of the fill where the blocks are."""
-        return sum((fill.load(assembly, pose) for fill in self.fills), self.dead)
+        """(n_blocks, n_dof) array: dead load where the blocks are, with that of the fill."""
+        dead = self.dead if self.dead_arms is None else self.dead + turned_moments(self.dead_arms, pose)
+        return sum((fill.load(assembly, pose) for fill in self.fills), dead)
+
+    def live_at(self, pose: Pose) -> np.ndarray:
+        """(n_blocks, n_dof) array: live load where the blocks are."""
+        return self.live if self.live_arms is None else self.live + turned_moments(self.live_arms, pose)
+
+    def with_forces(self, assembly: Assembly, forces: PointForces, kind: str = "dead") -> Loads:
+        """Add forces at points that go with their blocks to the dead or, by ``kind``, the live loads."""
+        load, arms = forces.load(assembly), forces.arms(assembly)
+        if kind == "dead":
+            return replace(self, dead=self.dead + load, dead_arms=added(self.dead_arms, arms))
+        return replace(self, live=self.live + load, live_arms=added(self.live_arms, arms))
 
     def total(self, multiplier: float = 0.0) -> np.ndarray:
         """(n_blocks, n_dof) array: dead load + multiplier · live load."""
@@ -58,6 +84,47 @@ def self_weight(assembly: Assembly) -> Loads:
     dead = _no_load(assembly)
     dead[:, assembly.dimension - 1] = -assembly.masses * GRAVITY
     return Loads(dead, np.zeros_like(dead))
+
+
+@dataclass(frozen=True)
+class PointForces:
+    """Forces at points of blocks, which go with them.
+
+    Attributes
+    ----------
+    block : (n,) int array
+    force : (n, d) array [N]
+    point : (n, d) array [m]
+        In the drawing.
+    """
+
+    block: np.ndarray
+    force: np.ndarray
+    point: np.ndarray
+
+    @classmethod
+    def at(cls, block: int, force: Sequence[float], point: Sequence[float]) -> PointForces:
+        """Return one force."""
+        return cls(np.array([block]), np.array([force], dtype=float), np.array([point], dtype=float))
+
+    def arms(self, assembly: Assembly) -> np.ndarray:
+        """(n_blocks, d, d) array [N·m]: sums of arm from the centroid ⊗ force."""
+        arms = np.zeros((assembly.n_blocks, assembly.dimension, assembly.dimension))
+        from_centroid = self.point - assembly.centroids[self.block]
+        np.add.at(arms, self.block, from_centroid[:, :, None] * self.force[:, None, :])
+        return arms
+
+    def load(self, assembly: Assembly) -> np.ndarray:
+        """(n_blocks, n_dof) array [N, N·m]: of the blocks as drawn."""
+        load = _no_load(assembly)
+        arms = cross_rows(self.point - assembly.centroids[self.block])
+        np.add.at(load, self.block, np.hstack([self.force, np.einsum("nrd,nd->nr", arms, self.force)]))
+        return load
+
+
+def added(one: np.ndarray | None, other: np.ndarray | None) -> np.ndarray | None:
+    """Add what may not be there."""
+    return other if one is None else one if other is None else one + other
 
 
 @dataclass(frozen=True)
@@ -111,7 +178,7 @@ class Settlement:
 
     def __post_init__(self) -> None:
         """Check the values; make the direction a unit vector, and the rotation without one a sign."""
-        refuse_text(self)
+        make_plain(self)
         if self.profile is not None:
             self._check_profile()
         elif self.direction is None and self.rotation_centre is None and self.radial_from is None:
@@ -178,10 +245,6 @@ class Settlement:
         largest = 1.0 if abs(largest - 1.0) < 1e-12 else largest
         scaled = {name: tuple((motion / largest).tolist()) for name, motion in motions.items()}
         object.__setattr__(self, "profile", scaled)
-
-    def step_to_stop(self, s: float) -> float:
-        """Distance from s to the next stop, infinite after the last; 1e-9 increments before a stop count as on it."""
-        return min((stop - s for stop in self.stops if stop - s > 1e-9 * self.increment), default=np.inf)
 
     @property
     def unit(self) -> str:
@@ -311,13 +374,13 @@ def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.nd
     -------
     (n_blocks, n_dof) array [N, N·m]
     """
-    load = _no_load(assembly)
+    load, parts = _no_load(assembly), np.asarray(fraction)
     chosen = slice(None) if blocks is None else blocks
-    if len(fraction) != assembly.dimension:
+    if parts.shape != (assembly.dimension,):
         raise ValueError(
-            f"a fraction of the weight is {list(fraction)}; give {assembly.dimension} numbers, one per axis"
+            f"a fraction of the weight is {parts.tolist()}; give {assembly.dimension} numbers, one per axis"
         )
-    load[chosen, : assembly.dimension] = (assembly.masses * GRAVITY)[chosen, None] * np.asarray(fraction, dtype=float)
+    load[chosen, : assembly.dimension] = (assembly.masses * GRAVITY)[chosen, None] * parts
     return load
 
 
@@ -344,13 +407,15 @@ def point_load(
     Returns
     -------
     (n_blocks, n_dof) array [N, N·m]
+        Of the block as drawn: with :meth:`Loads.with_forces` the point goes with its block.
     """
     load, d = _no_load(assembly), assembly.dimension
-    given = np.zeros(d) if force is None else np.asarray(force, dtype=float)
-    arm = np.zeros(d) if point is None else np.asarray(point, dtype=float) - assembly.centroids[block]
-    load[block, :d] = given
-    load[block, d:] = np.asarray(moment, dtype=float) + cross_rows(arm[None])[0] @ given
-    return load
+    if d == 3 and np.ndim(moment) == 0 and moment != 0.0:
+        raise ValueError(f"a moment in space is {moment!r}; give three numbers, about x, y and z")
+    load[block, d:] = np.asarray(moment, dtype=float)
+    if force is None:
+        return load
+    return load + PointForces.at(block, force, assembly.centroids[block] if point is None else point).load(assembly)
 
 
 def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
@@ -359,8 +424,8 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
         return self_weight(assembly)
     shape = _no_load(assembly).shape
     components = "fx, fy, moment" if assembly.dimension == 2 else "fx, fy, fz, mx, my, mz"
-    for name, given in (("dead", loads.dead), ("live", loads.live)):
-        array = np.asarray(given)
+    loads = replace(loads, dead=np.asarray(loads.dead, dtype=float), live=np.asarray(loads.live, dtype=float))
+    for name, array in (("dead", loads.dead), ("live", loads.live)):
         if array.shape != shape:
             raise ValueError(f"{name} loads have shape {array.shape}; give {shape}: {components}")
         if not np.isfinite(array).all():

@@ -47,9 +47,10 @@ from solver.assembly import Assembly, find_contacts
 from solver.equilibrium import friction_rays, wrench_matrix
 from solver.geometry.contacts import Contacts, matched_contacts
 from solver.interfaces import Interfaces
-from solver.kinematics import Pose, motion_size, moved, moved_vertices, point_velocities, relative_velocities
+from solver.kinematics import Pose, motion_size, moved, moved_vertices, relative_velocities
 from solver.loads import Loads, Settlement
 from solver.path.controls import Ending
+from solver.path.drivers import SupportMotion
 from solver.path.reports import no_equilibrium
 from solver.path.state import PathState, Place
 from solver.programs.problem import LinearProgram, SolveError, Unbounded
@@ -66,8 +67,8 @@ LINEARISATIONS = 10
 #: Cost of unbalanced force beside the reaction: above the speed of any block per speed of the supports.
 UNBALANCED_COST = 1e4
 
-#: Blocks, the laws of their joints, and the (n_blocks, 3) loads on them [N, N, N·m].
-Inputs = tuple[Assembly, Interfaces, np.ndarray]
+#: Blocks, the laws of their joints, and the loads on them.
+Inputs = tuple[Assembly, Interfaces, Loads]
 
 
 class SupportsLocked(Exception):
@@ -125,7 +126,8 @@ def solve_program(
     A c + f + r⁺ - r⁻ = 0. They are dual to the bound ρ of all displacements and cost too much to be used wherever the
     loads can be balanced. Equilibrium holds to a tolerance, so that frictionless blocks do not move at no cost.
     """
-    assembly, interfaces, load = inputs
+    assembly, interfaces, loads = inputs
+    load = loads.dead_at(assembly, pose)
     length, free = assembly.block_size, assembly.free
     units = np.array([length, length, 1.0])
     force = float(np.hypot(*load[free, :2].T).mean())
@@ -215,30 +217,23 @@ class _Phase:
 
     def __init__(self, inputs: Inputs, phase: Settlement, number: int, start: Pose) -> None:
         self.inputs, self.assembly, self.phase, self.number = inputs, inputs[0], phase, number
-        self.start, self.programs = start, 0
-        points, block = moved_vertices(self.assembly, start), self.assembly.block_of_vertex
-        #: Largest displacement of a support per unit of s: 1 m/m where it only travels.
-        self.lever = float(np.hypot(*point_velocities(points, block, start, self.rate(0.0)).T).max())
-        self.length, movement = self.assembly.block_size, self.lever * phase.increment
+        self.driver, self.start, self.programs = SupportMotion(inputs[0], phase, start), start, 0
+        self.length, movement = self.assembly.block_size, self.driver.lever * phase.increment
         #: Largest gap [m] that one program may close, largest displacement [m] in it, largest gap [m] that may be left.
         self.reach = max(min(4.0 * movement, self.length / 2.0), self.length / 4.0)
         self.trust = max(self.length, 10.0 * movement)
         self.gap_left = max(1e-2 * movement, tolerances.COMPUTED_GAP * self.length)
-        self.tolerance = float(phase.tolerance or phase.increment / 100.0) * (1.0 + 1e-9)
+        self.tolerance = self.driver.tolerance * (1.0 + 1e-9)
 
     def contacts(self, pose: Pose) -> Contacts:
         """Find the contact points at a pose."""
         return find_contacts(self.assembly, moved_vertices(self.assembly, pose), self.reach)
 
-    def size(self, motion: np.ndarray) -> float:
-        """Give the largest movement [m] in an (n_blocks, 3) motion, rotations times the block size."""
-        return float(motion_size(motion, self.length).max(initial=0.0))
-
     def solve(self, pose: Pose, contacts: Contacts, **arguments: Any) -> ProgramSolution:
         """Solve a program, by default of the gaps at the pose, with the supports fixed."""
         self.programs += 1
         gaps = np.column_stack([contacts.gaps, np.zeros(len(contacts))])
-        default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.inputs[2]), "trust": self.trust}
+        default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.inputs[2].dead), "trust": self.trust}
         arguments = default | arguments
         try:
             return solve_program(self.inputs, pose, contacts, **arguments)
@@ -248,16 +243,12 @@ class _Phase:
             arguments["gaps"] = np.where(is_small, 0.0, arguments["gaps"])
         return solve_program(self.inputs, pose, contacts, **arguments)
 
-    def rate(self, s: float) -> np.ndarray:
-        """Give the (n_blocks, 3) velocity of the supports per unit of s."""
-        return self.phase.rate(self.assembly, self.start, s)
-
     def evaluate(self, s: float, pose: Pose) -> _Equilibrium:
         """Read forces and velocities at a pose: the program of a vanishing step, of closed joints only."""
-        contacts, rate = self.contacts(pose), self.rate(s)
+        contacts, rate = self.contacts(pose), self.driver.rate(s)
         gaps = np.column_stack([np.where(contacts.gaps > self.gap_left, np.inf, 0.0), np.zeros(len(contacts))])
         try:
-            solution = self.solve(pose, contacts, supports=rate, gaps=gaps, trust=UNBALANCED_COST * self.lever)
+            solution = self.solve(pose, contacts, supports=rate, gaps=gaps, trust=UNBALANCED_COST * self.driver.lever)
         except SupportsLocked:
             # No finite reaction belongs to this state, but forces in equilibrium do.
             solution = self.solve(pose, contacts, gaps=gaps)
@@ -265,10 +256,10 @@ class _Phase:
 
     def step_to(self, current: _Equilibrium, s: float) -> _Equilibrium:
         """Step from an equilibrium to the settlement s; raises SupportsLocked and what ``close_joints`` raises."""
-        free, supports = self.assembly.free[:, None], self.rate(current.s) * (s - current.s)
+        free, supports = self.assembly.free[:, None], self.driver.rate(current.s) * (s - current.s)
         solution = self.solve(current.pose, self.contacts(current.pose), supports=supports)
         pose = moved(current.pose, solution.state.velocity)
-        supported = self.phase.displaced(self.assembly, self.start, s)
+        supported = self.driver.supports(s)
         positions = np.where(free, pose.positions, supported.positions)
         return self.close_joints(s, Pose(positions, np.where(free, pose.rotations, supported.rotations)), solution)
 
@@ -279,7 +270,7 @@ class _Phase:
         """
         pose = first
         for number in range(LINEARISATIONS + 1):
-            far = self.size(first.movement_to(pose)) > tolerances.FARTHEST_FALL * self.length
+            far = motion_size(first.movement_to(pose), self.length).max() > tolerances.FARTHEST_FALL * self.length
             if far or not solution.balanced:
                 raise _NoEquilibrium(solution)
             contacts, last = self.contacts(pose), number == LINEARISATIONS
@@ -320,7 +311,7 @@ class _Phase:
         if not reported:
             yield self.increment(current, step, upper_bound)
         while current.s < phase.limit:
-            target = self.next_report(current.s)
+            target = self.driver.next_stop(current.s)
             enclosed = upper_bound - current.s <= self.tolerance
             to = upper_bound if enclosed else min(current.s + step, target, (current.s + upper_bound) / 2.0)
             to = target if target - to < 1e-9 * phase.increment else to
@@ -350,13 +341,6 @@ class _Phase:
         words = f"the settlement reached its limit of {phase.limit:g} {phase.unit}"
         return Ending(Status.LIMIT_REACHED, words), current.pose
 
-    def next_report(self, s: float) -> float:
-        """Give the next settlement that is reported: a multiple of the increment, a stop, or the limit."""
-        phase = self.phase
-        multiple = (np.floor(s / phase.increment + 1e-9) + 1.0) * phase.increment
-        target = min(multiple, s + phase.step_to_stop(s))
-        return phase.limit if phase.limit - target < 1e-9 * phase.increment else float(target)
-
     def increment(self, current: _Equilibrium, step: float, upper_bound: float) -> Increment:
         """Report an equilibrium with its checkpoint."""
         place, ended = Place.unloaded(current.pose, current.s), current.s >= self.phase.limit
@@ -373,7 +357,7 @@ class _Phase:
         """Give the fall and the collapse, from the program without equilibrium beyond the last one."""
         fall = self.reported(solution, bound, 0.0, Status.FALLING)
         bracket, motion = (current.s, bound), solution.state.velocity
-        mechanism, words = motion / self.size(motion), str(mechanism_of(self.assembly, fall))
+        mechanism, words = motion / motion_size(motion, self.length).max(), str(mechanism_of(self.assembly, fall))
         collapse = Collapse(sum(bracket) / 2.0, bracket, current.reaction, mechanism, self.phase.unit, words)
         return fall, Ending(Status.COLLAPSED, str(collapse), collapse)
 
@@ -394,13 +378,12 @@ def linear_program_increments(
     ValueError
         If no load acts on any free block.
     """
-    load = loads.total()
-    if not np.abs(load[assembly.free, :2]).any():
+    if not np.abs(loads.dead[assembly.free, :2]).any():
         raise ValueError("no load acts on any free block; give them a weight")
     first, pose = (0, Pose.initial(assembly)) if resume is None else (resume.phase, resume.start)
     ending = Ending(Status.LIMIT_REACHED)
     for number, phase in enumerate(phases[first:], start=first):
-        path, reported = _Phase((assembly, interfaces, load), phase, number, pose), resume is not None
+        path, reported = _Phase((assembly, interfaces, loads), phase, number, pose), resume is not None
         step, upper_bound = phase.increment, np.inf
         try:
             if resume is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .loads import Loads
+from .loads import Loads, added
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,8 @@ class PhaseChange:
         Blocks that are taken away.
     dead : (n_blocks, n_dof) array, optional [N, N·m]
         Dead loads that are added from then on.
+    dead_arms : (n_blocks, d, d) array, optional [N·m]
+        Of those of them that are forces at points, as in :class:`Loads`.
     ties : tuple of str
         Names of ties that are taken away.
     """
@@ -30,6 +32,7 @@ class PhaseChange:
     removed: np.ndarray | None = None
     dead: np.ndarray | None = None
     ties: tuple[str, ...] = ()
+    dead_arms: np.ndarray | None = None
 
 
 def removed_before(changes: Sequence[PhaseChange], phase: int, n_blocks: int) -> np.ndarray:
@@ -40,5 +43,8 @@ def removed_before(changes: Sequence[PhaseChange], phase: int, n_blocks: int) ->
 
 def loads_in(loads: Loads, changes: Sequence[PhaseChange], phase: int) -> Loads:
     """Return the loads during a settlement, by its number from 0."""
-    added = [change.dead for change in changes if change.phase <= phase and change.dead is not None]
-    return replace(loads, dead=sum(added, loads.dead)) if added else loads
+    for change in changes:
+        if change.phase <= phase and change.dead is not None:
+            arms = added(loads.dead_arms, change.dead_arms)
+            loads = replace(loads, dead=loads.dead + change.dead, dead_arms=arms)
+    return loads

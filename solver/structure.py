@@ -17,7 +17,7 @@ from .analysis.settlement import settlement_increments
 from .assembly import Assembly
 from .interfaces import InterfaceLaw, Interfaces, uniform
 from .kinematics import Pose
-from .loads import Loads, Settlement, checked_loads, weight_fraction
+from .loads import Loads, PointForces, Settlement, checked_loads, weight_fraction
 from .path.controls import Controls
 from .path.drivers import ControlDisplacement
 from .phases import PhaseChange
@@ -70,6 +70,11 @@ class Structure(Shown):
             raise TypeError("a structure needs either a friction_coefficient or interfaces; give one of them")
         if interfaces is None:
             interfaces = uniform(friction_coefficient or 0.0)
+        if not isinstance(interfaces, Interfaces):
+            raise TypeError(
+                f"interfaces are {interfaces!r}; give solver.Interfaces, or friction_coefficient by its name"
+            )
+        interfaces.check(assembly)
         object.__setattr__(self, "assembly", assembly)
         object.__setattr__(self, "interfaces", interfaces)
         object.__setattr__(self, "loads", checked_loads(assembly, loads))
@@ -79,12 +84,14 @@ class Structure(Shown):
         """Say how many blocks it has."""
         return f"<Structure of {counted(self.assembly.n_blocks, 'block')}>"
 
-    def with_live(self, live: np.ndarray | None = None, *, acceleration: Sequence[float] | None = None) -> Structure:
+    def with_live(
+        self, live: np.ndarray | PointForces | None = None, *, acceleration: Sequence[float] | None = None
+    ) -> Structure:
         """Put the structure under other live loads.
 
         Parameters
         ----------
-        live : (n_blocks, n_dof) array [N, N·m], optional
+        live : (n_blocks, n_dof) array [N, N·m] or PointForces, optional
         acceleration : (d,) sequence, optional
             Instead: in units of gravity, of every block; (1, 0) pushes to the right with its weight.
         """
@@ -92,7 +99,10 @@ class Structure(Shown):
             raise TypeError("with_live needs either the live loads or an acceleration; give one of them")
         if acceleration is not None:
             live = weight_fraction(self.assembly, acceleration)
-        return replace(self, loads=replace(self.loads, live=np.asarray(live, dtype=float)))
+        if isinstance(live, PointForces):
+            none = replace(self.loads, live=np.zeros_like(self.loads.dead), live_arms=None)
+            return replace(self, loads=none.with_forces(self.assembly, live, "live"))
+        return replace(self, loads=replace(self.loads, live=np.asarray(live, dtype=float), live_arms=None))
 
     def settle(
         self,
@@ -152,6 +162,7 @@ class Structure(Shown):
         pose: Pose | None = None,
         ties_at: TieForces | None = None,
         bonds_at: Bonds | None = None,
+        fallen: np.ndarray | None = None,
         on_increment: Callable[[Increment], None] | None = None,
     ) -> Response:
         """Follow the structure under growing displacement from its limit load down to where it carries none.
@@ -165,10 +176,12 @@ class Structure(Shown):
         pose : Pose, optional
             Where to start, for instance after a settlement; the drawing by default. Displacements count from there.
         ties_at : TieForces, optional
-            ``ties`` of the increment that the pose is from; new ones by default.
+            ``ties`` of the increment that the pose is from; by default all are new, of whichever phase.
         bonds_at : Bonds, optional
             ``bonds`` of that increment: the strength that joints have left, and where elastic ones have no force,
             without which a pose with cohesion or elastic joints is refused.
+        fallen : (n_blocks,) bool array, optional
+            ``fallen`` of that increment: blocks that have left the structure, which all are a part of by default.
         on_increment : callable, optional
             Called with every :class:`Increment` as it is found.
 
@@ -200,6 +213,7 @@ class Structure(Shown):
             ties=self.ties,
             ties_at=ties_at,
             bonds_at=bonds_at,
+            fallen=fallen,
         )
         found = increments.all(on_increment)
         return self._response(increments, found, "pushover", CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, control=control)
@@ -216,6 +230,7 @@ class Structure(Shown):
         torsion: str = "points",
         ties_at: TieForces | None = None,
         bonds_at: Bonds | None = None,
+        fallen: np.ndarray | None = None,
     ) -> LimitLoad:
         """Find the largest multiplier of the live loads at which the structure can be in equilibrium.
 
@@ -227,7 +242,8 @@ class Structure(Shown):
             Instead of the live loads of the structure: of every block, in units of gravity; the multiplier is then
             the acceleration. For the other direction give minus this one.
         pose : Pose, optional
-            The geometry: that of an increment gives the capacity left after a settlement. The drawing by default.
+            The geometry: that of an increment gives the capacity left after a settlement, with its ``ties``, ``bonds``
+            and ``fallen``. The drawing by default.
         flow : {"associative", "non-associative"}
             Whether sliding joints lift by friction coefficient times slip, or do not lift.
         closed_gap : float, optional [m]
@@ -248,6 +264,8 @@ class Structure(Shown):
         bonds_at : Bonds, optional
             ``bonds`` of that increment: the strength that joints have left, by default all of it in closed ones; and
             where elastic joints have no force, without which a pose with such joints is refused.
+        fallen : (n_blocks,) bool array, optional
+            ``fallen`` of that increment: blocks that have left the structure, which all are a part of by default.
 
         Returns
         -------
@@ -281,19 +299,21 @@ class Structure(Shown):
             ties=self.ties,
             ties_at=ties_at,
             bonds_at=bonds_at,
+            fallen=fallen,
         )
         return replace(found, analysed=(self.assembly, self.interfaces, under.loads, self.ties))
 
     def envelope(
         self,
         positions: Sequence[float] | np.ndarray,
-        live: Callable[[float], np.ndarray],
+        live: Callable[[float], np.ndarray | PointForces],
         *,
         pose: Pose | None = None,
         flow: str = "associative",
         torsion: str = "points",
         ties_at: TieForces | None = None,
         bonds_at: Bonds | None = None,
+        fallen: np.ndarray | None = None,
     ) -> Envelope:
         """Limit loads of a live load that moves over the structure.
 
@@ -301,14 +321,15 @@ class Structure(Shown):
         ----------
         positions : (n,) sequence
         live : callable
-            From a position to the live loads there, an (n_blocks, n_dof) array [N, N·m].
-        pose, flow, torsion, ties_at, bonds_at
+            From a position to the live loads there, an (n_blocks, n_dof) array [N, N·m] or forces at points.
+        pose, flow, torsion, ties_at, bonds_at, fallen
             As in :meth:`limit_load`.
         """
         positions = np.asarray(positions, dtype=float)
         if positions.ndim != 1 or len(positions) == 0:
             raise ValueError(f"positions have shape {positions.shape}; give at least one number")
-        given: Any = {"pose": pose, "flow": flow, "torsion": torsion, "ties_at": ties_at, "bonds_at": bonds_at}
+        given: Any = {"pose": pose, "flow": flow, "torsion": torsion}
+        given |= {"ties_at": ties_at, "bonds_at": bonds_at, "fallen": fallen}
         limits = (self.with_live(live(float(x))).limit_load(**given) for x in positions)
         return Envelope(positions, tuple(limits))
 

@@ -7,18 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from .assembly import Assembly
-from .loads import point_load
+from .loads import PointForces
 
 
 def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) -> np.ndarray:
-    """Load one edge of a block with a uniform pressure perpendicular to it.
+    """Load one edge of a block with a uniform pressure perpendicular to it: :func:`edge_force` as drawn.
 
     Parameters
     ----------
     assembly : Assembly
     block : int
     edge : int
-        Number of the edge within the block: it runs from corner ``edge`` to the next, counter-clockwise.
+        Number of the edge within the block: it runs from corner ``edge`` to the next, counter-clockwise from the
+        first corner that was given.
     pressure : float [Pa]
         Positive into the block.
 
@@ -26,6 +27,11 @@ def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) ->
     -------
     (n_blocks, 3) array [N, N, N·m]
     """
+    return edge_force(assembly, block, edge, pressure).load(assembly)
+
+
+def edge_force(assembly: Assembly, block: int, edge: int, pressure: float) -> PointForces:
+    """Find the resultant of a uniform pressure on an edge, which keeps its direction; as :func:`edge_pressure`."""
     ring = assembly.outline(block)
     if not 0 <= edge < len(ring):
         raise ValueError(f"block '{assembly.names[block]}' has {len(ring)} edges; edge {edge} is none of them")
@@ -33,7 +39,7 @@ def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) ->
     along = stop - start
     inward = np.array([-along[1], along[0]])
     force = pressure * float(assembly.thickness[block]) * inward
-    return point_load(assembly, block, (force[0], force[1]), point=(start + stop) / 2.0)
+    return PointForces.at(block, force.tolist(), ((start + stop) / 2.0).tolist())
 
 
 def surface_pressure(
@@ -43,7 +49,7 @@ def surface_pressure(
     *,
     blocks: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Load the faces that a direction meets first with a uniform pressure: snow on a wall's top, wind on its flank.
+    """Load the faces that a direction meets first with a uniform pressure: :func:`surface_forces` as drawn.
 
     Parameters
     ----------
@@ -59,10 +65,24 @@ def surface_pressure(
     -------
     (n_blocks, 3) array [N, N, N·m]
     """
-    size = float(np.hypot(*np.asarray(direction, dtype=float)))
-    if size == 0.0:
-        raise ValueError("pressure direction is [0, 0]; give the direction in which it pushes")
-    push = np.asarray(direction, dtype=float) / size
+    return surface_forces(assembly, pressure, direction, blocks=blocks).load(assembly)
+
+
+def surface_forces(
+    assembly: Assembly,
+    pressure: float,
+    direction: Sequence[float] = (0.0, -1.0),
+    *,
+    blocks: np.ndarray | None = None,
+) -> PointForces:
+    """Find the forces of a uniform pressure on what a direction meets first: snow on a top, wind on a flank.
+
+    As :func:`surface_pressure`; each acts where it meets its block, and goes with it.
+    """
+    push = np.asarray(direction, dtype=float)
+    if push.shape != (2,) or not 0.0 < (size := float(np.hypot(*push))) < np.inf:
+        raise ValueError(f"pressure direction is {push.tolist()}; give the direction in which it pushes, two numbers")
+    push = push / size
     across = np.array([-push[1], push[0]])
     chosen = np.zeros(assembly.n_blocks, dtype=bool)
     chosen[assembly.free if blocks is None else blocks] = True
@@ -73,10 +93,7 @@ def surface_pressure(
     points = centre[loaded, None] * across + depth[loaded, None] * push
     owner = block[loaded]
     forces = (pressure * np.diff(strips)[loaded] * assembly.thickness[owner])[:, None] * push
-    arms = points - assembly.centroids[owner]
-    load = np.zeros((assembly.n_blocks, 3))
-    np.add.at(load, owner, np.column_stack([forces, arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]]))
-    return load
+    return PointForces(owner, forces, points)
 
 
 def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.0)) -> np.ndarray:
@@ -98,6 +115,11 @@ def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.
     ValueError
         Where nothing is below, or a support.
     """
+    return force_on_top(assembly, x, force).load(assembly)
+
+
+def force_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.0)) -> PointForces:
+    """Put a force on the topmost surface at a place, which goes with its block; as :func:`load_on_top`."""
     down = np.array([0.0, -1.0])
     strips, _, block = _first_met(assembly, down, np.array([1.0, 0.0]))
     k = int(np.clip(np.searchsorted(strips, x) - 1, 0, len(block) - 1))
@@ -114,7 +136,7 @@ def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.
     edges = np.flatnonzero((low <= x) & (x <= high) & (high > low))
     part = (x - ring[edges, 0]) / (following[edges, 0] - ring[edges, 0])
     top = float((ring[edges, 1] + part * (following[edges, 1] - ring[edges, 1])).max())
-    return point_load(assembly, owner, force, point=(x, top))
+    return PointForces.at(owner, force, (x, top))
 
 
 def _first_met(assembly: Assembly, push: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

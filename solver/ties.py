@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.words import counted, refuse_text
+from solver.words import counted, make_plain, numbers_of
 
 from .assembly import Assembly
 from .geometry.contacts import Contacts
@@ -69,15 +69,17 @@ class Tie:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        refuse_text(self)
+        make_plain(self)
         who = f"tie '{self.name}'"
         if self.kind not in KINDS:
             raise ValueError(f"{who} is of kind '{self.kind}'; kinds are {', '.join(KINDS)}")
-        points = np.asarray(self.points, dtype=float)
+        points = numbers_of(self.points, f"{who}: points")
         if points.ndim != 2 or points.shape[0] != 2 or not np.isfinite(points).all():
             raise ValueError(f"{who} needs two points with finite coordinates; it has {self.points}")
         if not np.linalg.norm(points[1] - points[0]) > 0.0:
-            raise ValueError(f"{who} has no length: both ends are at {tuple(points[0])}; give two places")
+            raise ValueError(f"{who} has no length: both ends are at {tuple(points[0].tolist())}; give two places")
+        if len(self.blocks) != 2 or any(not isinstance(of, int | np.integer) for of in self.blocks if of is not None):
+            raise TypeError(f"{who} has blocks {self.blocks}; give two numbers, assembly.index finds them, or None")
         if self.blocks[0] == self.blocks[1]:
             held = "the ground" if self.blocks[0] is None else f"block {self.blocks[0]}"
             raise ValueError(f"{who} has both ends in {held}, where it carries nothing; join two blocks")
@@ -115,6 +117,11 @@ class TieForces:
     rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
     states: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
+
+
+def held_ties(ties: Sequence[Tie], gone: np.ndarray) -> np.ndarray:
+    """(n_ties,) bool array: ties whose blocks are all there; some, (n_blocks,) bool array, are gone."""
+    return np.array([not any(b is not None and gone[b] for b in tie.blocks) for tie in ties], dtype=bool)
 
 
 def check_ties(ties: Sequence[Tie], assembly: Assembly, n_phases: int) -> None:
@@ -229,10 +236,6 @@ def plastic_forces(
 
     Parameters
     ----------
-    ties : sequence of Tie
-    assembly : Assembly
-    pose : Pose
-    contacts : Contacts
     forces : (n_contacts, d) array [N]
     before : (n_ties,) int array
         Numbers as in :class:`TieForces`: what is absent or broken stays it.

@@ -2,39 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from functools import cache
 from importlib.metadata import entry_points
-from typing import Any, Protocol
-
-
-class Views(Protocol):
-    """What a package that draws offers."""
-
-    def shown(self, value: Any, **options: Any) -> Any:
-        """Give what a notebook shows of a value as the last line of a cell."""
-
-    def html(self, value: Any) -> str:
-        """Give the value as HTML."""
-
-    def dataset(self, response: Any, of: str, k: int, shape: str) -> Any:
-        """Give the "blocks", "joints", "contacts" or "members" of increment k as a dataset."""
-
-    def fall(self, response: Any, time: float, shape: str) -> Any:
-        """Give the blocks so many seconds after the last equilibrium as a dataset."""
-
-    def animate(self, response: Any, path: str | os.PathLike[str], **options: Any) -> Any:
-        """Write a film."""
+from typing import Any
 
 
 @cache
-def _views() -> Views | None:
+def _views() -> Any:
     entries = tuple(entry_points(group="solver.views"))
-    first: Views | None = entries[0].load() if entries else None
-    return first
+    return entries[0].load() if entries else None
 
 
-def views() -> Views:
+def views() -> Any:
     """Find the views of the package that draws.
 
     Raises

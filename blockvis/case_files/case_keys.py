@@ -459,15 +459,17 @@ LOADS = Section(
         Key("weight_fraction", VECTOR, "Force as a fraction of each block's weight: a horizontal acceleration",
             [1.0, 0.0], otherwise="none"),
         Key("force", VECTOR, "Force on each of the blocks", [0.0, -500.0], "N", (0.0, 0.0)),
-        Key("point", VECTOR, "Point in the drawing at which the force acts, of several blocks on the one that holds it",
+        Key("point", VECTOR, "Point in the drawing at which the force acts, and which goes with its block; of several "
+            "blocks the one that holds it is loaded",
             [1.0, 2.0], "m", otherwise="the centroid of each block"),
         Key("moment", _MOMENT, "Moment on each of the blocks, counter-clockwise; in space about x, y and z", 100.0,
             "N·m", 0.0),
-        Key("pressure", NUMBER, "Pressure on the first faces in the way of direction, or on an edge", 1000.0, "Pa",
+        Key("pressure", NUMBER, "Pressure on the first faces in the way of direction, or on an edge: a force that goes "
+            "with its block and keeps its direction", 1000.0, "Pa",
             otherwise="none"),
         Key("direction", _PUSHES, "Direction in which the pressure pushes", [1.0, 0.0], default=(0.0, -1.0)),
         Key("edge", whole(1), "Number of the edge into which the pressure pushes, counter-clockwise from the first "
-            "corner", 2, otherwise="the faces in the way of direction"),
+            "corner, in whichever sense it is drawn", 2, otherwise="the faces in the way of direction"),
         Key("positions", _PLACES,
             "Places x of a live force that moves over what is topmost there", [-1.9, 1.9, 77], "m", otherwise="none"),
         Key("y", NUMBER, "The y of all positions, of blocks in space", 0.5, "m", otherwise="none"),

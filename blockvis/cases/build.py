@@ -14,7 +14,7 @@ import solver
 from blockvis import generators
 from blockvis.formats.read import overlap_remedy, read_layout, read_outlines
 from blockvis.layout import layout
-from blockvis.layout.assemble import assemble
+from blockvis.layout.assemble import assemble, supports_of
 from blockvis.layout.facing import DEFAULT_FACING
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.repair import DeepOverlap
@@ -29,7 +29,7 @@ from .contents import Case
 from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
-from .profiles import cut_ground, with_profiles
+from .profiles import cut_ground, pieces_named, with_profiles
 from .removals import removed_blocks, removed_ties
 from .role_places import with_roles_by_place
 from .ties import check_layers, drawn_ties, ties_of, without_tie_lines
@@ -76,6 +76,10 @@ def case_assembly(case: Case) -> solver.Assembly:
     if case.densities:
         sketch = _with_densities(case, sketch)
     try:
+        supports_of(case.supports, sketch.dimension)
+    except ValueError as error:
+        raise ValueError(f"{case.source}: [[supports]] {error}") from None
+    try:
         assembly = assemble(
             sketch,
             roles=case.roles,
@@ -99,11 +103,11 @@ def case_assembly(case: Case) -> solver.Assembly:
             f'{case.source}: no block is a moving support; give one of these the role "moving" under [roles] or add '
             f"[[supports]]: {', '.join(groups)}"
         )
-    _refuse_idle_settlements(case, assembly)
     check_coordinates(case, assembly)
     _note_numbers(assembly, case.source)
     _note_units(case, assembly)
     assembly = cut_ground(assembly, case.profiles)
+    _refuse_idle_settlements(case, assembly)
     return imperfect(assembly, case.imperfections)
 
 
@@ -124,18 +128,18 @@ def _refuse_idle_settlements(case: Case, assembly: solver.Assembly) -> None:
     for number, phase in enumerate(case.settlements, start=1):
         if phase.blocks is None:
             continue
+        named = pieces_named(phase.blocks, assembly)
         moving = [name for name, moves in zip(assembly.names, assembly.moving, strict=True) if moves]
         where = f"{case.source}: [settlement{f' {number}' if len(case.settlements) > 1 else ''}] blocks"
-        unknown = [name for name in phase.blocks if name not in assembly.names]
+        unknown = [name for name in named if name not in assembly.names]
         if unknown:
             raise ValueError(
                 f"{where}: no block is named '{unknown[0]}'{nearest(unknown[0], moving)}; "
                 f"the moving supports are {', '.join(moving[:12])}"
             )
-        if not set(moving) & set(phase.blocks):
-            named = ", ".join(phase.blocks[:6]) or "none"
+        if not set(moving) & set(named):
             raise ValueError(
-                f"{where} ({named}) are no moving supports, so that nothing would move; "
+                f"{where} ({', '.join(named[:6]) or 'none'}) are no moving supports, so that nothing would move; "
                 f"those of the case are {', '.join(moving[:12])}"
             )
 
@@ -326,7 +330,7 @@ def case_changes(case: Case, assembly: solver.Assembly, ties: Sequence[solver.Ti
     ]
     for phase in sorted({load.phase for load in case.loads} - {1}):
         added = loads_of(case.loads, assembly, case.source, phase)
-        changes.append(solver.PhaseChange(phase - 1, dead=added.dead))
+        changes.append(solver.PhaseChange(phase - 1, dead=added.dead, dead_arms=added.dead_arms))
     return tuple(changes)
 
 

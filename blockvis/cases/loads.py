@@ -14,7 +14,7 @@ import solver
 from blockvis.text import force_text, nearest
 
 from .block_at import block_at, note_outside
-from .topmost import load_on_top_in_space
+from .topmost import force_on_top_in_space
 
 
 @dataclass(frozen=True)
@@ -95,19 +95,23 @@ def loads_of(
         For a pattern that matches no free block, a point in none of those it matches, and for an edge that a block
         does not have.
     """
-    weight = solver.self_weight(assembly)
-    parts = {"dead": weight.dead * (phase is None), "live": weight.live.copy()}
+    loads = solver.self_weight(assembly)
+    if phase is not None:
+        loads = replace(loads, dead=np.zeros_like(loads.dead))
     for number, load in enumerate(entries):
         if load.positions or load.phase != (phase or 1):
             continue
         chosen = _chosen(load, assembly, f"{source}: [loads {number + 1}] blocks")
         if load.weight_fraction is not None:
-            parts[load.kind] += solver.weight_fraction(assembly, load.weight_fraction, chosen)
+            loads = _plus(loads, load.kind, solver.weight_fraction(assembly, load.weight_fraction, chosen))
         for block in _loaded(load, chosen, assembly, f"{source}: [loads {number + 1}]"):
-            force = load.force if load.has_force else None
-            parts[load.kind] += solver.point_load(assembly, block, force, point=load.point, moment=load.moment)
+            loads = _plus(loads, load.kind, solver.point_load(assembly, block, moment=load.moment))
+            if load.has_force:
+                point = assembly.centroids[block] if load.point is None else load.point
+                loads = loads.with_forces(assembly, solver.PointForces.at(block, load.force, point), load.kind)
         if load.pressure is not None and load.edge is None:
-            parts[load.kind] += solver.surface_pressure(assembly, load.pressure, load.direction, blocks=chosen)
+            forces = solver.surface_forces(assembly, load.pressure, load.direction, blocks=chosen)
+            loads = loads.with_forces(assembly, forces, load.kind)
         if load.pressure is not None and load.edge is not None:
             for block in chosen:
                 has = len(assembly.outline(block))
@@ -116,13 +120,19 @@ def loads_of(
                         f"{source}: [loads {number + 1}] edge is {load.edge}; block '{assembly.names[block]}' has "
                         f"edges 1 to {has}"
                     )
-                parts[load.kind] += solver.edge_pressure(assembly, block, load.edge - 1, load.pressure)
-    return solver.Loads(parts["dead"], parts["live"])
+                forces = solver.edge_force(assembly, block, load.edge - 1, load.pressure)
+                loads = loads.with_forces(assembly, forces, load.kind)
+    return loads
+
+
+def _plus(loads: solver.Loads, kind: str, more: np.ndarray) -> solver.Loads:
+    """Add loads whose moments stay as they are."""
+    return replace(loads, dead=loads.dead + more) if kind == "dead" else replace(loads, live=loads.live + more)
 
 
 def moving_loads(
     entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path
-) -> tuple[np.ndarray, Callable[[int], np.ndarray]]:
+) -> tuple[np.ndarray, Callable[[int], solver.PointForces]]:
     """Find the load that moves.
 
     Parameters
@@ -135,7 +145,7 @@ def moving_loads(
     positions : (n,) array [m]
         Empty if no load moves.
     live : function of int
-        The live load (n_blocks, n_dof) [N, N·m] at a position, by its number.
+        The live load at a position, by its number.
 
     Raises
     ------
@@ -144,20 +154,19 @@ def moving_loads(
     """
     moving = next(((number, load) for number, load in enumerate(entries, start=1) if load.positions), None)
     if moving is None:
-        return np.zeros(0), lambda k: np.zeros((assembly.n_blocks, 3))
+        return np.zeros(0), lambda k: solver.PointForces.at(k, (), ())
     number, load = moving
 
-    def at(x: float) -> np.ndarray:
+    def at(x: float) -> solver.PointForces:
         if assembly.dimension == 2:
-            return solver.load_on_top(assembly, x, load.force)
-        return load_on_top_in_space(assembly, x, load.y or 0.0, load.force)
+            return solver.force_on_top(assembly, x, load.force)
+        return force_on_top_in_space(assembly, x, load.y or 0.0, load.force)
 
     for x in load.positions:
         try:
             at(x)
         except ValueError as error:
             raise ValueError(f"{source}: [loads {number}] positions: {error}") from None
-    # Made one at a time: each array is as long as the list of blocks.
     return np.array(load.positions), lambda k: at(load.positions[k])
 
 
@@ -168,7 +177,7 @@ def with_moving_load(
     places, live = moving_loads(entries, assembly, source)
     if x is None or len(places) == 0:
         return loads
-    return replace(loads, live=loads.live + live(int(np.argmin(np.abs(places - x)))))
+    return loads.with_forces(assembly, live(int(np.argmin(np.abs(places - x)))), "live")
 
 
 def _loaded(load: LoadCase, chosen: np.ndarray, assembly: solver.Assembly, where: str) -> list[int]:

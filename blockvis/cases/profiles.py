@@ -220,7 +220,8 @@ def with_profiles(
         For a support that a profile names and that is no moving support.
     """
     found = []
-    for k, settlement in enumerate(settlements):
+    for k, given in enumerate(settlements):
+        settlement = replace(given, blocks=given.blocks and pieces_named(given.blocks, assembly))
         profile = profiles[k] if k < len(profiles) else None
         where = f"{source}: [settlement{f' {k + 1}' if len(settlements) > 1 else ''}] profile"
         if assembly.dimension != 2 and (profile is not None or settlement.profile is not None):
@@ -282,6 +283,15 @@ def _bent_supports(assembly: solver.Assembly, profiles: Sequence[Profile | None]
     bending = [profile for profile in profiles if profile is not None]
     extents = {i: assembly.outline(i)[:, 0] for i in np.flatnonzero(assembly.moving).tolist()} if bending else {}
     return [i for i, x in extents.items() if any(p.bends(float(x.min()), float(x.max())) for p in bending)]
+
+
+def pieces_named(names: Sequence[str], assembly: solver.Assembly) -> tuple[str, ...]:
+    """Put the names of the pieces in the place of that of a support that :func:`cut_ground` has cut."""
+    found: list[str] = []
+    for name in names:
+        cut = [one for one in assembly.names if one.rpartition(" ")[0] == name and one.rpartition(" ")[2].isdigit()]
+        found += [name] if name in assembly.names or not cut else cut
+    return tuple(found)
 
 
 def _with_pieces(assembly: solver.Assembly, pieces: Mapping[int, Sequence[np.ndarray]]) -> solver.Assembly:

@@ -180,8 +180,10 @@ def toml_value(text: str) -> Any:
     (0.5, 0.5, [1, 0], 'auto')
     """
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        # Lines that follow would be keys of their own.
+        (value,) = tomllib.loads(f"value = {text}").values()
+        return value
+    except ValueError:
         plain = text.strip()
         # Numbers to everybody but TOML.
         return float(plain) if re.fullmatch(r"[+-]?(\d+\.|\.\d+)", plain) else plain

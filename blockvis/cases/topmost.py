@@ -11,8 +11,8 @@ import solver
 from .block_at import ON_EDGE
 
 
-def load_on_top_in_space(assembly: solver.Assembly, x: float, y: float, force: Sequence[float]) -> np.ndarray:
-    """Load the topmost surface at a place in plan with a force.
+def force_on_top_in_space(assembly: solver.Assembly, x: float, y: float, force: Sequence[float]) -> solver.PointForces:
+    """Put a force on the topmost surface at a place in plan.
 
     Parameters
     ----------
@@ -21,10 +21,6 @@ def load_on_top_in_space(assembly: solver.Assembly, x: float, y: float, force: S
     x, y : float [m]
         Of blocks that meet there at one height the one with the smallest x carries it.
     force : (3,) sequence [N]
-
-    Returns
-    -------
-    (n_blocks, 6) array [N, N·m]
 
     Raises
     ------
@@ -54,4 +50,4 @@ def load_on_top_in_space(assembly: solver.Assembly, x: float, y: float, force: S
     owner = int(meeting[np.lexsort(assembly.centroids[meeting].T[::-1])[0]])
     if not assembly.free[owner]:
         raise ValueError(f"the load at x = {x:g}, y = {y:g} m stands on the support '{assembly.names[owner]}'")
-    return solver.point_load(assembly, owner, force, point=(x, y, highest))
+    return solver.PointForces.at(owner, force, (x, y, highest))

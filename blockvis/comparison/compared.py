@@ -130,7 +130,8 @@ class Comparison:
         at : float [m or rad]
         """
         response = max(self.sides, key=lambda side: side.end).response
-        return f"{response.parameter.name} {parameter_text(at, response)}"
+        several = any(increment.phase for side in self.sides for increment in side.response.path)
+        return f"{response.parameter.name} {parameter_text(at, response)}{', all phases added' if several else ''}"
 
     def changed_keys(self) -> list[tuple[str, str, str]]:
         """List the keys of the cases whose values differ, with both."""

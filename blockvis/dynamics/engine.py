@@ -55,6 +55,7 @@ class Engine:
     assembly : solver.Assembly
         With the ground.
     loads : (n_blocks, n_dof) array [N, N·m]
+        At the pose.
     interfaces : solver.Interfaces
     pose : solver.Pose
     velocity : (n_blocks, n_dof) array [m/s, rad/s]
@@ -67,6 +68,8 @@ class Engine:
         Their lengths without force; nan for those that are absent or broken.
     tensions : (n_ties,) array, optional [N]
         Their forces at the start, which are only told; by default zero.
+    arms : (n_blocks, d, d) array, optional [N·m]
+        Of the loads that are forces at points, as in :class:`solver.Loads`.
 
     Attributes
     ----------
@@ -92,6 +95,7 @@ class Engine:
         ties: Sequence[solver.Tie] = (),
         rest: np.ndarray | None = None,
         tensions: np.ndarray | None = None,
+        arms: np.ndarray | None = None,
     ) -> None:
         self.removed = np.zeros(assembly.n_blocks, dtype=bool) if removed is None else removed
         self.assembly, self.interfaces, self.pose = assembly, replace(interfaces, scatter=None), pose
@@ -101,6 +105,10 @@ class Engine:
         is_place = np.arange(loads.shape[1]) < self.d
         self.scales = np.where(is_place, self.length, 1.0)
         self.loads = loads / (self.mass * solver.GRAVITY * np.where(is_place, 1.0, self.length))
+        self.arms = np.zeros((len(loads), self.d, self.d))
+        if arms is not None:
+            self.arms[: len(arms)] = arms / (self.mass * solver.GRAVITY * self.length)
+            self.loads = self.loads - mechanics.turned_moments(self.arms, pose)
         self.velocity = np.where(self.free[:, None], velocity * self.unit / self.scales, 0.0)
         moments, self.drawn_axes = principal_inertia(assembly)
         masses = np.repeat(assembly.masses[:, None], self.d, axis=1)
@@ -137,6 +145,7 @@ class Engine:
     def energies(self) -> np.ndarray:
         """(n_blocks,) array [J]: potential and kinetic energy of the free blocks, and of what holds on to them."""
         height = (self.loads[:, : self.d] * self.pose.positions).sum(axis=1) / self.length
+        height += np.trace(mechanics.rotation_matrices(self.pose.rotations) @ self.arms, axis1=1, axis2=2)
         kinetic = self._kinetic(self.velocity, axes_at(self.pose, self.drawn_axes))
         energies = kinetic - height
         if self.ties:
@@ -282,7 +291,8 @@ class Engine:
         axes: np.ndarray,
     ) -> mechanics.ContactProblem:
         """State the program of a step, linearised where contact points are measured."""
-        matrix, loads = mechanics.wrench_matrix(measured, pose, self.length), self.loads
+        matrix = mechanics.wrench_matrix(measured, pose, self.length)
+        loads = self.loads + mechanics.turned_moments(self.arms, pose)
         if self.d == 3:
             each = matrix.data.reshape(len(start), 3, 12)
             for block, first in ((start.block_a, 3), (start.block_b, 9)):

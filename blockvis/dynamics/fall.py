@@ -24,6 +24,9 @@ CAPTION = "fall: rigid-body dynamics, restitution 0"
 #: Poses kept per second, and seconds after which the fall is cut off.
 RATE, LONGEST = 25, 4.0
 
+#: Blocks whose √(size / g) is shorter than this part of a pose, of less than 2 μm, have fallen before the first.
+BRIEFEST = 0.01
+
 #: The first push: speed of the fastest block, in sqrt(g × block size). Where everything stands after it, it is doubled,
 #: up to so many times.
 PUSH, DOUBLINGS = 0.05, 5
@@ -151,6 +154,8 @@ def fall_of(
 def may_fall(response: solver.Response) -> bool:
     """Whether a structure has collapsed along a path, so that its fall can be followed."""
     collapse = response.collapse
+    if np.sqrt(response.assembly.block_size / solver.GRAVITY) < BRIEFEST / RATE:
+        return False
     collapsed = response.stop == solver.Status.COLLAPSED and response.parameter.is_path and not response.limits
     return collapsed and collapse is not None and bool(response.path) and bool(collapse.mechanism.any())
 
@@ -222,7 +227,8 @@ def engine_of(response: solver.Response, push: float) -> tuple[Engine, float]:
     removed, tied = np.append(end.removed, False), response.path[-1].ties
     gone = np.isin(tied.states, (mechanics.ABSENT, mechanics.BROKEN))
     rest, ties = np.where(gone, np.nan, tied.rest), response.ties
-    return Engine(whole, loads, response.interfaces, pose, velocity, removed, ties, rest, tied.forces), ground
+    arms = response.loads_at(end).dead_arms
+    return Engine(whole, loads, response.interfaces, pose, velocity, removed, ties, rest, tied.forces, arms), ground
 
 
 def falling_increment(response: solver.Response, fall: Fall, time: float) -> solver.Increment:

@@ -197,7 +197,8 @@ def ordered(
     x = moving.centroids[:, :-1] @ (1.0, 0.5)[: moving.dimension - 1]
     middle, half = (x.max() + x.min()) / 2.0, max(float(np.ptp(x)) / 2.0, 1e-300)
     heavier = 1.0 + LEANING * variant.heavier_side * (x - middle) / half
-    loads = replace(loads, dead=loads.dead * heavier[:, None])
+    arms = None if loads.dead_arms is None else loads.dead_arms * heavier[:, None, None]
+    loads = replace(loads, dead=loads.dead * heavier[:, None], dead_arms=arms)
     given = RunInput(varied, moving, case_interfaces(varied), loads, ties=case_ties(case, moving))
     return Order(given, reach[1])
 

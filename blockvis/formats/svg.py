@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
@@ -546,6 +546,7 @@ def write(layout: Layout, path: Path) -> None:
                 f'stroke-width="{0.1 * margin:.4g}">'
             )
         points = " L ".join(f"{float(x)!r},{-float(y)!r}" for x, y in layout.outlines[i])
-        title = row["name"].replace("&", "&amp;").replace("<", "&lt;")
+        # XML has no place for control characters; the row has the name as it is.
+        title = escape(re.sub(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]", "", row["name"]))
         lines.append(f'<path d="M {points} Z" data-blockvis={quoteattr(json.dumps(row))}><title>{title}</title></path>')
     path.write_text("\n".join([*lines, "</g>", "</svg>", ""]), encoding="utf-8")

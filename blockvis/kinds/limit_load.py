@@ -152,6 +152,11 @@ class LimitLoadKind(AnalysisKind):
         needs_live_load(case)
         if case.settlements:
             needs_no_crushing(case, " after a settlement")
+        elif case.controls.increments == mechanics.INCREMENTS[1]:
+            raise ValueError(
+                f'{case.source}: [analysis] increments = "{case.controls.increments}" is of settlements, and the case '
+                "has none; leave it out"
+            )
         settings: LimitLoadSettings = case.settings
         if settings.displacement is not None and not case.settlements:
             raise _displacement_without_settlement(case)
@@ -298,7 +303,8 @@ class LimitLoadKind(AnalysisKind):
             return response.message or f"Limit load: {response.stop}"
         where = ""
         if len(response.path) > 1:
-            where = f" at {response.parameter.name} {state.parameter:.5g} {response.parameter.unit}"
+            place = f"{unit_in(response, state.phase)}{in_phase(response, state.phase)}"
+            where = f" at {response.parameter.name} {state.parameter:.5g} {place}"
         return f"Limit load: α = {state.load_multiplier:.5g}{where}"
 
     def rows(self, response: solver.Response) -> list[tuple[str, str]]:
@@ -435,7 +441,7 @@ def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, foun
 def _over_places(
     run: AnalysisRun,
     places: np.ndarray,
-    live: Callable[[int], np.ndarray],
+    live: Callable[[int], solver.PointForces],
     resume: LimitLoadCheckpoint | None,
     found: Sequence[solver.Increment],
 ) -> Steps:
@@ -458,7 +464,7 @@ def _over_places(
             # The dead load alone has no equilibrium: nor has it with the live load elsewhere.
             break
         else:
-            loads = replace(standing, live=standing.live + live(number))
+            loads = standing.with_forces(run.given.assembly, live(number), "live")
             state = replace(_limit_state(run, loads, pose, None, programs, ties, bonds), parameter=float(x))
             if number == 0 and (words := _closing_words(run)):
                 state = replace(state, notes=(*state.notes, words))
@@ -469,7 +475,7 @@ def _over_places(
         if number >= len(found):
             yield replace(state, checkpoint=_checkpoint(run, pose=pose, ties=ties, bonds=bonds))
     # A load that moves is kept at the place that governs.
-    run.given = replace(run.given, loads=replace(standing, live=standing.live + live(chosen)))
+    run.given = replace(run.given, loads=standing.with_forces(run.given.assembly, live(chosen), "live"))
     assert shown is not None
     yield from _swinging(run.given.assembly, shown)
     ending = _limit_ending(run.limits[chosen])

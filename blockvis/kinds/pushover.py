@@ -127,6 +127,7 @@ class PushoverKind(AnalysisKind):
             for name, i in (("first", path[0]), ("largest", largest), ("last", path[-1])):
                 # Moments have no resultant.
                 load = f", live load {i.reaction:.6g} N = {i.reaction / weight:.6f} W" if i.reaction else ""
+                load += ", the largest of the told increments" if name == "largest" else ""
                 name = f"{name} multiplier"
                 lines.append(f"{name:<21}{i.load_multiplier:12.6g}     at {i.parameter:.6g} m{load}")
         if response.collapse is not None:
@@ -154,7 +155,7 @@ class PushoverKind(AnalysisKind):
         if response.path:
             values = response.values
             rows.append(("load multiplier α at the start", f"{values[0]:.6g}"))
-            rows.append(("largest, last", f"{np.nanmax(values):.6g}, {values[-1]:.6g}"))
+            rows.append(("largest of the told increments, last", f"{np.nanmax(values):.6g}, {values[-1]:.6g}"))
         return rows
 
 

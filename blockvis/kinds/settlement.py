@@ -18,7 +18,6 @@ from blockvis.results.about import (
     in_phase,
     least_reaction,
     loss_of,
-    losses_in_phases,
     mechanism_text,
     unit_in,
 )
@@ -102,14 +101,7 @@ class SettlementKind(AnalysisKind):
         """Complete the response by the settlements of the summary."""
         course = settlement_course(stored_settlements(summary))
         response = super().restored(response, summary)
-        response = replace(
-            response, settlements=course.settlements, parameter=course.parameter, measured=course.measured
-        )
-        phase = collapse_phase(response)
-        if response.collapse is None or phase is None:
-            return response
-        # Stored is the unit of the last settlement, which may turn where the one before moves.
-        return replace(response, collapse=replace(response.collapse, unit=unit_in(response, phase)))
+        return replace(response, settlements=course.settlements, parameter=course.parameter, measured=course.measured)
 
     def lines(self, response: solver.Response) -> list[str]:
         """Give the first and last reaction, and the settlement at collapse."""
@@ -194,11 +186,11 @@ class SettlementKind(AnalysisKind):
 def losses_of(response: solver.Response) -> list[str]:
     """Say where blocks left for good while the structure stood, which, and what they weigh."""
     said = []
-    for phase, loss in losses_in_phases(response):
+    for loss in response.losses:
         names, more = ", ".join(loss.blocks[:4]), len(loss.blocks) - 4
         names += f" and {more} more" if more > 0 else ""
         weight = f"{force_text(loss.weight)}, {100.0 * loss.share:.2g} % of the weight"
-        place = f"{loss.settlement:.6g} {unit_in(response, phase)}{in_phase(response, phase)}"
+        place = f"{loss.settlement:.6g} {unit_in(response, loss.phase)}{in_phase(response, loss.phase)}"
         said.append(f"{names} at {place}, {weight}; the structure stands without")
     return said
 

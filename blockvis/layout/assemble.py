@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.text import nearest
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -206,9 +207,9 @@ def supports_of(supports: Sequence[Mapping[str, Any]], dimension: int) -> Layout
     for name, support in zip(names, supports, strict=True):
         strange = sorted(set(support) - known)
         if strange:
+            where, hint = "in space" if in_space else "in the plane", nearest(strange[0], sorted(known))
             raise ValueError(
-                f"support '{name}' has the key '{strange[0]}'; {'in space ' if in_space else ''}its keys are "
-                f"{', '.join(sorted(known))}"
+                f"support '{name}' has the key '{strange[0]}', which no support {where} has{hint}; leave it out"
             )
         outline = _outline_of(support, name)
         blocks.append(prism(outline, *_levels_of(support, name)) if in_space else outline)

@@ -84,7 +84,7 @@ def draw_still(
         For a view or a section of blocks in the plane, and a plane that misses the blocks.
     """
     _check_response(response)
-    chosen = response.increments[increment] if isinstance(increment, int) else increment
+    chosen = increment if isinstance(increment, solver.Increment) else response.increments[increment]
     look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
     drawer = Drawer(response, look, size, (chosen,), curve=curve, underlay=underlay, still=True)
     return _save(drawer.picture(chosen, widths=True), path)

@@ -6,7 +6,7 @@ import contextlib
 import json
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import solver
@@ -113,37 +113,6 @@ def collapse_phase(response: solver.Response) -> int | None:
         return falling or 0
     # What falls as soon as a phase begins has its last equilibrium at the end of the one before.
     return path[-1].phase + int(collapse.bracket[1] < path[-1].parameter)
-
-
-def losses_in_phases(response: solver.Response) -> list[tuple[int, solver.LocalLoss]]:
-    """List the blocks that left for good while the structure stood, with the number of the settlement, from 0.
-
-    Parameters
-    ----------
-    response : solver.Response
-
-    Returns
-    -------
-    list of (int, solver.LocalLoss)
-        In the order in which they fell.
-    """
-    losses, found = response.losses, []
-    if len(response.settlements) < 2:
-        return [(0, loss) for loss in losses]
-    ends = {increment.phase: increment for increment in response.path} if losses else {}
-    gone = {phase: end.fallen for phase, end in ends.items()}
-    assembly = response.assembly
-    for loss in losses:
-        blocks = [assembly.index(name) for name in loss.blocks]
-        phases = [next(phase for phase, fallen in gone.items() if fallen[block]) for block in blocks]
-        # Settlements count from the beginning of each phase: the same number may be that of two.
-        for phase in sorted(set(phases)):
-            own = [block for block, there in zip(blocks, phases, strict=True) if there == phase]
-            weight = float(assembly.masses[own].sum() * solver.GRAVITY)
-            names = tuple(assembly.names[block] for block in own)
-            share = weight / response.total_weight
-            found.append((phase, replace(loss, blocks=names, weight=weight, share=share)))
-    return sorted(found, key=lambda one: (one[0], one[1].settlement))
 
 
 def certified(response: solver.Response) -> tuple[solver.Increment, ...]:

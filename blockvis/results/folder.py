@@ -20,6 +20,7 @@ from blockvis.system.atomic_files import PARTIAL, WINDOWS, flush, make_folder, r
 from solver import mechanics
 
 from .cracks import MOST_LISTED, cracks_of
+from .fall_files import remove_fall
 from .increments import StoredIncrements, packed_increment
 from .joints import LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
@@ -137,6 +138,7 @@ class ResultsFolder:
         # Lists of files go first, so that none ever names a file that is gone.
         for name in (*_LISTS, *_PICTURES, *_STARTED):
             (self.path / name).unlink(missing_ok=True)
+        remove_fall(self.path)
         self._remove_from(0)
         write_atomic(self.path / "assembly.npz", compressed(flat(assembly)))
         write_ties(self.path, self.ties)
@@ -187,6 +189,7 @@ class ResultsFolder:
             except (ValueError, KeyError, OSError) as error:
                 raise ValueError(f"'{results.path}' cannot go on ({error}); run the case again with --force") from None
         (results.path / "summary.json").unlink(missing_ok=True)
+        remove_fall(results.path)
         results._start_table()
         for number, increment in enumerate(results.increments):
             results._add_row(number, increment)

@@ -13,7 +13,7 @@ import numpy as np
 import solver
 from solver import mechanics
 
-from .about import collapse_mechanism, collapse_phase, least_reaction, loss_of, losses_in_phases, mechanism_text
+from .about import collapse_mechanism, collapse_phase, least_reaction, loss_of, mechanism_text
 from .record import Record
 
 #: Measures of the certificate of an increment.
@@ -75,7 +75,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "mechanism": mechanism_text(response) if collapse else None,
         **_joint_counts(response),
         **_loss(response),
-        "losses": [{**asdict(loss), "phase": phase + 1} for phase, loss in losses_in_phases(response)],
+        "losses": [{**asdict(loss), "phase": loss.phase + 1} for loss in response.losses],
         "removed": _removed(response),
         "analysis": response.analysis,
         "parameter": response.parameter.name,
@@ -107,16 +107,18 @@ def _initial_reaction(response: solver.Response) -> float | None:
 
 
 def _removed(response: solver.Response) -> list[dict[str, Any]]:
-    """Blocks that are taken away before each settlement, its number from 1, and their weight."""
+    """Blocks and ties that are taken away before each settlement, its number from 1, and the blocks' weight."""
     names, weights = response.assembly.names, response.assembly.masses * solver.GRAVITY
+    blocks = [np.flatnonzero(() if change.removed is None else change.removed) for change in response.changes]
     return [
         {
             "phase": change.phase + 1,
-            "blocks": [names[k] for k in np.flatnonzero(change.removed)],
-            "weight": float(weights[change.removed].sum()),
+            "blocks": [names[k] for k in taken],
+            "ties": list(change.ties),
+            "weight": float(weights[taken].sum()),
         }
-        for change in response.changes
-        if change.removed is not None
+        for change, taken in zip(response.changes, blocks, strict=True)
+        if len(taken) or change.ties
     ]
 
 

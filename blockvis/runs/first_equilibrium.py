@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,9 +70,9 @@ def first_equilibrium(case: Case, assembly: solver.Assembly) -> FirstEquilibrium
         found = f"it stands: first equilibrium found in {seconds:.1f} s"
         return FirstEquilibrium(True, "; ".join(first.notes) or found)
     message = "no first equilibrium was found" if ending is None else ending.message
-    cause = _cause(case, assembly) if seconds < PATIENCE else ""
-    says = f"{message.partition(';')[0]}; {cause}" if cause else message
     falling = [] if first is None else mechanics.falling_blocks(assembly, first.velocity).tolist()
+    cause = _cause(case, assembly, falling) if seconds < PATIENCE else ""
+    says = f"{message.partition(';')[0]}; {cause}" if cause else message
     return FirstEquilibrium(False, says, tuple(falling))
 
 
@@ -87,23 +88,26 @@ def _first_of(case: Case, assembly: solver.Assembly) -> tuple[solver.Increment |
     return first, None
 
 
-def _cause(case: Case, assembly: solver.Assembly) -> str:
+def _cause(case: Case, assembly: solver.Assembly, falling: Sequence[int]) -> str:
     """Say why blocks fall: they touch nothing that stands, they slide, or they tip."""
     contacts = mechanics.find_contacts(assembly, assembly.vertices, AS_DRAWN * assembly.block_size)
     part = linked(contacts.block_a, contacts.block_b, assembly.n_blocks)
     loose = np.flatnonzero(assembly.free & ~np.isin(part, part[~assembly.free]))
     if len(loose):
-        shown = ", ".join(f"'{assembly.names[i]}'" for i in loose[:6].tolist()) + (" ..." if len(loose) > 6 else "")
+        others = "; the others fall for another reason, told once these stand" if set(falling) - set(loose) else ""
         return (
-            f"{len(loose)} of them touch nothing that stands ({shown}): give them a support, leave them out (ignore), "
-            "or close the gaps (joint_thickness)"
+            f"{len(loose)} of them touch nothing that stands ({assembly.listed(loose, 6)}): give them a support, leave "
+            f"them out (ignore), or close the gaps (joint_thickness){others}"
         )
     first, ending = _first_of(replace(case, friction_coefficient=ROUGH, interfaces={}), assembly)
     if ending is None and first is not None and first.status != solver.Status.FALLING:
         return (
             f"they slide: with more friction than {case.friction_coefficient:g}, or their gaps closed, they would stand"
         )
+    still = np.array(falling if first is None else mechanics.falling_blocks(assembly, first.velocity))
+    some = bool(set(falling) - set(still))
+    who = f"{len(still)} of them ({assembly.listed(still, 6)})" if some else "they"
     return (
-        "they tip or drop whatever the friction is: look for gaps below them, a missing stone or a missing support; "
-        "what overhangs needs a tie, a prop or a support"
+        f"{who} tip or drop whatever the friction is: look for gaps below them, a missing stone or a missing support; "
+        "what overhangs needs a tie, a prop or a support" + "; the others slide, or fall with these" * some
     )

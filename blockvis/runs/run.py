@@ -18,7 +18,6 @@ from blockvis.cases.contents import Case
 from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kind import AnalysisRun
 from blockvis.kinds.kinds import KINDS
-from blockvis.results.fall_files import remove_fall
 from blockvis.results.folder import RESULTS, ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
 from blockvis.results.viewer_files import restore_grids, write_end
@@ -138,7 +137,6 @@ def run_case(
             )
         except OSError as error:
             raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
-        remove_fall(folder)
         limit = case.increment_seconds if increment_seconds is None else increment_seconds
         return _followed(case, results, run, outputs, clock, limit)
 
@@ -196,8 +194,10 @@ def resume_run(
     kind = KINDS[case.analysis]
     with _begun(case, outputs):
         parameter, vtu = kind.course(case).parameter, viewer_format(case)
-        results, checkpoint = ResultsFolder.reopened(folder, parameter, kind.checkpoint, vtu)
-        remove_fall(folder)
+        try:
+            results, checkpoint = ResultsFolder.reopened(folder, parameter, kind.checkpoint, vtu)
+        except OSError as error:
+            raise _write_error(folder, error) from None
         run = planned(case, results.assembly, checkpoint, tuple(results.increments), results.ties)
         return _followed(case, results, run, outputs, Clock(), increment_seconds)
 

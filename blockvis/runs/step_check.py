@@ -14,6 +14,7 @@ import numpy as np
 import solver
 from blockvis.case_files.read import parse_case
 from blockvis.cases.contents import Case
+from blockvis.results.about import unit_in
 from blockvis.results.folder import STEP_CHECK, add_to_summary
 from blockvis.results.record import read_record
 from blockvis.system.atomic_files import write_atomic
@@ -59,6 +60,8 @@ class StepCheck:
         Largest distance between the two places of a block at the same parameter.
     stop, stop_of_check : str
         How the run and the other ended.
+    phase : int, optional
+        Number of the settlement, from 1, within which ``at`` counts, where there are several.
     """
 
     what: str
@@ -69,6 +72,7 @@ class StepCheck:
     position: float
     stop: str
     stop_of_check: str
+    phase: int | None = None
 
     @property
     def step_error(self) -> dict[str, float | None]:
@@ -88,7 +92,9 @@ class StepCheck:
         """Say it in a line."""
         error = self.step_error
         # Where it is too small to be told rounding decides where it is largest.
-        where = f" (at {self.at:.4g} {self.unit})" if ERROR_OVER_DIFFERENCE * self.difference >= SMALLEST else ""
+        phase = "" if self.phase is None else f" in phase {self.phase}"
+        told = ERROR_OVER_DIFFERENCE * self.difference >= SMALLEST
+        where = f" (at {self.at:.4g} {self.unit}{phase})" if told else ""
         parts = [f"{self.what} {_percent(error['reaction'])}{where}"]
         if error["collapse"] is not None:
             parts.append(f"collapse {_percent(error['collapse'])}")
@@ -209,7 +215,7 @@ def stored_check(folder: Path) -> StepCheck | None:
     if not (folder / STEP_CHECK).is_file():
         return None
     numbers = json.loads((folder / STEP_CHECK).read_text(encoding="utf-8"))
-    known = {field.name: numbers[field.name] for field in fields(StepCheck)}
+    known = {field.name: numbers[field.name] for field in fields(StepCheck) if field.name in numbers}
     return StepCheck(**{**known, "collapse": np.nan if known["collapse"] is None else known["collapse"]})
 
 
@@ -253,14 +259,16 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
     apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), first), np.finfo(float).tiny)
     moved = np.linalg.norm(ours.positions[mine] - other.positions[theirs], axis=2)
     ends = [np.nan if path.collapse is None else path.collapse for path in (ours, other)]
-    driver = response.settlements[-1] if response.control is None and response.settlements else None
+    worst = mine[np.argmax(apart)] if apart.any() else None
+    phase = 0 if worst is None else int(ours.phases[worst])
     return StepCheck(
         what=response.measured.name,
         difference=float(apart.max(initial=0.0)),
-        at=float(ours.parameters[mine[np.argmax(apart)]]) if apart.any() else 0.0,
-        unit=response.parameter.unit if driver is None else driver.unit,
+        at=0.0 if worst is None else float(ours.parameters[worst]),
+        unit=unit_in(response, phase),
         collapse=abs(ends[1] - ends[0]) / ends[0] if ends[0] > 0.0 else np.nan,
         position=float(moved.max(initial=0.0)),
         stop=ours.stop,
         stop_of_check=other.stop,
+        phase=phase + 1 if len(response.settlements) > 1 else None,
     )

@@ -44,9 +44,8 @@ def has_failed(row: Mapping[str, Any]) -> bool:
 
 
 def finished_runs(folder: str | Path) -> int:
-    """Count the finished runs in the folder of a study."""
-    file = Path(folder) / RUNS
-    return file.read_bytes().count(b"\n") if file.is_file() else 0
+    """Count the finished runs in the folder of a study; one that was made again has several lines."""
+    return len(_rows(Path(folder) / RUNS)[0])
 
 
 class StudyFolder:
@@ -184,19 +183,9 @@ class StudyFolder:
         write_atomic(self.folder / "summary.json", _json({**summary, **finished}))
 
     def _stored(self) -> dict[int, dict[str, Any]]:
-        """Read the rows on the disk; a broken line counts as a run that was never made."""
-        file, rows = self.folder / RUNS, {}
-        lines = file.read_bytes().split(b"\n") if file.is_file() else [b""]
-        # The last line is complete if it ends with a line feed; a study killed while writing leaves part of a line.
-        self._whole = not lines[-1]
-        for line in lines:
-            try:
-                row = json.loads(line)
-            except ValueError:
-                continue
-            if isinstance(row, dict) and isinstance(row.get("run"), int) and 0 <= row["run"] < self.study.n_runs:
-                rows[row["run"]] = row
-        return rows
+        """Read the rows on the disk, of runs that the study has."""
+        rows, self._whole = _rows(self.folder / RUNS)
+        return {run: row for run, row in rows.items() if 0 <= run < self.study.n_runs}
 
     def _clear(self) -> None:
         """Remove the files that a study writes, and nothing else."""
@@ -210,6 +199,21 @@ class StudyFolder:
 
 #: The pictures of a study.
 PICTURES = ("fragility", "sensitivity", "scatter", "mechanisms")
+
+
+def _rows(file: Path) -> tuple[dict[int, dict[str, Any]], bool]:
+    """Read the last row of each run, and whether the last line is whole; a broken one is that of no run."""
+    rows = {}
+    lines = file.read_bytes().split(b"\n") if file.is_file() else [b""]
+    for line in lines:
+        try:
+            row = json.loads(line)
+        except ValueError:
+            continue
+        if isinstance(row, dict) and isinstance(row.get("run"), int):
+            rows[row["run"]] = row
+    # It ends with a line feed; a study killed while writing leaves part of a line.
+    return rows, not lines[-1]
 
 
 def _plain(value: Any) -> Any:

@@ -71,11 +71,12 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     curve = fragility_of(independent_rows(study, table))
     units = [u for u in table["unit"].unique().tolist() if u]
     failed = table[table["status"].isin(NO_RESULT)]
+    collapsed = table["status"] == str(solver.Status.COLLAPSED)
     return {
         "n_runs": study.n_runs,
         "n_finished": len(table),
-        "n_collapsed": int((table["status"] == str(solver.Status.COLLAPSED)).sum()),
-        "n_local": int((table["falling_share"] < LOCAL).sum()),
+        "n_collapsed": int(collapsed.sum()),
+        "n_local": int((collapsed & (table["falling_share"] < LOCAL)).sum()),
         "n_never_stood": int((table["status"] == str(solver.Status.NO_INITIAL_EQUILIBRIUM)).sum()),
         "n_stood": curve.n_stood,
         "n_without_result": len(failed),

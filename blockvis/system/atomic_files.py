@@ -58,7 +58,9 @@ def atomic_file(path: str | os.PathLike[str], *, last: bool = True, durable: boo
         if durable:
             flush(partial)
         _move(partial, path)
-    except BaseException:
+    except BaseException as error:
+        if isinstance(error, OSError) and error.filename == str(partial):
+            error.filename = str(path)
         remove(partial)
         raise
     if last and durable:
@@ -68,9 +70,12 @@ def atomic_file(path: str | os.PathLike[str], *, last: bool = True, durable: boo
 def write_atomic(
     path: str | os.PathLike[str], content: str | bytes, *, last: bool = True, durable: bool = True
 ) -> Path:
-    """Write a text in UTF-8, or bytes, whole or not at all; see :func:`atomic_file`."""
+    """Write a text in UTF-8, or bytes, whole or not at all; see :func:`atomic_file`.
+
+    What UTF-8 cannot hold, such as parts of a path in another encoding, is written with backslashes, as JSON reads it.
+    """
     with atomic_file(path, last=last, durable=durable) as partial:
-        partial.write_bytes(content.encode() if isinstance(content, str) else content)
+        partial.write_bytes(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
     return Path(path)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from solver.assembly import Assembly, check_blocks, find_contacts
+from solver.assembly import FIXED, Assembly, check_blocks, find_contacts
 from solver.contact_step.balance import nearest_equilibrium
 from solver.contact_step.problem import NotSolved
 from solver.contact_step.stiffness import ContactRows
@@ -33,6 +33,7 @@ from solver.ties import (
     Tie,
     TieForces,
     check_ties,
+    held_ties,
     is_member,
     member_contacts,
     plastic_forces,
@@ -41,6 +42,7 @@ from solver.ties import (
     tie_lengths,
 )
 from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
+from solver.words import counted
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25
@@ -77,6 +79,7 @@ def find_limit_load(
     ties: Sequence[Tie] = (),
     ties_at: TieForces | None = None,
     bonds_at: Bonds | None = None,
+    fallen: np.ndarray | None = None,
 ) -> LimitLoad:
     """The limit load of a structure; parameters as those of :meth:`solver.Structure.limit_load`.
 
@@ -97,6 +100,8 @@ def find_limit_load(
     -τ A ≤ N ≤ σ A with the tensile strength τ. A face of two corners thus carries moments up to σ A b / 2 with all of
     its force at the ends: more than the stress block of a continuous face, so that crushing at a toe is found later
     than it comes. What crushes moves by the same flow rule.
+
+    Blocks that have left the structure are out of it, with their loads, contact points and ties.
 
     At the pose of an increment its bonds say what is closed: gaps count from those at which elastic joints have no
     force, and points with tension left hold at any gap, as in the bounds of a path. The give that the forces of the
@@ -129,16 +134,20 @@ def find_limit_load(
     check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
     if pose is not None and bonds_at is None:
         interfaces.refuse_pose_alone()
-    loads = checked_live(assembly, loads)
+    left = remaining(assembly, fallen)
+    loads = checked_live(left, loads)
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
-    loads = replace(loads, dead=loads.dead_at(assembly, pose), fills=())
-    if not (np.isfinite(displacement) and displacement >= 0.0):
-        raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
+    loads = replace(loads, dead=loads.dead_at(assembly, pose), live=loads.live_at(pose))
+    for name, value in (("displacement", displacement), ("closed_gap", closed_gap)):
+        if not (np.isfinite(value) and value >= 0.0):
+            raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
+    gone = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else np.asarray(fallen)
     states = np.full(len(ties), ELASTIC) if ties_at is None else ties_at.states
+    states = np.where(held_ties(ties, gone), states, ABSENT)
     problem = _Problem(
-        assembly, interfaces, loads, pose, closed_gap, displacement, torsion, tuple(ties), states, bonds_at
+        left, interfaces, loads, pose, closed_gap, displacement, torsion, tuple(ties), states, bonds_at, gone
     )
     balanced, status = problem.balanced(with_live=False), LimitStatus.FOUND
     if balanced.falls:
@@ -202,14 +211,15 @@ class _Problem:
         ties: tuple[Tie, ...],
         tie_states: np.ndarray,
         bonds: Bonds | None,
+        gone: np.ndarray,
     ) -> None:
-        self.assembly, self.pose, self.ties, self.tie_states = assembly, pose, ties, tie_states
+        self.assembly, self.pose, self.ties, self.tie_states, self.gone = assembly, pose, ties, tie_states, gone
         self.length, free, d = assembly.block_size, assembly.free, assembly.dimension
         reach = max(closed_gap, REACH * self.length) if displacement > 0.0 else closed_gap
         vertices = moved_vertices(assembly, pose)
-        contacts = find_contacts(assembly, vertices, reach)
+        contacts = self._found(vertices, reach)
         dry = interfaces.dry and bonds is None
-        around = contacts if dry else find_contacts(assembly, vertices, max(reach, REACH * self.length))
+        around = contacts if dry else self._found(vertices, max(reach, REACH * self.length))
         bonded = None if bonds is None else bonds.of(around)
         contacts, areas = (contacts, None) if bonded is None else (around, bonded.areas * bonded.left)
         cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around, areas)
@@ -256,6 +266,11 @@ class _Problem:
         if displacement > 0.0:
             total = float(np.linalg.norm(live[:, :d], axis=1).sum() + np.linalg.norm(live[:, d:], axis=1).sum())
             self.price = np.where(is_open, gaps, 0.0) / displacement * (size / total)
+
+    def _found(self, vertices: np.ndarray, reach: float) -> Contacts:
+        """Contact points of the blocks that are there, with gaps up to a reach [m]."""
+        found = find_contacts(self.assembly, vertices, reach)
+        return found[~(self.gone[found.block_a] | self.gone[found.block_b])]
 
     @property
     def admissible(self) -> Admissible:
@@ -429,6 +444,7 @@ class _Problem:
             friction=self.friction[between],
             velocity=mechanism,
             support_forces=np.where(self.assembly.free[:, None], 0.0, on_blocks),
+            fell_at=np.where(self.gone, -np.inf, np.nan) if self.gone.any() else np.zeros(0),
             ties=plastic_forces(self.ties, self.assembly, self.pose, self.contacts, forces, self.tie_states),
         )
 
@@ -456,6 +472,15 @@ def _beyond_give(
     # Give of elastic joints is neither a gap nor a penetration.
     gives = (stiffness > 0.0) & np.isfinite(stiffness) & (holds | (gaps < 0.0))
     return np.where(gives, 0.0, gaps)
+
+
+def remaining(assembly: Assembly, fallen: np.ndarray | None) -> Assembly:
+    """The assembly with blocks that have left, (n_blocks,) bool array, no longer free."""
+    if fallen is None:
+        return assembly
+    if np.shape(fallen) != (assembly.n_blocks,) or np.asarray(fallen).dtype != bool:
+        raise ValueError(f"fallen is {fallen!r}; give a bool for each of the {counted(assembly.n_blocks, 'block')}")
+    return assembly.with_roles(np.where(fallen, FIXED, assembly.roles))
 
 
 def checked_live(assembly: Assembly, loads: Loads) -> Loads:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
 
 from solver.assembly import Assembly, check_blocks
 from solver.interfaces import Interfaces
@@ -10,6 +14,7 @@ from solver.kinematics import Pose
 from solver.loads import Loads
 from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
 from solver.path.drivers import ControlDisplacement, ControlledLoad
+from solver.path.local_origin import at_origin, in_global_coordinates, without_origin
 from solver.path.path import Path
 from solver.path.state import PathState
 from solver.programs.problem import SolveError
@@ -18,7 +23,7 @@ from solver.ties import Tie, TieForces, check_ties
 from solver.words import counted
 
 from .increments import Increments, TimedIncrements
-from .limit_load import checked_live
+from .limit_load import checked_live, remaining
 from .settlement import model_of
 
 
@@ -33,6 +38,7 @@ def pushover_increments(
     ties: Sequence[Tie] = (),
     ties_at: TieForces | None = None,
     bonds_at: Bonds | None = None,
+    fallen: np.ndarray | None = None,
     resume: PathState | None = None,
     on_step: Callable[[PathState], None] | None = None,
 ) -> Increments:
@@ -44,6 +50,8 @@ def pushover_increments(
         Of the increment that the pose is from; new ones by default.
     bonds_at : Bonds, optional
         Of that increment: the strength that joints have left; joints that have some need it.
+    fallen : (n_blocks,) bool array, optional
+        Of that increment: blocks that have left the structure.
     resume : PathState, optional
         Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
         for bit as if the loop had not been interrupted. ``pose`` is not looked at then.
@@ -63,29 +71,45 @@ def pushover_increments(
                 "joints have cohesion, of which a pose does not tell what is left; give bonds_at, the bonds of the "
                 "increment that the pose is from"
             )
-    loads = checked_live(assembly, loads)
-    if not assembly.free[assembly.index(control.block)]:
-        raise ValueError(f"control block '{control.block}' is a support; name a free block")
+    left = remaining(assembly, fallen)
+    loads = checked_live(left, loads)
+    if not left.free[assembly.index(control.block)]:
+        what = "has left the structure" if assembly.free[assembly.index(control.block)] else "is a support"
+        raise ValueError(f"control block '{control.block}' {what}; name a free block")
     if resume is not None and len(resume.place.pose.rotations) != assembly.n_blocks:
         raise ValueError(
             f"the checkpoint has {counted(len(resume.place.pose.rotations), 'block')}, the assembly "
             f"{assembly.n_blocks}: it belongs to another run"
         )
-    check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
-    model = model_of(assembly, loads, interfaces, controls, loads.live, tuple(ties))
-    start = Pose.initial(assembly) if pose is None else pose
+    # There are no settlements that a tie could wait for.
+    ties = tuple(replace(tie, phase=1) for tie in ties)
+    check_ties(ties, assembly, 1)
+    origin, near = at_origin(assembly), assembly
+    if origin.any():
+        near, _, ties = without_origin(origin, assembly, (), ties)
+        loads = replace(loads, fills=tuple(fill.shifted(-origin) for fill in loads.fills))
+        if control.point is not None:
+            control = replace(control, point=tuple((np.asarray(control.point) - origin).tolist()))
+    start = Pose.initial(near) if pose is None else Pose(pose.positions - origin, pose.rotations)
     if resume is not None:
         start = resume.start
-    path = Path(model, ControlledLoad(assembly, control, start), 0, controls, on_step)
-    return TimedIncrements(_increments(path, start, ties_at, bonds_at, resume))
+    model = model_of(near, loads, interfaces, controls, loads.live, ties)
+    path = Path(model, ControlledLoad(near, control, start), 0, controls, on_step)
+    steps = _increments(path, start, ties_at, bonds_at, fallen, resume)
+    return TimedIncrements(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
 
 
 def _increments(
-    path: Path, start: Pose, ties_at: TieForces | None, bonds_at: Bonds | None, resume: PathState | None
+    path: Path,
+    start: Pose,
+    ties_at: TieForces | None,
+    bonds_at: Bonds | None,
+    fallen: np.ndarray | None,
+    resume: PathState | None,
 ) -> Generator[Increment, None, Ending]:
     at = 0.0
     try:
-        state = path.begin(start, ties_at=ties_at, bonds_at=bonds_at) if resume is None else resume
+        state = path.begin(start, None, ties_at, bonds_at, fallen) if resume is None else resume
         at = state.place.s
         return (yield from path.follow(state, resume is not None))
     except SolveError as error:

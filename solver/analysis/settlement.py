@@ -8,10 +8,10 @@ from functools import partial
 
 import numpy as np
 
-from solver.assembly import Assembly, check_blocks
+from solver.assembly import MOVING, Assembly, check_blocks
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose
-from solver.loads import Loads, Settlement
+from solver.loads import Loads, Settlement, checked_loads
 from solver.paper_method import linear_program_increments
 from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
 from solver.path.drivers import SupportMotion
@@ -154,6 +154,8 @@ def model_of(
         live=live,
         ties=ties,
         fills=loads.fills,
+        arms=loads.dead_arms,
+        live_arms=loads.live_arms,
         compliance=controls.compliance_factor,
         imperfection=controls.imperfection_factor,
     )
@@ -171,20 +173,26 @@ def check_settlement(
     Raises
     ------
     ValueError
-        For no settlement, no free block, a phase that moves no support or none that is still there, a change before a
-        phase that does not exist, blocks that overlap (both named, with depth).
+        For no settlement, no free block, a phase that moves no support, none that is still there or a block with
+        another role, a change before a phase that does not exist, blocks that overlap (both named, with depth).
     """
     controls = controls or Controls()
     if not phases:
         raise ValueError("no settlement was given; give one Settlement, or several phases")
     for number, phase in enumerate(phases):
         phase.check_dimension(assembly)
+        which = f"settlement phase {number + 1}" if len(phases) > 1 else "the settlement"
+        for name in phase.profile or phase.blocks or ():
+            role = assembly.roles[assembly.index(name)]
+            if role != MOVING:
+                raise ValueError(
+                    f"{which} moves block '{name}', whose role is '{role}'; give it the role 'moving', or leave it out"
+                )
         if not phase.taking_part(assembly).any():
-            which = f"settlement phase {number + 1}" if len(phases) > 1 else "the settlement"
-            named = ", ".join(f"'{name}'" for name in (assembly.names if phase.blocks is None else phase.blocks)[:6])
-            if phase.blocks is not None and assembly.moving.any():
-                raise ValueError(f"{which} moves no support: of its blocks ({named}) none has the role 'moving'")
-            raise ValueError(f"{which} moves no support: give one of the blocks the role 'moving': {named}")
+            raise ValueError(
+                f"{which} moves no support: give one of the blocks the role 'moving': "
+                + ", ".join(f"'{name}'" for name in assembly.names[:6])
+            )
     _check_changes(assembly, phases, changes, ties)
     check_blocks(assembly, controls.overlap_tolerance)
 
@@ -196,6 +204,10 @@ def _check_changes(
     for change in changes:
         if not 0 <= change.phase < len(phases):
             raise ValueError(f"a change comes before settlement phase {change.phase + 1}; there are {len(phases)}")
+        if change.dead is not None:
+            checked_loads(assembly, Loads(change.dead, change.dead))
+        if change.removed is not None and np.shape(change.removed) != (assembly.n_blocks,):
+            raise ValueError(f"removed has shape {np.shape(change.removed)}; give one per block, {assembly.n_blocks}")
         for name in change.ties:
             if name not in {tie.name for tie in ties if tie.phase <= change.phase}:
                 raise ValueError(

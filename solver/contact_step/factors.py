@@ -34,7 +34,6 @@ def factorisation(pairs: np.ndarray, places: np.ndarray | None, n_blocks: int, d
         Numbers of the two blocks; -1 for a support.
     places : (n_blocks, d) array, optional
         For the order of the blocks.
-    n_blocks, dof : int
     """
     touching = pairs[(pairs >= 0).all(axis=1)]
     graph = sp.csr_array((np.ones(len(touching)), touching.T), shape=(n_blocks, n_blocks))
@@ -86,7 +85,6 @@ class Front:
 
     Parameters
     ----------
-    own : slice
     beyond : (n,) int array
     start : int
         Where its matrices begin among those of all fronts: (own, own), and (beyond, own) after it, by columns.

@@ -125,7 +125,6 @@ class StepSolution:
         Trial forces, from which the next program starts.
     multiplier : float
         Of the live load.
-    factorisations : int
     """
 
     motion: np.ndarray

@@ -126,10 +126,8 @@ def successors(
 
     Parameters
     ----------
-    before : Contacts
     vanished : (k,) int array
         Numbers of those that are not among the contact points any more.
-    contacts : Contacts
     near, length : float [m]
         Difference up to which points are equally near; largest distance, as much as a normal that is turned by 1.
 

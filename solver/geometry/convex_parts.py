@@ -107,7 +107,6 @@ class PlacedParts:
 
     Attributes
     ----------
-    parts : ConvexParts
     vertices : (n_corners, 3) array [m]
         Current corners of all parts.
     """
@@ -252,7 +251,6 @@ class _Piece:
     triangles : (m, 3) int array
     face : (m,) int array
         The face of the block in which each triangle lies; numbers beyond those of its faces are of cuts.
-    volume : float
     """
 
     points: np.ndarray

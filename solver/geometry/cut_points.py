@@ -19,8 +19,6 @@ def without_points_of_cuts(parts: ConvexParts, contacts: Contacts, planes: np.nd
 
     Parameters
     ----------
-    parts : ConvexParts
-    contacts : Contacts
     planes : (n, 2) int array
         The planes of the two faces in which each point was found; -1 where it was not found between faces.
 

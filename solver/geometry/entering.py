@@ -77,10 +77,8 @@ def entered(movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, 
 
     Parameters
     ----------
-    movement : Movement
     i, j : (n_pairs,) int arrays
         Parts that are near each other after it.
-    tolerance : float
     deepest : (n_pairs,) array [m]
         Overlap before the movement beyond which an axis is none of a contact.
 

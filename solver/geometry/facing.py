@@ -136,7 +136,6 @@ def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray, widths: 
 
     Parameters
     ----------
-    placed : PlacedParts
     reach : float [m]
     useful : (n_blocks,) bool array
         One of two near parts must be of these blocks.

@@ -99,20 +99,41 @@ def measured_points(
 def _areas(shapes: Outlines, contacts: Contacts) -> np.ndarray:
     """(n,) array [m²]: tributary area of each contact point of the faces between blocks.
 
-    Half the distance to the neighbours along the face times the smaller thickness. Open contact points count too: a
-    face has its whole length however it has turned.
+    A face is where a side of one block lies over a side of another. Half the distance to the neighbours along it times
+    the smaller thickness; a corner may end two faces. Open contact points count too: a face has its whole length
+    however it has turned.
     """
-    _, first, which = np.unique(contacts.pair_keys(), return_index=True, return_inverse=True)
-    normal, reference = contacts.frames[:, 0], contacts.frames[first[which.ravel()], 0]
-    across = np.abs(normal[:, 0] * reference[:, 1] - normal[:, 1] * reference[:, 0]) > 0.5
-    _, first, face = np.unique(2 * which.ravel() + across, return_index=True, return_inverse=True)
-    face = face.ravel()
-    along = np.einsum("ki,ki->k", contacts.points, contacts.frames[first[face], 1])
+    vertex, edge, corner = corners_and_edges(contacts.features)
+    over, side = np.stack([vertex, shapes.previous_vertex[vertex]], axis=1), _side_of_edge(shapes)
+    on_corner = corner >= 0
+    over[on_corner] = _facing_edge(shapes, vertex[on_corner], edge[on_corner], corner[on_corner])[:, None]
+    low, high = np.sort([side[over], np.broadcast_to(side[edge][:, None], over.shape)], axis=0).astype(np.int64)
+    _, first, face = np.unique((low * len(side) + high).ravel(), return_index=True, return_inverse=True)
+    point = np.repeat(np.arange(len(contacts)), 2)
+    along = np.einsum("ki,ki->k", contacts.points[point], contacts.frames[point[first[face]], 1])
     order = np.lexsort((along, face))
     step = np.where(np.diff(face[order]) == 0, np.diff(along[order]), 0.0)
-    length = np.zeros(len(contacts))
+    length = np.zeros(len(point))
     length[order] = (np.append(step, 0.0) + np.append(0.0, step)) / 2.0 if len(contacts) else 0.0
-    return length * np.minimum(shapes.thickness[contacts.block_a], shapes.thickness[contacts.block_b])
+    thickness = np.minimum(shapes.thickness[contacts.block_a], shapes.thickness[contacts.block_b])
+    return length.reshape(-1, 2).sum(axis=1) * thickness
+
+
+def _side_of_edge(shapes: Outlines) -> np.ndarray:
+    """(n_vertices,) int array: first edge of the side that each edge is a part of.
+
+    A straight or slightly re-entrant corner, which has no contact point of its own, does not end a side.
+    """
+    first, last = shapes.offsets[:-1], shapes.offsets[1:] - 1
+    along = _unit(shapes.vertices[shapes.next_vertex] - shapes.vertices)
+    before = along[shapes.previous_vertex]
+    turn = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
+    ends = shapes.convex_vertex | (turn < -LARGEST_TILT) | (_dot(before, along) < 0.0)
+    number = np.arange(len(ends))
+    side = np.maximum.accumulate(np.where(ends, number, first[shapes.block_of_vertex]))
+    # The side at the first corner may begin before it.
+    wraps = ~ends[side]
+    return np.where(wraps, side[last][shapes.block_of_vertex], side)
 
 
 def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:

@@ -13,12 +13,7 @@ from .planar_contacts import features_of, find_points, measured_points, passed_e
 
 @dataclass(frozen=True)
 class Polygons(Outlines):
-    """Blocks in the plane: :class:`Shapes` whose corners have two coordinates."""
-
-    @property
-    def sizes(self) -> np.ndarray:
-        """(n_blocks,) array [m]: edge of the square as large as each block."""
-        return np.sqrt(self.areas)
+    """Blocks in the plane: their corners have two coordinates."""
 
     @property
     def gyration(self) -> np.ndarray:
@@ -49,7 +44,11 @@ class Polygons(Outlines):
     def entered(
         self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
     ) -> Contacts:
-        """Contact points that would have kept blocks apart: see :class:`Shapes`."""
+        """Contact points beside those given that would have kept apart what a movement has put into each other.
+
+        Measured before it, of corners (n_vertices, d) [m] before and after, of overlaps of more than ``tolerance`` [m]
+        with useful blocks.
+        """
         i, j, _ = overlap_depths(after, self.offsets, tolerance)
         chosen = useful[i] | useful[j]
         vertex, edge = passed_edges(self, before, after, i[chosen], j[chosen])

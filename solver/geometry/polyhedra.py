@@ -17,12 +17,7 @@ from .spatial_overlaps import overlap_depths_in_space
 
 @dataclass(frozen=True)
 class Polyhedra(Solids):
-    """Blocks in space: :class:`Shapes` whose corners have three coordinates."""
-
-    @cached_property
-    def sizes(self) -> np.ndarray:
-        """(n_blocks,) array [m]: edge of the cube as large as each block."""
-        return np.cbrt(self.volumes)
+    """Blocks in space: their corners have three coordinates."""
 
     def size(self, chosen: np.ndarray) -> float:
         """Edge of the cube as large as the mean of the chosen blocks, (n_blocks,) bool, [m]."""
@@ -53,6 +48,10 @@ class Polyhedra(Solids):
     def entered(
         self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
     ) -> Contacts:
-        """Contact points that would have kept blocks apart: see :class:`Shapes`."""
+        """Contact points beside those given that would have kept apart what a movement has put into each other.
+
+        Measured before it, of corners (n_vertices, d) [m] before and after, of overlaps of more than ``tolerance`` [m]
+        with useful blocks.
+        """
         movement = Movement(self.parts.placed(before), self.parts.placed(after))
         return entered_points(movement, self.widths, useful, tolerance, contacts)

@@ -19,7 +19,6 @@ def face_separations(
 
     Parameters
     ----------
-    placed : PlacedParts
     i, j : (n,) int arrays
         Parts.
     inner : (n_faces,) bool array
@@ -59,7 +58,6 @@ def edge_separations(
 
     Parameters
     ----------
-    placed : PlacedParts
     i, j : (n,) int arrays
         Parts.
     smallest_sine : float

@@ -31,7 +31,6 @@ def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray
 
     Parameters
     ----------
-    placed : PlacedParts
     features : (n, 4) int array
         As in :class:`Contacts`.
     areas : (n,) array, optional [m²]
@@ -196,9 +195,7 @@ def _slivers(
 
     Parameters
     ----------
-    placed : PlacedParts
     face_i, face_j : (n_pairs,) int arrays
-    corners : ClippedCorners
     largest : (n_pairs,) array [m²]
         Of all polygons in which the same two blocks cover each other.
     """
@@ -276,7 +273,6 @@ def entered_points(
 
     Parameters
     ----------
-    movement : Movement
     widths : (n_blocks,) array [m]
     useful : (n_blocks,) bool array
         One of two blocks that overlap must be of these.

@@ -15,7 +15,6 @@ def overlap_depths_in_space(placed: PlacedParts, tolerance: float) -> tuple[np.n
 
     Parameters
     ----------
-    placed : PlacedParts
     tolerance : float [m]
 
     Returns

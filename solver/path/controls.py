@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from solver.results.increment import Status
 from solver.results.response import Collapse
-from solver.words import refuse_text
+from solver.words import make_plain
 
 #: Methods to find increments: the path of Coulomb friction, or the linear programs of the paper.
 COULOMB, LINEAR_PROGRAM = "coulomb", "linear program"
@@ -52,10 +52,10 @@ class Controls:
 
     def __post_init__(self) -> None:
         """Refuse an unknown method, and numbers out of their range."""
-        refuse_text(self)
+        make_plain(self)
         if self.increments not in (None, *INCREMENTS):
             raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
-        if self.falling_frames is None or self.falling_frames < 0:
+        if self.falling_frames < 0:
             raise ValueError(f"falling_frames is {self.falling_frames}; it is a number of at least 0, by default 10")
         if not 0.0 < self.step_tolerance < 1.0:
             raise ValueError(

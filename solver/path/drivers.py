@@ -11,6 +11,7 @@ import numpy as np
 from solver.assembly import Assembly
 from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_count, rotation_matrices
 from solver.loads import Settlement, check_steps
+from solver.words import make_plain
 
 
 class Driver(Protocol):
@@ -37,6 +38,13 @@ class Driver(Protocol):
     what: str
     lever: float
     stops: tuple[float, ...]
+
+    def next_stop(self, s: float) -> float:
+        """Next parameter that is reported: a multiple of the increment, one of the stops, or the limit."""
+        near = 1e-9 * self.increment
+        multiple = float(np.floor(s / self.increment + 1e-9) + 1.0) * self.increment
+        stop = min([multiple, *(stop for stop in self.stops if stop > s + near)])
+        return self.limit if self.limit - stop < near else stop
 
     def supports(self, s: float) -> Pose:
         """Pose of the supports; that of free blocks has no meaning."""
@@ -107,6 +115,7 @@ class ControlDisplacement:
 
     def __post_init__(self) -> None:
         """Check the numbers; the direction becomes a unit vector."""
+        make_plain(self)
         for name in ("direction", "point"):
             value = getattr(self, name)
             if value is None:
@@ -133,12 +142,6 @@ class ControlDisplacement:
         turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
         moved_by = pose.positions[block] + turned - assembly.centroids[block] - arm
         return float(moved_by @ self._along(assembly))
-
-    def speed(self, assembly: Assembly, pose: Pose, velocity: np.ndarray) -> float:
-        """Rate of the control displacement in a velocity (n_blocks, n_dof) of the blocks."""
-        block, arm = self._place(assembly)
-        point = pose.positions[[block]] + arm @ rotation_matrices(pose.rotations[[block]])[0].T
-        return float((point_velocities(point, np.array([block]), pose, velocity) @ self._along(assembly))[0])
 
     def weights(self, assembly: Assembly, pose: Pose) -> np.ndarray:
         """(n_blocks, n_dof) array: gradient of the control displacement by movements of the blocks."""

@@ -82,7 +82,7 @@ class EquilibriumChecks:
         beyond_give, limits = self.stepper.force_limits(place, contacts, gap)
         closed = (beyond_give.gaps <= gap * model.length) | limits.hold | is_member(contacts)
         matrix = wrench_matrix(contacts, place.pose, model.length)
-        live, live_size = model.scaled_live
+        live, live_size = model.scaled_live(place.pose)
         load = (model.scaled_load_at(place.pose) + place.multiplier * live_size * live)[free].ravel()
         reference = np.zeros_like(contacts.points) if at_rest else self.stepper.transferred(place, contacts)[0]
         # The program is that of the normal forces beyond the least ones.

@@ -14,6 +14,7 @@ from solver.ties import (
     ABSENT,
     BROKEN,
     TieForces,
+    held_ties,
     installed_lengths,
     is_member,
     member_contacts,
@@ -48,11 +49,7 @@ class Members:
         self.brittle = np.array([tie.brittle for tie in self.ties], dtype=bool)
         # In units of the program.
         self.compliance = model.force / (self.stiffness * model.length)
-        fallen = model.fallen
-        self.held = np.array(
-            [fallen is None or not any(b is not None and fallen[b] for b in tie.blocks) for tie in self.ties],
-            dtype=bool,
-        )
+        self.held = held_ties(self.ties, np.zeros(len(model.load)) if model.fallen is None else model.fallen)
 
     def installed(self, place: Place, phase: int, told: TieForces | None = None) -> Place:
         """Install the members of a phase, from 0, at the geometry of a place, or all as an increment tells of them."""
@@ -66,13 +63,13 @@ class Members:
         now = installed_lengths(self.ties, tie_ends(self.ties, self.model.assembly, place.pose))
         return replace(place, tie_lengths=np.where(new[:, None], now, lengths))
 
-    def contacts(self, pose: Pose, lengths: np.ndarray) -> Contacts | None:
-        """The contact points of the members that are there; None where there are none."""
+    def beside(self, contacts: Contacts, pose: Pose, lengths: np.ndarray) -> Contacts:
+        """The contact points of blocks, then those of the members that are there."""
         if not len(lengths):
-            return None
+            return contacts
         rest = np.where(self.held, lengths[:, 1], np.nan)
         features = present_members(self.ties, rest)
-        return member_contacts(self.ties, self.model.assembly, pose, rest, features) if len(features) else None
+        return joined_contacts([contacts, member_contacts(self.ties, self.model.assembly, pose, rest, features)])
 
     def measured(self, contacts: Contacts, pose: Pose, lengths: np.ndarray) -> Contacts:
         """The same contact points at another pose."""
@@ -119,8 +116,3 @@ class Members:
         state = np.where(np.isnan(lengths[:, 1]), BROKEN, state)
         state = np.where(np.isnan(lengths[:, 0]) | ~self.held, ABSENT, state)
         return TieForces(force * self.model.force, tie_lengths(ends) - lengths[:, 0], lengths[:, 1], state, ends)
-
-
-def with_members(contacts: Contacts, members: Contacts | None) -> Contacts:
-    """Contact points of blocks and members, in this order."""
-    return contacts if members is None else joined_contacts([contacts, members])

@@ -122,8 +122,9 @@ class Path:
         before: PathState | None = None,
         ties_at: TieForces | None = None,
         bonds_at: Bonds | None = None,
+        fallen: np.ndarray | None = None,
     ) -> PathState:
-        """The state at the start of the phase: of the drawing at rest, or after the phase before."""
+        """The state at the start of the phase: of a pose at rest, without fallen blocks, or after the phase before."""
         fell_at = np.zeros(0)
         if before is not None:
             # Joints keep the forces of the phase before, blocks not their velocity.
@@ -131,6 +132,9 @@ class Path:
             self._remove_blocks(fell_at)
             place = self.stepper.members.installed(place, self.number)
         else:
+            if fallen is not None and np.any(fallen):
+                fell_at = np.where(fallen, -np.inf, np.nan)
+                self._remove_blocks(fell_at)
             place = self.stepper.unloaded(start, self.number, ties_at, bonds_at)
             drawn = bonds_at is None
             resting = self._at_rest(place, drawn)
@@ -214,7 +218,7 @@ class Path:
                 return ending
         while not self.state.ended:
             # What blocks that drop come to may be at a stop that has not been reported.
-            state, outcome = self.advance(self.state, self._next_stop(self.reported))
+            state, outcome = self.advance(self.state, self.driver.next_stop(self.reported))
             self.state = state
             if outcome is Outcome.REACHED:
                 yield from self._report_reached(state)
@@ -269,7 +273,7 @@ class Path:
 
     def _onset(self) -> float:
         """Parameter at which the joints' compliance is used up."""
-        return min(MECHANISM * self.stepper.unit, self._next_stop(0.0))
+        return min(MECHANISM * self.stepper.unit, self.driver.next_stop(0.0))
 
     def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
@@ -446,7 +450,7 @@ class Path:
         """Works of dead and live loads, on supports and of friction in a step, with the forces at its end."""
         model, contacts = self.model, after.contacts
         assert contacts is not None
-        live, live_size = model.scaled_live
+        live, live_size = model.scaled_live(after.pose)
         free = model.assembly.free[:, None]
         resultant = (wrench_matrix(contacts, after.pose, model.length) @ after.forces.ravel()).reshape(motion.shape)
         started, members = self.stepper.measured(contacts, before.pose, before.tie_lengths), is_member(contacts)
@@ -533,13 +537,6 @@ class Path:
         if self.model.live is not None and place.s == 0.0 and np.isfinite(check.bounds.high):
             check = replace(check, forces=check.bounds.forces, measured=check.bounds.high)
         return check
-
-    def _next_stop(self, s: float) -> float:
-        """Next parameter that is reported: a multiple of the driver's increment, one of its stops, or the limit."""
-        near = 1e-9 * self.driver.increment
-        number = np.floor(s / self.driver.increment + 1e-9) + 1.0
-        stops = (number * self.driver.increment, *self.driver.stops)
-        return float(min([self.driver.limit, *(stop for stop in stops if stop > s + near)]))
 
     def _next_motion(self, place: Place) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity in the movement that follows, per unit of the parameter."""

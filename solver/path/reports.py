@@ -46,7 +46,7 @@ class Reports:
         """The increment of an equilibrium and the movement that follows, with the notes since the last one."""
         model, place, contacts, bounds = self.model, check.place, check.contacts, check.bounds
         resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
-        live, live_size = model.scaled_live
+        live, live_size = model.scaled_live(place.pose)
         multiplier = check.measured * live_size if model.live is not None else 0.0
         balance = (resultant + model.scaled_load_at(place.pose) + multiplier * live)[model.assembly.free]
         support_forces = on_supports(model, contacts, place.pose, check.forces)
@@ -65,7 +65,8 @@ class Reports:
             duality_gap=bounds.gap,
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
-        notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
+        where = f"{self.driver.unit}{f' in phase {self.number + 1}' if self.number else ''}"
+        notes = tuple(f"at {note.s:.6g} {where}: {note.words}" for note in self.notes)
         self.notes = []
         state = self.stepper.mortar.told(state, place)
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)

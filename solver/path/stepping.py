@@ -31,7 +31,7 @@ from solver.ties import TieForces, is_member
 from solver.tolerances import COMPLIANCE, FRICTION_MEMORY, IMPERFECTION, SHEAR_COMPLIANCE, VELOCITY_MEMORY, VISCOSITY
 
 from .drivers import Driver
-from .members import Members, with_members
+from .members import Members
 from .mortar import JointPoints, Mortar
 from .state import Place
 
@@ -193,7 +193,7 @@ class Stepper:
 
     def contacts_at(self, place: Place) -> Contacts:
         """Return the contact points at a place, those of members last."""
-        return with_members(self.contacts(place.pose), self.members.contacts(place.pose, place.tie_lengths))
+        return self.members.beside(self.contacts(place.pose), place.pose, place.tie_lengths)
 
     def measured(self, contacts: Contacts, pose: Pose, tie_lengths: np.ndarray) -> Contacts:
         """Return the same contact points at another pose, with ties of these lengths."""
@@ -201,7 +201,7 @@ class Stepper:
         if not members.any():
             return measure_contacts(self.model.assembly, vertices, contacts)
         of_blocks = measure_contacts(self.model.assembly, vertices, contacts[~members])
-        return with_members(of_blocks, self.members.measured(contacts[members], pose, tie_lengths))
+        return joined_contacts([of_blocks, self.members.measured(contacts[members], pose, tie_lengths)])
 
     def contacts(self, pose: Pose) -> Contacts:
         """Return the contact points of blocks at a pose; those of the last pose are kept."""
@@ -381,19 +381,17 @@ class Stepper:
         model, driver, free, start, joints = self.model, self.driver, self.free, points.start, points.joints
         forces, supports = points.forces, driver.supports(s)
         guess: np.ndarray | None = points.trial
-        live, live_size = model.scaled_live
-        multiplier = place.multiplier * live_size
         before_step = np.column_stack([points.kept * forces[:, 0], forces[:, 1:]])
         # Linearised where blocks come to that go on as before: what that is wrong by, not all they move, is squared.
         # In time, what lands would be behind what it lands on.
         motion_so_far = before if loads > 0.0 else np.zeros_like(before)
         pose = self._with_supports(moved(place.pose, self._of_blocks(motion_so_far)), supports)
         contacts = self.measured(start, pose, place.tie_lengths)
-        number = 0
+        load, (live, live_size) = self._load(pose, loads), model.scaled_live(pose)
+        multiplier, number = place.multiplier * live_size, 0
         while True:
             rows = ContactRows(wrench_matrix(contacts, pose, model.length), free, model.assembly.centroids)
             control = driver.control(pose) if model.live is not None else None
-            load = self._load(pose, loads)
             problem = ContactProblem(
                 rows=rows,
                 gap=joints.beyond_give(contacts.gaps) / model.length,
@@ -422,9 +420,11 @@ class Stepper:
             pose = self._with_supports(moved(place.pose, self._of_blocks(motion_so_far)), supports)
             predicted = problem.gap + rows.relative(solution.motion)[:, 0]
             contacts = self.measured(start, pose, place.tie_lengths)
+            acting = load + multiplier * live[free].ravel()
+            load, (live, _) = self._load(pose, loads), model.scaled_live(pose)
             residual = max(
                 self._linearisation_error(contacts, predicted, forces, points, closed),
-                self._largest(self._load(pose, loads) - load) / SAME_LOAD,
+                self._largest(load + multiplier * live[free].ravel() - acting) / SAME_LOAD,
                 0.0 if control is None else abs(s - driver.control_displacement(pose)) / model.length / EXACT,
             )
             number += 1

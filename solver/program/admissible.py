@@ -31,7 +31,6 @@ class EquilibriumBounds:
         whose program was not solved is not a number. Without an equilibrium both are the value of ``forces``.
     gap : float
         Largest relative difference of the two objectives of the programs.
-    programs : int
     forces : (n_contacts, d) array
         Normal and shear forces of the least reaction or largest multiplier, in units of the program; of another
         equilibrium where that has no bound or was not found; nearest to one where none exists.
@@ -60,7 +59,6 @@ class StaticProgram:
     ----------
     model : Model
         Where it has a live load, its multiplier is bounded.
-    pose : Pose
     contacts : Contacts
         At the pose; open ones carry no force.
     friction : (n_contacts,) array
@@ -68,7 +66,6 @@ class StaticProgram:
         Movement of the supports along which the reaction is bounded.
     gap : float
         Largest one of a contact point that carries force, in block sizes.
-    limits : ForceLimits
     """
 
     def __init__(
@@ -105,7 +102,7 @@ class StaticProgram:
         given = matrix @ self.least.ravel()
         self.load = model.scaled_load_at(pose).ravel()[free] + given[free]
         self.tolerance = BALANCE_TOLERANCE * model.total_load
-        live, self.live_size = model.scaled_live
+        live, self.live_size = model.scaled_live(pose)
         columns, objective = [balance], np.zeros(self.n)
         if self.live_size > 0.0:
             column = sp.csc_array(live[blocks].reshape(-1, 1))
@@ -187,7 +184,6 @@ class StaticProgram:
 
         Parameters
         ----------
-        sign : float
         balanced : Solution
             An equilibrium; the rounding that leaves it out of balance may do so here.
 

@@ -9,7 +9,7 @@ import numpy as np
 from solver.assembly import Assembly
 from solver.backfill import Backfill
 from solver.interfaces import Interfaces
-from solver.kinematics import Pose, dimension_of, unit_lengths
+from solver.kinematics import Pose, dimension_of, turned_moments, unit_lengths
 from solver.ties import Tie
 
 
@@ -19,8 +19,6 @@ class Model:
 
     Attributes
     ----------
-    assembly : Assembly
-    interfaces : Interfaces
     load : (n_blocks, n_dof) array [N, N·m]
         Forces and moments with the blocks as drawn, n_dof = 3 in the plane and 6 in space.
     length : float [m]
@@ -32,9 +30,10 @@ class Model:
         Loads whose multiplier is an unknown of every program.
     fallen : (n_blocks,) bool array, optional
         Blocks that have left the structure, without loads and contact points.
-    ties : tuple of Tie
     fills : tuple of Backfill
         Fill whose load as drawn is a part of ``load`` and follows the blocks.
+    arms, live_arms : (n_blocks, d, d) array, optional [N·m]
+        As in :class:`solver.loads.Loads`.
     compliance, imperfection : float
         Times those of :mod:`solver.tolerances`.
     """
@@ -49,13 +48,16 @@ class Model:
     fallen: np.ndarray | None = None
     ties: tuple[Tie, ...] = ()
     fills: tuple[Backfill, ...] = ()
+    arms: np.ndarray | None = None
+    live_arms: np.ndarray | None = None
     compliance: float = 1.0
     imperfection: float = 1.0
 
     def without(self, fallen: np.ndarray) -> Model:
         """Return the model once blocks, (n_blocks,) bool array, have left it."""
         fills = tuple(fill.without(fallen) for fill in self.fills)
-        return replace(self, load=np.where(fallen[:, None], 0.0, self.load), fallen=fallen, fills=fills)
+        arms = None if self.arms is None else np.where(fallen[:, None, None], 0.0, self.arms)
+        return replace(self, load=np.where(fallen[:, None], 0.0, self.load), fallen=fallen, fills=fills, arms=arms)
 
     @property
     def n_dof(self) -> int:
@@ -78,22 +80,23 @@ class Model:
         return self.load / (self.force * unit_lengths(self.n_dof, self.length))
 
     def scaled_load_at(self, pose: Pose) -> np.ndarray:
-        """(n_blocks, n_dof) array: the load at a pose, where fill has followed the blocks, in units of the program."""
-        if not self.fills:
+        """(n_blocks, n_dof) array: the load at a pose, which it has followed, in units of the program."""
+        if not self.fills and self.arms is None:
             return self.scaled_load
         drawn = Pose.initial(self.assembly)
         moved = sum(fill.load(self.assembly, pose) - fill.load(self.assembly, drawn) for fill in self.fills)
+        if self.arms is not None:
+            moved = moved + turned_moments(self.arms, pose)
         return self.scaled_load + moved / (self.force * unit_lengths(self.n_dof, self.length))
 
-    @property
-    def scaled_live(self) -> tuple[np.ndarray, float]:
-        """(n_blocks, n_dof) array: live load on the free blocks, its largest component 1; and that component."""
-        free = self.assembly.free
-        live = np.zeros((len(free), self.n_dof))
-        if self.live is not None:
-            live[free] = self.live[free] / (self.force * unit_lengths(self.n_dof, self.length))
-        size = float(np.abs(live).max(initial=0.0))
-        return live / (size or 1.0), size
+    def scaled_live(self, pose: Pose) -> tuple[np.ndarray, float]:
+        """(n_blocks, n_dof) array: live load on the free blocks, its largest component as drawn 1; and that one."""
+        free, units = self.assembly.free[:, None], self.force * unit_lengths(self.n_dof, self.length)
+        if self.live is None:
+            return np.zeros((len(free), self.n_dof)), 0.0
+        size = float(np.abs(np.where(free, self.live / units, 0.0)).max(initial=0.0))
+        live = self.live if self.live_arms is None else self.live + turned_moments(self.live_arms, pose)
+        return np.where(free, live / units, 0.0) / (size or 1.0), size
 
     @property
     def total_load(self) -> float:

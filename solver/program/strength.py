@@ -24,9 +24,6 @@ def point_strength(
 
     Parameters
     ----------
-    assembly : Assembly
-    interfaces : Interfaces
-    contacts : Contacts
     around : Contacts
         At the same geometry, with the open ones, which measure the faces.
     bonded : (n_contacts,) array, optional [m²]

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
+from solver.geometry.outlines import polygon_integrals
 from solver.kinematics import Pose
 
 #: Laws of torsion of the faces between blocks in space.
@@ -48,7 +49,6 @@ class Faces:
 
         Parameters
         ----------
-        contacts : Contacts
         length : float [m]
             Block size.
         """
@@ -68,9 +68,6 @@ def face_wrench_matrix(contacts: Contacts, faces: Faces, pose: Pose, length: flo
 
     Parameters
     ----------
-    contacts : Contacts
-    faces : Faces
-    pose : Pose
     length : float [m]
         Moments are divided by it.
 
@@ -106,8 +103,6 @@ def point_forces(contacts: Contacts, faces: Faces, forces: np.ndarray) -> np.nda
 
     Parameters
     ----------
-    contacts : Contacts
-    faces : Faces
     forces : (n_contacts, 4) array
         As columns of :func:`face_wrench_matrix`; any unit of force.
     """
@@ -159,7 +154,10 @@ def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.nd
     flat = np.einsum("nkx,nix->nki", points - middle[:, None], frames[:, 1:])
     angular_order = np.argsort(np.arctan2(flat[..., 1], flat[..., 0]), axis=1)
     flat = np.take_along_axis(flat, angular_order[..., None], axis=1)
-    centre, area = _centroid(flat)
+    area, centre = polygon_integrals(flat.reshape(-1, 2), points.shape[1] * np.arange(len(points) + 1))
+    # Points on one line have no area.
+    wide = area > 1e-12 * (flat**2).sum(axis=(1, 2))
+    centre = np.where(wide[:, None], centre, 0.0)
     flat = flat - centre[:, None]
     start, end = flat, np.roll(flat, -1, axis=1)
     edge = end - start
@@ -172,18 +170,6 @@ def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.nd
         t = (corner * along).sum(axis=2)
         over = np.divide(t, height, out=np.zeros_like(t), where=height > 0.0)
         mean += sign * (height / 6.0 * (t * np.hypot(t, height) + height**2 * np.arcsinh(over))).sum(axis=1)
-    # Points on one line have no area.
-    wide = area > 1e-12 * (flat**2).sum(axis=(1, 2))
     farthest = np.linalg.norm(flat[:, :, None] - flat[:, None], axis=3).max(axis=(1, 2))
     radii = np.where(wide, mean / np.where(wide, area, 1.0), farthest / 4.0)
     return middle + np.einsum("ni,nix->nx", centre, frames[:, 1:]), radii
-
-
-def _centroid(flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Centroids (n, 2) and areas (n,) of polygons (n, k, 2), counter-clockwise."""
-    end = np.roll(flat, -1, axis=1)
-    cross = flat[..., 0] * end[..., 1] - flat[..., 1] * end[..., 0]
-    area = cross.sum(axis=1) / 2.0
-    first = ((flat + end) * cross[..., None]).sum(axis=1) / 6.0
-    wide = area > 1e-12 * (flat**2).sum(axis=(1, 2))
-    return np.where(wide[:, None], first / np.where(wide, area, 1.0)[:, None], 0.0), area

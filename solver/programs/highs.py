@@ -32,7 +32,6 @@ def run_highs(program: LinearProgram, route: str) -> tuple[Solution | None, str]
 
     Parameters
     ----------
-    program : LinearProgram
     route : str
         One of ``ROUTES``.
 

@@ -34,32 +34,8 @@ class Unbounded(Exception):
         self.x = x
 
 
-class _Program:
-    """What linear and conic programs have in common."""
-
-    cost: np.ndarray
-    matrix: sp.csc_array
-
-    def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
-        """Measure a solution by the program alone.
-
-        Parameters
-        ----------
-        x : (n,) array
-        y : (m,) array
-            Multipliers of the rows.
-        route, iterations
-            As of :class:`Solution`.
-        """
-        return Solution(x, y, float(self.cost @ x), *self._measures(x, y), route, iterations)
-
-    def _measures(self, x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
-        """Dual objective, violation by x, and violation by the reduced costs."""
-        raise NotImplementedError
-
-
 @dataclass(frozen=True)
-class LinearProgram(_Program):
+class LinearProgram:
     """Minimise cost · x subject to lower ≤ A x ≤ upper and x ≥ 0.
 
     Attributes
@@ -78,15 +54,14 @@ class LinearProgram(_Program):
     upper: np.ndarray
     places: np.ndarray | None = None
 
-    def _measures(self, x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
-        """Dual objective, and violations, which are absolute."""
+    def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
+        """Measure a solution x with multipliers y of the rows by the program alone; violations are absolute."""
         activity = self.matrix @ x
-        violation = np.maximum(self.lower - activity, activity - self.upper).max(initial=0.0)
-        return (
-            float(np.where(y > 0, y * self.lower, y * self.upper).sum()),
-            max(float(violation), float(-x.min(initial=0.0))),
-            float(-(self.cost - self.matrix.T @ y).min(initial=0.0)),
-        )
+        bound = float(np.where(y > 0, y * self.lower, y * self.upper).sum())
+        violation = float(np.maximum(self.lower - activity, activity - self.upper).max(initial=0.0))
+        violation = max(violation, float(-x.min(initial=0.0)))
+        of_dual = float(-(self.cost - self.matrix.T @ y).min(initial=0.0))
+        return Solution(x, y, float(self.cost @ x), bound, violation, of_dual, route, iterations)
 
     def raise_if_unbounded(self, ray: np.ndarray) -> None:
         """Raise ``Unbounded`` where the ray, (n,), passes our own check."""
@@ -100,7 +75,7 @@ class LinearProgram(_Program):
 
 
 @dataclass(frozen=True)
-class ConicProgram(_Program):
+class ConicProgram:
     """Minimise cost · x subject to A x = right, the first columns in round friction cones and x ≥ 0 in the others.
 
     Attributes
@@ -155,15 +130,13 @@ class ConicProgram(_Program):
         excess /= np.hypot(1.0, self.friction)
         return max(float(excess.max(initial=0.0)), float(-reduced[self.in_cones :].min(initial=0.0)))
 
-    def _measures(self, x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
-        """Dual objective, and violations, which are relative to 1 + the largest number of their kind."""
+    def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
+        """Measure a solution by the program alone; violations are relative to 1 + the largest number of their kind."""
         of_right, of_x, of_y = (1.0 + float(np.abs(kind).max(initial=0.0)) for kind in (self.right, x, y))
         violation = float(np.abs(self.matrix @ x - self.right).max(initial=0.0))
-        return (
-            float(self.right @ y),
-            max(violation / of_right, self.outside(x) / of_x),
-            self.outside_dual(self.cost - self.matrix.T @ y) / of_y,
-        )
+        violation = max(violation / of_right, self.outside(x) / of_x)
+        of_dual = self.outside_dual(self.cost - self.matrix.T @ y) / of_y
+        return Solution(x, y, float(self.cost @ x), float(self.right @ y), violation, of_dual, route, iterations)
 
     def raise_if_unbounded(self, ray: np.ndarray) -> None:
         """Raise ``Unbounded`` where the ray, (n,), passes our own check."""
@@ -194,14 +167,12 @@ class Solution:
     x : (n,) array
     row_dual : (m,) array
         Multipliers of the rows.
-    objective, dual_objective : float
     primal_violation : float
         Largest violation of a row, of a cone or of x ≥ 0.
     dual_violation : float
         How far the reduced costs leave the dual cones or go below 0 at most.
     route : str
         How it was found.
-    iterations : int
     """
 
     x: np.ndarray

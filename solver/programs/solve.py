@@ -37,7 +37,6 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, v
 
     Parameters
     ----------
-    program : LinearProgram
     routes : tuple of str, optional
         ``BAND`` or names out of ``ROUTES``, in the order to try; chosen by size by default.
     vertex : bool
@@ -65,7 +64,6 @@ def solve_cones(program: ConicProgram, routes: Sequence[str] = CONIC_ROUTES) -> 
 
     Parameters
     ----------
-    program : ConicProgram
     routes : sequence of str
         In the order in which they are tried.
 

@@ -36,7 +36,7 @@ class Collapse(Shown):
         Last settlement with an equilibrium, first one without.
     reaction : float [N or N·m]
         At the last equilibrium.
-    mechanism : (n_blocks, 3) array
+    mechanism : (n_blocks, n_dof) array
         Direction in which the blocks move when they fall, largest movement 1 (rotations times block size).
     unit : str
     words : str
@@ -76,12 +76,15 @@ class LocalLoss:
     weight : float [N]
     share : float
         Of the weight of all free blocks.
+    phase : int
+        Number of the settlement, from 0.
     """
 
     settlement: float
     blocks: tuple[str, ...]
     weight: float
     share: float
+    phase: int = 0
 
 
 class Control(Protocol):
@@ -163,20 +166,26 @@ class Response(Shown):
     @property
     def losses(self) -> tuple[LocalLoss, ...]:
         """Blocks that left for good along the path, in the order in which they fell."""
-        fell_at = self.path[-1].state.fell_at if self.path else np.zeros(0)
-        weights = self.assembly.masses * GRAVITY
-        losses = []
-        for value in np.unique(fell_at[np.isfinite(fell_at)]):
-            fallen = np.flatnonzero(fell_at == value)
-            weight = float(weights[fallen].sum())
-            names = tuple(self.assembly.names[k] for k in fallen)
-            losses.append(LocalLoss(float(value), names, weight, weight / self.total_weight))
+        losses, weights = [], self.assembly.masses * GRAVITY
+        gone = np.zeros(self.assembly.n_blocks, dtype=bool)
+        for phase, end in {increment.phase: increment for increment in self.path}.items():
+            fell_at = end.state.fell_at
+            fell_at = np.where(gone, np.nan, fell_at if len(fell_at) else np.nan)
+            gone |= ~np.isnan(fell_at)
+            for value in np.unique(fell_at[np.isfinite(fell_at)]):
+                fallen = np.flatnonzero(fell_at == value)
+                weight = float(weights[fallen].sum())
+                names = tuple(self.assembly.names[k] for k in fallen)
+                losses.append(LocalLoss(float(value), names, weight, weight / self.total_weight, phase))
         return tuple(losses)
 
     def dead_at(self, increment: Increment, pose: Pose | None = None) -> np.ndarray:
         """(n_blocks, n_dof) array [N, N·m]: in the phase of an increment, at its pose or at another."""
-        loads = loads_in(self.loads, self.changes, increment.phase)
-        return loads.dead_at(self.assembly, increment.pose if pose is None else pose)
+        return self.loads_at(increment).dead_at(self.assembly, increment.pose if pose is None else pose)
+
+    def loads_at(self, increment: Increment) -> Loads:
+        """Return the loads in the phase of an increment."""
+        return loads_in(self.loads, self.changes, increment.phase)
 
     @property
     def parameters(self) -> np.ndarray:
@@ -224,7 +233,9 @@ class Response(Shown):
 
     @property
     def initial_reaction(self) -> float:
-        """Least reaction [N or N·m] that equilibrium allows before anything moves: what a first movement overcomes."""
+        """Least reaction [N or N·m] that equilibrium allows before anything moves; nan where there is none."""
+        if not self.path:
+            return np.nan
         first = self.path[0]
         return first.least if np.isfinite(first.least) and self.control is None else first.reaction
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from blockvis import read, read_layout
+import solver
+from blockvis import read, read_layout, save_layout
 
 
 def saved(tmp_path, body, head='width="2000mm" height="1000mm" viewBox="0 0 2000 1000"'):
@@ -115,3 +116,10 @@ def test_lines_of_patterns_that_fill_shapes_are_missed_in_a_note(tmp_path):
         "not read: the lines of the pattern 'bond', which fills 3 shapes; turn it into shapes (Inkscape: Object, "
         "Pattern, Pattern to Objects)"
     ]
+
+
+def test_names_of_any_characters_are_written_and_read(tmp_path):
+    names = ["<b>&amp;</b>]]>", "a\x01\x0b\x1b", "line\nand\ttab"]
+    squares = [[[x, 0], [x + 1, 0], [x + 1, 1], [x, 1]] for x in (0, 2, 4)]
+    save_layout(solver.Assembly.from_outlines(squares, names=names), tmp_path / "names.svg")
+    assert read(tmp_path / "names.svg").names == tuple(names)

@@ -305,11 +305,13 @@ def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "zero capacity at" in printed
     assert "first multiplier" in printed
+    assert re.search(r"largest multiplier .* at 0 m, .*, the largest of the told increments\n", printed)
     response = blockvis.open_results(folder)
     assert response.settlements == ()
     assert response.control == solver.ControlDisplacement(**summary["control"])
     assert response.load_multiplier == pytest.approx(alpha)
     page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<td>largest of the told increments, last</td>" in page
     assert "Zero capacity at a control displacement of 0.1961" in page
     assert "control displacement [m]" in page
 
@@ -404,6 +406,7 @@ MOVING = '[[loads]]\nkind = "live"\nforce = [0.0, -1.0]\npositions = {}\n'
         (LIMIT + SIDEWAYS + '[control]\nblock = "block 1"\n', ['[control] belongs to [analysis] kind = "pushover"']),
         (LIMIT + "capacity_at = [0.1]\n" + SIDEWAYS, ["capacity_at asks for limit loads", "along a [settlement]"]),
         (LIMIT + "displacement = 0.1\n" + SIDEWAYS, ["displacement is that of a limit load after a settlement"]),
+        (LIMIT + 'increments = "linear program"\n' + SIDEWAYS, ['"linear program" is of settlements', "leave it out"]),
         (LIMIT + 'flow = "asociative"\n' + SIDEWAYS, ["did you mean 'associative'"]),
         (LIMIT + '[[loads]]\nkind = "live"\n', ["[loads] force is missing or zero"]),
         (LIMIT + '[[loads]]\nkind = "live"\npressure = 1.0\nedge = 9\n', ["edge is 9", "has edges 1 to 4"]),

@@ -244,6 +244,7 @@ def test_set_changes_the_case_for_one_run(case, capsys):
         ("material.friction_coefficient=-1", ["[material] friction_coefficient is -1"]),
         ("settlement.direction.x=1", ["cannot set 'settlement.direction.x'"]),
         ("supports[3].role=fixed", ["cannot set 'supports[3].role'"]),
+        ("material.density=1\nsettlement.limit=2", ["[material] density is '1\\nsettlement.limit=2'"]),
         ("material.density", ["'material.density' is no change of a case"]),
     ],
 )
@@ -290,6 +291,24 @@ def test_a_pipe_closed_early_is_no_error(case):
         ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"], capture_output=True, text=True, check=False, cwd=ROOT
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("streams", [">&- 2>&-", "2>/dev/full"])
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no stream that is full")
+def test_streams_that_take_nothing_end_no_run(case, streams):
+    _changed(case, "limit = 0.5", "limit = 0.01")
+    command = f"{sys.executable} -m blockvis run {case} -o {case.parent / 'out'} --no-pictures --no-check-steps"
+    done = subprocess.run(["bash", "-c", f"{command} {streams}"], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (case.parent / "out" / "summary.json").is_file()
+    assert (">&-" in streams.split()) != (f"results in {case.parent / 'out'}/" in done.stdout)
+
+
+def test_no_results_are_written_where_their_folder_has_no_name(case, capsys, monkeypatch):
+    monkeypatch.chdir(case.parent)
+    assert run_command(case, "-o", "") == 2
+    assert "-o is empty; name the folder of the results" in capsys.readouterr().err
+    assert {path.name for path in case.parent.iterdir()} == {"arch.msh", "case.toml"}
 
 
 @pytest.mark.parametrize("size", ["abc", "1280", "40x", "40x30", "-5x300"])

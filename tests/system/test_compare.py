@@ -52,6 +52,16 @@ def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_p
         assert (np.abs(curves - np.array(colour)).sum(axis=2) == 0).sum() > 1000
 
 
+def test_places_of_several_settlements_are_told_as_their_sum(tmp_path):
+    structure, folders = solver.Structure(generators.arch(voussoirs=5), friction_coefficient=2.0), []
+    for step in (1e-3, 2e-3):
+        response = structure.settle([solver.Settlement((1, 0), increment=step, limit=step)] * 2)
+        folders.append(blockvis.write(response, tmp_path / f"{step}"))
+    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    numbers = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "numbers")
+    assert any(name.endswith(" at settlement 2.00 mm, all phases added") for name in numbers), list(numbers)
+
+
 @pytest.mark.slow
 def test_what_the_cases_differ_in_is_told(tmp_path):
     folders = []

@@ -1,6 +1,9 @@
 """Full disks, folders that cannot be written, results that are there: one message, and what is there stays."""
 
+import errno
+import json
 import os
+import re
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -10,6 +13,7 @@ import pytest
 from structures import run_command
 
 import blockvis
+from blockvis.cli import main
 
 CASE = """
 [geometry]
@@ -77,6 +81,36 @@ def test_read_only_folder(case, tmp_path, capsys):
     with _mounted(tmp_path / "disk", "ro"):
         assert run_command(case, "-o", tmp_path / "disk" / "out") == 2
     assert "Read-only file system; choose another folder with -o" in capsys.readouterr().err
+
+
+def test_a_folder_whose_name_is_not_utf_8(case, tmp_path):
+    """As old archives and shares have them."""
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("this file system takes UTF-8 alone")
+    case.rename(folder / "case.toml")
+    assert run_command(folder / "case.toml", "-o", folder / "out") == 0
+    record = json.loads((folder / "out" / "run.json").read_text(encoding="utf-8"))
+    assert record["case_file"] == str(folder / "case.toml")
+
+
+def test_what_could_not_be_written_is_named(case, tmp_path, capsys, monkeypatch):
+    """By its own name, no temporary one, and a run that goes on says how to go on again."""
+    assert run_command(case, "-o", tmp_path / "out", "--no-pictures", "--no-check-steps") == 0
+    monkeypatch.setattr(Path, "write_bytes", _full)
+    monkeypatch.setattr(Path, "write_text", _full)
+    assert main(["report", str(tmp_path / "out")]) == 2
+    assert re.search(r"blockvis: .*No space left on device: '.*/out/report\.html'", capsys.readouterr().err)
+    (tmp_path / "out" / "summary.json").unlink()
+    assert run_command("--resume", tmp_path / "out", "--no-pictures", "--no-check-steps") == 2
+    said = f"could not write to '{tmp_path / 'out'}': No space left on device; what is there stays as it is: make room"
+    assert said in capsys.readouterr().err
+
+
+def _full(path: Path, *_: object, **__: object) -> int:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
 def test_a_file_where_the_folder_should_be(case, tmp_path, capsys):

@@ -139,6 +139,16 @@ def test_ctrl_c_leaves_the_range(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == "blockvis: range not known: interrupted; everything else is written\n"
 
 
+def test_a_range_that_is_asked_for_later_is_drawn_in_every_curve_that_is_there(tmp_path, monkeypatch):
+    arch = blockvis.generators.arch(voussoirs=6, thickness_ratio=0.2)
+    response = solver.settle(arch, solver.Settlement([1, 0], increment=0.01, limit=0.01), friction_coefficient=2.0)
+    monkeypatch.setattr(path_range, "find_range", lambda *_: "range")
+    monkeypatch.setattr("blockvis.runs.step_check.stored_case", lambda _: None)
+    (tmp_path / "curve.svg").touch()
+    _say_range(Namespace(range=True), SimpleNamespace(response=response, folder=tmp_path, had_finished=True))
+    assert [(file.name, file.stat().st_size > 400) for file in tmp_path.iterdir()] == [("curve.svg", True)]
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -192,6 +192,15 @@ def test_runs_are_compared_at_the_same_places_only(settled):
     assert check.error == 2.0 * check.difference
 
 
+def test_an_error_is_told_in_the_unit_of_the_settlement_where_it_is_and_with_its_phase(settled):
+    turning = solver.Settlement(rotation_centre=(1.0, 0.0), rotation=1.0)
+    other = traced(settled)
+    other.measured[1] *= 1.02
+    check = compared(replace(settled, settlements=(*settled.settlements, turning)), other)
+    assert (check.unit, check.phase) == ("m", 1)
+    assert " (at 0.1 m in phase 1), " in str(check)
+
+
 def test_where_the_reaction_is_next_to_nothing_it_is_compared_with_a_part_of_the_first(settled):
     last = replace(settled.increments[2], measured=0.0)
     other = traced(settled)

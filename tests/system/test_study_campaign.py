@@ -139,6 +139,8 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
     assert table["message"].str.contains("blocks is 0").tolist() == [False, False, True, True]
     assert records.missing() == []
     assert records.missing(retry_failed=True) == [2, 3]
+    _made_here(read_study(given), tmp_path / "out", [2])
+    assert finished_runs(tmp_path / "out") == 4, "a run that is made again is one"
     impatient = {**given, "study": {**given["study"], "seconds": 1e-9}}
     plan = read_study(impatient)
     row, shape = run_once(plan.values, "case", plan.order(0), 0, plan.seconds)

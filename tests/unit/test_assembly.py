@@ -101,6 +101,12 @@ REFUSED = {
     "infinite": ([[[0, 0], [np.inf, 0], [1, 1]]], {}, "corner 1"),
     "a line": ([SQUARE, [[0, 0], [1, 0], [2, 0]]], {}, "'block 1'.*not a block"),
     "a bow tie": ([[[0, 0], [2, 1], [2, 0], [0, 2]]], {}, "'block 0'.*crosses itself"),
+    "ragged": (
+        [SQUARE, [[0, 0], [1], [1, 1]]],
+        {},
+        r"outline of block 'block 1' is \[\[0, 0\], \[1\], .*; give numbers",
+    ),
+    "heavy": ([SQUARE], {"density": "heavy"}, "density is 'heavy'; give numbers"),
     "role": ([SQUARE], {"roles": ["loose"]}, "'loose'"),
     "too few roles": ([SQUARE, U_BLOCK], {"roles": ["free"]}, "2 outlines but 1 roles"),
     "too many names": ([SQUARE], {"names": ["a", "b"]}, "1 outlines but 2 names"),
@@ -135,3 +141,5 @@ def test_halves_of_characters_are_refused():
         solver.Assembly.from_outlines([square, [[x + 1, y] for x, y in square]], names=["b", "a\ud800"])
     with pytest.raises(ValueError, match=r"block 0: its material '\\udfff' holds half of a character at place 0"):
         solver.Assembly.from_outlines([square], materials=["\udfff"])
+    with pytest.raises(ValueError, match=r"block 0: its name 'a\\x00' holds a NUL at place 1, which no file can hold"):
+        solver.Assembly.from_outlines([square], names=["a\0"])

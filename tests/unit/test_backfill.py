@@ -154,3 +154,19 @@ def test_fill_is_drawn_up_to_its_surface(tmp_path: Path) -> None:
         shown[name] = alike(pixels(drawn), (150, 128, 92), 30).sum()
     # The line of its surface is as long as the block is wide.
     assert shown["filled"] > shown["bare"] + 40
+
+
+def test_fill_of_lists_is_that_of_arrays() -> None:
+    assembly = solver.Assembly.from_outlines([rectangle(0.0, 0.0, 4.0, 1.0)], names=["slab"])
+    fill, pose = lay(assembly, "slab", 2.0), solver.Pose.initial(assembly)
+    assert fill.thickness is not None
+    listed = solver.Backfill(
+        fill.pieces.tolist(),
+        fill.block.tolist(),
+        2.0,
+        WEIGHT,
+        thickness=fill.thickness.tolist(),  # type: ignore[arg-type]
+    )
+    assert listed.load(assembly, pose).tolist() == fill.load(assembly, pose).tolist()
+    with pytest.raises(ValueError, match="a fill has the thickness of its pieces in the plane"):
+        solver.Backfill(fill.pieces, fill.block, 2.0, WEIGHT)

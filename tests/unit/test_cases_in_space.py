@@ -76,7 +76,10 @@ def test_rotations_and_loads_have_three_numbers(tmp_path):
         (DOME.replace("\n", '\nclosing = "faces"\n', 1) + DOWN, r"closing belongs to outlines in the plane"),
         (DOME + DOWN + '[[imperfections]]\nkind = "vertices"\ndistribution = "normal"\nmean = 0\ndeviation = 0.01\n',
          r"kind 'vertices' belongs to blocks in the plane"),
-        (DOME + DOWN + '[[supports]]\noutline = [[0, 0], [1, 0], [1, 1]]\n', r"levels = \[bottom, top\] in m"),
+        (DOME + DOWN + '[[supports]]\noutline = [[0, 0], [1, 0], [1, 1]]\n',
+         r"case\.toml: \[\[supports\]\] .* levels = \[bottom, top\] in m"),
+        (ARCH + DOWN.replace("0, 0", "0") + '[[supports]]\noutline = [[0, 0], [1, 0], [1, 1]]\nlevels = [0, 1]\n',
+         r"case\.toml: \[\[supports\]\] .* 'levels', which no support in the plane has; leave it out"),
         (DOME + DOWN + '[roles]\n"sprinter 1" = "fixed"\n', r"roles: 'sprinter 1' matches no block"),
     ],
 )  # fmt: skip

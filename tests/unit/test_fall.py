@@ -174,6 +174,14 @@ def test_what_does_not_collapse_along_a_path_does_not_fall():
     assert fall_of(replace(response, parameter=mechanics.Quantity("position", "x", "m", is_path=False))) is None
 
 
+def test_blocks_smaller_than_any_stone_have_no_fall_that_would_never_end():
+    arch = blockvis.generators.arch(radius=1e-12, voussoirs=5)
+    spread = solver.Settlement(direction=(1.0, 0.0), increment=1e-12, limit=2e-12, tolerance=1e-13)
+    response = solver.settle(arch, spread, friction_coefficient=2.0, controls=solver.Controls(falling_frames=1))
+    assert response.stop is solver.Status.COLLAPSED
+    assert fall_of(response) is None
+
+
 def test_friction_of_each_pair_of_materials():
     """A brick on a slope of 22°: by the friction of its pair it stays or slides."""
     turn = np.array([[np.cos(0.384), -np.sin(0.384)], [np.sin(0.384), np.cos(0.384)]])
@@ -459,7 +467,7 @@ def test_a_heap_of_thrown_stones_comes_to_rest_without_overlaps_and_loses_energy
     weight = np.append(solver.self_weight(assembly).dead, np.zeros((1, 6)), axis=0)
     velocity = np.append(rng.uniform(-2.0, 2.0, (8, 6)), np.zeros((1, 6)), axis=0)
     engine = Engine(whole, weight, solver.Interfaces(solver.InterfaceLaw(0.6)), pose, velocity)
-    sizes, energies = np.where(whole.free, whole.shapes.sizes, np.inf), [engine.energies.sum()]
+    sizes, energies = np.where(whole.free, np.cbrt(whole.shapes.volumes), np.inf), [engine.energies.sum()]
     for _ in range(100):
         engine.advance(0.04)
         energies.append(engine.energies.sum())
@@ -508,3 +516,14 @@ def test_a_block_in_space_swings_on_a_tie():
         assert mechanics.tie_lengths(mechanics.tie_ends([tie], whole, engine.pose)) < 1.001 * rest
     assert (np.diff(energies) <= 0.0).all()
     assert np.linalg.norm(engine.pose.rotations[0]) > 0.1
+
+
+def test_results_that_replace_those_of_a_collapse_have_no_fall(tmp_path):
+    response = shipped_arch()
+    folder = blockvis.write(response, tmp_path / "out")
+    write_fall(fallen(shipped_arch), response, folder)
+    stands = replace(response, increments=response.path, stop=solver.Status.LIMIT_REACHED, collapse=None)
+    blockvis.write(stands, folder, overwrite=True)
+    assert not list(folder.glob("fall*"))
+    with pytest.raises(ValueError, match="nothing falls here"):
+        blockvis.open_results(folder).fall(1.0)

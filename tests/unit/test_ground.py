@@ -1,6 +1,7 @@
 """The ground that blockvis new lays: a case stands at its first try, in the plane and in space."""
 
 import json
+import re
 import tomllib
 from dataclasses import replace
 
@@ -197,6 +198,28 @@ def test_what_does_not_stand_is_named_with_its_cause_and_marked(tmp_path, capsys
     assert (pixels == (244, 176, 97)).all(axis=2).sum() > 1000
     said = capsys.readouterr().err
     assert "1 of 14 blocks fall ('s13'); 1 of them touch nothing that stands ('s13')" in said
+
+
+@pytest.mark.parametrize(
+    ("causes", "words"),
+    [
+        (("hangs", "tips"), "1 of them touch nothing that stands .'s13'.: .*; the others fall for another reason"),
+        (
+            ("rests", "slides", "tips"),
+            r"1 of them \('s15'\) tip or drop whatever .*; the others slide",
+        ),
+    ],
+)
+def test_blocks_that_fall_for_another_reason_are_not_left_out(tmp_path, capsys, causes, words):
+    stones = {
+        "hangs": [(3.0, 1.0), (3.4, 1.0), (3.4, 1.2), (3.0, 1.2)],
+        "tips": [(1.9, 0.9), (2.6, 0.9), (2.6, 1.1), (1.9, 1.1)],
+        "rests": [(-3.0, 0.0), (-2.0, 0.0), (-2.0, 1.4), (-3.0, 0.4)],
+        "slides": [(-2.8, 0.6), (-2.4, 1.0), (-2.6, 1.2), (-3.0, 0.8)],
+    }
+    drawing = drawn(tmp_path / "wall.json", [*wall([(0.0, 0.0)] * STONES), *(stones[cause] for cause in causes)])
+    assert main(["new", str(drawing), "-o", str(tmp_path / "wall.toml")]) == 0
+    assert re.search(words, capsys.readouterr().err)
 
 
 def test_a_unit_in_doubt_is_replaced_and_said_above_its_line(tmp_path, capsys):

@@ -214,3 +214,11 @@ def test_supports_carry_the_loads_of_the_limit_state(dimension, flow):
     turned = np.cross(arms, pushes[: len(arms)]).sum(axis=0) - np.cross(arms[free], pushes[len(arms) :]).sum(axis=0)
     own = forces[:, dimension:].sum(axis=0) - carried[:, dimension:].sum(axis=0)
     assert turned[-len(own) :] == pytest.approx(-own, abs=1e-6 * weight)
+
+
+@pytest.mark.parametrize("name", ["closed_gap", "overlap_tolerance", "displacement"])
+@pytest.mark.parametrize("value", [np.nan, -1.0])
+def test_lengths_that_are_none_are_refused(name, value):
+    structure = Structure(block(), friction_coefficient=0.5)
+    with pytest.raises(ValueError, match=f"{name} is {value:g} m; it must be .*at least 0"):
+        structure.limit_load(acceleration=(1, 0), **{name: value})

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import structures
+from structures import box, drawn, rectangle
 
 import blockvis
 import solver
@@ -57,6 +57,20 @@ def test_between_two_blocks_the_force_goes_into_the_one_it_pushes(tmp_path):
     assert blocks["[0, -500]"] < 2 * course < blocks["[0, 500]"]
 
 
+@pytest.mark.parametrize("sense", [1, -1])
+def test_edges_are_counted_from_the_first_corner_in_whichever_sense_it_is_drawn(tmp_path, sense):
+    """Edge 2 of a trapezoid that begins at its lower left corner is its right flank, a metre high."""
+    trapezoid = np.array([[0, 0], [1, 0], [1, 1], [0.2, 1]])
+    stone = trapezoid if sense > 0 else np.roll(trapezoid[::-1], 1, axis=0)
+    drawn(tmp_path / "stone.json", [stone, rectangle(0, -1, 1, 0)], ["stone", "ground"], role=[None, "fixed"])
+    case = '[geometry]\nfile = "stone.json"\n[analysis]\nkind = "limit load"\n[output]\nanimation = false\n'
+    (tmp_path / "case.toml").write_text(
+        case + '[[loads]]\nkind = "live"\npressure = 1000.0\nblocks = "stone"\nedge = 2\n', encoding="utf-8"
+    )
+    live = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=()).response.loads.live
+    np.testing.assert_allclose(live[0, :2], [-1000.0, 0.0])
+
+
 @pytest.mark.slow
 def test_in_space_the_block_is_found_by_its_faces(tmp_path):
     corner = blockvis.generators.build("L corner", {})
@@ -75,8 +89,8 @@ def test_in_space_the_block_is_found_by_its_faces(tmp_path):
 
 
 def test_a_moment_in_space_acts_on_one_of_the_blocks_that_meet_at_its_point(tmp_path):
-    boxes = [structures.box((0, 0, z), (1, 1, z + 1)) for z in (-1, 0, 1)]
-    structures.drawn(tmp_path / "pile.json", boxes, role=["moving", None, None])
+    boxes = [box((0, 0, z), (1, 1, z + 1)) for z in (-1, 0, 1)]
+    drawn(tmp_path / "pile.json", boxes, role=["moving", None, None])
     path = tmp_path / "case.toml"
     path.write_text(
         '[geometry]\nfile = "pile.json"\n[settlement]\ndirection = [0, 0, -1]\nincrement = 1e-3\nlimit = 1e-3\n'

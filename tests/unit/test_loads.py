@@ -116,6 +116,7 @@ def test_refused_settlements(given, message):
         lambda: solver.InterfaceLaw(cohesion="0.6"),
         lambda: solver.Settlement(direction=(1, 0), limit="0.6"),
         lambda: solver.Controls(local_loss="0.6"),
+        lambda: solver.ControlDisplacement("brick", limit="0.6"),
         lambda: solver.Structure(ASSEMBLY, friction_coefficient="0.6"),
         lambda: solver.settle(ASSEMBLY, solver.Settlement(direction=(1, 0)), friction_coefficient="0.6"),
     ],
@@ -130,8 +131,10 @@ def test_text_in_place_of_a_number_is_named(make):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"falling_frames": None}, "falling_frames is None; it is a number of at least 0"),
+        ({"falling_frames": None}, "falling_frames is None; give a whole number"),
         ({"falling_frames": -1}, "falling_frames is -1; it is a number of at least 0"),
+        ({"falling_frames": 2.5}, "falling_frames is 2.5; give a whole number"),
+        ({"overlap_tolerance": np.nan}, "overlap_tolerance is nan; give a number"),
         ({"local_loss": 1.5}, "local_loss is 1.5; give a share of the weight from 0 to 1"),
         ({"step_tolerance": 0.0}, "step_tolerance is 0; it is a number between 0 and 1"),
     ],
@@ -144,3 +147,35 @@ def test_refused_controls(given, message):
 def test_friction_given_in_degrees_warns():
     with pytest.warns(UserWarning, match=r"friction_coefficient = 60 is .* give its tangent, 1\.73"):
         solver.Structure(ASSEMBLY, friction_coefficient=60)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: solver.Settlement((1, 0), limit=None), "limit is None; give a number"),
+        (lambda: solver.Settlement((1, 0), rotation=None), "rotation is None; give a number"),
+        (lambda: solver.InterfaceLaw(None), "friction_coefficient is None; give a number"),
+        (lambda: solver.InterfaceLaw([0.5]), r"friction_coefficient is \[0\.5\]; give a number"),
+        (lambda: solver.settle(ASSEMBLY, (1, 0), friction_coefficient=None), "friction_coefficient is None"),
+        (lambda: solver.Settlement((1, 0), blocks="pier"), "blocks is the text 'pier'; give a sequence of names"),
+        (lambda: solver.Structure(ASSEMBLY, 0.5), r"interfaces are 0\.5; .* or friction_coefficient by its name"),
+    ],
+)
+def test_what_is_no_number_is_refused_by_its_name(make, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        make()
+
+
+@pytest.mark.parametrize("direction", [(np.nan, 0), (0, 0), (0, 0, -1)])
+def test_a_pressure_needs_its_direction(direction):
+    with pytest.raises(ValueError, match=r"pressure direction is \[.*\]; give the direction in which it pushes"):
+        solver.surface_pressure(ASSEMBLY, 1e3, direction)
+
+
+def test_a_moment_in_space_is_three_numbers():
+    """One number would act about all three axes."""
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    faces = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+    cube = solver.Assembly.from_solids([(corners, faces)])
+    with pytest.raises(ValueError, match="moment in space is 5.0; give three numbers"):
+        solver.point_load(cube, 0, moment=5.0)

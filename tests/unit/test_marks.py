@@ -539,3 +539,11 @@ def test_places_are_told_by_openings():
     above, below = sorted(cracks_of(wall, moved(wall, **column)), key=lambda crack: -crack.at[1])
     assert above.places == ("the upper right corner of the opening", "the top")
     assert below.places[1] == "the lower right corner of the opening"
+
+
+def test_an_arch_has_an_opening_that_the_ground_closes_and_an_outer_face():
+    arch = generators.arch(voussoirs=10, thickness_ratio=0.2)
+    parts = {f"voussoir {k}": (0.02 * (k > 7) - 0.03 * (k < 4) + 0.01 * (k > 5), 0.0, 0.0) for k in range(1, 11)}
+    found = {frozenset(crack.places) for crack in cracks_of(arch, moved(arch, **parts))}
+    sides = {frozenset({f"the {side} haunch of the opening", "the outer face"}) for side in ("left", "right")}
+    assert found >= sides | {frozenset({"the head of the opening", "the top"})}

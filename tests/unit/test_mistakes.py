@@ -5,7 +5,6 @@ import re
 import pytest
 
 import blockvis
-import solver
 from blockvis import generators, pyvista_plugin
 from blockvis.cli import main
 
@@ -69,8 +68,6 @@ def test_two_laws_of_the_same_materials_are_refused(tmp_path, capsys, pairs):
     laws = "".join(f"[[interfaces]]\nmaterials = [{pair}]\nfriction_coefficient = 0.3\n" for pair in pairs)
     assert main(["run", str(written(tmp_path, ARCH + laws)), "-o", str(tmp_path / "out")]) == 2
     assert re.search(r"case\.toml: \[interfaces 2\] materials .* are there twice; give each", capsys.readouterr().err)
-    with pytest.raises(ValueError, match="the materials 'a' and 'b' have two laws"):
-        solver.Interfaces(pairs=dict.fromkeys((("a", "b"), ("b", "a")), solver.InterfaceLaw()))
 
 
 @pytest.mark.parametrize(

@@ -173,7 +173,7 @@ def test_a_drawing_that_is_missing_is_refused(tmp_path, capsys):
 
 
 def test_hostile_names_stay_in_their_quotes_and_comments(tmp_path):
-    names = ['q"\\', "new\nline = 1", "nul\x00", "[[loads]]", "support \x7f é", "support 2 \u2028"]
+    names = ['q"\\', "new\nline = 1", "bell\x07", "[[loads]]", "support \x7f é", "support 2 \u2028"]
     blocks = [
         {"name": name, "role": "free", "outline": [[k, 0], [k + 0.9, 0], [k + 0.9, 1], [k, 1]]}
         for k, name in enumerate(names)

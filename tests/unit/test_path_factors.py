@@ -40,7 +40,7 @@ def test_the_imperfection_is_multiplied(factor):
         ({"compliance_factor": 0.0}, "compliance_factor is 0; it is a number above 0, by default 1"),
         ({"compliance_factor": float("inf")}, "compliance_factor is inf; it is a number above 0"),
         ({"imperfection_factor": -1.0}, "imperfection_factor is -1; it is a number of at least 0, by default 1"),
-        ({"imperfection_factor": float("nan")}, "imperfection_factor is nan; it is a number of at least 0"),
+        ({"imperfection_factor": float("nan")}, "imperfection_factor is nan; give a number"),
     ],
 )
 def test_a_factor_that_is_none_is_refused(factors, words):

@@ -69,6 +69,34 @@ def test_springs_keep_what_has_compressed_them_when_something_apart_is_taken_awa
     assert found[1] == pytest.approx(found[0], abs=1e-4 * mechanics.total_weight(assembly))
 
 
+def test_the_capacity_of_a_pose_is_that_of_the_blocks_that_are_left() -> None:
+    """A tower against a buttress, pushed with 10 kN at mid-height; without it, it tips at W b/2 = α F h/2."""
+    outlines = [rectangle(0, -1, 9, 0), rectangle(2, 0, 3, 3), rectangle(3, 0, 5, 3), rectangle(9, -1, 10, 0)]
+    assembly = solver.Assembly.from_outlines(
+        [*outlines, rectangle(9, 0, 10, 1)],
+        roles=["fixed", "free", "free", "moving", "free"],
+        names=["ground", "tower", "buttress", "pad", "stone"],
+    )
+    prop = solver.Tie("prop", (1, 2), ((2.5, 2.9), (4.0, 2.9)), stiffness=1e8, kind="prop")
+    structure = solver.Structure(assembly, friction_coefficient=0.6, ties=[prop])
+    last = structure.settle(DOWN, changes=[taken_away(structure, 0, "buttress")]).path[-1]
+    assert last.fallen.tolist() == [False, False, True, False, False]
+    pushed = structure.with_live(solver.point_load(assembly, 1, (1e4, 0.0)))
+    left, alone = {"pose": last.pose, "fallen": last.fallen}, assembly.masses[1] * solver.GRAVITY * 0.5 / (1e4 * 1.5)
+    limit = pushed.limit_load(**left)
+    assert limit.multiplier == pytest.approx(alone, rel=1e-9)
+    assert limit.increment.fallen.tolist() == last.fallen.tolist()
+    assert pushed.limit_load(pose=last.pose).multiplier > 2.0 * alone
+    control = solver.ControlDisplacement("tower", increment=0.01, limit=0.01)
+    response = pushed.pushover(control, **left, ties_at=last.ties)
+    assert response.path[0].load_multiplier == pytest.approx(alone, rel=1e-6)
+    assert all(increment.fallen[2] for increment in response.path)
+    with pytest.raises(ValueError, match="control block 'buttress' has left the structure; name a free block"):
+        pushed.pushover(solver.ControlDisplacement("buttress"), **left)
+    with pytest.raises(ValueError, match=r"fallen is .*; give a bool for each of the 5 blocks"):
+        pushed.limit_load(pose=last.pose, fallen=np.array([2]))
+
+
 def test_a_load_acts_from_its_phase_on() -> None:
     structure = beam_on_a_prop()
     dead = np.zeros((6, 3))
@@ -104,7 +132,8 @@ def test_what_falls_at_once_is_told_as_a_loss(tmp_path: Path) -> None:
     controls = solver.Controls(local_loss=0.5)
     response = wider.settle([DOWN, DOWN], changes=[taken_away(wider, 1, "prop", "beam")], controls=controls)
     assert response.stop is solver.Status.LIMIT_REACHED
-    assert [loss.blocks for loss in response.losses] == [("load",)]
+    assert [(loss.blocks, loss.phase) for loss in response.losses] == [(("load",), 1)]
+    assert any(note.startswith("at 0 m in phase 2: ") for note in response.notes)
     assert "load at 0 m in phase 2, " in report_of(response)
     blockvis.write(response, tmp_path / "out")
     (told,) = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["losses"]
@@ -188,6 +217,14 @@ def run_told(folder: Path, case: str, capsys: pytest.CaptureFixture[str]) -> tup
     return capsys.readouterr().out, json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
 
 
+def test_a_tie_that_is_taken_away_is_named_in_the_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    iron = '[[ties]]\nname = "iron"\nfrom = { block = "left springer", point = [-1, 0] }\n'
+    iron += 'to = { block = "right springer", point = [1, 0] }\nstiffness = 1e5\n'
+    steps = SPREADING.replace("increment = 0.05\nlimit = 0.1", "increment = 0.002\nlimit = 0.002")
+    _, summary = run_told(tmp_path, ARCH + 2 * steps + iron + '[[remove]]\nphase = 2\nties = "iron"\n', capsys)
+    assert summary["removed"] == [{"phase": 2, "blocks": [], "ties": ["iron"], "weight": 0.0}]
+
+
 @pytest.mark.parametrize("ranged", ["", "[analysis]\nrange = true\n"])
 def test_what_falls_before_anything_moves_is_a_collapse_at_no_settlement(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], ranged: str
@@ -241,11 +278,27 @@ def test_places_along_several_settlements_are_told_with_their_phase(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "asked", ["", '[analysis]\nkind = "limit load"\n[[loads]]\nkind = "live"\nweight_fraction = [0, -1]\n']
+)
 def test_a_collapse_before_the_supports_turn_is_read_back_in_metres(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], asked: str
 ) -> None:
     turning = "[[settlement]]\nrotation_centre = [1, 0]\nrotation = 1\nincrement = 0.01\nlimit = 0.01\n"
-    _, summary = run_told(tmp_path, ARCH + SPREADING.replace("0.1", "0.5") + turning, capsys)
+    _, summary = run_told(tmp_path, ARCH + SPREADING.replace("0.1", "0.5") + turning + asked, capsys)
     assert (summary["status"], summary["collapse_phase"]) == ("collapsed", 1)
     told = report_of(blockvis.open_results(tmp_path / "out"))
-    assert f"{summary['collapse_displacement']:.6g} m in phase 1<" in told
+    assert f"{summary['collapse_displacement']:.6g} m in phase 1" in told
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"dead": np.full((6, 3), np.nan)}, "dead load on block 'left' is .*; not finite"),
+        ({"dead": np.zeros((6, 2))}, r"dead loads have shape \(6, 2\); give \(6, 3\)"),
+        ({"removed": np.array([3])}, r"removed has shape \(1,\); give one per block, 6"),
+    ],
+)
+def test_changes_that_do_not_fit_the_blocks_are_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        beam_on_a_prop().settle([DOWN, DOWN], changes=[solver.PhaseChange(1, **change)])

@@ -258,6 +258,14 @@ def test_friction_of_pairs_of_materials():
     assert laws.friction(assembly, first, second).tolist() == [0.2, 0.2, 0.2, 0.5]
 
 
+def test_a_pair_of_materials_with_two_laws_is_refused():
+    laws = {("a", "b"): solver.InterfaceLaw(0.1), ("b", "a"): solver.InterfaceLaw(0.9)}
+    with pytest.raises(ValueError, match="interface of 'a' and 'b' has another law as 'b' and 'a'; give one"):
+        solver.Interfaces(pairs=laws)
+    same = solver.Interfaces(pairs=dict.fromkeys(laws, solver.InterfaceLaw(0.1)))
+    assert len(same.laws) == 3
+
+
 def depths(outlines, tolerance=1e-6):
     assembly = solver.Assembly.from_outlines(outlines)
     i, j, depth = mechanics.overlap_depths(assembly.vertices, assembly.offsets, tolerance)

@@ -137,6 +137,22 @@ def test_a_ground_of_one_block_is_cut_under_the_joints_of_the_first_course():
     assert assembly.areas[pieces].sum() == pytest.approx(whole.areas[whole.index("ground")])
 
 
+@pytest.mark.parametrize(
+    ("blocks", "moved"), [('"ground"', {1, 2, 3, 4, 5}), ('["ground 1", "ground 2"]', {1, 2}), ('"rock"', None)]
+)
+def test_ground_that_was_cut_is_named_by_its_name_or_its_pieces(tmp_path, blocks, moved):
+    profile = 'profile = { kind = "gaussian", centre = 0.5, inflection = 0.2 }\n'
+    first, then = WALL.replace("limit = 0.004", "limit = 0.002").split("[settlement]")
+    text = f"{first}[[settlement]]\n{profile}{then}[[settlement]]\ndirection = [0, -1]\nblocks = {blocks}{then}"
+    if moved is None:
+        with pytest.raises(ValueError, match=r"\[settlement 2\] blocks: no block is named 'rock'.* ground 1, ground 2"):
+            assembly_of(case_from(text))
+        return
+    response = blockvis.run_case(case_from(text), tmp_path / "out", outputs=()).response
+    assert response.settlements[1].blocks == tuple(f"ground {k}" for k in sorted(moved))
+    assert response.path[-1].phase == 1
+
+
 def test_a_trough_and_its_mirror_open_the_wall_alike(tmp_path):
     # One increment: at the second a brick slips, and comes to rest a little earlier in the one than in the other. What
     # a program leaves of the step grows to a ten-thousandth of a brick.

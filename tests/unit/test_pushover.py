@@ -135,6 +135,41 @@ def test_what_has_fallen_is_marked():
     assert "no capacity is left" in response.message
 
 
+def test_ties_act_from_the_start_whichever_settlement_they_were_to_wait_for():
+    assembly = block()
+    control = solver.ControlDisplacement("block", (1, 0), increment=0.005, limit=0.01)
+    found = []
+    for phase in (1, 2):
+        tie = solver.Tie("stay", (0, None), ((0.0, 1.0), (-1.0, 1.0)), stiffness=1e8, strength=500.0, phase=phase)
+        structure = solver.Structure(assembly, friction_coefficient=0.6, loads=sideways(assembly), ties=[tie])
+        found.append(structure.pushover(control).load_multiplier)
+    assert found[1].tolist() == found[0].tolist()
+    # It yields: W (b/2 - d/2) + F h = α W h/2, but for what the displacement d of the centroid has turned.
+    assert found[0][-1] == pytest.approx(0.2 + 2 * 500.0 / mechanics.total_weight(assembly), rel=0.1)
+
+
+def test_far_from_the_origin_a_pushover_is_what_it_is_near():
+    # Quarters of metres, which are as exact in both places.
+    shift, found = np.array([524288.0, 5242880.0]), []
+    outlines = np.array([[[0, 0], [0.25, 0], [0.25, 1], [0, 1]], [[0, -1], [1, -1], [1, 0], [0, 0]]])
+    for origin in (0.0 * shift, shift):
+        assembly = solver.Assembly.from_outlines(outlines + origin, roles=["free", "fixed"])
+        ends = tuple(map(tuple, np.array([[0.0, 1.0], [-1.0, 1.0]]) + origin))
+        ties = [solver.Tie("stay", (0, None), ends, stiffness=1e5, strength=1e3)]
+        structure = solver.Structure(assembly, friction_coefficient=0.6, loads=sideways(assembly), ties=ties)
+        control = solver.ControlDisplacement(
+            "block 0", (1, 0), tuple(origin + np.array([0.25, 1.0])), increment=0.02, limit=0.02
+        )
+        response = structure.pushover(control)
+        first, last = response.path
+        again = structure.pushover(control, pose=last.pose, ties_at=last.ties).path[0]
+        assert again.load_multiplier == pytest.approx(last.load_multiplier, rel=1e-9)
+        assert last.ties.ends[0, 1] == pytest.approx(ends[1], abs=1e-9)
+        found.append([*response.load_multiplier, *(last.pose.positions - first.pose.positions).ravel()])
+    assert found[1] == pytest.approx(found[0], rel=1e-12, abs=2e-9)
+    assert found[1][:2] == found[0][:2]
+
+
 def test_input_is_refused_with_a_remedy():
     assembly = block()
     loads = sideways(assembly)

@@ -84,7 +84,7 @@ def test_frames_differ_and_the_fall_is_marked(tmp_path):
     response = arch_response()
     first = pixels(draw_still(response, 0, tmp_path / "first.png", size=SMALL))
     last = pixels(draw_still(response, len(response.path) - 1, tmp_path / "last.png", size=SMALL))
-    fallen = pixels(draw_still(response, -1, tmp_path / "fallen.png", size=SMALL))
+    fallen = pixels(draw_still(response, np.int64(-1), tmp_path / "fallen.png", size=SMALL))
     assert first.shape == (360, 640, 3)
     assert (np.abs(first - last).max(axis=2) > 30).sum() > 1000
     assert (alike(fallen[:40], palette.WARNING)).sum() > 500

@@ -74,3 +74,24 @@ def test_the_worst_of_some_certificates_passes_over_what_was_not_worked_out():
         assert (worst.equilibrium_residual, worst.largest_penetration, worst.duality_gap) == (2e-9, 3e-8, 4e-12)
         assert np.isnan(worst.kinematic_violation)
     assert mechanics.worst_of([]) is None
+
+
+def test_numbers_of_numpy_are_written(tmp_path):
+    """Those of np.arange and of data in single precision, which compute like others."""
+    block, ground = [[0, 0], [1, 0], [1, 1], [0, 1]], [[-1, -1], [2, -1], [2, 0], [-1, 0]]
+    assembly = solver.Assembly.from_outlines([ground, block], names=["ground", "block"], roles=["moving", "free"])
+    settlement = solver.Settlement(
+        (0, -1),
+        (0, 0),
+        rotation=np.float32(0.25),
+        increment=np.float32(0.5),
+        limit=np.int64(1),
+        blocks=np.array(["ground"]),
+    )
+    response = solver.settle(assembly, settlement, friction_coefficient=np.float32(0.5))
+    again = blockvis.open_results(blockvis.write(response, tmp_path / "out"))
+    assert again.settlements == response.settlements == (settlement,)
+    live = solver.Loads(solver.self_weight(assembly).dead, solver.weight_fraction(assembly, (1, 0)))
+    control = solver.ControlDisplacement("block", increment=np.float32(0.25), limit=np.int64(1))
+    pushed = solver.pushover(assembly, control, loads=live, friction_coefficient=0.3)
+    assert blockvis.open_results(blockvis.write(pushed, tmp_path / "pushed")).control == control

@@ -51,10 +51,18 @@ def test_no_moving_support_is_refused():
         solver.settle(two_bricks(roles=["free", "free", "fixed"]), DOWN)
 
 
-def test_phase_that_moves_nothing_is_refused_by_its_number():
-    still = solver.Settlement(direction=(1, 0), blocks=("lower",))
-    with pytest.raises(ValueError, match="phase 2 moves no support"):
-        solver.settle(two_bricks(), [DOWN, still])
+@pytest.mark.parametrize(
+    "named",
+    [
+        {"direction": (1, 0), "blocks": ("base", "lower")},
+        {"profile": {"base": (0.0, -0.1, 0.0), "lower": (0.0, -1.0, 0.0)}},
+    ],
+    ids=["blocks", "profile"],
+)
+def test_a_block_that_does_not_move_is_refused_by_its_phase_and_name(named):
+    words = "settlement phase 2 moves block 'lower', whose role is 'free'; give it the role 'moving', or leave it out"
+    with pytest.raises(ValueError, match=words):
+        solver.settle(two_bricks(), [DOWN, solver.Settlement(**named)])
 
 
 def test_no_free_block_is_refused():

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from structures import case_from, drawn, rectangle, run_command
+from structures import case_from, drawn, prism, rectangle, run_command
 
 import solver
 from blockvis import generators
@@ -98,6 +98,41 @@ def test_faces_are_shared_out_among_their_contact_points():
     on_ground = contacts.points[:, 1] < 1e-9
     assert set(cohesion[on_ground & flat]) == {1e3}
     assert set(strength[~on_ground]) == {np.inf}
+
+
+#: Stones that are not convex, fixed, and what touches them: a lintel on the feet of a U, a tenon in a socket.
+TOUCHING = {
+    "U": ([[0, 0], [2, 0], [2, 1], [1.8, 1], [1.8, 0.5], [0.2, 0.5], [0.2, 1], [0, 1]], rectangle(0, 1, 2, 1.5)),
+    "socket": ([[0, 0], [3, 0], [3, 2], [2, 2], [2, 1], [1, 1], [1, 2], [0, 2]], rectangle(1, 1, 2, 3)),
+}
+
+
+@pytest.mark.parametrize(("name", "along", "area"), [("U", 0, 0.4), ("socket", 1, 2.0)])
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("in_space", [False, True])
+def test_cohesion_acts_where_stones_that_are_not_convex_touch(name, along, area, mirrored, in_space):
+    """Without friction, pushed along its faces: α W = c A, and out of a socket c A beside its own weight."""
+    outlines = [np.array(outline, dtype=float) for outline in TOUCHING[name]]
+    if mirrored:
+        outlines = [(outline * [-1.0, 1.0])[::-1] for outline in outlines]
+    roles, direction = ["fixed", "free"], np.zeros(3 if in_space else 2)
+    if in_space:
+        solids = [(corners[:, [0, 2, 1]] * [1, -1, 1], faces) for corners, faces in map(prism, outlines)]
+        assembly = solver.Assembly.from_solids(solids, roles=roles)
+    else:
+        assembly = solver.Assembly.from_outlines(outlines, roles=roles)
+    interfaces = solver.Interfaces(solver.InterfaceLaw(friction_coefficient=0.0, cohesion=1e4))
+    direction[-1 if along else 0] = 1.0
+    found = solver.Structure(assembly, interfaces).limit_load(acceleration=direction)
+    assert found.multiplier == pytest.approx(along + 1e4 * area / mechanics.total_weight(assembly), rel=1e-6)
+
+
+@pytest.mark.parametrize("middle", [0.0, -0.05], ids=["straight", "slightly re-entrant"])
+def test_a_face_with_a_corner_that_is_none_is_shared_out_whole(middle):
+    under = [[0, -1], [2, -1], [2, 0], [1, middle], [0, 0]]
+    assembly = solver.Assembly.from_outlines([rectangle(0, 0, 2, 1), under], roles=["free", "fixed"])
+    areas = mechanics.find_contacts(assembly, assembly.vertices, 1e-6).areas
+    np.testing.assert_allclose(areas, 1.0, rtol=1e-3)
 
 
 def test_a_strong_joint_is_a_dry_joint():

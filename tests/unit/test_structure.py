@@ -29,6 +29,13 @@ def test_acceleration_at_which_a_block_overturns_or_slides(block, friction, mult
         assert structure.with_live(acceleration=acceleration).limit_load().multiplier == limit.multiplier
 
 
+def test_loads_may_be_lists(block):
+    dead = solver.self_weight(block).dead
+    live = solver.weight_fraction(block, (1, 0))
+    found = solver.limit_load(block, loads=solver.Loads(dead.tolist(), live.tolist()), friction_coefficient=0.7)
+    assert found.multiplier == pytest.approx(0.5, rel=1e-6)
+
+
 def test_friction_is_never_assumed(block):
     with pytest.raises(TypeError, match="either a friction_coefficient or interfaces"):
         solver.Structure(block)
@@ -155,3 +162,38 @@ def test_messages_on_a_model_in_memory_name_no_file():
 def test_what_is_no_model_of_compas_is_named(model, said):
     with pytest.raises(TypeError, match=said):
         blockvis.from_compas(model)
+
+
+def test_laws_of_what_is_not_there_are_refused(block):
+    law = solver.InterfaceLaw(0.1)
+    with pytest.raises(
+        ValueError, match=r"no block is of the material 'brik' of the pairs of interfaces; there are \[''\]"
+    ):
+        solver.Structure(block, solver.Interfaces(law, {("brik", ""): law}))
+    for name in ("nobody", "block 1"):
+        with pytest.raises(ValueError, match=f"no support is named '{name}', whose ground has a stiffness"):
+            solver.Structure(block, solver.Interfaces(law, ground={name: 1e8}))
+
+
+@pytest.mark.parametrize(("factor", "told"), [(-1.0, "-1"), (np.nan, "nan"), (np.inf, "inf")])
+def test_factors_of_friction_that_are_none_are_refused(block, factor, told):
+    scatter = solver.JointScatter(1, lambda p: factor + 0.0 * p)
+    structure = solver.Structure(block, solver.Interfaces(scatter=scatter))
+    with pytest.raises(ValueError, match=f"scatter gives the factor {told}; it must be at least 0"):
+        structure.limit_load(acceleration=(1, 0))
+
+
+def test_a_pose_of_other_blocks_is_refused(block):
+    structure = solver.Structure(block, friction_coefficient=0.5)
+    pose = solver.Pose.initial(generators.arch())
+    live = structure.with_live(acceleration=(1, 0))
+    for analyse in (live.limit_load, lambda pose: live.pushover(solver.ControlDisplacement("block 1"), pose=pose)):
+        with pytest.raises(ValueError, match=r"the pose is of another structure: its positions have shape \(14, 2\)"):
+            analyse(pose=pose)
+
+
+def test_what_has_no_equilibrium_has_no_first_reaction():
+    loose = solver.Assembly.from_outlines([GROUND, BLOCK, [[5, 5], [6, 5], [6, 6]]], roles=["moving", "free", "free"])
+    response = solver.settle(loose, solver.Settlement((0, -1)))
+    assert response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
+    assert np.isnan(response.initial_reaction)

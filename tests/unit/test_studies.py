@@ -367,7 +367,8 @@ def test_title_and_words_count_what_collapsed_and_what_never_stood_apart():
     study = _study(runs=8)
     status = ["collapsed"] * 4 + ["no initial equilibrium"] * 2 + ["limit reached", "solver failed"]
     table = _table(study, [0.1, 0.2, 0.3, 0.4, 0.0, 0.0, np.nan, np.nan], status)
-    table.loc[1, "falling_share"] = 0.02
+    # Of those that never stood none is a loss of a structure that stands.
+    table.loc[[1, 4], "falling_share"] = 0.02
     summary = summary_of(study, table)
     assert (summary["n_collapsed"], summary["n_never_stood"], summary["n_local"]) == (4, 2, 1)
     assert "4 collapsed, 2 no initial equilibrium" in in_words(summary)

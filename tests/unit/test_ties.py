@@ -346,3 +346,11 @@ def test_a_run_that_was_stopped_goes_on_with_its_ties(run, tmp_path):
     assert main(["run", "--resume", str(folder), "--no-pictures"]) == 0
     assert (folder / "ties.csv").read_bytes() == (run.folder / "ties.csv").read_bytes()
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["ties"] == run.summary["ties"]
+
+
+@pytest.mark.parametrize("blocks", [("block 0", "block 1"), (0,)])
+def test_blocks_of_a_tie_are_two_numbers(blocks):
+    with pytest.raises(
+        TypeError, match=r"tie 'rod' has blocks .*; give two numbers, assembly\.index finds them, or None"
+    ):
+        solver.Tie("rod", blocks, ((0, 0), (1, 0)), 1e6)

@@ -169,6 +169,13 @@ def test_stops_are_reported():
     assert response.settlement.tolist() == [0.0, 0.013, 0.02, 0.04, 0.05]
 
 
+@pytest.mark.parametrize("increments", ["linear program", "coulomb"])
+def test_a_multiple_that_is_the_limit_but_for_rounding_is_the_limit(increments):
+    arch = generators.arch(thickness_ratio=0.15, voussoirs=12)
+    response = settle(arch, 2.0, solver.Controls(increments=increments), direction=(1, 0), increment=0.009, limit=0.027)
+    assert response.settlement.tolist() == [0.0, 0.009, 0.018, 0.027]
+
+
 @pytest.mark.slow
 def test_goes_on_from_a_checkpoint_bit_for_bit():
     arch = generators.arch(thickness_ratio=0.15, voussoirs=12)
