@@ -372,7 +372,7 @@ SUPPORTS = Section(
     "supports",
     "A support that the drawing does not contain",
     (
-        Key("name", TEXT, "Name of the support", "ground left", default="support"),
+        Key("name", TEXT, "Name of the support, which nothing else has", "ground left", default="support"),
         Key("role", one_of((mechanics.FIXED, mechanics.MOVING)), "Whether the support stands or settles", "moving",
             default=mechanics.FIXED),
         Key("outline", OUTLINE, "Corners in order; in space those of its plan",

@@ -149,7 +149,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         supports=tuple(_support(table) for table in top.tables("supports")),
         **_material(top.table("material")),
         densities=_densities(top.table("materials")),
-        interfaces=dict(_interface(table) for table in top.tables("interfaces")),
+        interfaces=_interfaces(top),
         imperfections=_imperfections(top),
         settlements=tuple(settlement for settlement, _ in motions),
         profiles=tuple(profile for _, profile in motions),
@@ -308,9 +308,15 @@ def _support(table: Table) -> Mapping[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
 
 
-def _interface(table: Table) -> tuple[tuple[str, str], solver.InterfaceLaw]:
-    values = _law(keys.INTERFACES.read(table))
-    return values.pop("materials"), _checked_law(table, values)
+def _interfaces(top: Table) -> dict[tuple[str, str], solver.InterfaceLaw]:
+    found: dict[tuple[str, str], solver.InterfaceLaw] = {}
+    for entry in top.tables("interfaces"):
+        values = _law(keys.INTERFACES.read(entry))
+        one, other = values.pop("materials")
+        if (one, other) in found or (other, one) in found:
+            raise entry.error("materials", f"'{one}' and '{other}' are there twice; give each pair one table")
+        found[one, other] = _checked_law(entry, values)
+    return found
 
 
 def _imperfections(top: Table) -> tuple[Imperfection, ...]:

@@ -71,6 +71,7 @@ def case_assembly(case: Case) -> solver.Assembly:
     sketch = _case_layout(case)
     _refuse_doubted_unit(case, sketch)
     sketch = with_roles_by_place(sketch, case.role_places)
+    _refuse_shared_names(case, sketch)
     _note_density(case, sketch)
     if case.densities:
         sketch = _with_densities(case, sketch)
@@ -108,6 +109,18 @@ def case_assembly(case: Case) -> solver.Assembly:
     assembly = cut_ground(assembly, case.profiles)
     _refuse_idle_settlements(case, assembly)
     return imperfect(assembly, case.imperfections)
+
+
+def _refuse_shared_names(case: Case, sketch: layout.Layout) -> None:
+    """Refuse a support that is called as another or a block of the drawing: by its name it has its stiffness."""
+    taken = {*sketch.names}
+    for name in (support["name"] for support in case.supports):
+        if name in taken:
+            raise ValueError(
+                f"{case.source}: [supports] name: '{name}' is the name of another support or block; give each support "
+                "a name of its own"
+            )
+        taken.add(name)
 
 
 def _refuse_idle_settlements(case: Case, assembly: solver.Assembly) -> None:
@@ -303,9 +316,7 @@ def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
     return replace(loads, fills=backfills(case.backfills, assembly, case.source))
 
 
-def case_changes(
-    case: Case, assembly: solver.Assembly, ties: Sequence[solver.Tie] = ()
-) -> tuple[solver.PhaseChange, ...]:
+def case_changes(case: Case, assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> tuple[solver.PhaseChange, ...]:
     """Find what changes between the settlements of a case: what is taken away, and loads that begin to act.
 
     Raises

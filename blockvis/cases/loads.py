@@ -185,7 +185,8 @@ def _loaded(load: LoadCase, chosen: np.ndarray, assembly: solver.Assembly, where
     if not (load.has_force or load.has_moment):
         return []
     if load.point is not None and len(chosen) > 1:
-        return [block_at(assembly, load.point, chosen, load.force, f"{where} point")]
+        towards = load.force if load.has_force else (0.0,) * assembly.dimension
+        return [block_at(assembly, load.point, chosen, towards, f"{where} point")]
     if load.point is not None:
         note_outside(assembly, load.point, int(chosen[0]), f"{where} point", "on which the force acts")
     if load.has_force and len(chosen) > 1:

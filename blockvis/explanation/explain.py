@@ -106,6 +106,11 @@ def explain(
         if not isinstance(case, Case):
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
+        if case.removals:
+            raise ValueError(
+                f"{case.removals[0].where} takes away what blockvis explain would follow: it knows the structure as "
+                "drawn; leave it out, and such blocks out of the drawing"
+            )
         refuse_ties(case)
         drawn = case_assembly(case)
         _refuse_grounded(case_ties(case, drawn), case)

@@ -18,6 +18,7 @@ from blockvis.cases.contents import Case
 from blockvis.kinds.kind import RunInput
 from blockvis.kinds.settlement import SettlementKind
 from blockvis.results.joints import initial_joints, opening_and_slip
+from blockvis.runs.path_range import Variation
 from blockvis.runs.progress import RunsProgress
 from blockvis.system.extras import require
 from blockvis.system.processes import cores
@@ -185,14 +186,9 @@ def ordered(
     )
     friction = variant.friction
     factor = friction / case.friction_coefficient if case.friction_coefficient > 0.0 else 1.0
-    laws = {
-        pair: replace(law, friction_coefficient=factor * law.friction_coefficient)
-        for pair, law in case.interfaces.items()
-    }
     varied = replace(
-        case,
+        Variation(friction_factor=factor).of(case),
         friction_coefficient=friction,
-        interfaces=laws,
         settlements=(settlement,),
         controls=replace(case.controls, falling_frames=0),
     )

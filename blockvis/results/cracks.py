@@ -274,7 +274,11 @@ def _course_through(
         arm[k] = k if before[k] == root else arm[before[k]]
 
     def back(k: int) -> list[int]:
-        return [] if k == root else [k, *back(int(before[k]))]
+        found = []
+        while k != root:
+            found.append(k)
+            k = int(before[k])
+        return found
 
     first = back(int(total.argmax()))
     if first:

@@ -59,6 +59,6 @@ def open_results(folder: str | Path) -> solver.Response:
     return replace(
         response,
         interfaces=case_interfaces(case),
-        changes=case_changes(case, response.assembly),
+        changes=case_changes(case, response.assembly, response.ties),
         loads=with_moving_load(loads, case.loads, response.assembly, case.source, summary.get("governing_position")),
     )

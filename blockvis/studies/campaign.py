@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import json
 import logging
 import multiprocessing
 import queue
@@ -165,13 +166,14 @@ def _keep(records: StudyFolder, run: int) -> None:
     from blockvis.runs.run import run_case
 
     folder = records.folder / "results" / f"run_{run:06d}"
-    if (folder / "summary.json").is_file():
+    summary = folder / "summary.json"
+    if summary.is_file() and not has_failed(json.loads(summary.read_text(encoding="utf-8"))):
         return
     values = records.study.values_of(run)
     source = records.study.case_source
-    geometry = values.get("geometry", {})
-    if "file" in geometry:
-        geometry["file"] = str(source.parent / geometry["file"])
+    for table, key in (("geometry", "file"), ("output", "underlay")):
+        if key in values.get(table, {}):
+            values[table][key] = str(source.parent / values[table][key])
     folder.parent.mkdir(parents=True, exist_ok=True)
     case_file = folder.with_suffix(".toml")
     case_file.write_text(tomli_w.dumps(values), encoding="utf-8")

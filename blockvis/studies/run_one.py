@@ -19,7 +19,7 @@ from blockvis.cases.contents import Case
 from blockvis.pictures.frame import Frame
 from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
-from blockvis.results.about import least_reaction, loss_in
+from blockvis.results.about import collapse_phase, least_reaction, loss_in
 from blockvis.results.swinging import swing_factors
 from blockvis.results.ties import known_ties
 from blockvis.runs.plan import planned
@@ -132,7 +132,8 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         "hinges": len(mechanism.hinges),
         "sliding_joints": len(mechanism.sliding),
     }
-    return found, _shape(assembly, falls, mechanism, response.settlements[falls.phase], known_ties(response))
+    settlement = response.settlements[collapse_phase(response) or 0]
+    return found, _shape(assembly, falls, mechanism, settlement, known_ties(response))
 
 
 def _numbers(response: solver.Response) -> dict[str, Any]:
@@ -152,7 +153,7 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
         weights = assembly.masses * assembly.free
         found["lost_share"] = float(weights[path[-1].fallen & ~path[-1].removed].sum() / weights.sum())
     if collapse is not None and path:
-        low, high = (float(before[path[-1].phase] + s) for s in collapse.bracket)
+        low, high = (float(before[collapse_phase(response) or 0] + s) for s in collapse.bracket)
         found |= {"collapse_displacement": (low + high) / 2.0, "bracket_low": low, "bracket_high": high}
         found["last_settlement"] = low
         found["collapse_reaction"] = float(collapse.reaction)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import time
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
@@ -190,6 +191,8 @@ class StudyFolder:
         """Remove the files that a study writes, and nothing else."""
         for file in (self.folder / "mechanisms").glob("*.npz"):
             file.unlink()
+        for kept in (self.folder / "results").glob("run_*"):
+            shutil.rmtree(kept) if kept.is_dir() else kept.unlink()
         for name in (RUNS, "table.csv", "table.parquet", "summary.json", *(f"{p}.png" for p in PICTURES)):
             (self.folder / name).unlink(missing_ok=True)
 

@@ -253,6 +253,16 @@ def test_a_resumed_study_has_the_rows_of_one_run_at_once(arches, tmp_path, capsy
     assert StudyFolder(out, read_study(arches), force=True).missing() == list(range(8))
 
 
+def test_what_falls_as_a_later_settlement_begins_falls_after_those_before(arches, tmp_path):
+    settlement = "[[settlement]]\ndirection = [1, 0]\nincrement = 0.01\nlimit = 0.01\n"
+    removed = '[[remove]]\nphase = 2\nblocks = "voussoir 3"\n'
+    (tmp_path / "case.toml").write_text(f'[geometry]\nlayout = "arch"\n{2 * settlement}{removed}', encoding="utf-8")
+    arches.write_text(STUDY.partition("[[imperfections]]")[0], encoding="utf-8")
+    (row,) = _made_here(read_study(arches), tmp_path / "out", [0]).table().to_dict("records")
+    assert row["status"] == "collapsed"
+    assert [row[name] for name in ("collapse_displacement", "bracket_high", "last_settlement")] == [0.01] * 3
+
+
 def test_a_folder_that_is_no_study_is_refused(arches, tmp_path, capsys):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "thesis.tex").write_text("precious", encoding="utf-8")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, box, posed
+from structures import arch_response, box, posed, rectangle
 
 import solver
 from blockvis.pictures import crack_drawing, palette
@@ -50,6 +50,16 @@ def test_any_increment_is_drawn_on_demand(tmp_path):
         draw_cracks(response, 0, tmp_path / "none.png", view="front")
     with pytest.raises(ValueError, match=f"no increment 999: choose one from 0 to {len(response.path) - 1}"):
         draw_cracks(response, 999, tmp_path / "none.png")
+
+
+def test_a_crack_may_be_as_long_as_a_wall():
+    n = 1200
+    stones = [rectangle(k, 0.0, k + 1.0, 0.5) for k in range(n)]
+    row = solver.Assembly.from_outlines([rectangle(-1.0, -1.0, n + 1.0, 0.0), *stones], roles=["fixed", *n * ["free"]])
+    drawn = solver.Pose.initial(row)
+    lifted = solver.Pose(drawn.positions + 0.01 * np.outer(row.free, (0.0, 1.0)), drawn.rotations)
+    (crack,) = cracks_of(row, lifted)
+    assert len(crack.joints) == n
 
 
 @pytest.mark.slow

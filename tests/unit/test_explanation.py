@@ -432,6 +432,26 @@ def test_cracks_of_causes_are_those_of_joints_with_mortar_or_that_give():
     assert 0.2 * widest["dry"] < widest["glued"] < 0.8 * widest["dry"]
 
 
+def test_more_friction_takes_the_tension_that_the_joints_then_cannot_have():
+    law = "friction_coefficient = 0.6\ncohesion = 1e4\ntensile_strength = 1.5e4\n"
+    case = structures.case_from(
+        f'[geometry]\nlayout = "arch"\nparameters = {{ voussoirs = 6 }}\n[material]\n{law}'
+        f'[[interfaces]]\nmaterials = ["a", "b"]\n{law}[settlement]\ndirection = [0, -1]\n'
+    )
+    _, (one, *_) = candidates(ARCH)
+    given = ordered(case, ARCH, one.motions, Variant(0.75, 0), (0.02, 0.01)).given
+    for law in given.interfaces.laws:
+        assert (law.friction_coefficient, law.tensile_strength) == pytest.approx((0.75, 1e4 / 0.75))
+
+
+def test_a_case_of_which_something_is_taken_away_has_no_causes(tmp_path):
+    removed = '[geometry]\nlayout = "arch"\n[[remove]]\nphase = 1\nblocks = "voussoir 3"\n'
+    (tmp_path / "case.toml").write_text(removed, encoding="utf-8")
+    (tmp_path / "cracks.csv").write_text("kind,block_a,block_b,width\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"case.toml: \[remove\] takes away what blockvis explain would follow"):
+        blockvis.explain(tmp_path / "case.toml", tmp_path / "cracks.csv")
+
+
 def test_a_case_that_crushes_has_no_causes(tmp_path):
     layout = '[geometry]\nlayout = "arch"\n[material]\nfriction_coefficient = 0.6\n'
     (tmp_path / "case.toml").write_text(layout + "compressive_strength = 1e6\n", encoding="utf-8")

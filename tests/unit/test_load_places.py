@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from structures import drawn, rectangle
+from structures import box, drawn, rectangle
 
 import blockvis
 import solver
@@ -86,6 +86,20 @@ def test_in_space_the_block_is_found_by_its_faces(tmp_path):
     expected = np.zeros(corner.n_blocks)
     expected[chosen] = -1e-3 * (chosen + 1)
     np.testing.assert_allclose(added, expected, atol=1e-9)
+
+
+def test_a_moment_in_space_acts_on_one_of_the_blocks_that_meet_at_its_point(tmp_path):
+    boxes = [box((0, 0, z), (1, 1, z + 1)) for z in (-1, 0, 1)]
+    drawn(tmp_path / "pile.json", boxes, role=["moving", None, None])
+    path = tmp_path / "case.toml"
+    path.write_text(
+        '[geometry]\nfile = "pile.json"\n[settlement]\ndirection = [0, 0, -1]\nincrement = 1e-3\nlimit = 1e-3\n'
+        "[[loads]]\nmoment = [0, 100, 0]\npoint = [0.5, 0.5, 1]\n",
+        encoding="utf-8",
+    )
+    response = blockvis.run_case(path, tmp_path / "out", outputs=()).response
+    added = response.loads.dead - solver.self_weight(response.assembly).dead
+    np.testing.assert_allclose(added[1:].sum(axis=0), [0.0, 0.0, 0.0, 0.0, 100.0, 0.0], atol=1e-9)
 
 
 def test_a_point_in_no_block_names_the_nearest(tmp_path, capsys):

@@ -52,6 +52,24 @@ def test_a_point_of_what_acts_all_over_is_refused(tmp_path, capsys, acts):
     assert "case.toml: [loads] point is that of a force or moment; pressure and weight" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["", 'name = "springer"\n', 'name = "voussoir 1"\n'])
+def test_a_support_that_is_called_as_something_else_is_refused(tmp_path, capsys, name):
+    """By its name it has its stiffness, which another had."""
+    under = "".join(
+        f"[[supports]]\n{name}outline = [[{x}, -1], [{x + 1}, -1], [{x + 1}, 0], [{x}, 0]]\nstiffness = 1e7\n"
+        for x in (5, 7)
+    )
+    assert main(["run", str(written(tmp_path, ARCH + under)), "-o", str(tmp_path / "out")]) == 2
+    assert re.search(r"case\.toml: \[supports\] name: '.*' is the name of another support", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("pairs", [['"a", "b"', '"b", "a"'], ['"a", "a"', '"a", "a"']])
+def test_two_laws_of_the_same_materials_are_refused(tmp_path, capsys, pairs):
+    laws = "".join(f"[[interfaces]]\nmaterials = [{pair}]\nfriction_coefficient = 0.3\n" for pair in pairs)
+    assert main(["run", str(written(tmp_path, ARCH + laws)), "-o", str(tmp_path / "out")]) == 2
+    assert re.search(r"case\.toml: \[interfaces 2\] materials .* are there twice; give each", capsys.readouterr().err)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -240,6 +240,20 @@ def test_what_falls_before_anything_moves_is_a_collapse_at_no_settlement(
     assert main(["report", str(tmp_path / "out")]) == 0
 
 
+def test_a_folder_is_reopened_after_a_tie_has_been_taken_away(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tie = (
+        '[[ties]]\nname = "iron"\nfrom = { block = "left springer", point = [-1, 0] }\n'
+        'to = { block = "right springer", point = [1, 0] }\nstiffness = 1e5\n'
+    )
+    removed = '[[remove]]\nphase = 2\nties = ["iron"]\n'
+    run_told(tmp_path, ARCH + 2 * SPREADING.replace("0.1", "0.05") + tie + removed, capsys)
+    (change,) = blockvis.open_results(tmp_path / "out").changes
+    assert (change.phase, change.ties) == (1, ("iron",))
+    assert main(["report", str(tmp_path / "out")]) == 0
+
+
 @pytest.mark.slow
 def test_places_along_several_settlements_are_told_with_their_phase(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

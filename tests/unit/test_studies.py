@@ -1,5 +1,6 @@
 """Studies: what their file may hold, and the numbers that sum up their runs."""
 
+import json
 import re
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import scipy.stats as st
+from PIL import Image
 
 from blockvis.case_files.read import case_of
 from blockvis.cases.value_paths import parse_path, put
@@ -461,6 +463,26 @@ def test_a_study_in_which_nothing_collapses_says_nothing_of_a_collapse(tmp_path,
     )
     assert "average" not in said
     assert not (tmp_path / "out" / "sensitivity.png").exists()
+
+
+@pytest.mark.slow
+def test_a_run_is_kept_with_its_photograph_and_thrown_away_with_its_study(study_file, capsys):
+    """An interrupted one is made again."""
+    folder = study_file.parent
+    Image.new("RGB", (40, 20), "grey").save(folder / "photo.png")
+    (folder / "photo.pgw").write_text("0.1\n0\n0\n-0.1\n-2\n1.5\n", encoding="utf-8")
+    study_file.write_text(STUDY.replace("runs = 8", "runs = 1\nkeep = 0"), encoding="utf-8")
+    summary, limits = folder / "out" / "results" / "run_000000" / "summary.json", []
+    for limit, force in (("0.001", ()), ("0.002", ("--force",))):
+        case = CASE.replace("limit = 0.3", f"limit = {limit}") + 'underlay = "photo.png"\n'
+        (folder / "case.toml").write_text(case, encoding="utf-8")
+        assert main(["sweep", str(study_file), "-o", str(folder / "out"), "--workers", "1", *force]) == 0
+        limits.append(json.loads(summary.read_text(encoding="utf-8"))["last_settlement"])
+    assert limits == [0.001, 0.002]
+    done = summary.read_text(encoding="utf-8")
+    summary.write_text(done.replace("limit reached", "interrupted"), encoding="utf-8")
+    assert main(["sweep", str(study_file), "-o", str(folder / "out")]) == 0
+    assert json.loads(summary.read_text(encoding="utf-8"))["status"] == "limit reached"
 
 
 def test_means_with_runs_that_stood_are_the_least_that_they_may_be(tmp_path):
