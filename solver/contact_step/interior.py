@@ -23,7 +23,7 @@ from .problem import ContactProblem, NotSolved, StepSolution
 #: Mean product, in block weights × block sizes, residual of the geometry, as a part of the movement, and force out of
 #: balance, in block weights, at which the method has converged. The first is small beside the compliance of the joints,
 #: which decides forces that equilibrium leaves open, however far the blocks move.
-CONVERGED, CLOSED, BALANCED = 1e-12, 1e-8, 1e-9
+CONVERGED, FITS, BALANCED = 1e-12, 1e-8, 1e-9
 
 #: All three, the first as a part of the movement, where the method goes no further.
 ACCEPTED = 1e-6
@@ -197,7 +197,7 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
     point = _Iterate(problem, multiplier)
     for _ in range(ITERATIONS):
         size = max(point.size, float(np.abs(point.motion).max()))
-        if point.mean <= CONVERGED and point.imbalance < BALANCED and point.residual <= CLOSED * size:
+        if point.mean <= CONVERGED and point.imbalance < BALANCED and point.residual <= FITS * size:
             break
         point.factorise()
         scaled_point = point.scaling.scaled_point
