@@ -133,8 +133,8 @@ class SettlementKind(AnalysisKind):
             at = f"{response.collapse.displacement:12.6g} {_unit_and_phase(response)}"
             # Where the structure falls at once nothing has been in equilibrium, and there is no reaction.
             if path:
-                last, where = _last_reaction(response)
-                lines.append(f"last reaction        {reaction(last, path[-1].phase)}{where}")
+                value, where = _last_reaction(response)
+                lines.append(f"last reaction        {reaction(value, path[-1].phase)}{where}")
             lines += [
                 f"collapse displacement{at}   between {low:.6g} and {high:.6g}",
                 f"mechanism: {mechanism_text(response)}",
