@@ -133,7 +133,8 @@ class SettlementKind(AnalysisKind):
             at = f"{response.collapse.displacement:12.6g} {_unit_and_phase(response)}"
             # Where the structure falls at once nothing has been in equilibrium, and there is no reaction.
             if path:
-                lines.append(f"last reaction        {reaction(response.collapse.reaction, path[-1].phase)}")
+                value, where = _last_reaction(response)
+                lines.append(f"last reaction        {reaction(value, path[-1].phase)}{where}")
             lines += [
                 f"collapse displacement{at}   between {low:.6g} and {high:.6g}",
                 f"mechanism: {mechanism_text(response)}",
@@ -179,7 +180,7 @@ class SettlementKind(AnalysisKind):
             rows.append(("first reaction", reaction(least_reaction(path[0]), path[0].phase)))
             if _rests_elsewhere(response):
                 rows.append(("reaction at rest", reaction(path[0].reaction, path[0].phase)))
-            rows.append(("last reaction", reaction(path[-1].reaction, path[-1].phase)))
+            rows.append(("last reaction", reaction(path[-1].reaction, path[-1].phase) + _last_reaction(response)[1]))
         return rows
 
 
@@ -201,6 +202,14 @@ def _unit_and_phase(response: solver.Response) -> str:
     assert response.collapse is not None
     assert phase is not None
     return f"{response.collapse.unit}{in_phase(response, phase)}"
+
+
+def _last_reaction(response: solver.Response) -> tuple[float, str]:
+    """Give the reaction at the last equilibrium, and its phase where what falls as a phase begins had it before."""
+    last, collapse = response.path[-1], response.collapse
+    if collapse is not None and collapse.reaction is not None:
+        return collapse.reaction, ""
+    return last.reaction, "" if collapse is None else in_phase(response, last.phase)
 
 
 def settlement_course(settlements: tuple[solver.Settlement, ...]) -> Course:
@@ -226,7 +235,9 @@ def _rests_elsewhere(response: solver.Response) -> bool:
 def _is_idle(response: solver.Response) -> bool:
     """Whether neither a free block nor a tie holds on to the supports that move, before they do."""
     contacts = response.path[0].contacts
-    touches = contacts.gaps < NOTABLE * response.assembly.block_size
+    # Joints of given stiffness carry across gaps, too.
+    carries = response.path[0].forces[:, 0] > 0.0
+    touches = carries | (contacts.gaps < NOTABLE * response.assembly.block_size)
     pairs = np.stack([contacts.block_a, contacts.block_b])[:, touches]
     return not response.ties and not response.assembly.moving[pairs].any()
 

@@ -98,7 +98,11 @@ def collapse_html(collapse: solver.Collapse) -> str:
             ("collapse at", f"{collapse.displacement:.6g} {unit}"),
             (f"{collapse.lost} at", f"{low:.6g} {unit}"),
             (f"no {collapse.lost} at", f"{high:.6g} {unit}"),
-            ("reaction at the last", force_text(collapse.reaction, moment=unit == "rad")),
+            *(
+                []
+                if collapse.reaction is None
+                else [("reaction at the last", force_text(collapse.reaction, moment=unit == "rad"))]
+            ),
             ("mechanism", collapse.words),
         ]
     )

@@ -215,5 +215,7 @@ def loss_of(response: solver.Response) -> Loss | None:
 
 
 def _last_before(response: solver.Response) -> solver.Increment | None:
-    """Give the last equilibrium before a collapse, or where the fall begins where there is none."""
-    return next(iter((*response.path[-1:], *response.increments[:1])), None)
+    """Give the last equilibrium before a collapse, or where the fall begins where its phase has none."""
+    last, falls = response.path[-1:], [i for i in response.increments if i.status == solver.Status.FALLING][:1]
+    at_once = response.collapse is not None and response.collapse.reaction is None
+    return next(iter((*falls, *last) if at_once else (*last, *falls)), None)

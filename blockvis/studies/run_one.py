@@ -156,7 +156,7 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
         low, high = (float(before[collapse_phase(response) or 0] + s) for s in collapse.bracket)
         found |= {"collapse_displacement": (low + high) / 2.0, "bracket_low": low, "bracket_high": high}
         found["last_settlement"] = low
-        found["collapse_reaction"] = float(collapse.reaction)
+        found["collapse_reaction"] = float(path[-1].reaction if collapse.reaction is None else collapse.reaction)
     elif response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
         # It collapses before any settlement.
         found |= {"collapse_displacement": 0.0, "bracket_low": 0.0, "bracket_high": 0.0}

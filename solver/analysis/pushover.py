@@ -107,10 +107,9 @@ def _increments(
     fallen: np.ndarray | None,
     resume: PathState | None,
 ) -> Generator[Increment, None, Ending]:
-    at = 0.0
     try:
         state = path.begin(start, None, ties_at, bonds_at, fallen) if resume is None else resume
-        at = state.place.s
         return (yield from path.follow(state, resume is not None))
     except SolveError as error:
-        return Ending(Status.SOLVER_FAILED, f"at a control displacement of {at:.6g} m: {error}")
+        at = max(path.reported, 0.0)
+        return Ending(Status.SOLVER_FAILED, f"beyond a control displacement of {at:.6g} m: {error}")

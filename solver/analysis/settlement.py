@@ -109,10 +109,13 @@ def _increments(
     first = 0 if resume is None else resume.phase
     before: PathState | None = None
     ending = Ending(Status.LIMIT_REACHED, "the settlement has reached its limit")
+    # Numbers that pass from phase to phase are in the unit of the first.
+    unit = model_of(assembly, loads_in(loads, changes, 0), interfaces, controls).force
     for number, phase in enumerate(phases[first:], start=first):
         start = Pose.initial(assembly) if before is None else before.place.pose
         start = start if resume is None else resume.start
         model = model_of(assembly, loads_in(loads, changes, number), interfaces, controls, ties=ties)
+        model = replace(model, force=unit)
         path = Path(model, SupportMotion(assembly, phase, start), number, controls, on_step)
         try:
             state = path.begin(start, before) if resume is None else resume

@@ -10,7 +10,7 @@ import numpy as np
 from solver.contact_step.problem import NotSolved
 from solver.kinematics import motion_size
 from solver.results.increment import Increment, Status
-from solver.results.mechanism import mechanism_of
+from solver.results.mechanism import mechanism_of, with_motion
 from solver.results.response import Collapse
 from solver.tolerances import CLOSING_GAP, FARTHEST_FALL
 
@@ -134,14 +134,19 @@ class Fall:
         sizes = [float(motion_size(frame.velocity, model.length).max()) for frame in frames]
         chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
         velocity, largest = frames[chosen].velocity, max(sizes[chosen], 1e-300)
-        at_last = self.reports.increment(last, velocity / largest, last.place.works)
+        multiplier, reaction = last.measured, None
+        if upper_bound > last.place.s:
+            reaction = multiplier if model.live is None else multiplier * model.live_force
+            at_last = self.reports.increment(last, velocity / largest, last.place.works)
+        else:
+            # A phase that begins with the fall has no equilibrium.
+            at_last = with_motion(frames[0], velocity / largest)
         # A multiplier is interpolated to zero; an equilibrium is lost anywhere in the bracket.
         part = 0.5 if multiplier_beyond is None else last.measured / (last.measured - multiplier_beyond)
-        multiplier = last.measured
         collapse = Collapse(
             displacement=last.place.s + part * (upper_bound - last.place.s),
             bracket=(last.place.s, upper_bound),
-            reaction=multiplier if model.live is None else multiplier * model.live_force,
+            reaction=reaction,
             mechanism=velocity / largest,
             unit=driver.unit,
             words=str(mechanism_of(model.assembly, at_last)),

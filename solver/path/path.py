@@ -130,7 +130,7 @@ class Path:
             # Joints keep the forces of the phase before, blocks not their velocity.
             place, fell_at = replace(before.place, s=0.0, velocity=None, works=(0.0, 0.0, 0.0, 0.0)), before.fell_at
             self._remove_blocks(fell_at)
-            place = self.stepper.members.installed(place, self.number)
+            place = self.stepper.members.installed(self._without_viscosity(place), self.number)
         else:
             if fallen is not None and np.any(fallen):
                 fell_at = np.where(fallen, -np.inf, np.nan)
@@ -166,13 +166,13 @@ class Path:
             lengths[[tie.name in ties for tie in self.model.ties]] = np.nan
             state = replace(state, place=replace(state.place, tie_lengths=lengths))
         self.disturbed = True
-        if not self.checks.in_equilibrium(state.place):
+        if self._gives(state.place) or not self.checks.in_equilibrium(state.place):
             end, at_rest = self.fall.relax(state.place)
             settled = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
             if settled is None:
                 return state
             state = settled
-        place = self._at_rest(state.place, anew=False) or state.place
+        place = self._without_viscosity(self._at_rest(state.place, anew=False) or state.place)
         return replace(state, place=place, history=(place,))
 
     def _at_rest(self, place: Place, anew: bool = True) -> Place | None:
@@ -251,7 +251,7 @@ class Path:
         check = self._check(place)
         bounds = check.bounds
         if not bounds.in_equilibrium and self.disturbed:
-            check, words = replace(check, measured=self._reaction(place)), [note.words for note in self.reports.notes]
+            words = [note.words for note in self.reports.notes]
             ending = yield from self.fall.collapse(check, place, place.s, None)
             return replace(ending, message="; ".join([*words, ending.message]))
         if not bounds.in_equilibrium:
@@ -299,13 +299,17 @@ class Path:
 
     def _without_viscosity(self, place: Place) -> Place:
         """The place once the supports have stood still: joints of given stiffness have given by their forces alone."""
-        if not (self.stepper.mortar.points(place, self.stepper.contacts_at(place)).give > COMPLIANCE).any():
+        if not self._gives(place):
             return place
         try:
             still, _, error = self.stepper.step(replace(place, velocity=None), STANDSTILL, in_time=True, exact=True)
         except NotSolved:
             return place
         return place if error.moved > JUMP else replace(still, velocity=place.velocity, works=place.works)
+
+    def _gives(self, place: Place) -> bool:
+        """Whether joints of given stiffness carry at a place: they move where their forces change."""
+        return bool((self.stepper.mortar.points(place, self.stepper.contacts_at(place)).give > COMPLIANCE).any())
 
     def _report(self, state: PathState, check: EquilibriumCheck) -> Increment:
         """The increment of an equilibrium, with the state as its checkpoint."""

@@ -126,7 +126,8 @@ class Reports:
         assert contacts is not None
         pressed = normal > 0.1 * normal.max()
         blocks = np.unique(np.concatenate([contacts.block_a[pressed], contacts.block_b[pressed]]))
-        blocks = blocks[assembly.free[blocks]]
+        # The ground at an end of a member is -1.
+        blocks = blocks[(blocks >= 0) & assembly.free[blocks]]
         wedged = counted(len(blocks), "block is", "blocks are")
         return f"the supports cannot move on: {wedged} wedged ({self._named(blocks)})"
 

@@ -175,8 +175,9 @@ class Stepper:
         self.unit = model.length / self.lever
         self.programs = 0
         self._last: tuple[Pose, Contacts] | None = None
-        support_motion = driver.rate(0.0)[assembly.moving, :d].sum(axis=0)
-        sense = support_motion / max(float(np.linalg.norm(support_motion)), 1e-300)
+        support_motion = driver.rate(0.0)[assembly.moving, :d]
+        # Of motions that cancel, rounding would choose a direction of the sum.
+        sense = support_motion.sum(axis=0) / max(float(np.linalg.norm(support_motion, axis=1).sum()), 1e-300)
         self.imperfection = np.zeros_like(model.load)
         self.imperfection[:, :d] = model.imperfection * IMPERFECTION * self.weights[:, :1] * sense
 

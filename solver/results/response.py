@@ -34,8 +34,8 @@ class Collapse(Shown):
         Middle of the bracket.
     bracket : (float, float) [m or rad]
         Last settlement with an equilibrium, first one without.
-    reaction : float [N or N·m]
-        At the last equilibrium.
+    reaction : float, optional [N or N·m]
+        At the last equilibrium; None where its phase begins with the fall.
     mechanism : (n_blocks, n_dof) array
         Direction in which the blocks move when they fall, largest movement 1 (rotations times block size).
     unit : str
@@ -48,7 +48,7 @@ class Collapse(Shown):
 
     displacement: float
     bracket: tuple[float, float]
-    reaction: float
+    reaction: float | None
     mechanism: np.ndarray
     unit: str = "m"
     words: str = ""
@@ -57,6 +57,8 @@ class Collapse(Shown):
     def __str__(self) -> str:
         """Say where, at which reaction, and how."""
         low, high = self.bracket
+        if self.reaction is None:
+            return f"collapse at {self.displacement:.6g} {self.unit}, before anything moves, {self.words}"
         force = "N" if self.unit == "m" else "N·m"
         return (
             f"collapse at {self.displacement:.6g} {self.unit} (equilibrium at {low:.6g}, none at {high:.6g}), "

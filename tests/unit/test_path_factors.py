@@ -34,6 +34,18 @@ def test_the_imperfection_is_multiplied(factor):
     assert np.array_equal(other.imperfection, factor * plain.imperfection)
 
 
+def test_motions_that_cancel_choose_no_direction():
+    squares = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) + np.arange(3)[:, None, None]
+    assembly = solver.Assembly.from_outlines(squares, roles=["moving", "moving", "free"])
+    model = mechanics.model_of(assembly, solver.self_weight(assembly), solver.Interfaces(), solver.Controls())
+
+    def largest(left, right):
+        motions = np.array([[left, 0.0, 0.0], [right, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        return np.abs(mechanics.Stepper(model, SimpleNamespace(lever=1.0, rate=lambda s: motions)).imperfection).max()
+
+    assert largest(-1.0, 1.0 + 1e-15) < 1e-12 * largest(1.0, 1.0)
+
+
 @pytest.mark.parametrize(
     ("factors", "words"),
     [

@@ -14,6 +14,7 @@ from structures import assembly_of, case_from, rectangle, report_of
 import blockvis
 import solver
 from blockvis.cli import main
+from blockvis.generators import build
 from solver import mechanics
 
 DOWN = solver.Settlement([0.0, -1.0], increment=1e-3, limit=1e-3)
@@ -107,6 +108,42 @@ def test_a_load_acts_from_its_phase_on() -> None:
     assert sums == pytest.approx([weight_above(structure)] * 2 + [weight_above(structure) + 1000.0] * 2, rel=1e-8)
 
 
+def test_a_load_elsewhere_leaves_the_forces_of_joints_as_they_are() -> None:
+    arch = build("arch")
+    x = float(arch.vertices[:, 0].max()) + 5.0
+    apart = [rectangle(x, -1.0, x + 1.0, 0.0), rectangle(x, 0.0, x + 1.0, 1.0)]
+    assembly = solver.Assembly.from_outlines(
+        [*(arch.outline(k) for k in range(arch.n_blocks)), *apart],
+        roles=[*("free" if free else "fixed" for free in arch.free), "moving", "free"],
+    )
+    dead = np.zeros((assembly.n_blocks, 3))
+    dead[-1, 1] = -20.0 * mechanics.total_weight(assembly)
+    changes = [solver.PhaseChange(1, dead=dead)]
+    response = solver.Structure(assembly, friction_coefficient=0.7).settle([DOWN, DOWN], changes=changes)
+    springer = np.flatnonzero(~arch.free)[-1]
+    thrusts = [float(increment.support_forces[springer, 0]) for increment in response.path]
+    assert thrusts[0] != 0.0
+    assert thrusts[2] == pytest.approx(thrusts[1], rel=1e-4)
+
+
+def test_springs_have_moved_before_a_settlement_begins() -> None:
+    footing, on_it = rectangle(0.0, 0.0, 1.5, 0.5), rectangle(0.3, 0.5, 0.8, 2.5)
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(-1.0, -0.5, 3.0, 0.0), footing, on_it], roles=["moving", "free", "free"]
+    )
+    structure = solver.Structure(assembly, solver.Interfaces(solver.InterfaceLaw(0.6, normal_stiffness=1e7)))
+    response = structure.settle([DOWN, DOWN], changes=[solver.PhaseChange(1, np.arange(3) == 2)])
+    end, begin = response.path[1], response.path[2]
+    assert (end.phase, begin.phase, begin.parameter) == (0, 1, 0.0)
+    weight = float(assembly.masses[2] * solver.GRAVITY)
+    # Half of the springs, k b t, is at either end: N / (k b t), and N e / (k b t (b / 2)²) where N has the arm e.
+    base = 1.5 * 1e7
+    heave, turn = weight / base, weight * 0.2 / (base * 0.75**2)
+    moved = end.pose.movement_to(begin.pose)[1]
+    assert moved[1] == pytest.approx(heave, rel=1e-3)
+    assert moved[2] == pytest.approx(-turn, rel=1e-2)
+
+
 def test_a_structure_that_stands_no_more_collapses_before_the_settlement() -> None:
     structure = beam_on_a_prop()
     controls = solver.Controls(falling_frames=1)
@@ -197,6 +234,48 @@ def test_a_change_that_cannot_be_is_refused_in_one_line(more: str, words: str) -
     with pytest.raises(ValueError, match=words) as error:
         run()
     assert "\n" not in str(error.value)
+
+
+PILE = """
+[geometry]
+file = "pile.json"
+[[remove]]
+phase = 2
+blocks = "prop"
+[[settlement]]
+direction = [0, -1]
+increment = 0.01
+limit = 0.02
+[[settlement]]
+rotation_centre = [-3, 0]
+rotation = 1
+increment = 0.01
+limit = 0.02
+"""
+BLOCKS = {
+    "ground": [[-1, -1], [2, -1], [2, 0], [-1, 0]],
+    "prop": [[0, 0], [1, 0], [1, 3], [0, 3]],
+    "stone": [[0, 3], [1, 3], [1, 3.6], [0, 3.6]],
+}
+
+
+def test_the_last_reaction_before_a_fall_at_once_is_that_of_the_phase_before(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    blocks = [{"name": name, "outline": outline} for name, outline in BLOCKS.items()]
+    blocks[0]["role"] = "moving"
+    layout = {"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}
+    (tmp_path / "pile.json").write_text(json.dumps(layout), encoding="utf-8")
+    said, summary = run_told(tmp_path, PILE, capsys)
+    assert re.search(r"last reaction +70632 N   1\.000000 W in phase 1\n", said)
+    assert summary["collapse_reaction"] is None
+    assert "reaction" not in summary["message"]
+    assert summary["mechanism"] == "1 macro-block"
+    assert summary["message"].endswith(", 1 macro-block")
+    response = blockvis.open_results(tmp_path / "out")
+    assert response.collapse is not None
+    assert response.collapse.reaction is None
+    assert "1.0000 W in phase 1<" in report_of(response)
 
 
 ARCH = """

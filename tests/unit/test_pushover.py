@@ -1,3 +1,4 @@
+import pkgutil
 from functools import cache
 from itertools import pairwise
 
@@ -219,3 +220,21 @@ def test_the_lift_of_a_corner_is_followed_to_where_it_is_largest():
     lift = 0.2 * np.sin(turned) + np.cos(turned) - 1.0
     assert [i.parameter for i in response.path] == pytest.approx(lift, abs=1e-6)
     assert response.path[-1].parameter == pytest.approx(np.hypot(0.2, 1.0) - 1.0, rel=1e-3)
+
+
+def test_a_program_that_fails_on_the_way_is_told_with_the_increment_before(monkeypatch):
+    """Bounds that are not found from some increment on end the analysis beyond the last one."""
+    bounds = "solver.path.equilibrium_check.EquilibriumChecks.bounds"
+    found = pkgutil.resolve_name(bounds)
+
+    def breaks(checks, place, *gap):
+        if place.s > 0.005:
+            raise solver.SolveError("planted")
+        return found(checks, place, *gap)
+
+    monkeypatch.setattr(bounds, breaks)
+    assembly = generators.arch()
+    control = solver.ControlDisplacement("voussoir 6", increment=0.002, limit=0.05)
+    response = pushover(assembly, control, loads=sideways(assembly), friction_coefficient=0.7)
+    assert [increment.parameter for increment in response.path] == pytest.approx([0.0, 0.002, 0.004])
+    assert response.message == "beyond a control displacement of 0.004 m: planted"

@@ -354,3 +354,22 @@ def test_blocks_of_a_tie_are_two_numbers(blocks):
         TypeError, match=r"tie 'rod' has blocks .*; give two numbers, assembly\.index finds them, or None"
     ):
         solver.Tie("rod", blocks, ((0, 0), (1, 0)), 1e6)
+
+
+def test_what_a_prop_presses_from_the_ground_alone_is_wedged():
+    """The ground at the other end has no number of a block: no other one is named."""
+    assembly = solver.Assembly.from_outlines(
+        [
+            structures.rectangle(-2, -1, 5, 0),
+            structures.rectangle(-1, 1, 2, 2),
+            structures.rectangle(0, 0, 1, 1),
+            structures.rectangle(3, 0, 3.5, 1),
+        ],
+        names=["ground", "ceiling", "propped", "far away"],
+        roles=["moving", "fixed", "free", "free"],
+    )
+    prop = solver.Tie("prop", (2, None), ((0.5, 0.9), (0.5, 2.0)), stiffness=1e9, kind="prop", prestress=1e7)
+    rising = solver.Settlement((0.0, 1.0), increment=0.01, limit=0.02)
+    response = solver.Structure(assembly, friction_coefficient=0.6, ties=[prop]).settle(rising)
+    assert response.stop is solver.Status.LOCKED
+    assert response.message.endswith("1 block is wedged (block 'propped')")
