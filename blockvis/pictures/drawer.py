@@ -208,7 +208,7 @@ class Drawer:
         if self._plane is not None and self._plane[1] @ self._views[0].axes[2] > 0.0:
             # What lies between the plane and the eye is left out.
             self._plane = self._plane * [[1.0], [-1.0]]
-        self.ties = DrawnTies(response)
+        self.ties = DrawnTies(response, self._plane)
         self._seen = _Series(sampled=sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
