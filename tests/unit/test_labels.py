@@ -200,6 +200,20 @@ def test_in_a_fall_the_label_of_a_tie_says_what_its_colour_does(monkeypatch):
 
 
 @pytest.mark.slow
+def test_lost_blocks_have_the_colour_of_their_legend_beside_the_tints_of_a_mechanism(words, tmp_path):
+    blocks = [rectangle(-2.0, -1.0, 2.0, 0.0), rectangle(-0.5, 0.0, 0.5, 1.5), rectangle(0.4, 1.5, 0.5, 1.9)]
+    materials = ["rock", "stone", "brick"]
+    assembly = solver.Assembly.from_outlines(blocks, roles=["moving", "free", "free"], materials=materials)
+    tilt = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.05, limit=1.0)
+    response = solver.settle(assembly, tilt, friction_coefficient=0.9)
+    draw_mechanism(response, tmp_path / "mechanism.png", size=LARGE)
+    (key,) = (key for key in words[-1]["keys"] if key.text == "lost block")
+    with Image.open(tmp_path / "mechanism.png") as picture:
+        above_the_legend = np.asarray(picture.convert("RGB"))[60:480]
+    assert (above_the_legend == key.colour).all(axis=2).sum() > 300
+
+
+@pytest.mark.slow
 def test_a_section_leaves_the_labels_of_the_ties_that_it_leaves_at_the_middle_of_what_is_left(monkeypatch, tmp_path):
     piers = [box((0, 0, 0), (1, 1, 2)), box((3, 0, 0), (4, 1, 2)), box((0, 0, -1), (1, 1, 0)), box((3, 0, -1), (4, 1, 0))]
     assembly = solver.Assembly.from_solids(piers, roles=["free", "free", "fixed", "moving"])
