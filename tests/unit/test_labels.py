@@ -215,7 +215,7 @@ def test_lost_blocks_have_the_colour_of_their_legend_beside_the_tints_of_a_mecha
 
 @pytest.mark.slow
 def test_a_section_leaves_the_labels_of_the_ties_that_it_leaves_at_the_middle_of_what_is_left(monkeypatch, tmp_path):
-    piers = [box((0, 0, 0), (1, 1, 2)), box((3, 0, 0), (4, 1, 2)), box((0, 0, -1), (1, 1, 0)), box((3, 0, -1), (4, 1, 0))]
+    piers = [box((x, 0, low), (x + 1, 1, high)) for low, high in ((0, 2), (-1, 0)) for x in (0, 3)]
     assembly = solver.Assembly.from_solids(piers, roles=["free", "free", "fixed", "moving"])
     ties = [
         solver.Tie("before", (0, 1), ((0.5, 0.1, 1.2), (3.5, 0.1, 1.2)), stiffness=1e7),
