@@ -22,21 +22,26 @@ def distances_to(assembly: solver.Assembly, point: ArrayLike) -> np.ndarray:
     ----------
     assembly : solver.Assembly
     point : (d,) sequence [m]
-
-    Notes
-    -----
-    In space the distance to the plane of the face that is farthest: no more than that to the block itself.
     """
     if assembly.dimension == 2:
         outlines = np.array([shapely.Polygon(assembly.outline(block)) for block in range(assembly.n_blocks)])
         return np.asarray(shapely.distance(outlines, shapely.Point(point)))
-    parts = assembly.polyhedra.parts
-    faces = parts.solids.faces(parts.solids.vertices)
-    beyond = ((np.asarray(point) - faces.middles) * faces.normals).sum(axis=1)
-    of_part = np.maximum.reduceat(beyond, parts.solids.faces_of_block[:-1])
+    parts, point = assembly.polyhedra.parts, np.asarray(point)
+    solids = parts.solids
+    faces, corners = solids.faces(solids.vertices), solids.vertices[solids.corners]
+    beyond = ((point - faces.middles) * faces.normals).sum(axis=1)
+    along, reach = corners[solids.next_corner] - corners, point - corners
+    shares = np.clip((reach * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
+    to_edges = np.linalg.norm(reach - shares[:, None] * along, axis=1)
+    inward = (np.cross(faces.normals[solids.face_of_corner], along) * reach).sum(axis=1)
+    first = solids.face_offsets[:-1]
+    over = np.minimum.reduceat(inward, first) >= 0.0
+    to_faces = np.where(over, np.abs(beyond), np.minimum.reduceat(to_edges, first))
+    first = solids.faces_of_block[:-1]
+    outside = np.maximum.reduceat(beyond, first) > 0.0
     found = np.full(assembly.n_blocks, np.inf)
-    np.minimum.at(found, parts.block_of_part, of_part)
-    return np.maximum(found, 0.0)
+    np.minimum.at(found, parts.block_of_part, np.where(outside, np.minimum.reduceat(to_faces, first), 0.0))
+    return found
 
 
 def note_outside(assembly: solver.Assembly, point: Sequence[float], block: int, where: str, role: str) -> None:

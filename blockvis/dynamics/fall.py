@@ -139,7 +139,8 @@ def fall_of(
     for _ in range(DOUBLINGS + 1):
         fall = _followed(response, push, progress, watch)
         fallen = np.linalg.norm(fall.positions[-1] - fall.positions[0], axis=1) > FALLEN * assembly.block_size
-        mass = float(assembly.masses[fallen].sum())
+        # What was lost before falls in any case.
+        mass = float(assembly.masses[fallen & ~response.path[-1].fallen].sum())
         # No more falls by a larger push: the mechanism takes blocks with it that come to rest.
         if best is not None and mass <= most:
             break

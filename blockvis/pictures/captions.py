@@ -45,6 +45,17 @@ def drops_at_start(response: solver.Response) -> bool:
     return bool(abs(path[1].measured - path[0].measured) > NOTABLE * np.abs(response.values).max())
 
 
+def new_motions(response: solver.Response) -> list[int]:
+    """Rows of the path from which on supports move otherwise than before: the reaction is along their motion."""
+    path, found = response.path, []
+    for k in range(1, len(path) if response.settlements else 0):
+        before, now = (response.settlements[path[row].phase] for row in (k - 1, k))
+        steps = {name: getattr(now, name) for name in ("increment", "limit", "tolerance", "stops")}
+        if replace(before, **steps) != now:
+            found.append(k)
+    return found
+
+
 def in_one_unit(response: solver.Response, phase: int | None = None) -> solver.Response:
     """Leave out the phases that another unit parts from a given one: distances and rotations share no axis.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from .captions import (
     force_unit,
     in_one_unit,
     lost_text,
+    new_motions,
     parameter_label,
     parameter_text,
     parameter_unit,
@@ -237,10 +239,11 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
 def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text: float) -> int:
     """Mark where a settlement begins and what changes before it; returns the most lines that are written at one."""
     path, grey, lines = response.path, palette.hexadecimal(palette.FAINT), 0
+    others = new_motions(response)
     for k in range(1, len(path)):
         if path[k].phase == path[k - 1].phase:
             continue
-        words = [f"phase {path[k].phase + 1} from here on"]
+        words = [f"phase {path[k].phase + 1} from here on"] + ["reaction along another motion"] * (k in others)
         taken = int(path[k].removed.sum()) - int(path[k - 1].removed.sum())
         if taken:
             words.append(f"{mechanics.counted(taken, 'block')} taken away")
@@ -277,7 +280,8 @@ def _draw_line(
     """Draw the path, in a file of its own with dots at few increments and words of the size of ``text``."""
     blue = palette.hexadecimal(palette.FORCE)
     first = 1 if drops_at_start(response) else 0
-    axes.plot(total[first:], values[first:], "-", color=blue, linewidth=2.0, zorder=3)
+    for start, stop in pairwise([first, *new_motions(response), len(total)]):
+        axes.plot(total[start:stop], values[start:stop], "-", color=blue, linewidth=2.0, zorder=3)
     axes.plot(total[: 2 * first], values[: 2 * first], ":", color=blue, linewidth=1.2, zorder=3)
     if text is None:
         return

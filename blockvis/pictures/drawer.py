@@ -208,7 +208,7 @@ class Drawer:
         if self._plane is not None and self._plane[1] @ self._views[0].axes[2] > 0.0:
             # What lies between the plane and the eye is left out.
             self._plane = self._plane * [[1.0], [-1.0]]
-        self.ties = DrawnTies(response)
+        self.ties = DrawnTies(response, self._plane)
         self._seen = _Series(sampled=sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
@@ -501,7 +501,8 @@ class Drawer:
                     Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",))
                 )
             if self._loses and (self._seen.lost or self._drawn_at is not None):
-                colour = palette.rgb(palette.pale(self.fill[self.assembly.free][:1], np.ones(1, dtype=bool))[0])
+                first = self.assembly.index(self.response.losses[0].blocks[0])
+                colour = palette.rgb(palette.pale(self.fill[[first]], np.ones(1, dtype=bool))[0])
                 keys.append(Key("area", LOST, colour))
             if self.live.largest > 0.0:
                 keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
@@ -584,7 +585,9 @@ class Drawer:
         colours = self._standing_colours(pose, increment)
         if not self._loses:
             return colours
-        return palette.pale(self.fill if colours is None else colours, increment.fallen)
+        # As in the legend, whatever colours the others.
+        lost = palette.pale(self.fill, increment.fallen)
+        return lost if colours is None else np.where(increment.fallen[:, None], lost, colours)
 
     def _standing_colours(self, pose: solver.Pose, increment: solver.Increment) -> np.ndarray | None:
         if self.look.colour_by != "displacement":

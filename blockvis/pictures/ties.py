@@ -15,6 +15,7 @@ from solver import mechanics
 
 from . import palette
 from .frame import Key
+from .surface import IN_PLANE
 
 #: Elastic and in compression, which pictures tell from tension.
 PRESSED = len(STATE_WORDS)
@@ -82,6 +83,8 @@ class DrawnTies:
     Parameters
     ----------
     response : solver.Response
+    cut : (2, 3) array, optional
+        A point [m] of the plane of a section and its unit normal towards what is kept.
 
     Attributes
     ----------
@@ -89,8 +92,8 @@ class DrawnTies:
         States and kinds that were found so far by :meth:`survey`.
     """
 
-    def __init__(self, response: solver.Response) -> None:
-        self._assembly, self._ties = response.assembly, known_ties(response)
+    def __init__(self, response: solver.Response, cut: np.ndarray | None = None) -> None:
+        self._assembly, self._ties, self._cut = response.assembly, known_ties(response), cut
         self._props = np.array([tie.kind == mechanics.PROP for tie in self._ties], dtype=bool)
         self._grounded = np.array([[b is None for b in tie.blocks] for tie in self._ties], dtype=bool).reshape(-1, 2)
         self.seen: set[tuple[int, str]] = set()
@@ -110,7 +113,8 @@ class DrawnTies:
 
     def along(self, increment: solver.Increment, shown: solver.Pose) -> np.ndarray:
         """(n, d) array [m]: points along what is drawn of an increment, which labels leave free."""
-        ends = mechanics.tie_ends(self._ties, self._assembly, shown)[self._states(increment) != mechanics.ABSENT]
+        ends, left = self._left(shown)
+        ends = ends[left & (self._states(increment) != mechanics.ABSENT)]
         shares = np.linspace(0.0, 1.0, ALONG)[:, None, None]
         return ((1.0 - shares) * ends[:, 0] + shares * ends[:, 1]).reshape(-1, self._assembly.dimension)
 
@@ -147,14 +151,26 @@ class DrawnTies:
         self, increment: solver.Increment, shown: solver.Pose
     ) -> tuple[np.ndarray, list[str], list[tuple[int, int, int]]]:
         """Give middles (n, d) [m], words and colours of the labels of an increment, the largest force first."""
-        states = self._states(increment)
-        middles = mechanics.tie_ends(self._ties, self._assembly, shown).mean(axis=1)
+        states, (ends, left) = self._states(increment), self._left(shown)
         sizes = _told_forces(increment) if len(increment.ties.forces) else np.zeros(len(states))
-        order = [k for k in np.argsort(-sizes, kind="stable").tolist() if states[k] != mechanics.ABSENT][:MOST_NAMED]
+        there = left & (states != mechanics.ABSENT)
+        order = [k for k in np.argsort(-sizes, kind="stable").tolist() if there[k]][:MOST_NAMED]
         # In a fall forces change from frame to frame.
         told = increment.status != solver.Status.FALLING
         words = [self._words(k, float(sizes[k]) if told else None, int(states[k])) for k in order]
-        return middles[order], words, [COLOURS[int(states[k])] for k in order]
+        return ends.mean(axis=1)[order], words, [COLOURS[int(states[k])] for k in order]
+
+    def _left(self, shown: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 2, d) array [m]: ends of what a section leaves of each; and whether it leaves anything, (n,) bool."""
+        ends = mechanics.tie_ends(self._ties, self._assembly, shown)
+        if self._cut is None:
+            return ends, np.ones(len(ends), dtype=bool)
+        heights = (ends - self._cut[0]) @ self._cut[1]
+        # One that lies in the plane is left.
+        left = heights.max(axis=1) >= -IN_PLANE * float(np.ptp(self._assembly.vertices, axis=0).max())
+        across = heights.min(axis=1) * heights.max(axis=1) < 0.0
+        shares = np.divide(heights, heights - heights[:, ::-1], out=np.zeros_like(heights), where=across[:, None])
+        return ends + np.where(heights < 0.0, shares, 0.0)[:, :, None] * (ends[:, ::-1] - ends), left
 
     def told(self, increment: solver.Increment) -> list[dict[str, Any]]:
         """List what a page draws of an increment, as JSON has it.

@@ -29,6 +29,7 @@ from blockvis.pictures.captions import (
     fall_text,
     force_unit,
     in_one_unit,
+    new_motions,
     parameter_label,
     parameter_unit,
     shown_range,
@@ -446,6 +447,8 @@ def _curve(response: solver.Response, band: ReactionRange | None) -> dict[str, A
         "reaction": [float(f"{v:.7g}") if np.isfinite(v) else None for v in y],
         # The reaction leaves that at rest at once: the way to the next one is dotted.
         "rest": drops_at_start(response),
+        # From these on it is along another motion.
+        "breaks": new_motions(response),
         "band": [[float(f"{v:.7g}") for v in row] for row in zip(total, least, most, strict=True)],
         "collapse": collapse,
         "x_min": first,

@@ -263,10 +263,10 @@
       pen.fill(); pen.restore(); pen.beginPath();
     }
     if (c.single && c.reaction[0] !== null) { pen.moveTo(X(0), Y(0)); pen.lineTo(X(0), Y(c.reaction[0])); pen.lineTo(X(1), Y(c.reaction[0])); }
-    // An unbounded multiplier is null: the line stops before it and starts again after it.
+    // An unbounded multiplier is null: the line stops before it and starts again after it, as where another motion begins.
     if (!c.single) c.settlement.forEach((s, i) => {
       if (c.reaction[i] === null) return;
-      if (i > (c.rest ? 1 : 0) && c.reaction[i - 1] !== null) pen.lineTo(X(s), Y(c.reaction[i])); else pen.moveTo(X(s), Y(c.reaction[i]));
+      if (i > (c.rest ? 1 : 0) && c.reaction[i - 1] !== null && !c.breaks.includes(i)) pen.lineTo(X(s), Y(c.reaction[i])); else pen.moveTo(X(s), Y(c.reaction[i]));
     });
     pen.stroke();
     if (c.rest) {

@@ -187,3 +187,13 @@ def test_a_pushover_counts_along_x_by_default(tmp_path):
     )
     assert run_command(tmp_path / "case.toml", "--no-pictures", "-o", tmp_path / "out") == 0
     assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["limit_load_multiplier"] == pytest.approx(0.4)
+
+
+def test_a_tie_end_in_no_block_is_led_to_the_nearest_by_its_distance(tmp_path):
+    # Off the edge of the first by (0.3, 0.3), off the face of the second by 0.35.
+    blocks = [box((0, 0, 0), (1, 1, 1)), box((1.3, 1.65, 0), (2.3, 2.65, 1)), box((0, 0, -1), (3, 3, 0))]
+    assembly = solver.Assembly.from_solids(blocks, names=["edge", "face", "ground"], roles=["free", "free", "moving"])
+    save_layout(assembly, tmp_path / "blocks.json")
+    tie = '[[ties]]\nname = "iron"\nfrom = [1.3, 1.3, 0.5]\nto = [0.5, 0.5, 0.5]\nstiffness = 1e7\n'
+    with pytest.raises(ValueError, match=r"lies in no block; the nearest is 'face', 0\.35 m away"):
+        blockvis.run_case(case('[geometry]\nfile = "blocks.json"\n' + DOWN + tie, tmp_path), tmp_path / "out")

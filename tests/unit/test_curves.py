@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import arch_response, parted, pixels, wall
+from structures import arch_response, parted, pixels, report_of, wall
 
 import blockvis
 import solver
@@ -139,6 +139,19 @@ def test_phases_in_other_units_share_no_axis(tmp_path):
     assert {"settlement [rad]", "reaction [kN·m]"} <= set(told) or {"settlement [rad]", "reaction [N·m]"} <= set(told)
     assert any(line.endswith("phase 2 of 2") for line in told)
     assert "reaction / weight W" not in told
+
+
+def test_reactions_along_different_motions_are_not_joined(tmp_path):
+    outlines = [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
+    down, aside = (solver.Settlement(direction=way, increment=0.1, limit=0.2) for way in ((0, -1), (1, 0)))
+    for then, joined in ((replace(down, increment=0.05), True), (aside, False)):
+        response = solver.settle(assembly, [down, then], friction_coefficient=0.6)
+        text = draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
+        assert "<!-- phase 2 from here on" in text
+        assert ("reaction along another motion" in text) is not joined
+        assert len(re.findall("stroke-width: 2; stroke-linecap", text)) == (1 if joined else 2)
+        assert f'"breaks":{"[]" if joined else "[3]"}' in report_of(response).replace(" ", "")
 
 
 @pytest.mark.slow

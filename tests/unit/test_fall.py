@@ -125,6 +125,19 @@ def test_a_lintel_falls_between_its_piers_to_their_feet():
     assert corners[:, 1].min() == pytest.approx(fall.ground, abs=1e-3)
 
 
+def test_the_push_grows_until_what_still_stands_falls_whatever_was_lost_before():
+    blocks = [rectangle(-2.0, -1.0, 2.0, 0.0), rectangle(-0.5, 0.0, 0.5, 1.5), rectangle(0.4, 1.5, 0.5, 1.9)]
+    assembly = solver.Assembly.from_outlines(blocks, roles=["moving", "free", "free"])
+    tilt = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.05, limit=1.0)
+    response = solver.settle(assembly, tilt, friction_coefficient=0.9)
+    (loss,) = response.losses
+    assert loss.blocks == (assembly.names[2],)
+    # From an equilibrium well before the collapse the first push does not turn the pier over.
+    early = tuple(increment for increment in response.path if increment.parameter < 0.53)
+    fall = fall_of(replace(response, increments=early))
+    assert np.linalg.norm(fall.positions[-1] - fall.positions[0], axis=1)[1] > 1.0
+
+
 @pytest.mark.slow
 def test_the_same_bytes_twice(tmp_path):
     response = shipped_arch()

@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, dropped_brick, parted, rectangle, wall
+from structures import arch_response, box, dropped_brick, parted, rectangle, wall
 
 import solver
-from blockvis import draw_mechanism, generators
+from blockvis import draw_mechanism, draw_still, generators
 from blockvis.dynamics.fall import fall_of
 from blockvis.pictures import drawer as drawing
 from blockvis.pictures import palette
@@ -197,6 +197,42 @@ def test_in_a_fall_the_label_of_a_tie_says_what_its_colour_does(monkeypatch):
         ties = replace(last.ties, forces=np.array([force]), states=np.array([state]))
         drawer.picture(replace(last, status=solver.Status.FALLING).with_arrays(ties=ties))
     assert written == ["iron slack", "iron in tension"]
+
+
+@pytest.mark.slow
+def test_lost_blocks_have_the_colour_of_their_legend_beside_the_tints_of_a_mechanism(words, tmp_path):
+    blocks = [rectangle(-2.0, -1.0, 2.0, 0.0), rectangle(-0.5, 0.0, 0.5, 1.5), rectangle(0.4, 1.5, 0.5, 1.9)]
+    materials = ["rock", "stone", "brick"]
+    assembly = solver.Assembly.from_outlines(blocks, roles=["moving", "free", "free"], materials=materials)
+    tilt = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.05, limit=1.0)
+    response = solver.settle(assembly, tilt, friction_coefficient=0.9)
+    draw_mechanism(response, tmp_path / "mechanism.png", size=LARGE)
+    (key,) = (key for key in words[-1]["keys"] if key.text == "lost block")
+    with Image.open(tmp_path / "mechanism.png") as picture:
+        above_the_legend = np.asarray(picture.convert("RGB"))[60:480]
+    assert (above_the_legend == key.colour).all(axis=2).sum() > 300
+
+
+@pytest.mark.slow
+def test_a_section_leaves_the_labels_of_the_ties_that_it_leaves_at_the_middle_of_what_is_left(monkeypatch, tmp_path):
+    piers = [box((x, 0, low), (x + 1, 1, high)) for low, high in ((0, 2), (-1, 0)) for x in (0, 3)]
+    assembly = solver.Assembly.from_solids(piers, roles=["free", "free", "fixed", "moving"])
+    ties = [
+        solver.Tie("before", (0, 1), ((0.5, 0.1, 1.2), (3.5, 0.1, 1.2)), stiffness=1e7),
+        solver.Tie("across", (0, 1), ((0.5, 0.1, 0.8), (3.5, 0.9, 0.8)), stiffness=1e7),
+        solver.Tie("behind", (None, 1), ((2.0, 0.9, 0.4), (3.5, 0.9, 0.4)), stiffness=1e7),
+    ]
+    apart = solver.Settlement((1, 0, 0), increment=1e-6, limit=1e-6)
+    response = solver.Structure(assembly, friction_coefficient=0.6, ties=ties).settle(apart)
+    written = {}
+    monkeypatch.setattr(
+        drawing,
+        "write_labels",
+        lambda _, places, words, *__: written.update(zip((word.split()[0] for word in words), places, strict=True)),
+    )
+    draw_still(response, -1, tmp_path / "cut.png", size=SMALL, view="front", section="y")
+    assert set(written) == {"across", "behind"}
+    assert written["across"][0] == pytest.approx(written["behind"][0], abs=0.1)
 
 
 def test_widths_leave_hinges_free_where_there_is_room():
