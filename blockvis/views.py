@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Picture:
-    """What a notebook shows as HTML.
-
-    Attributes
-    ----------
-    written : str
-    """
+    """What a notebook shows as HTML."""
 
     written: str
 

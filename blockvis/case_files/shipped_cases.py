@@ -18,10 +18,6 @@ _DRAWINGS = "../assets/"
 def shipped_cases() -> dict[str, Path]:
     """Return the case files that come with blockvis by their names; those to explain begin with ``explain/``.
 
-    Returns
-    -------
-    dict of str to Path
-
     Raises
     ------
     FileNotFoundError

@@ -53,10 +53,6 @@ DENSITY, THICKNESS = 2000.0, 1.0
 def case_assembly(case: Case) -> solver.Assembly:
     """Build the assembly of a case.
 
-    Parameters
-    ----------
-    case : Case
-
     Returns
     -------
     solver.Assembly

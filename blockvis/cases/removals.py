@@ -59,11 +59,6 @@ def read_removal(table: Table) -> Removal:
 def removed_blocks(removal: Removal, assembly: solver.Assembly) -> np.ndarray:
     """(n_blocks,) bool array: blocks that a table takes away.
 
-    Parameters
-    ----------
-    removal : Removal
-    assembly : solver.Assembly
-
     Raises
     ------
     ValueError
@@ -74,11 +69,6 @@ def removed_blocks(removal: Removal, assembly: solver.Assembly) -> np.ndarray:
 
 def removed_ties(removal: Removal, ties: Sequence[solver.Tie]) -> tuple[str, ...]:
     """Names of the ties that a table takes away.
-
-    Parameters
-    ----------
-    removal : Removal
-    ties : sequence of solver.Tie
 
     Raises
     ------

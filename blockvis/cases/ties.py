@@ -312,10 +312,6 @@ def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[solv
         As of :func:`drawn_ties`.
     assembly : solver.Assembly
 
-    Returns
-    -------
-    tuple of solver.Tie
-
     Raises
     ------
     ValueError

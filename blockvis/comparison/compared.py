@@ -96,12 +96,7 @@ class CrackPair:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two runs of the same kind of analysis.
-
-    Attributes
-    ----------
-    sides : (Side, Side)
-    """
+    """Two runs of the same kind of analysis."""
 
     sides: tuple[Side, Side]
 
@@ -192,14 +187,6 @@ class Comparison:
 
 def compared(one: str | Path, other: str | Path) -> Comparison:
     """Open two results folders for a comparison.
-
-    Parameters
-    ----------
-    one, other : str or Path
-
-    Returns
-    -------
-    Comparison
 
     Raises
     ------

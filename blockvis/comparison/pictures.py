@@ -35,13 +35,7 @@ STRIP = 40
 
 
 def draw_curves(comparison: Comparison, path: Path) -> Path:
-    """Draw both curves in one plot, with where each collapses.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    path : Path
-    """
+    """Draw both curves in one plot, with where each collapses."""
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     axes = figure.add_subplot()
     longest = max(comparison.sides, key=lambda side: side.end).response
@@ -104,12 +98,7 @@ class Pair:
         return (width, 2 * height) if self._below else (2 * width, height)
 
     def picture(self, images: list[Image.Image]) -> Image.Image:
-        """Put the pictures of both beside or below each other, each under its name.
-
-        Parameters
-        ----------
-        images : list of PIL.Image.Image
-        """
+        """Put the pictures of both beside or below each other, each under its name."""
         page = Image.new("RGB", self.size, palette.PAPER)
         draw = ImageDraw.Draw(page)
         width, height = self._panel
@@ -139,13 +128,7 @@ class Pair:
 
 
 def draw_stations(comparison: Comparison, path: Path) -> Path:
-    """Draw both at the same settlements, one row below the other.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    path : Path
-    """
+    """Draw both at the same settlements, one row below the other."""
     pair = Pair(comparison, Look(forces="none"))
     rows = [pair.at(at, widths=True) for at in comparison.stations.tolist()]
     page = Image.new("RGB", (pair.size[0], sum(row.height for row in rows)), palette.PAPER)

@@ -22,11 +22,6 @@ def ground_below(assembly: solver.Assembly, pose: solver.Pose) -> float:
     """Height of the ground [m]: below the lowest corner, in the plane of the lowest place where something may lie.
 
     Supports that are taller than wide are piers, and stand on the ground; others are the ground.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    pose : solver.Pose
     """
     corners, free = mechanics.moved_vertices(assembly, pose), assembly.free[assembly.block_of_vertex]
     low, high = corners[free, -1].min(), corners[free, -1].max()

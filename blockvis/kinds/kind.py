@@ -192,12 +192,7 @@ class AnalysisKind(ABC):
         return
 
     def checked(self, case: Case) -> Case:
-        """Check that the keys of a case of this kind fit together; returns the case, completed.
-
-        Parameters
-        ----------
-        case : Case
-        """
+        """Check that the keys of a case of this kind fit together; returns the case, completed."""
         return case
 
     def course(self, case: Case) -> Course:

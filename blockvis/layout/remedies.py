@@ -29,12 +29,7 @@ MOST = 20_000
 
 
 def deep_overlaps(layout: Layout) -> list[tuple[int, int]]:
-    """Find the pairs of blocks of which a run refuses the overlap, drawn twice or not.
-
-    Parameters
-    ----------
-    layout : Layout
-    """
+    """Find the pairs of blocks of which a run refuses the overlap, drawn twice or not."""
     dropped = dropped_twins(layout, duplicates(layout.every_corner), {})
     kept = [i for i in range(layout.n_blocks) if i not in dropped]
     drawn = layout.chosen(kept)

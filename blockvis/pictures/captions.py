@@ -30,12 +30,7 @@ NOTABLE = 0.05
 
 
 def drops_at_start(response: solver.Response) -> bool:
-    """Whether the reaction has left that at rest by the first increment: it does so at once, not along a line.
-
-    Parameters
-    ----------
-    response : solver.Response
-    """
+    """Whether the reaction has left that at rest by the first increment: it does so at once, not along a line."""
     path = response.path
     if len(path) < 2 or not response.measured.is_force or not response.parameter.is_path:
         return False
@@ -174,13 +169,7 @@ def matters(increment: solver.Increment, response: solver.Response) -> bool:
 
 
 def state_text(increment: solver.Increment, response: solver.Response) -> str:
-    """Write the first line of a caption: the parameter and what is measured there.
-
-    Parameters
-    ----------
-    increment : solver.Increment
-    response : solver.Response
-    """
+    """Write the first line of a caption: the parameter and what is measured there."""
     response = in_one_unit(response, increment.phase)
     place = parameter_text(increment.parameter, response)
     if response.parameter.is_path:

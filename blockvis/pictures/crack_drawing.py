@@ -56,10 +56,6 @@ def draw_cracks(
     view, section
         Of blocks in space, as of :func:`blockvis.draw_still`.
 
-    Returns
-    -------
-    pathlib.Path
-
     Raises
     ------
     ValueError

@@ -434,10 +434,6 @@ class Drawer:
 
         In the plane the blocks stay where they stand, and outlines are where it takes them; in space it is the other
         way round. Of more than ``MOST_PARTS`` parts the speed is tinted instead, and arrows stand on a grid.
-
-        Parameters
-        ----------
-        swing : Swing
         """
         pose, volumes = swing.increment.pose, self.assembly.shapes.volumes
         chosen = self._blocks_with_arrows(swing)

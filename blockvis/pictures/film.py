@@ -67,12 +67,7 @@ def film_of(
 
 
 def poster_of(drawer: Drawer) -> Image.Image:
-    """Draw the one frame that stands for a film: where the fall is fastest, or a mechanism farthest out, or the end.
-
-    Parameters
-    ----------
-    drawer : Drawer
-    """
+    """Draw the one frame that stands for a film: where the fall is fastest, or a mechanism farthest out, or the end."""
     fall, last = drawer.fall, drawer.increments[-1]
     if fall is not None and len(fall) > 1:
         speeds = np.linalg.norm(np.diff(fall.positions, axis=0), axis=2) / np.diff(fall.times)[:, None]

@@ -57,12 +57,7 @@ class FilmProcess:
         self._worker.say("follow", (folder, assembly, vtu, count))
 
     def add(self, increment: solver.Increment) -> None:
-        """Write the files for viewers of the next increment, whose state is in the folder; returns at once.
-
-        Parameters
-        ----------
-        increment : solver.Increment
-        """
+        """Write the files for viewers of the next increment, whose state is in the folder; returns at once."""
         self._worker.say("add")
 
     def finish(self) -> bool:

@@ -44,10 +44,6 @@ def draw_inspection(
         Supports beside the blocks of the drawing, with their roles, in the plane or in space as these are.
     falling : sequence of int
         Blocks of the layout that do not stand.
-
-    Returns
-    -------
-    pathlib.Path
     """
     return draw_contents(_contents(inspection, ground, set(falling)), path)
 

@@ -139,10 +139,6 @@ def draw_contents(contents: Contents, path: str | Path) -> Path:
     contents : Contents
     path : str or Path
         .png, .svg or .pdf.
-
-    Returns
-    -------
-    pathlib.Path
     """
     from matplotlib.figure import Figure
 

@@ -249,12 +249,6 @@ def hinge_ends(assembly: solver.Assembly, increment: solver.Increment, mechanism
     """(n, 2) int array: of each hinge the two contact points farthest from each other that do not open.
 
     In the plane it is one, twice.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    increment : solver.Increment
-    mechanism : solver.mechanics.Mechanism
     """
     contacts = increment.contacts
     if assembly.dimension == 2:

@@ -150,10 +150,6 @@ def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
     ----------
     folder : path
         The results folder.
-
-    Returns
-    -------
-    pathlib.Path
     """
     path = Path(folder) / "paraview_colours.py"
     text = _SCRIPT.substitute(

@@ -490,10 +490,6 @@ def blocks_picture(assembly: solver.Assembly, size: tuple[int, int], fill: np.nd
 def seen_faces(scene: SolidScene) -> tuple[np.ndarray, np.ndarray]:
     """Find where the name of each block can stand: on the face that shows most of itself in the last picture.
 
-    Parameters
-    ----------
-    scene : SolidScene
-
     Returns
     -------
     places : (n_blocks, 3) array [m]
@@ -513,13 +509,7 @@ def seen_faces(scene: SolidScene) -> tuple[np.ndarray, np.ndarray]:
 
 
 def drawn_forward(actor: Any, by: float) -> None:
-    """Draw lines and polygons in front of what lies at their place, by so many hairs.
-
-    Parameters
-    ----------
-    actor : pyvista.Actor
-    by : float
-    """
+    """Draw lines and polygons in front of what lies at their place, by so many hairs."""
     mapper = actor.mapper
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
     # In units of the smallest difference of depth, which is some 1e-5 of the distance to the structure.

@@ -100,13 +100,7 @@ def views_of(
 
 
 def has_intrados(assembly: solver.Assembly, joints: InitialJoints) -> bool:
-    """Whether free blocks hang over air as vaults do: faces that look down and rest on nothing cover their plan.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    joints : InitialJoints
-    """
+    """Whether free blocks hang over air as vaults do: faces that look down and rest on nothing cover their plan."""
     shapes, free = assembly.polyhedra, assembly.free
     heights = shapes.face_areas * shapes.faces(shapes.vertices).normals[:, 2]
     heights = heights[free[shapes.block_of_face]]
@@ -121,13 +115,7 @@ def has_intrados(assembly: solver.Assembly, joints: InitialJoints) -> bool:
 
 
 def hiding_supports(assembly: solver.Assembly, view: View) -> np.ndarray:
-    """(n_blocks,) bool array: supports that hide the structure from an eye below it.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    view : View
-    """
+    """(n_blocks,) bool array: supports that hide the structure from an eye below it."""
     hides = np.zeros(assembly.n_blocks, dtype=bool)
     if view.above >= 0.0 or not assembly.free.any():
         return hides
@@ -141,11 +129,6 @@ def hiding_supports(assembly: solver.Assembly, view: View) -> np.ndarray:
 
 def plane_of(assembly: solver.Assembly, cut: Cut | None) -> np.ndarray | None:
     """(2, 3) array: a point [m] of the plane that cuts blocks open, and its unit normal; None without one.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    cut : Cut, optional
 
     Raises
     ------

@@ -18,10 +18,6 @@ IN_PLANE = 1e-9
 def triangles_of(shapes: mechanics.Polyhedra) -> tuple[np.ndarray, np.ndarray]:
     """Cut all faces into triangles.
 
-    Parameters
-    ----------
-    shapes : solver.mechanics.Polyhedra
-
     Returns
     -------
     triangles : (n, 3) int array

@@ -80,10 +80,6 @@ def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:
 
     In space blocks that fall soon meet others, and the analysis ends there; the mechanism then swings out instead, ever
     faster, as it begins at the last equilibrium.
-
-    Parameters
-    ----------
-    response : solver.Response
     """
     path = response.path
     if response.assembly.dimension == 2 or response.collapse is None or not path:

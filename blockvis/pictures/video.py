@@ -80,10 +80,6 @@ def write_film(
     fps : float
         Frames per second; a gif counts in hundredths of a second.
 
-    Returns
-    -------
-    pathlib.Path
-
     Raises
     ------
     ValueError

@@ -74,10 +74,6 @@ def write_pdf(
     view, section
         Of blocks in space, as of :func:`blockvis.draw_still`.
 
-    Returns
-    -------
-    pathlib.Path
-
     Raises
     ------
     ValueError
@@ -165,12 +161,7 @@ def _crack_table(cracks: Sequence[Crack]) -> tuple[Sequence[str], list[tuple[str
 
 
 class _Paper(FPDF):
-    """A4 pages with the words of a document at their foot.
-
-    Parameters
-    ----------
-    foot : str
-    """
+    """A4 pages with the words of a document at their foot."""
 
     def __init__(self, foot: str) -> None:
         super().__init__(format="A4")

@@ -41,12 +41,7 @@ class About:
 
 
 def about(response: solver.Response) -> About:
-    """Find where a response comes from, by the results folder that its increments are in.
-
-    Parameters
-    ----------
-    response : solver.Response
-    """
+    """Find where a response comes from, by the results folder that its increments are in."""
     folder = folder_of(response.increments[0]) if response.increments else None
     record, finished = Record(versions=versions()), ""
     if folder is not None:
@@ -99,12 +94,7 @@ def unit_in(response: solver.Response, phase: int) -> str:
 
 
 def collapse_phase(response: solver.Response) -> int | None:
-    """Find the number of the settlement, from 0, in which a structure collapses; None where it does not.
-
-    Parameters
-    ----------
-    response : solver.Response
-    """
+    """Find the number of the settlement, from 0, in which a structure collapses; None where it does not."""
     collapse, path = response.collapse, response.path
     if collapse is None:
         return None
@@ -116,22 +106,13 @@ def collapse_phase(response: solver.Response) -> int | None:
 
 
 def certified(response: solver.Response) -> tuple[solver.Increment, ...]:
-    """Give the increments whose certificate is that of the result: of states that stand by themselves what governs.
-
-    Parameters
-    ----------
-    response : solver.Response
-    """
+    """Give the increments whose certificate is that of the result: of states that stand by themselves what governs."""
     governing = response.governing
     return response.path if response.parameter.is_path or governing is None else (governing,)
 
 
 def collapse_mechanism(response: solver.Response) -> mechanics.Mechanism | None:
     """Find the collapse mechanism at the last equilibrium: what words, tables, curves, pictures and pages count.
-
-    Parameters
-    ----------
-    response : solver.Response
 
     Returns
     -------
@@ -189,25 +170,14 @@ class Loss:
 
 
 def loss_in(assembly: solver.Assembly, falling: solver.Increment) -> Loss:
-    """Weigh what moves in the motion that follows an increment.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    falling : solver.Increment
-    """
+    """Weigh what moves in the motion that follows an increment."""
     moves = mechanics.rigid_parts(assembly, falling) >= 0
     weight = float(assembly.masses[moves & assembly.free].sum() * solver.GRAVITY)
     return Loss(weight, weight / mechanics.total_weight(assembly))
 
 
 def loss_of(response: solver.Response) -> Loss | None:
-    """Weigh what the collapse mechanism of a response takes with it; None where nothing collapses.
-
-    Parameters
-    ----------
-    response : solver.Response
-    """
+    """Weigh what the collapse mechanism of a response takes with it; None where nothing collapses."""
     collapse, last = response.collapse, _last_before(response)
     if collapse is None or collapse.lost != "equilibrium" or last is None or not collapse.mechanism.any():
         return None

@@ -39,13 +39,7 @@ class Bearing:
 
 
 def bearings(response: solver.Response, increment: solver.Increment) -> list[Bearing]:
-    """List what each support with a stiffness carries at an increment, in the order of the blocks.
-
-    Parameters
-    ----------
-    response : solver.Response
-    increment : solver.Increment
-    """
+    """List what each support with a stiffness carries at an increment, in the order of the blocks."""
     assembly, contacts, normal = response.assembly, increment.contacts, increment.forces[:, 0]
     found = []
     for support in np.flatnonzero(~np.isnan(response.interfaces.ground_stiffness(assembly))).tolist():

@@ -99,12 +99,7 @@ def _timed(grid: vtkUnstructuredGrid, time: float) -> vtkUnstructuredGrid:
 
 
 def known_fall(response: solver.Response) -> Fall | None:
-    """Read the fall of a response from its folder, or work it out, once; None where nothing falls.
-
-    Parameters
-    ----------
-    response : solver.Response
-    """
+    """Read the fall of a response from its folder, or work it out, once; None where nothing falls."""
     key = id(response)
     if key not in _known:
         folder = folder_of(response.path[-1]) if response.path else None

@@ -408,10 +408,6 @@ def add_to_summary(folder: Path, **found: Any) -> None:
 def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
     """Read the response of a results folder, without what its kind of analysis adds, and its summary.
 
-    Parameters
-    ----------
-    folder : Path
-
     Returns
     -------
     solver.Response

@@ -88,13 +88,7 @@ class StoredIncrements:
         return len(list((self.folder / "increments").glob("state_*.npz")))
 
     def without_arrays(self, number: int, increment: solver.Increment) -> solver.Increment:
-        """Drop the arrays of an increment that has been written: it reads them from its file, or from those kept last.
-
-        Parameters
-        ----------
-        number : int
-        increment : solver.Increment
-        """
+        """Drop the arrays of an increment that has been written: it reads them from its file or from those kept last."""
         self._keep(number, replace(increment, checkpoint=None))
         return replace(increment, held=StateInFile(self, number, _numbers(increment)), checkpoint=None)
 

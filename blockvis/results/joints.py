@@ -41,14 +41,7 @@ class Faces:
 
 
 def carried_faces(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> Faces:
-    """Carry the faces of joints to a pose.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    joints : InitialJoints
-    pose : solver.Pose
-    """
+    """Carry the faces of joints to a pose."""
     initial, rings = solver.Pose.initial(assembly), joints.rings
     on_a, on_b = (
         mechanics.carried(rings.points, block[rings.ring], initial, pose) for block in (joints.block_a, joints.block_b)
@@ -160,14 +153,7 @@ class JointStates:
 
 
 def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment) -> JointStates:
-    """Work out opening, slip and forces of all joints of an increment.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    joints : InitialJoints
-    increment : solver.Increment
-    """
+    """Work out opening, slip and forces of all joints of an increment."""
     contacts = increment.contacts
     faces = carried_faces(assembly, joints, increment.pose)
     rings = joints.rings.at((faces.on_a + faces.on_b) / 2.0)

@@ -56,12 +56,7 @@ class ReactionRange:
         return text.getvalue()
 
     def along(self, response: solver.Response) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(n,) arrays: parameter with the phases one after another, low and high, of the phases of a response.
-
-        Parameters
-        ----------
-        response : solver.Response
-        """
+        """(n,) arrays: parameter with the phases one after another, low and high, of the phases of a response."""
         path = response.path
         starts = {i.phase: float(t) - i.parameter for i, t in zip(path, response.parameters, strict=True)}
         shown = np.isin(self.phases, list(starts))
@@ -70,12 +65,7 @@ class ReactionRange:
 
 
 def stored_range(folder: Path) -> ReactionRange | None:
-    """Read the range of a results folder, if it has one.
-
-    Parameters
-    ----------
-    folder : Path
-    """
+    """Read the range of a results folder, if it has one."""
     if not (folder / RANGE).is_file():
         return None
     with (folder / RANGE).open(encoding="utf-8", newline="") as file:

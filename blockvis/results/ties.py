@@ -74,14 +74,7 @@ def known_ties(response: solver.Response) -> tuple[solver.Tie, ...]:
 
 
 def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment) -> mechanics.TieForces:
-    """Give what ties do at an increment; where that is not known, where their ends are.
-
-    Parameters
-    ----------
-    ties : sequence of solver.Tie
-    assembly : solver.Assembly
-    increment : solver.Increment
-    """
+    """Give what ties do at an increment; where that is not known, where their ends are."""
     found = increment.ties
     if len(found.forces) == len(ties):
         return found
@@ -163,12 +156,7 @@ class TieCourse:
 
 
 class TieCourses:
-    """The courses of ties over the increments in equilibrium so far.
-
-    Parameters
-    ----------
-    ties : sequence of solver.Tie
-    """
+    """The courses of ties over the increments in equilibrium so far."""
 
     def __init__(self, ties: Sequence[solver.Tie]) -> None:
         self.ties = tuple(ties)

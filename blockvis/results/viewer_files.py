@@ -213,10 +213,6 @@ def grid_file(folder: Path, kind: str, number: int) -> Path:
 def output_times(increments: Sequence[solver.Increment]) -> list[float]:
     """Strictly increasing times, one per increment, for readers that sort or merge by time.
 
-    Parameters
-    ----------
-    increments : sequence of solver.Increment
-
     Returns
     -------
     list of float [m or rad]

@@ -141,12 +141,6 @@ def traced(response: solver.Response) -> Traced:
 
 
 def followed(case: Case, assembly: solver.Assembly) -> Traced:
-    """Follow the path of a case to its end, here.
-
-    Parameters
-    ----------
-    case : Case
-    assembly : solver.Assembly
-    """
+    """Follow the path of a case to its end, here."""
     run = planned(replace(case, controls=replace(case.controls, falling_frames=1)), assembly)
     return traced(run.response(run.steps.all(), run.steps.ending))

@@ -204,11 +204,6 @@ def _underlay(case: Case) -> Underlay | None:
 def seen_from(case: Case, response: solver.Response) -> dict[str, Any]:
     """Say from where the pictures of a case are drawn; they are drawn all the same where that makes no sense.
 
-    Parameters
-    ----------
-    case : Case
-    response : solver.Response
-
     Returns
     -------
     dict

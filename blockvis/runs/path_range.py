@@ -32,12 +32,7 @@ class Variation:
     imperfection_factor: float = 1.0
 
     def of(self, case: Case) -> Case:
-        """Vary a case.
-
-        Parameters
-        ----------
-        case : Case
-        """
+        """Vary a case."""
         laws = {pair: law.with_friction(self.friction_factor) for pair, law in case.interfaces.items()}
         controls = replace(
             case.controls,

@@ -160,10 +160,6 @@ def resume_run(
     increment_seconds : float, optional [s]
         What an increment may take; by default what it takes, whatever the case says.
 
-    Returns
-    -------
-    Run
-
     Raises
     ------
     ValueError

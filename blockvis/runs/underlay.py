@@ -26,10 +26,6 @@ SAME_SHAPE = 0.01
 def underlay_of(case: Case) -> Underlay | None:
     """Read the photograph under the pictures of a case; None if it names none.
 
-    Parameters
-    ----------
-    case : Case
-
     Raises
     ------
     ValueError

@@ -40,13 +40,7 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
 
 
 def finish(results: ResultsFolder, response: solver.Response) -> dict[str, object]:
-    """Write and return the summary of a response whose increments are in the folder, and the tables of its kind.
-
-    Parameters
-    ----------
-    results : ResultsFolder
-    response : solver.Response
-    """
+    """Write and return the summary of a response whose increments are in the folder, and the tables of its kind."""
     kind = KINDS[response.analysis]
     seconds = sum(i.seconds for i in response.increments)
     return results.finish(response, seconds, own=kind.summary(response), tables=kind.tables(response))
