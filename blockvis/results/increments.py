@@ -88,7 +88,7 @@ class StoredIncrements:
         return len(list((self.folder / "increments").glob("state_*.npz")))
 
     def without_arrays(self, number: int, increment: solver.Increment) -> solver.Increment:
-        """Drop the arrays of an increment that has been written: it reads them from its file or from those kept last."""
+        """Drop the arrays of an increment that has been written: they are in its file, or among those kept last."""
         self._keep(number, replace(increment, checkpoint=None))
         return replace(increment, held=StateInFile(self, number, _numbers(increment)), checkpoint=None)
 
