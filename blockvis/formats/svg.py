@@ -240,7 +240,8 @@ def _pattern_fills(root: ElementTree.Element) -> list[str]:
     fills = Counter[str]()
     for element in root.iter():
         said = f"{element.get('fill', '')} {element.get('style', '')}"
-        fills.update(set(re.findall(r"url\(\s*['\"]?#([^'\")\s]+)", said)) & patterns)
+        named = dict.fromkeys(re.findall(r"url\(\s*['\"]?#([^'\")\s]+)", said))
+        fills.update(name for name in named if name in patterns)
     return [
         Note(
             LEFT_OUT,
