@@ -103,6 +103,8 @@ def read(path: Path, reading: Reading) -> Layout:
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
     found = _Outlines(notes=[*_styled(root), *_pattern_fills(root)])
+    if stated and stated not in UNITS and reading.unit is None:
+        found.notes.append(f"1 unit of the drawing is {stated}, by its width and its viewBox")
     _walk(root, _Context(np.eye(3), (), tolerance, path), found)
     faces = _with_loose(found, reading)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
@@ -193,8 +195,10 @@ def _unit(root: ElementTree.Element) -> str:
         return ""
     if len(box) != 4:
         return "px"
-    scale = float(match[1]) * UNITS[match[2]] / max(float(box[2]), 1e-300)
-    return next((unit for unit, metres in UNITS.items() if math.isclose(scale, metres, rel_tol=1e-3)), "")
+    number = float(match[1]) / max(float(box[2]), 1e-300)
+    scale = number * UNITS[match[2]]
+    named = (unit for unit, metres in UNITS.items() if math.isclose(scale, metres, rel_tol=1e-3))
+    return next(named, f"{number:.9g} {match[2]}" if 0.0 < number < math.inf else "")
 
 
 def _styled(root: ElementTree.Element) -> list[str]:

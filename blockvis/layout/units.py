@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -29,6 +30,9 @@ _OTHER_NAMES = {
     "inch": "in", "inches": "in", "foot": "ft", "feet": "ft", "yard": "yd", "yards": "yd", "point": "pt", "pixel": "px",
 }  # fmt: skip
 
+#: A number of units of length, and the name of the unit.
+_NUMBER_OF = re.compile(r"\s*(\d+\.?\d*(?:e[-+]?\d+)?|\.\d+(?:e[-+]?\d+)?)?\s*(.*?)\s*", re.DOTALL | re.IGNORECASE)
+
 #: Median size (root of the area) of a masonry block [m]: from a mosaic-sized chip to a megalith.
 PLAUSIBLE_SIZE = (0.02, 20.0)
 
@@ -43,23 +47,30 @@ TRIED = ("mm", "cm", "m", "dm", "in", "ft")
 
 
 def metres_per(unit: str) -> float:
-    """Metres per unit of length.
+    """Metres per unit of length, or of a number of them, as a drawing at a scale has it.
 
     Raises
     ------
     ValueError
-        For an unknown unit.
+        For an unknown unit, and a number of them that is not above 0.
 
     Examples
     --------
     >>> metres_per("inches")
     0.0254
+    >>> metres_per("20 mm")
+    0.02
     """
-    name = unit.strip()
+    number, name = _NUMBER_OF.fullmatch(unit).groups()  # type: ignore[union-attr]
     name = _OTHER_NAMES.get(name.lower(), name if name in UNITS else name.lower())
     if name not in UNITS:
-        raise ValueError(f"unit '{unit}' is not known; the units of length are {', '.join(UNITS)}")
-    return UNITS[name]
+        raise ValueError(
+            f"unit '{unit}' is not known; the units of length are {', '.join(UNITS)}, or a number of one: 20 mm"
+        )
+    metres = float(number or 1.0) * UNITS[name]
+    if not 0.0 < metres < np.inf:
+        raise ValueError(f"unit '{unit}' is {metres:g} m long; give a number above 0, as 20 mm")
+    return metres
 
 
 def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str, str]:

@@ -139,6 +139,20 @@ def test_one_curve_has_a_bounded_number_of_chords(tmp_path):
     assert len(read(path, chord_tolerance=1e-12).vertices) <= 512
 
 
+def test_a_scale_of_width_and_view_box_that_is_no_unit_is_kept(tmp_path):
+    body = '<rect width="100" height="50"/>'
+    path = saved(tmp_path, body, 'width="5940mm" height="4200mm" viewBox="0 0 297 210"')
+    layout = read_layout(path)
+    assert layout.unit == "20 mm"
+    assert layout.notes == ("1 unit of the drawing is 20 mm, by its width and its viewBox",)
+    assert layout.outlines[0].max(axis=0) == pytest.approx([2.0, 0.0])
+    # What a sheet at 1:20 does not say can be given.
+    sheet = saved(tmp_path, body, 'width="297mm" height="210mm" viewBox="0 0 297 210"')
+    assert read_layout(sheet, unit="20 mm").outlines[0].max(axis=0) == pytest.approx([2.0, 0.0])
+    with pytest.raises(ValueError, match="unit '0 mm' is 0 m long; give a number above 0, as 20 mm"):
+        read_layout(sheet, unit="0 mm")
+
+
 def test_lines_of_patterns_that_fill_shapes_are_missed_in_a_note(tmp_path):
     path = tmp_path / "filled.svg"
     path.write_text(
