@@ -296,7 +296,7 @@ GEOMETRY = Section(
             {"span": 4.0},
             otherwise="each parameter at its default",
         ),
-        Key("unit", _UNIT, "Unit of the file's lengths, or a number of it ('20 mm'), where the file does not say or is wrong",
+        Key("unit", _UNIT, "Unit of the file's lengths, or a number of it, 20 mm, if the file does not say or is wrong",
             "mm", otherwise="what the file states, else m"),
         Key("view", one_of(tuple(VIEWS)), "Coordinates to take as x and y, of a drawing in space", "xz",
             otherwise="those in which the bodies lie side by side"),

@@ -8,6 +8,7 @@ import pytest
 import shapely
 
 from blockvis import read, read_layout
+from blockvis.cli import main
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
@@ -274,6 +275,20 @@ def test_closed_splines_with_the_knots_of_a_period_are_those_drawn(tmp_path, deg
     for outline, x in zip(layout.outlines, (0.0, 20.0), strict=True):
         read_as = shapely.Polygon(outline - [x, 0.0])
         assert shapely.symmetric_difference(read_as, exact).area < 1e-3 * exact.area
+
+
+def test_convert_writes_what_is_drawn_twice_once(tmp_path, capsys):
+    def draw(document, space):
+        for x in (0, 1, 0):
+            space.add_lwpolyline([(x + u, v) for u, v in SQUARE], close=True)
+
+    path = saved(tmp_path, draw)
+    assert main(["convert", str(path), str(tmp_path / "b.json")]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("2 blocks written to")
+    assert "note: 1 of 3 blocks are drawn twice and were dropped: 'block " in err
+    assert read_layout(tmp_path / "b.json").n_blocks == 2
+    assert main(["convert", str(path), str(tmp_path / "c.json"), "--ignore", "0"]) == 2
 
 
 def test_faces_of_lines_are_noted_where_they_are_analysed(tmp_path):
