@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .notes import UNIT_CLASH, Note
+from .notes import UNIT, UNIT_CLASH, Note
 
 #: Metres per unit.
 UNITS = {
@@ -41,6 +41,9 @@ DOUBTED = (0.02, 10.0)
 
 #: Median size of the blocks of common masonry [m], from a split brick to an ashlar.
 COMMON = (0.04, 3.0)
+
+#: Units that templates state whose drawings are metric, and those in which these are drawn.
+IMPERIAL, METRIC = ("in", "ft", "yd"), ("mm", "cm", "m")
 
 #: Units that are tried where another makes no masonry.
 TRIED = ("mm", "cm", "m", "dm", "in", "ft")
@@ -101,7 +104,7 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
     low, high = PLAUSIBLE_SIZE
     in_stated, in_metres = median * metres_per(stated), median
     if low <= in_stated <= high:
-        return stated, ""
+        return stated, _doubt_of_template(stated, median)
     # Most drawings whose unit is wrong are in m; blocks of several m are rather bricks in another.
     likely = "m" if COMMON[0] <= in_metres <= COMMON[1] else _masonry_unit(median)
     likely = likely or ("m" if low <= in_metres <= high else "")
@@ -111,6 +114,20 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
         UNIT_CLASH,
         f"unit clash: the file says its unit is {stated}, which makes the median block {in_stated:.3g} m in size; "
         f"{likely} was assumed, which makes it {median * metres_per(likely):.3g} m; give unit=... to settle it",
+    )
+
+
+def _doubt_of_template(stated: str, size: float) -> str:
+    """Doubt inches, feet or yards that make blocks too large for common masonry, as a metric unit would not."""
+    large = size * UNITS.get(stated, 1.0)
+    metric = _masonry_unit(size, METRIC) if stated in IMPERIAL and COMMON[1] < large <= DOUBTED[1] else ""
+    if not metric:
+        return ""
+    return Note(
+        UNIT,
+        f"unit {stated} in doubt, which the file states, perhaps from a template: it makes the median block "
+        f"{large:.3g} m across; {metric} would make it {size * UNITS[metric]:.3g} m: say so under [geometry] "
+        f'unit = "{metric}", or by --unit {metric}',
     )
 
 
