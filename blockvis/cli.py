@@ -879,14 +879,15 @@ def _info(options: argparse.Namespace) -> int:
 
 def _convert(options: argparse.Namespace) -> int:
     from .formats.read import read_layout, save_layout, write_layout
-    from .layout.assemble import assemble
+    from .layout.assemble import assemble, without_twins
 
     target = _new_file(options.target, options.force)
     if (Path(options.source) / "assembly.npz").is_file():
         return _convert_results(options, target)
     choice = _choice(options)
     layout = read_layout(options.source, unit=options.unit, dimension=_dimension(options), **choice)
-    for note in layout.notes:
+    layout, twins = without_twins(layout, {})
+    for note in (*layout.notes, *([twins] if twins else [])):
         print(f"blockvis: note: {note}", file=sys.stderr)
     joint = options.joint_thickness
     if joint == "0":

@@ -313,6 +313,9 @@ def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | No
         ring = np.array([(p.x, p.y, p.z) for p in entity.wcs_vertices()])
         found.add(ring, entity, handle)
         return
+    if kind == "SPLINE":
+        clamped = _clamped(entity.control_points, entity.weights, entity.knots, entity.dxf.degree)
+        entity.control_points, entity.weights, entity.knots = clamped
     exact = _circular(entity, tolerance)
     points = _points(make_path(entity), tolerance) if exact is None else exact
     if len(points) < 2:
@@ -335,6 +338,33 @@ def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | No
         found.add(points, entity, handle)
         return
     found.loose.append(Line(points, str(entity.dxf.layer), handle, kind not in ("LINE", "ARC"), _looks(entity)))
+
+
+def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, Any, Any]:
+    """Write a spline with knots at whose ends it begins and ends: ezdxf splits others, as periodic ones, wrongly.
+
+    Returns
+    -------
+    points : sequence of vectors
+    weights, knots : sequences of float
+    """
+    from scipy.interpolate import BSpline, make_interp_spline
+
+    n, every = len(points), np.array(knots, dtype=float)
+    if n <= degree or len(every) != n + degree + 1 or (np.diff(every) < 0).any():
+        return points, weights, knots
+    first, last = every[degree], every[n]
+    inner = every[(every > first) & (every < last)]
+    most = np.unique(inner, return_counts=True)[1].max(initial=0)
+    if (every[0] == first and every[-1] == last) or first == last or most > degree:
+        return points, weights, knots
+    factors = np.array(weights if len(weights) == n else np.ones(n))[:, None]
+    curve = BSpline(every, np.column_stack([np.array([(*p,) for p in points]) * factors, factors]), degree)
+    ends = np.concatenate([np.full(degree + 1, first), inner, np.full(degree + 1, last)])
+    # As many values as there are control points between these knots determine them.
+    at = np.array([ends[i + 1 : i + 1 + degree].mean() for i in range(len(ends) - degree - 1)])
+    found = make_interp_spline(at, curve(at), degree, ends).c
+    return (found[:, :-1] / found[:, -1:]).tolist(), found[:, -1].tolist() if len(weights) else [], ends.tolist()
 
 
 def _circular(entity: Any, tolerance: float | None) -> np.ndarray | None:
@@ -400,11 +430,16 @@ def _looks(entity: Any) -> tuple[str, ...]:
 
 def _hatch_rings(entity: Any, tolerance: float | None) -> list[np.ndarray]:
     """(n, 3) arrays: boundaries of a hatch."""
+    from ezdxf.math import Vec2
     from ezdxf.path import from_hatch
 
     rings = []
     for boundary in entity.paths:
         if not hasattr(boundary, "vertices"):
+            for edge in (one for path in entity.paths for one in getattr(path, "edges", ())):
+                if hasattr(edge, "knot_values"):
+                    clamped = _clamped(edge.control_points, edge.weights, edge.knot_values, edge.degree)
+                    edge.control_points, edge.weights, edge.knot_values = Vec2.list(clamped[0]), *clamped[1:]
             # Boundaries of separate edges may turn either way and contain splines: ezdxf orders them.
             return [_points(curve, tolerance) for curve in from_hatch(entity)]
         flat = _with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance)

@@ -306,6 +306,8 @@ def _of_noise(image: Image.Image) -> _Found:
     order[large], piece[large] = alike, np.arange(1, len(large) + 1)
     share = [np.where(alike == k, weight, 0) for k in range(alike.max() + 1)]
     colours = np.stack([np.average(colour, axis=0, weights=own) for own in share])
+    if _shades_of_paper(rgb, colours):
+        raise Photograph
     numbers, own = order[pieces], piece[pieces]
     # Joints too thin to be flat have the colour of the background.
     outer = _outer(numbers)
@@ -341,6 +343,14 @@ def _two_colours(rgb: np.ndarray, colour: np.ndarray, weight: np.ndarray) -> np.
     far = np.minimum(*(np.abs(rgb - one).max(axis=2) for one in (first, second))) > 2 * FLAT
     stray = np.minimum(*(np.abs(colour - one).max(axis=1) for one in (first, second))) > 2 * FLAT
     return None if far.mean() > MOST_BETWEEN or weight[stray].sum() > 0.01 * weight.sum() else np.stack([first, second])
+
+
+def _shades_of_paper(rgb: np.ndarray, colours: np.ndarray) -> bool:
+    """Whether colours are nearer to each other than to the ink between them, which is none of them."""
+    if np.ptp(colours, axis=0).max() >= 3 * FLAT:
+        return False
+    inked = np.min([np.abs(rgb - own).max(axis=2) for own in colours], axis=0) > 3 * FLAT
+    return bool(inked.mean() > THIN)
 
 
 def _background_of_mask(numbers: np.ndarray) -> int:

@@ -38,7 +38,15 @@ _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
 _ARC = re.compile(
     rf"({_NUMBER})[\s,]*({_NUMBER})[\s,]*({_NUMBER})[\s,]*([01])[\s,]*([01])[\s,]*({_NUMBER})[\s,]*({_NUMBER})"
 )
-_TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
+_TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([-+.\deE,\s]*)\)")
+#: Lengths in px and angles in degrees are what a transform attribute means without a unit.
+_CSS_UNIT = re.compile(rf"({_NUMBER})(?:px|deg)\b")
+#: Comments, the signs of an XML comment that old sheets stand in, and rules of a condition or of no element.
+_COMMENT = re.compile(r"/\*.*?\*/|<!--|-->", re.DOTALL)
+_AT_RULE = re.compile(r"@[^@{};]*(?:;|\{(?:[^{}]|\{[^{}]*\})*\})")
+_SELECTOR = re.compile(r"(\*|[a-zA-Z][\w-]*)?((?:[.#][\w-]+)*)")
+#: Properties by which shapes are read, chosen or left out.
+_READ = re.compile(r"(?:^|[;{])\s*(?:display|visibility|fill|stroke|transform)\s*:", re.IGNORECASE)
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 
 #: Numbers that follow each path command.
@@ -77,6 +85,7 @@ class _Context:
     depth: int = 0
     fill: str = "black"
     stroke: str = "none"
+    visibility: str = "visible"
 
     @property
     def layer(self) -> str:
@@ -93,7 +102,9 @@ def read(path: Path, reading: Reading) -> Layout:
     tolerance = None
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
-    found = _Outlines(notes=_pattern_fills(root))
+    found = _Outlines(notes=[*_styled(root), *_pattern_fills(root)])
+    if stated and stated not in UNITS and reading.unit is None:
+        found.notes.append(f"1 unit of the drawing is {stated}, by its width and its viewBox")
     _walk(root, _Context(np.eye(3), (), tolerance, path), found)
     faces = _with_loose(found, reading)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
@@ -184,8 +195,47 @@ def _unit(root: ElementTree.Element) -> str:
         return ""
     if len(box) != 4:
         return "px"
-    scale = float(match[1]) * UNITS[match[2]] / max(float(box[2]), 1e-300)
-    return next((unit for unit, metres in UNITS.items() if math.isclose(scale, metres, rel_tol=1e-3)), "")
+    number = float(match[1]) / max(float(box[2]), 1e-300)
+    scale = number * UNITS[match[2]]
+    named = (unit for unit, metres in UNITS.items() if math.isclose(scale, metres, rel_tol=1e-3))
+    return next(named, f"{number:.9g} {match[2]}" if 0.0 < number < math.inf else "")
+
+
+def _styled(root: ElementTree.Element) -> list[str]:
+    """Put what style sheets say before the own style of each element, which holds; say what was not understood."""
+    sheets = "\n".join(element.text or "" for element in root.iter() if _tag(element) == "style")
+    sheets = _COMMENT.sub("", sheets)
+    missed = [rule.split("{")[0].strip() for rule in _AT_RULE.findall(sheets) if _READ.search(rule)]
+    rules = []
+    for rule in _AT_RULE.sub("", sheets).split("}"):
+        selectors, _, said = rule.rpartition("{")
+        for selector in selectors.split(","):
+            match = _SELECTOR.fullmatch(selector.strip())
+            if match is not None and selector.strip():
+                marks = re.findall(r"[.#][\w-]+", match[2])
+                ids = {mark[1:] for mark in marks if mark[0] == "#"}
+                classes = {mark[1:] for mark in marks if mark[0] == "."}
+                tag = match[1] or "*"
+                rules.append(((len(ids), len(classes), tag != "*"), tag, ids, classes, said))
+            elif _READ.search(said):
+                missed.append(selector.strip())
+    rules.sort(key=lambda rule: rule[0])
+    for element in root.iter() if rules else ():
+        own, called = set(element.get("class", "").split()), {element.get("id", "")}
+        applied = [
+            text for _, tag, ids, classes, text in rules
+            if tag in ("*", _tag(element)) and ids <= called and classes <= own
+        ]  # fmt: skip
+        if applied:
+            element.set("style", ";".join([*applied, element.get("style", "")]))
+    return [
+        Note(
+            LEFT_OUT,
+            f"not read: what the style sheet says of '{selector}'; give the shapes a class, or export with "
+            "presentation attributes",
+        )
+        for selector in dict.fromkeys(missed)
+    ]
 
 
 def _pattern_fills(root: ElementTree.Element) -> list[str]:
@@ -193,8 +243,9 @@ def _pattern_fills(root: ElementTree.Element) -> list[str]:
     patterns = {element.get("id", "") for element in root.iter() if _tag(element) == "pattern"} - {""}
     fills = Counter[str]()
     for element in root.iter():
-        said = " ".join([element.get("fill", ""), element.get("style", ""), _style_sheet(element)])
-        fills.update(name for name in re.findall(r"url\(\s*['\"]?#([^'\")\s]+)", said) if name in patterns)
+        said = f"{element.get('fill', '')} {element.get('style', '')}"
+        named = dict.fromkeys(re.findall(r"url\(\s*['\"]?#([^'\")\s]+)", said))
+        fills.update(name for name in named if name in patterns)
     return [
         Note(
             LEFT_OUT,
@@ -203,10 +254,6 @@ def _pattern_fills(root: ElementTree.Element) -> list[str]:
         )
         for name, n in fills.items()
     ]
-
-
-def _style_sheet(element: ElementTree.Element) -> str:
-    return element.text or "" if _tag(element) == "style" else ""
 
 
 def _tag(element: ElementTree.Element) -> str:
@@ -219,22 +266,22 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> No
     tag = _tag(element)
     if tag in ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata"):
         return
-    if "display:none" in element.get("style", "").replace(" ", "") or element.get("display") == "none":
+    if _style(element, "display") == "none":
         found.notes.append(Note(LEFT_OUT, f"a hidden <{tag}> was skipped"))
         return
     if tag == "use":
         found.notes.append(Note(LEFT_OUT, "a <use> (clone) was skipped; unlink clones to have them read"))
         return
-    where = replace(
-        where, matrix=where.matrix @ _matrix(element.get("transform", ""), where.path), depth=where.depth + 1
-    )
+    where = replace(where, matrix=where.matrix @ _matrix(_transform(element), where.path), depth=where.depth + 1)
     fill, stroke = _style(element, "fill") or where.fill, _style(element, "stroke") or where.stroke
-    where = replace(where, fill=fill, stroke=stroke)
+    where = replace(where, fill=fill, stroke=stroke, visibility=_style(element, "visibility") or where.visibility)
     if tag == "g":
         label = element.get(f"{_INKSCAPE}label") or element.get("id") or ""
         where = replace(where, layers=(*where.layers, label) if label else where.layers)
     shape = _SHAPES.get(tag)
-    if shape is not None:
+    if shape is not None and where.visibility != "visible":
+        found.notes.append(Note(LEFT_OUT, f"a hidden <{tag}> was skipped"))
+    elif shape is not None:
         try:
             parts = shape(element, where)
         except (ValueError, OverflowError) as error:
@@ -296,9 +343,15 @@ def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], whe
 
 def _style(element: ElementTree.Element, key: str) -> str:
     """Value of a property of an element, of its style or an attribute; "" where it is that of its parent."""
-    styled = re.findall(rf"(?:^|;)\s*{key}\s*:\s*([^;]+)", element.get("style", ""))
+    styled = re.findall(rf"(?:^|;)\s*{key}\s*:\s*([^;!]+)", element.get("style", ""), re.IGNORECASE)
     word = (styled[-1] if styled else element.get(key, "")).strip()
     return "" if word == "inherit" else word
+
+
+def _transform(element: ElementTree.Element) -> str:
+    """Transform of an element; about an origin of its own, which is not read, it is none."""
+    said, origin = _style(element, "transform"), _style(element, "transform-origin")
+    return f"{said} about {origin}" if said and origin.strip(" 0px") else said
 
 
 def _colour(where: _Context) -> tuple[str, ...]:
@@ -332,6 +385,7 @@ def _hole(rings: list[np.ndarray]) -> int | None:
 
 def _matrix(text: str, path: Path) -> np.ndarray:
     result = np.eye(3)
+    text = _CSS_UNIT.sub(r"\1", text)
     for name, arguments in _TRANSFORM.findall(text):
         v = [float(x) for x in re.findall(_NUMBER, arguments)]
         step = np.eye(3)
@@ -353,6 +407,9 @@ def _matrix(text: str, path: Path) -> np.ndarray:
                 f"'{path}' has a transform {name}({arguments}) that cannot be read; apply it to the shapes"
             )
         result = result @ step
+    unread = _TRANSFORM.sub("", text).strip(" ,\t\r\n")
+    if unread not in ("", "none"):
+        raise ValueError(f"'{path}' has a transform {unread} that cannot be read; apply it to the shapes")
     return result
 
 

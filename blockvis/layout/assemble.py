@@ -85,11 +85,9 @@ def assemble(
             warnings.warn(f"{where}: {note}", stacklevel=2)
     if isinstance(joint_thickness, str) and layout.dimension == 3:
         joint_thickness = inspected(layout).joint_thickness
-    twins = duplicates(layout.every_corner)
-    if twins:
-        dropped = dropped_twins(layout, twins, roles or {})
-        warnings.warn(twins_note(layout, twins, dropped), stacklevel=2)
-        layout = layout.chosen([i for i in range(layout.n_blocks) if i not in dropped])
+    layout, note = without_twins(layout, roles or {})
+    if note:
+        warnings.warn(note, stacklevel=2)
     n_drawn = layout.n_blocks
     if layout.dimension == 2:
         layout, note = _simplified(layout, outline_tolerance)
@@ -125,6 +123,16 @@ def assemble(
     for note in repairs:
         warnings.warn(f"{where}: {note}", stacklevel=2)
     return solver.Assembly.from_outlines(outlines, **of_blocks)
+
+
+def without_twins(layout: Layout, roles: Mapping[str, str]) -> tuple[Layout, str]:
+    """Drop blocks that are drawn in the place of another, and say which; "" for none."""
+    twins = duplicates(layout.every_corner)
+    if not twins:
+        return layout, ""
+    dropped = dropped_twins(layout, twins, roles)
+    kept = [i for i in range(layout.n_blocks) if i not in dropped]
+    return layout.chosen(kept), twins_note(layout, twins, dropped)
 
 
 def _left_overlaps(assembly: solver.Assembly, accepted: float) -> str:

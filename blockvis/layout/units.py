@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
 
-from .notes import UNIT_CLASH, Note
+from .notes import UNIT, UNIT_CLASH, Note
 
 #: Metres per unit.
 UNITS = {
@@ -29,6 +30,9 @@ _OTHER_NAMES = {
     "inch": "in", "inches": "in", "foot": "ft", "feet": "ft", "yard": "yd", "yards": "yd", "point": "pt", "pixel": "px",
 }  # fmt: skip
 
+#: A number of units of length, and the name of the unit.
+_NUMBER_OF = re.compile(r"\s*(\d+\.?\d*(?:e[-+]?\d+)?|\.\d+(?:e[-+]?\d+)?)?\s*(.*?)\s*", re.DOTALL | re.IGNORECASE)
+
 #: Median size (root of the area) of a masonry block [m]: from a mosaic-sized chip to a megalith.
 PLAUSIBLE_SIZE = (0.02, 20.0)
 
@@ -38,28 +42,38 @@ DOUBTED = (0.02, 10.0)
 #: Median size of the blocks of common masonry [m], from a split brick to an ashlar.
 COMMON = (0.04, 3.0)
 
+#: Units that templates state whose drawings are metric, and those in which these are drawn.
+IMPERIAL, METRIC = ("in", "ft", "yd"), ("mm", "cm", "m")
+
 #: Units that are tried where another makes no masonry.
 TRIED = ("mm", "cm", "m", "dm", "in", "ft")
 
 
 def metres_per(unit: str) -> float:
-    """Metres per unit of length.
+    """Metres per unit of length, or of a number of them, as a drawing at a scale has it.
 
     Raises
     ------
     ValueError
-        For an unknown unit.
+        For an unknown unit, and a number of them that is not above 0.
 
     Examples
     --------
     >>> metres_per("inches")
     0.0254
+    >>> metres_per("20 mm")
+    0.02
     """
-    name = unit.strip()
+    number, name = _NUMBER_OF.fullmatch(unit).groups()  # type: ignore[union-attr]
     name = _OTHER_NAMES.get(name.lower(), name if name in UNITS else name.lower())
     if name not in UNITS:
-        raise ValueError(f"unit '{unit}' is not known; the units of length are {', '.join(UNITS)}")
-    return UNITS[name]
+        raise ValueError(
+            f"unit '{unit}' is not known; the units of length are {', '.join(UNITS)}, or a number of one: 20 mm"
+        )
+    metres = float(number or 1.0) * UNITS[name]
+    if not 0.0 < metres < np.inf:
+        raise ValueError(f"unit '{unit}' is {metres:g} m long; give a number above 0, as 20 mm")
+    return metres
 
 
 def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str, str]:
@@ -90,7 +104,7 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
     low, high = PLAUSIBLE_SIZE
     in_stated, in_metres = median * metres_per(stated), median
     if low <= in_stated <= high:
-        return stated, ""
+        return stated, _doubt_of_template(stated, median)
     # Most drawings whose unit is wrong are in m; blocks of several m are rather bricks in another.
     likely = "m" if COMMON[0] <= in_metres <= COMMON[1] else _masonry_unit(median)
     likely = likely or ("m" if low <= in_metres <= high else "")
@@ -100,6 +114,20 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
         UNIT_CLASH,
         f"unit clash: the file says its unit is {stated}, which makes the median block {in_stated:.3g} m in size; "
         f"{likely} was assumed, which makes it {median * metres_per(likely):.3g} m; give unit=... to settle it",
+    )
+
+
+def _doubt_of_template(stated: str, size: float) -> str:
+    """Doubt inches, feet or yards that make blocks too large for common masonry, as a metric unit would not."""
+    large = size * UNITS.get(stated, 1.0)
+    metric = _masonry_unit(size, METRIC) if stated in IMPERIAL and COMMON[1] < large <= DOUBTED[1] else ""
+    if not metric:
+        return ""
+    return Note(
+        UNIT,
+        f"unit {stated} in doubt, which the file states, perhaps from a template: it makes the median block "
+        f"{large:.3g} m across; {metric} would make it {size * UNITS[metric]:.3g} m: say so under [geometry] "
+        f'unit = "{metric}", or by --unit {metric}',
     )
 
 

@@ -5,8 +5,10 @@ import itertools
 import ezdxf
 import numpy as np
 import pytest
+import shapely
 
 from blockvis import read, read_layout
+from blockvis.cli import main
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
@@ -250,6 +252,43 @@ def test_a_spline_of_degree_one_is_straight(tmp_path):
 
     assert read(saved(tmp_path, draw)).areas.tolist() == pytest.approx([1.0])
     assert len(read(saved(tmp_path, draw)).vertices) == 4
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize("rational", [False, True])
+def test_closed_splines_with_the_knots_of_a_period_are_those_drawn(tmp_path, degree, rational):
+    oval = [(0, 0), (5, 0), (5.5, 2.5), (5, 5), (0, 5), (-0.5, 2.5)]
+    weights = [1.0, 1.5, 1.0, 0.8, 1.0, 1.0]
+    curve = ezdxf.math.closed_uniform_bspline(oval, order=degree + 1, weights=weights if rational else None)
+
+    def draw(document, space):
+        space.add_spline().apply_construction_tool(curve).dxf.flags = 11
+        hatch = space.add_hatch(dxfattribs={"layer": "hatch"})
+        edge = hatch.paths.add_edge_path().add_spline(
+            control_points=[(p.x + 20, p.y) for p in curve.control_points], degree=degree, knot_values=curve.knots(),
+            weights=curve.weights() or None, periodic=1,
+        )  # fmt: skip
+        assert edge.is_valid()
+
+    exact = shapely.Polygon([(p.x, p.y) for p in curve.approximate(800)])
+    layout = read_layout(saved(tmp_path, draw), chord_tolerance=1e-4)
+    for outline, x in zip(layout.outlines, (0.0, 20.0), strict=True):
+        read_as = shapely.Polygon(outline - [x, 0.0])
+        assert shapely.symmetric_difference(read_as, exact).area < 1e-3 * exact.area
+
+
+def test_convert_writes_what_is_drawn_twice_once(tmp_path, capsys):
+    def draw(document, space):
+        for x in (0, 1, 0):
+            space.add_lwpolyline([(x + u, v) for u, v in SQUARE], close=True)
+
+    path = saved(tmp_path, draw)
+    assert main(["convert", str(path), str(tmp_path / "b.json")]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("2 blocks written to")
+    assert "note: 1 of 3 blocks are drawn twice and were dropped: 'block " in err
+    assert read_layout(tmp_path / "b.json").n_blocks == 2
+    assert main(["convert", str(path), str(tmp_path / "c.json"), "--ignore", "0"]) == 2
 
 
 def test_faces_of_lines_are_noted_where_they_are_analysed(tmp_path):

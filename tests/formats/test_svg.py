@@ -82,6 +82,48 @@ def test_refusals(tmp_path, body, message):
         read(saved(tmp_path, body))
 
 
+SHEET = """<style type="text/css"><![CDATA[ /* as drawing programs write it: .st1{display:none} */
+    @font-face { font-family: x; src: url(x) }
+    .st0, .st9 { fill: #D2B48C; stroke:#000000 } rect.st1 { FILL:none; stroke:#E30613 !important; }
+    .st3{display:none;} #quiet{visibility:hidden} .st4{transform:translate(0px, 30px) rotate(0deg)}
+    ]]></style>"""
+
+
+def test_what_a_style_sheet_says_of_shapes_is_read(tmp_path):
+    path = saved(
+        tmp_path,
+        f"""{SHEET}<g class="st3"><rect width="1" height="1"/></g><rect class="st0" width="10" height="10"/>
+        <rect class="st0 st1" x="20" width="10" height="10"/><rect class="st4" x="40" width="10" height="10"/>
+        <rect class="st1" style="stroke: blue" x="60" width="10" height="10"/>
+        <g id="quiet"><rect x="80" width="10" height="10"/><rect x="100" visibility="visible" width="9" height="9"/></g>
+        <rect style="visibility:hidden" width="7" height="7"/>""",
+        'viewBox="0 0 200 100"',
+    )
+    layout = read_layout(path)
+    colours = ["#d2b48c", "#e30613", "#000000", "#0000ff", "#000000"]
+    assert layout.looks == tuple(("rect", colour) for colour in colours)
+    assert [ring[:, 1].min() for ring in layout.outlines] == [-10, -10, -40, -10, -9]
+    assert [note for note in layout.notes if "hidden" in note] == [f"a hidden <{x}> was skipped" for x in ("g", "rect")]
+    assert read_layout(path, ignore=["#E30613"]).n_blocks == 4
+
+
+def test_what_a_style_sheet_says_of_other_selectors_is_missed_in_a_note(tmp_path):
+    sheet = (
+        "<style>g > rect{display:none} @media print {.a{fill:red}} g text{font-size:2px} .a:hover{stroke:red}</style>"
+    )
+    notes = read_layout(saved(tmp_path, f'{sheet}<g><rect class="a" width="9" height="9"/></g>')).notes
+    told = [note for note in notes if note.startswith("not read")]
+    assert [note.split("'")[1] for note in told] == ["@media print", "g > rect", ".a:hover"]
+
+
+@pytest.mark.parametrize(
+    "said", ["translateX(3px)", "rotate(1rad)", "translate(50%, 0)", "scale(2); transform-origin:5px 0"]
+)
+def test_transforms_of_a_style_that_are_not_read_are_refused(tmp_path, said):
+    with pytest.raises(ValueError, match=r"has a transform .* that cannot be read; apply it to the shapes"):
+        read(saved(tmp_path, f'<rect style="transform:{said}" width="9" height="9"/>'))
+
+
 def test_entities_are_refused_before_parsing(tmp_path):
     path = tmp_path / "a.svg"
     bombs = "".join(f'<!ENTITY l{k + 1} "{f"&l{k};" * 10}">' for k in range(9))
@@ -96,6 +138,20 @@ def test_entities_are_refused_before_parsing(tmp_path):
 def test_one_curve_has_a_bounded_number_of_chords(tmp_path):
     path = saved(tmp_path, '<circle cx="0" cy="0" r="1"/>', 'viewBox="0 0 1 1"')
     assert len(read(path, chord_tolerance=1e-12).vertices) <= 512
+
+
+def test_a_scale_of_width_and_view_box_that_is_no_unit_is_kept(tmp_path):
+    body = '<rect width="100" height="50"/>'
+    path = saved(tmp_path, body, 'width="5940mm" height="4200mm" viewBox="0 0 297 210"')
+    layout = read_layout(path)
+    assert layout.unit == "20 mm"
+    assert layout.notes == ("1 unit of the drawing is 20 mm, by its width and its viewBox",)
+    assert layout.outlines[0].max(axis=0) == pytest.approx([2.0, 0.0])
+    # What a sheet at 1:20 does not say can be given.
+    sheet = saved(tmp_path, body, 'width="297mm" height="210mm" viewBox="0 0 297 210"')
+    assert read_layout(sheet, unit="20 mm").outlines[0].max(axis=0) == pytest.approx([2.0, 0.0])
+    with pytest.raises(ValueError, match="unit '0 mm' is 0 m long; give a number above 0, as 20 mm"):
+        read_layout(sheet, unit="0 mm")
 
 
 def test_lines_of_patterns_that_fill_shapes_are_missed_in_a_note(tmp_path):

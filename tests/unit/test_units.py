@@ -44,3 +44,12 @@ def test_choice(tmp_path, given, stated, size, unit, word):
     assert layout.unit == unit
     assert word in " ".join(notes)
     assert bool(word) == bool(notes)
+
+
+@pytest.mark.parametrize(("stated", "size", "metric"), [("in", 137.0, "mm"), ("ft", 25.0, "cm"), ("in", 50.0, "")])
+def test_inches_of_a_template_that_make_blocks_too_large_are_doubted(tmp_path, stated, size, metric):
+    layout = read_layout(square(tmp_path, size, stated))
+    assert layout.unit == stated
+    told = [note for note in layout.notes if f"unit {stated} in doubt" in note]
+    assert len(told) == bool(metric)
+    assert all(f"by --unit {metric}" in note for note in told)
