@@ -160,14 +160,14 @@ def test_halves_of_characters_are_replaced_and_noted(tmp_path):
     """A name that no file can hold ended the process in VTK."""
     blocks = [
         {"name": "a\ud800b", "material": "m\udfff", "outline": [[0, 0], [1, 0], [1, 1], [0, 1]]},
-        {"name": "c\u0000d \U0001f9f1", "outline": [[0, 1], [1, 1], [1, 2], [0, 2]]},
+        {"name": "c\u0001d \U0001f9f1", "outline": [[0, 1], [1, 1], [1, 2], [0, 2]]},
     ]
     path = tmp_path / "halves.json"
     path.write_text(
         json.dumps({"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}), encoding="utf-8"
     )
     drawing = read_layout(path)
-    assert drawing.names == ("a\ufffdb", "c\u0000d \U0001f9f1")
+    assert drawing.names == ("a\ufffdb", "c\u0001d \U0001f9f1")
     assert drawing.materials == ("m\ufffd", "")
     assert [note for note in drawing.notes if "encoding" in note] == [
         "characters that the file's encoding does not have are shown as \ufffd"
