@@ -29,12 +29,7 @@ def on_supports(model: Model, contacts: Contacts, pose: Pose, forces: np.ndarray
 
 
 class EquilibriumChecks:
-    """Equilibrium within exact Coulomb friction, without viscosity, at the places of a path.
-
-    Parameters
-    ----------
-    stepper : Stepper
-    """
+    """Equilibrium within exact Coulomb friction, without viscosity, at the places of a path."""
 
     def __init__(self, stepper: Stepper) -> None:
         self.stepper, self.model, self.driver = stepper, stepper.model, stepper.driver

@@ -35,12 +35,7 @@ GIVE = 1e-2
 
 
 class Members:
-    """The ties, props and bars of a model.
-
-    Parameters
-    ----------
-    model : Model
-    """
+    """The ties, props and bars of a model."""
 
     def __init__(self, model: Model) -> None:
         self.model, self.ties = model, model.ties

@@ -73,12 +73,7 @@ class JointPoints:
 
 
 class Mortar:
-    """The mortar of a model, and the elastic joints.
-
-    Parameters
-    ----------
-    model : Model
-    """
+    """The mortar of a model, and the elastic joints."""
 
     def __init__(self, model: Model) -> None:
         self.model, self.present, interfaces = model, model.interfaces.mortar, model.interfaces
