@@ -183,7 +183,9 @@ class Settlement:
             self._check_profile()
         elif self.direction is None and self.rotation_centre is None and self.radial_from is None:
             raise ValueError("a settlement needs a direction, or a rotation_centre and rotation")
-        self._check_vectors()
+        counts = {"direction": (2, 3), "rotation_centre": (2, 3), "rotation_axis": (3,), "radial_from": (2,)}
+        units = {"direction": "direction in which the support moves", "rotation_axis": "axis about which it turns"}
+        set_vectors(self, "settlement", counts, units)
         if self.radial_from is not None and (self.direction is not None or self.rotation_centre is not None):
             raise ValueError("a settlement with radial_from has neither direction nor rotation_centre; leave them out")
         turns_in_space = self.rotation_centre is not None and len(self.rotation_centre) == 3
@@ -203,26 +205,6 @@ class Settlement:
             if not 0.0 <= stop <= self.limit:
                 raise ValueError(f"settlement stop {stop:g} is not between 0 and the limit of {self.limit:g}")
         object.__setattr__(self, "stops", tuple(sorted(float(stop) for stop in self.stops)))
-
-    def _check_vectors(self) -> None:
-        """Make numbers of what is given, and unit vectors of directions."""
-        for name, counts in (
-            ("direction", (2, 3)),
-            ("rotation_centre", (2, 3)),
-            ("rotation_axis", (3,)),
-            ("radial_from", (2,)),
-        ):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, _numbers(getattr(self, name), name, counts))
-        for name in ("direction", "rotation_axis"):
-            vector = getattr(self, name)
-            if vector is None:
-                continue
-            length = float(np.hypot(*vector)) if len(vector) == 2 else float(np.linalg.norm(vector))
-            if length == 0.0:
-                what = "direction in which the support moves" if name == "direction" else "axis about which it turns"
-                raise ValueError(f"settlement {name} is {[0] * len(vector)}; give the {what}")
-            object.__setattr__(self, name, tuple(part / length for part in vector))
 
     def _check_profile(self) -> None:
         """Scale the profile so that its largest displacement, or angle where nothing is displaced, is 1."""
@@ -345,13 +327,23 @@ def check_steps(path: Any, what: str) -> None:
             raise ValueError(f"{what} {name} is {value:g}; it must be a positive number")
 
 
-def _numbers(value: Sequence[float], name: str, counts: tuple[int, ...]) -> tuple[float, ...]:
-    numbers = np.asarray(value, dtype=float)
-    if numbers.ndim != 1 or len(numbers) not in counts or not np.isfinite(numbers).all():
-        wanted = "two finite numbers [x, y]" if counts[0] == 2 else "three finite numbers [x, y, z]"
-        more = ", or in space three, [x, y, z]" if counts == (2, 3) else ""
-        raise ValueError(f"settlement {name} is {value!r}; give {wanted}{more}")
-    return tuple(numbers.tolist())
+def set_vectors(owner: Any, what: str, counts: Mapping[str, tuple[int, ...]], units: Mapping[str, str]) -> None:
+    """Make tuples of numbers of the vectors of a dataclass, by how many they may be, and unit vectors of directions."""
+    for name, count in counts.items():
+        value = getattr(owner, name)
+        if value is None:
+            continue
+        vector = np.asarray(value, dtype=float)
+        if vector.ndim != 1 or len(vector) not in count or not np.isfinite(vector).all():
+            wanted = "two finite numbers [x, y]" if count[0] == 2 else "three finite numbers [x, y, z]"
+            more = ", or in space three, [x, y, z]" if count == (2, 3) else ""
+            raise ValueError(f"{what} {name} is {value!r}; give {wanted}{more}")
+        if name in units:
+            length = float(np.hypot(*vector)) if len(vector) == 2 else float(np.linalg.norm(vector))
+            if length == 0.0:
+                raise ValueError(f"{what} {name} is {[0] * len(vector)}; give the {units[name]}")
+            vector = vector / length
+        object.__setattr__(owner, name, tuple(vector.tolist()))
 
 
 def _no_load(assembly: Assembly) -> np.ndarray:

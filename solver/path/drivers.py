@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.assembly import Assembly
 from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_count, rotation_matrices
-from solver.loads import Settlement, check_steps
+from solver.loads import Settlement, check_steps, set_vectors
 from solver.words import make_plain
 
 
@@ -116,19 +116,8 @@ class ControlDisplacement:
     def __post_init__(self) -> None:
         """Check the numbers; the direction becomes a unit vector."""
         make_plain(self)
-        for name in ("direction", "point"):
-            value = getattr(self, name)
-            if value is None:
-                continue
-            numbers = np.asarray(value, dtype=float)
-            if numbers.shape not in ((2,), (3,)) or not np.isfinite(numbers).all():
-                raise ValueError(f"control {name} is {value!r}; give two finite numbers [x, y], or in space three")
-            object.__setattr__(self, name, tuple(numbers.tolist()))
-        if self.direction is not None:
-            length = float(np.linalg.norm(self.direction))
-            if length == 0.0:
-                raise ValueError("control direction is [0, 0]; give the direction in which the displacement counts")
-            object.__setattr__(self, "direction", tuple(part / length for part in self.direction))
+        units = {"direction": "direction in which the displacement counts"}
+        set_vectors(self, "control", {"direction": (2, 3), "point": (2, 3)}, units)
         check_steps(self, "control")
 
     @property
