@@ -108,15 +108,14 @@ def case_assembly(case: Case) -> solver.Assembly:
 
 
 def _refuse_shared_names(case: Case, sketch: layout.Layout) -> None:
-    """Refuse a support that is called as another or a block of the drawing: by its name it has its stiffness."""
-    taken = {*sketch.names}
-    for name in (support["name"] for support in case.supports):
-        if name in taken:
+    """Refuse a support of given stiffness, which it has by its name, that is called as another or a block."""
+    names = [*sketch.names, *(support["name"] for support in case.supports)]
+    for name in case.ground:
+        if names.count(name) > 1:
             raise ValueError(
                 f"{case.source}: [supports] name: '{name}' is the name of another support or block; give each support "
                 "a name of its own"
             )
-        taken.add(name)
 
 
 def _refuse_idle_settlements(case: Case, assembly: solver.Assembly) -> None:

@@ -187,7 +187,7 @@ def check_settlement(
         which = f"settlement phase {number + 1}" if len(phases) > 1 else "the settlement"
         for name in phase.profile or phase.blocks or ():
             role = assembly.roles[assembly.index(name)]
-            if role != MOVING:
+            if role != MOVING and (phase.profile is None or any(phase.profile[name])):
                 raise ValueError(
                     f"{which} moves block '{name}', whose role is '{role}'; give it the role 'moving', or leave it out"
                 )

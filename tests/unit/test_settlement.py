@@ -65,6 +65,12 @@ def test_a_block_that_does_not_move_is_refused_by_its_phase_and_name(named):
         solver.settle(two_bricks(), [DOWN, solver.Settlement(**named)])
 
 
+def test_a_profile_may_name_a_support_that_it_leaves_where_it_is():
+    profile = {"base": (0.0, -1.0, 0.0), "lower": (0.0, 0.0, 0.0)}
+    response = solver.settle(two_bricks(), solver.Settlement(profile=profile, increment=0.01, limit=0.01))
+    assert response.stop is solver.Status.LIMIT_REACHED
+
+
 def test_no_free_block_is_refused():
     with pytest.raises(ValueError, match="3 blocks, all supports"):
         solver.settle(two_bricks(roles=["fixed", "fixed", "moving"]), DOWN)
