@@ -293,6 +293,7 @@ def test_a_pipe_closed_early_is_no_error(case):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("streams", [">&- 2>&-", "2>/dev/full"])
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no stream that is full")
 def test_streams_that_take_nothing_end_no_run(case, streams):

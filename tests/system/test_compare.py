@@ -52,6 +52,7 @@ def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_p
         assert (np.abs(curves - np.array(colour)).sum(axis=2) == 0).sum() > 1000
 
 
+@pytest.mark.slow
 def test_places_of_several_settlements_are_told_as_their_sum(tmp_path):
     structure, folders = solver.Structure(generators.arch(voussoirs=5), friction_coefficient=2.0), []
     for step in (1e-3, 2e-3):

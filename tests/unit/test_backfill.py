@@ -95,6 +95,7 @@ def test_fill_that_cannot_be_is_refused_in_one_line(change: dict[str, str], word
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.slow
 def test_fills_over_the_same_blocks_lie_one_on_another(tmp_path: Path) -> None:
     def filled(*tables: dict[str, str]) -> tuple[solver.Assembly, solver.Loads]:
         texts = ["\n".join(f"{key} = {value}" for key, value in (FILL | table).items()) for table in tables]

@@ -141,6 +141,7 @@ def test_phases_in_other_units_share_no_axis(tmp_path):
     assert "reaction / weight W" not in told
 
 
+@pytest.mark.slow
 def test_reactions_along_different_motions_are_not_joined(tmp_path):
     outlines = [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])

@@ -125,6 +125,7 @@ def test_a_lintel_falls_between_its_piers_to_their_feet():
     assert corners[:, 1].min() == pytest.approx(fall.ground, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_the_push_grows_until_what_still_stands_falls_whatever_was_lost_before():
     blocks = [rectangle(-2.0, -1.0, 2.0, 0.0), rectangle(-0.5, 0.0, 0.5, 1.5), rectangle(0.4, 1.5, 0.5, 1.9)]
     assembly = solver.Assembly.from_outlines(blocks, roles=["moving", "free", "free"])
@@ -531,6 +532,7 @@ def test_a_block_in_space_swings_on_a_tie():
     assert np.linalg.norm(engine.pose.rotations[0]) > 0.1
 
 
+@pytest.mark.slow
 def test_results_that_replace_those_of_a_collapse_have_no_fall(tmp_path):
     response = shipped_arch()
     folder = blockvis.write(response, tmp_path / "out")

@@ -153,6 +153,7 @@ def test_ground_that_was_cut_is_named_by_its_name_or_its_pieces(tmp_path, blocks
     assert response.path[-1].phase == 1
 
 
+@pytest.mark.slow
 def test_a_trough_and_its_mirror_open_the_wall_alike(tmp_path):
     # One increment: at the second a brick slips, and comes to rest a little earlier in the one than in the other. What
     # a program leaves of the step grows to a ten-thousandth of a brick.

@@ -211,6 +211,7 @@ def test_the_end_of_a_pushover_is_told_where_blocks_are_a_little_out_of_balance(
     assert response.path[-1].certificate.equilibrium_residual < 1e-8
 
 
+@pytest.mark.slow
 def test_the_lift_of_a_corner_is_followed_to_where_it_is_largest():
     """A block on one corner: tan of the angle that its diagonal has left, and the lift by geometry."""
     assembly = block()
