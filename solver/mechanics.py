@@ -43,7 +43,7 @@ from .results.quantities import (
     reaction_to,
     settlement_in,
 )
-from .results.response import Control, path_parameters, total_weight
+from .results.response import Control, lowest, path_parameters, total_weight
 from .ties import (
     ABSENT,
     BAR,
@@ -73,9 +73,9 @@ __all__ = [
     "Mechanism", "NotSolved", "PathState", "Place", "Polygons", "Polyhedra", "Quantity", "Shapes", "State",
     "Stepper", "StoredState", "TieForces", "block_forces", "carried", "carried_between", "check_settlement",
     "corners_and_edges", "counted", "falling_blocks", "features_of", "find_contacts", "is_member",
-    "joined_contacts", "matched_contacts", "measure_contacts", "mechanism_of", "member_contacts", "member_forces",
-    "member_states", "minimise", "model_of", "motion_size", "moved", "moved_vertices", "overlap_depths",
-    "path_parameters", "point_velocities", "present_members", "pushover_increments", "reaction_to", "rigid_parts",
-    "rotation_matrices", "settlement_in", "settlement_increments", "steep_note", "swung", "tie_ends", "tie_lengths",
-    "total_weight", "turned", "turned_moments", "with_motion", "worst_of", "wrench_matrix"
+    "joined_contacts", "lowest", "matched_contacts", "measure_contacts", "mechanism_of", "member_contacts",
+    "member_forces", "member_states", "minimise", "model_of", "motion_size", "moved", "moved_vertices",
+    "overlap_depths", "path_parameters", "point_velocities", "present_members", "pushover_increments", "reaction_to",
+    "rigid_parts", "rotation_matrices", "settlement_in", "settlement_increments", "steep_note", "swung", "tie_ends",
+    "tie_lengths", "total_weight", "turned", "turned_moments", "with_motion", "worst_of", "wrench_matrix"
 ]  # fmt: skip

@@ -404,12 +404,12 @@ def _matrix(text: str, path: Path) -> np.ndarray:
             step[(0, 1) if name == "skewX" else (1, 0)] = math.tan(math.radians(v[0]))
         else:
             raise ValueError(
-                f"'{path}' has a transform {name}({arguments}) that cannot be read; apply it to the shapes"
+                f"'{path}' has a transform {name}({arguments:.60}) that cannot be read; apply it to the shapes"
             )
         result = result @ step
     unread = _TRANSFORM.sub("", text).strip(" ,\t\r\n")
     if unread not in ("", "none"):
-        raise ValueError(f"'{path}' has a transform {unread} that cannot be read; apply it to the shapes")
+        raise ValueError(f"'{path}' has a transform {unread:.60} that cannot be read; apply it to the shapes")
     return result
 
 

@@ -456,7 +456,7 @@ def _over_places(
             yield _read_for_multipliers(increment)
     if steps.ending.stop is not solver.Status.LIMIT_REACHED:
         return not_reached(steps.ending, "it carries no live load")
-    chosen, shown, least = 0, None, np.inf
+    chosen, shown = 0, None
     for number, x in enumerate(places):
         if number < len(found):
             state = found[number]
@@ -469,9 +469,8 @@ def _over_places(
             if number == 0 and (words := _closing_words(run)):
                 state = replace(state, notes=(*state.notes, words))
             programs = 0
-        multiplier = float(np.nan_to_num(state.load_multiplier, nan=-np.inf, posinf=np.inf))
-        if shown is None or multiplier < least:
-            chosen, shown, least = number, state, multiplier
+        if shown is None or mechanics.lowest([shown.load_multiplier, state.load_multiplier]):
+            chosen, shown = number, state
         if number >= len(found):
             yield replace(state, checkpoint=_checkpoint(run, pose=pose, ties=ties, bonds=bonds))
     # A load that moves is kept at the place that governs.

@@ -20,13 +20,10 @@ import numpy as np
 from .cones import ITERATIONS, Scaling, inner, longest_step, product, quotient
 from .problem import ContactProblem, NotSolved, StepSolution
 
-#: Mean product, in block weights × block sizes, residual of the geometry, as a part of the movement, and force out of
-#: balance, in block weights, at which the method has converged. The first is small beside the compliance of the joints,
-#: which decides forces that equilibrium leaves open, however far the blocks move.
-CONVERGED, FITS, BALANCED = 1e-12, 1e-8, 1e-9
-
-#: All three, the first as a part of the movement, where the method goes no further.
-ACCEPTED = 1e-6
+#: Mean product, small beside the compliance, which decides forces that equilibrium leaves open, however far the blocks
+#: move; residual of the geometry, as a part of the movement; and force out of balance, in block weights, at which the
+#: method has converged. The last is accepted of each, of the first as a part of the movement, where it goes no further.
+CONVERGED, FITS, BALANCED, ACCEPTED = 1e-12, 1e-8, 1e-9, 1e-6
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from solver.kinematics import Pose
 from solver.loads import GRAVITY, Loads, Settlement
 from solver.phases import PhaseChange, loads_in
 from solver.ties import Tie
+from solver.tolerances import AT_LIMIT
 from solver.views import Shown, views
 from solver.words import REMEDY, counted
 
@@ -208,7 +209,7 @@ class Response(Shown):
             return None
         if self.parameter.is_path:
             return path[-1]
-        return path[int(np.argmin(np.nan_to_num([i.measured for i in path], nan=-np.inf, posinf=np.inf)))]
+        return path[lowest([i.measured for i in path])]
 
     @property
     def limit_states(self) -> list[tuple[LimitLoad, Increment]]:
@@ -485,4 +486,10 @@ class Envelope:
     @property
     def worst(self) -> int:
         """Number of the position with the smallest multiplier; no equilibrium counts as smaller than any."""
-        return int(np.argmin(np.nan_to_num(self.multipliers, nan=-np.inf, posinf=np.inf)))
+        return lowest(self.multipliers)
+
+
+def lowest(multipliers: Sequence[float] | np.ndarray) -> int:
+    """Find the number of the smallest multiplier, nan before any, and of those that rounding parts the first."""
+    values = np.nan_to_num(multipliers, nan=-np.inf, posinf=np.inf)
+    return int(np.argmax(np.isclose(values, values.min(), rtol=AT_LIMIT, atol=0.0)))

@@ -122,8 +122,8 @@ def test_envelope_after_a_settlement_has_the_mortar_that_is_left(tmp_path):
     assert last.bonds.left.min() == 0.0
     assert last.bonds.left.max() == 1.0
     for limit, x in zip(response.limits, (-0.4, 0.4), strict=True):
-        live = solver.load_on_top(response.assembly, x, (0.0, -1000.0))
-        whole = solver.Structure(response.assembly, response.interfaces, replace(path.loads, live=live))
+        live = solver.force_on_top(response.assembly, x, (0.0, -1000.0))
+        whole = solver.Structure(response.assembly, response.interfaces, path.loads).with_live(live)
         close = 1e-3 * response.assembly.block_size
         expected = whole.limit_load(pose=last.pose, bonds_at=last.bonds, displacement=close)
         assert limit.multiplier == pytest.approx(expected.multiplier, rel=1e-9)

@@ -280,7 +280,7 @@ def test_a_speck_that_tumbles_between_large_stones_makes_no_step_short():
     )  # fmt: skip
     # Rounding decides where it comes to lie between the lintels.
     assert with_it.reaction[-1] == pytest.approx(without.reaction[-1], rel=0.02)
-    assert sum(increment.programs for increment in with_it.increments) < 300, "13,012 by its rotation times their size"
+    assert sum(increment.programs for increment in with_it.increments) < 1500, "13,012 by its rotation times their size"
 
 
 def test_rotation_about_a_point_moves_the_support_on_the_arc():
