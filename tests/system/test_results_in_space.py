@@ -122,6 +122,7 @@ def test_faces_of_joints_are_those_of_the_voussoirs():
     assert ((between * joints.normals).sum(axis=1) > 0).all()
 
 
+@pytest.mark.slow
 def test_joints_open_on_one_side_and_carry_the_weight():
     response = vault_response()
     assembly, last = response.assembly, response.path[-1]

@@ -198,6 +198,7 @@ def test_the_facade_closes_without_overlap_and_its_openings_stay():
     assert (np.abs(contacts.gaps) < 1e-6).mean() > 0.95
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000), st.sampled_from(["running", "stack", "arch"]))
 @settings(max_examples=40, deadline=None)
 def test_drawings_by_hand_leave_no_overlap(seed, kind):

@@ -57,6 +57,7 @@ def test_between_two_blocks_the_force_goes_into_the_one_it_pushes(tmp_path):
     assert blocks["[0, -500]"] < 2 * course < blocks["[0, 500]"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sense", [1, -1])
 def test_edges_are_counted_from_the_first_corner_in_whichever_sense_it_is_drawn(tmp_path, sense):
     """Edge 2 of a trapezoid that begins at its lower left corner is its right flank, a metre high."""

@@ -115,6 +115,7 @@ def test_supports_that_stand_leave_the_rightmost_to_move(tmp_path):
     assert "density" not in values["material"], "the file has its own"
 
 
+@pytest.mark.slow
 def test_a_drawing_of_which_nothing_can_move_is_asked_for_its_horizontal_capacity(tmp_path, capsys):
     path = tmp_path / "block.json"
     blocks = [

@@ -32,6 +32,7 @@ def collapsed():
     return solver.settle(generators.arch(voussoirs=5), spread, friction_coefficient=2.0)
 
 
+@pytest.mark.slow
 def test_a_response_is_shown_by_its_pictures_and_numbers(collapsed):
     shown = collapsed._repr_html_()
     pictures = [base64.b64decode(data) for data in re.findall(r"base64,([A-Za-z0-9+/=]+)", shown)]

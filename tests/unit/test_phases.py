@@ -259,6 +259,7 @@ BLOCKS = {
 }
 
 
+@pytest.mark.slow
 def test_the_last_reaction_before_a_fall_at_once_is_that_of_the_phase_before(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -137,6 +137,7 @@ def test_a_ground_of_one_block_is_cut_under_the_joints_of_the_first_course():
     assert assembly.areas[pieces].sum() == pytest.approx(whole.areas[whole.index("ground")])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("blocks", "moved"), [('"ground"', {1, 2, 3, 4, 5}), ('["ground 1", "ground 2"]', {1, 2}), ('"rock"', None)]
 )

@@ -154,7 +154,7 @@ def test_units(name, exponent, heavier):
     assert_same(name, scaled.settle(), length, density * length**2)
 
 
-@SLIDING_THOROUGHLY
+@ARCHES_THOROUGHLY
 def test_mirror_image(name):
     assert_same(name, CASES[name].mapped(np.diag([-1.0, 1.0])).settle())
 

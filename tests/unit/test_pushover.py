@@ -51,6 +51,7 @@ def test_every_increment_of_an_arch_proves_itself():
     assert response.path[-1].load_multiplier < 0.01
 
 
+@pytest.mark.slow
 def test_the_multiplier_on_the_path_is_the_limit_load_of_the_pose():
     response = arch(0.005)
     for increment in response.path:

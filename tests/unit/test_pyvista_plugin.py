@@ -28,6 +28,7 @@ def test_layouts_through_pyvista(tmp_path):
         assert list(again.cell_data["name"]) == ["left", "right"]
 
 
+@pytest.mark.slow
 def test_three_lines_from_a_polygon_mesh_to_a_solved_collapse():
     # Two blocks side by side between abutments, the right one moves out: falls at 2 (sqrt(a² + h²) - a).
     a, h = 1.0, 0.25

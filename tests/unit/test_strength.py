@@ -171,6 +171,7 @@ animation = false
 """
 
 
+@pytest.mark.slow
 def test_strength_from_the_case_file(tmp_path, capsys):
     path = tmp_path / "case.toml"
     path.write_text(CASE.format(""), encoding="utf-8")

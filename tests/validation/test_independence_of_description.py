@@ -100,6 +100,7 @@ def test_a_wall_sinks_alike_however_it_is_described(name, description):
 HALVED = {"panel": 0.0125, "wall with a door": 0.005}
 
 
+@pytest.mark.slow
 @EACH_WALL
 def test_a_wall_sinks_alike_with_half_the_increment(name):
     settlement, expected = as_drawn(name)

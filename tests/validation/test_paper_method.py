@@ -78,6 +78,7 @@ def test_panel_at_the_onset(mu, share):
     assert response.reaction[0] / response.total_weight == pytest.approx(share, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_panel_with_opening():
     """The reaction at first is the least that equilibrium allows, which the path of Coulomb friction reports, too."""
     response = settle(opening(), 0.6, increment=0.01, limit=0.03)
