@@ -103,7 +103,7 @@ class PointForces:
     point: np.ndarray
 
     @classmethod
-    def at(cls, block: int, force: Sequence[float], point: Sequence[float]) -> PointForces:
+    def at(cls, block: int, force: Sequence[float] | np.ndarray, point: Sequence[float] | np.ndarray) -> PointForces:
         """Return one force."""
         return cls(np.array([block]), np.array([force], dtype=float), np.array([point], dtype=float))
 
@@ -405,9 +405,8 @@ def point_load(
     if d == 3 and np.ndim(moment) == 0 and moment != 0.0:
         raise ValueError(f"a moment in space is {moment!r}; give three numbers, about x, y and z")
     load[block, d:] = np.asarray(moment, dtype=float)
-    if force is None:
-        return load
-    return load + PointForces.at(block, force, assembly.centroids[block] if point is None else point).load(assembly)
+    acts, at = np.zeros(d) if force is None else force, assembly.centroids[block] if point is None else point
+    return load + PointForces.at(block, acts, at).load(assembly)
 
 
 def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:

@@ -39,7 +39,7 @@ def edge_force(assembly: Assembly, block: int, edge: int, pressure: float) -> Po
     along = stop - start
     inward = np.array([-along[1], along[0]])
     force = pressure * float(assembly.thickness[block]) * inward
-    return PointForces.at(block, force.tolist(), ((start + stop) / 2.0).tolist())
+    return PointForces.at(block, force, (start + stop) / 2.0)
 
 
 def surface_pressure(
