@@ -347,6 +347,9 @@ def _selected(found: Bodies, path: Path | str, reading: Reading) -> _Selection:
     if not kept:
         raise ValueError(f"'{path}' draws no block: all that it draws is left out as asked (ignore, only)")
     bodies = [found.bodies[k] for k in kept]
+    bare = next((body.name for body in bodies if not len(body.faces)), None)
+    if bare is not None:
+        raise ValueError(f"'{path}': body '{bare}' has no surface, as of cells that are there twice; export it once")
     every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
     size = float(spread_of(every, f"'{path}'").max())
     if not 0.0 < size < LARGEST_SIZE:

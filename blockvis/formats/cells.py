@@ -21,7 +21,10 @@ from .bodies import Bodies, Body
 from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
 
 #: Names of the cell array that numbers the blocks, in order of preference.
-BLOCK_ARRAYS = ("block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags")
+BLOCK_ARRAYS = (
+    "block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags", "nastran:ref",
+    "netgen:index", "avsucd:material", "ugrid:ref",
+)  # fmt: skip
 
 
 def block_array(data: Mapping[str, np.ndarray]) -> str | None:
