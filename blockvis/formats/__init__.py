@@ -82,7 +82,6 @@ FORMATS = {
     ".meshb": _MESHIO,
     ".su2": _MESHIO,
     ".ugrid": _MESHIO,
-    ".unv": _MESHIO,
     ".vol": _MESHIO,
     ".xdmf": _MESHIO,
     ".xmf": _MESHIO,

@@ -458,8 +458,9 @@ def _not_flat(seen: Sequence[_Projection], bodies: Sequence[Body], path: Path | 
         holed = [one.refused for one in seen if "no extrusion" not in one.refused]
         if holed:
             return NotFlat(f"'{path}': {holed[0]}; dimension = 3 reads the blocks in space", holed[0])
-        name = seen[0].refused.split("'")[1]
-        reason = f"body '{name}' is no extrusion along x, y or z"
+        size = _size(bodies)
+        alone = next((body.name for body in bodies if not any(_is_prism(body, axis, size) for axis in range(3))), None)
+        reason = f"body '{alone}' is no extrusion along x, y or z" if alone else "; ".join(one.refused for one in seen)
         return NotFlat(
             f"'{path}' is not prismatic: {reason}; dimension = 3 reads the blocks in space, in the plane export "
             "extrusions of their outlines along an axis",

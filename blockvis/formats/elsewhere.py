@@ -68,6 +68,7 @@ ELSEWHERE = {
     ".pts": _CLOUD,
     ".ptx": _CLOUD,
     ".rcp": _CLOUD,
+    ".unv": "in gmsh: File, Open, then File, Export as .msh (gmsh a.unv -save -o a.msh)",
     ".csv": _TABLE,
     ".xlsx": _TABLE,
     ".xls": _TABLE,

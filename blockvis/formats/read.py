@@ -427,7 +427,13 @@ def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     module = _module_of(path, "read")
     if _format(path, "read").module not in HOLD_IMAGES:
         reading.refuse_image_keys(path)
-    found: Layout | Bodies = module.read(path, reading)
+    try:
+        found: Layout | Bodies = module.read(path, reading)
+    except ValueError as error:
+        if str(path) not in str(error):
+            # What is wrong with a block is found where its file is not known.
+            error.args = (f"'{path}': {error}", *error.args[1:])
+        raise
     return found
 
 

@@ -93,6 +93,22 @@ def test_what_is_no_prism_is_refused(tmp_path):
         read(tmp_path / "a.stl", dimension=2)
 
 
+def test_what_is_told_to_be_no_prism_is_none_along_any_axis(tmp_path):
+    scene = trimesh.Scene()
+    ell = trimesh.creation.extrude_triangulation([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]], 1.0)
+    for k, (name, turn) in enumerate({"along z": (0, 0, 1), "along x": (0, 1, 0)}.items()):
+        tilted = ell.copy().apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, turn))
+        scene.add_geometry(tilted.apply_translation((3 * k, 0, 0)), geom_name=name)
+    scene.export(tmp_path / "a.obj")
+    told = "body 'along x' is no extrusion along z; .*'along z' is no extrusion along y; .*'along z' is .* along x;"
+    with pytest.raises(ValueError, match=rf"is not prismatic: {told}"):
+        read(tmp_path / "a.obj", dimension=2)
+    scene.add_geometry(trimesh.creation.icosphere(1).apply_translation((0, 9, 0)), geom_name="ball")
+    scene.export(tmp_path / "a.obj")
+    with pytest.raises(ValueError, match=r"is not prismatic: body 'ball' is no extrusion along x, y or z"):
+        read(tmp_path / "a.obj", dimension=2)
+
+
 def test_open_bodies_are_refused(tmp_path):
     body = bricks(1)[0]
     trimesh.Trimesh(body.vertices, body.faces[:-1]).export(tmp_path / "a.ply")
