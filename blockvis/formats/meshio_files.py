@@ -42,7 +42,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
                 mesh = meshio.read(io.StringIO(f"BEGIN BULK\n{text}"), "nastran")
             else:
                 mesh = meshio.read(path)
-            sets = _abaqus_sets(cards, mesh.cells) if cards else _sets_of_mesh(mesh)
+            sets = _abaqus_sets(cards, mesh.cells) if cards else {}
     except (SystemExit, Exception) as error:  # noqa: BLE001
         if isinstance(error, ModuleNotFoundError):
             raise ValueError(f"'{path}' needs the package {error.name}: pip install {error.name}") from None
@@ -54,6 +54,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
             "(order 1), or as .msh or .vtu"
         ) from None
     points = np.asarray(mesh.points, dtype=float)
+    sets = sets or _sets_of_mesh(mesh)
     solid = [(k, shape) for k, block in enumerate(mesh.cells) if (shape := _shape(block.type))]
     if solid:
         # Surface cells beside cells with a volume are their skin.

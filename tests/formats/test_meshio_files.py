@@ -29,6 +29,23 @@ def test_cell_sets_name_the_blocks(tmp_path):
     assert sorted(len(ring) for ring in drawing.outlines) == [4, 4]
 
 
+def test_lines_are_no_blocks(tmp_path):
+    meshio.write(tmp_path / "a.inp", meshio.Mesh(POINTS, [("line", [[0, 1]])]))
+    with pytest.raises(ValueError, match="has no surface cells"):
+        read(tmp_path / "a.inp")
+
+
+def test_a_reader_that_leaves_the_program_is_held(tmp_path, monkeypatch):
+    def leave(path):
+        sys.stdout.write("unknown element")
+        raise SystemExit(1)
+
+    monkeypatch.setattr(meshio, "read", leave)
+    (tmp_path / "a.inp").write_text("x", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"cannot be read by meshio as \.inp: unknown element; export it again"):
+        read(tmp_path / "a.inp")
+
+
 def strip(tail, *, nodes_in="*NODE", cells_in="*ELEMENT, TYPE=S3"):
     """Four squares side by side, of the triangles 1 to 8, in an .inp file; its nodes are in two lists."""
     corners = [f"{2 * i + j + 1}, {i}., {j}., 0." for i in range(5) for j in range(2)]
@@ -126,20 +143,3 @@ def test_nastran_without_its_first_line(tmp_path):
     # As gmsh writes it.
     (tmp_path / "b.bdf").write_text(text.replace("BEGIN BULK\n", ""), encoding="utf-8")
     assert read(tmp_path / "b.bdf").areas == pytest.approx([1, 1], rel=1e-6)
-
-
-def test_lines_are_no_blocks(tmp_path):
-    meshio.write(tmp_path / "a.inp", meshio.Mesh(POINTS, [("line", [[0, 1]])]))
-    with pytest.raises(ValueError, match="has no surface cells"):
-        read(tmp_path / "a.inp")
-
-
-def test_a_reader_that_leaves_the_program_is_held(tmp_path, monkeypatch):
-    def leave(path):
-        sys.stdout.write("unknown element")
-        raise SystemExit(1)
-
-    monkeypatch.setattr(meshio, "read", leave)
-    (tmp_path / "a.inp").write_text("x", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"cannot be read by meshio as \.inp: unknown element; export it again"):
-        read(tmp_path / "a.inp")
