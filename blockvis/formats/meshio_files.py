@@ -40,6 +40,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         raise ValueError(
             f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again"
         ) from None
+    if path.suffix.lower() == ".f3grid":
+        mesh.cell_sets = _groups(mesh)
     points = np.asarray(mesh.points, dtype=float)
     solid = [(k, shape) for k, block in enumerate(mesh.cells) if (shape := _shape(block.type))]
     if solid:
@@ -56,6 +58,18 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         rings += [ring_of_nodes(np.asarray(cell, dtype=np.int64), MESHIO[kind]) for cell in block.data]
         chosen.append((k, len(block.data)))
     return layout_of_cells(points, rings, _cell_data(mesh, chosen), path, reading.view)
+
+
+def _groups(mesh: Any) -> dict[str, list[np.ndarray]]:
+    """Take the groups of FLAC3D, which meshio calls "zone:NAME:SLOT", with numbers of cells in each block of cells."""
+    # It numbers them through all blocks of cells.
+    starts = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+    return {
+        re.sub(r"^(zone|face):(.*):[^:]*$", r"\2", name): [
+            part - start for part, start in zip(parts, starts[:-1], strict=True)
+        ]
+        for name, parts in mesh.cell_sets.items()
+    }
 
 
 def _shape(kind: str) -> Faces | None:

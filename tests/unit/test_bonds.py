@@ -343,6 +343,7 @@ def test_info_and_run_say_that_the_wall_wants_a_bond(facade, capsys):
         blockvis.read(facade)
 
 
+@pytest.mark.slow
 def test_a_hatch_of_two_points_is_no_wall(tmp_path):
     document = ezdxf.new()
     space = document.modelspace()
