@@ -53,6 +53,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
             f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again, with straight cells "
             "(order 1), or as .msh or .vtu"
         ) from None
+    if path.suffix.lower() == ".f3grid":
+        mesh.cell_sets = _groups(mesh)
     points = np.asarray(mesh.points, dtype=float)
     sets = sets or _sets_of_mesh(mesh)
     solid = [(k, shape) for k, block in enumerate(mesh.cells) if (shape := _shape(block.type))]
@@ -74,6 +76,18 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     data, notes = _cell_data(mesh, chosen, sets)
     found = layout_of_cells(points, rings, data, path, reading.view)
     return replace(found, notes=found.notes + notes)
+
+
+def _groups(mesh: Any) -> dict[str, list[np.ndarray]]:
+    """Take the groups of FLAC3D, which meshio calls "zone:NAME:SLOT", with numbers of cells in each block of cells."""
+    # It numbers them through all blocks of cells.
+    starts = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+    return {
+        re.sub(r"^(zone|face):(.*):[^:]*$", r"\2", name): [
+            part - start for part, start in zip(parts, starts[:-1], strict=True)
+        ]
+        for name, parts in mesh.cell_sets.items()
+    }
 
 
 def _shape(kind: str) -> Faces | None:

@@ -29,6 +29,18 @@ def test_cell_sets_name_the_blocks(tmp_path):
     assert sorted(len(ring) for ring in drawing.outlines) == [4, 4]
 
 
+def test_groups_of_flac3d_name_the_blocks_and_their_roles(tmp_path):
+    points = [[x, y, z] for z in range(3) for y in range(2) for x in range(2)]
+    cells = [("hexahedron", [[0, 1, 3, 2, 4, 5, 7, 6]]), ("wedge", [[4, 5, 6, 8, 9, 10], [5, 7, 6, 9, 11, 10]])]
+    none = np.zeros(0, int)
+    sets = {"fixed base": [np.array([0]), none], "stone: top": [none, np.array([0, 1])]}
+    meshio.write(tmp_path / "a.f3grid", meshio.Mesh(points, cells, cell_sets=sets))
+    drawing = read_layout(tmp_path / "a.f3grid", dimension=3)
+    assert drawing.names == ("fixed base", "stone: top")
+    assert drawing.roles == ("fixed", "")
+    np.testing.assert_allclose(drawing.volumes, 1.0)
+
+
 def test_lines_are_no_blocks(tmp_path):
     meshio.write(tmp_path / "a.inp", meshio.Mesh(POINTS, [("line", [[0, 1]])]))
     with pytest.raises(ValueError, match="has no surface cells"):
