@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .assembly import Assembly
-from .loads import PointForces
+from .loads import PointForces, chosen_blocks
 
 
 def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) -> np.ndarray:
@@ -32,6 +32,7 @@ def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) ->
 
 def edge_force(assembly: Assembly, block: int, edge: int, pressure: float) -> PointForces:
     """Find the resultant of a uniform pressure on an edge, which keeps its direction; as :func:`edge_pressure`."""
+    chosen_blocks(assembly, block)
     ring = assembly.outline(block)
     if not 0 <= edge < len(ring):
         raise ValueError(f"block '{assembly.names[block]}' has {len(ring)} edges; edge {edge} is none of them")
@@ -84,8 +85,7 @@ def surface_forces(
         raise ValueError(f"pressure direction is {push.tolist()}; give the direction in which it pushes, two numbers")
     push = push / size
     across = np.array([-push[1], push[0]])
-    chosen = np.zeros(assembly.n_blocks, dtype=bool)
-    chosen[assembly.free if blocks is None else blocks] = True
+    chosen = assembly.free if blocks is None else chosen_blocks(assembly, blocks)
     strips, depth, block = _first_met(assembly, push, across)
     centre = (strips[:-1] + strips[1:]) / 2.0
     loaded = np.isfinite(depth)
