@@ -172,9 +172,9 @@ def convex_parts(solids: Solids) -> ConvexParts:
     for block in range(len(solids)):
         own, loops = solids.surface(block)
         start = int(solids.offsets[block])
-        frame = _spread_corners(own)
         parts = [(own, loops, [False] * len(loops))]
         if is_bent[block]:
+            frame = _spread_corners(own)
             try:
                 parts = _parts_of(own.tobytes(), tuple(map(tuple, loops)))
             except ValueError as error:
