@@ -111,7 +111,7 @@ class EquilibriumCheck:
         At its pose.
     friction : (n_contacts,) array
     forces : (n_contacts, d) array
-        In equilibrium where one exists; otherwise those of the path.
+        In equilibrium where one exists; otherwise those that come nearest to it.
     measured : float
         Reaction [N or N·m] or multiplier of the live load.
     bounds : EquilibriumBounds

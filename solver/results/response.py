@@ -358,7 +358,7 @@ class LimitLoad(HasState, Shown):
     live_force : float [N]
         Resultant of the live loads on the free blocks at a multiplier of 1.
     programs : int
-        Linear programs solved.
+        Linear or conic programs solved.
     torsion : str
         Of the faces of blocks in space: that of their contact "points", or under a "uniform" pressure.
     held : State or StoredState, optional
