@@ -142,14 +142,8 @@ def force_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1
 def _first_met(assembly: Assembly, push: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Divide the structure into strips along a direction, between all corners, and find what each meets first.
 
-    Returns
-    -------
-    strips : (n + 1,) array [m]
-        Where they begin and end, measured across.
-    depth : (n,) array [m]
-        Along the direction in the middle of the strip; infinite where there is no block.
-    block : (n,) int array
-        -1 where there is none.
+    Gives the ends of the strips, (n + 1,) [m] across, the depth in the middle of each, infinite where there is no
+    block, and the number of the block, -1 where there is none.
     """
     start, stop = assembly.vertices, assembly.vertices[assembly.next_vertex]
     a, b = start @ across, stop @ across

@@ -16,20 +16,13 @@ from solver.words import make_plain
 
 
 class Driver(ABC):
-    """The parameter of a path: what it moves, how far, and in which increments, from a pose.
+    """The parameter of a path: what it moves, how far, and in which increments, from a pose."""
 
-    Attributes
-    ----------
-    what : str
-        Name of the parameter.
-    lever : float
-        Largest displacement that it prescribes, per unit of it.
-    stops : tuple of float
-        Values that are reported, too.
-    """
-
+    #: Name of the parameter.
     what: str
+    #: Largest displacement that it prescribes, per unit of it.
     lever = 1.0
+    #: Values that are reported, too.
     stops: tuple[float, ...] = ()
 
     def __init__(self, assembly: Assembly, given: Any, start: Pose) -> None:
