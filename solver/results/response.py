@@ -407,6 +407,8 @@ class LimitLoad(HasState, Shown):
     @property
     def increment(self) -> Increment:
         """The state at the limit as an increment, for pictures and tables; its velocity is the mechanism."""
+        if self.held is None:
+            raise ValueError("this limit load has only its numbers; its arrays are with the increment that reports it")
         finite = self.multiplier if np.isfinite(self.multiplier) else 0.0
         return Increment(
             parameter=0.0,
@@ -418,7 +420,7 @@ class LimitLoad(HasState, Shown):
             status=Status.FALLING if self.status is LimitStatus.NO_EQUILIBRIUM else Status.EQUILIBRIUM,
             programs=self.programs,
             seconds=0.0,
-            held=self.state,
+            held=self.held,
         )
 
     @property
