@@ -271,11 +271,16 @@ class Assembly(Shown):
     def index(self, name: str) -> int:
         """Find the number of the block with this name; raises ``ValueError`` where there is none."""
         try:
-            return self.names.index(name)
-        except ValueError:
+            return self._numbers[name]
+        except KeyError:
             raise ValueError(
                 f"no block is named '{name}'; the assembly has {counted(self.n_blocks, 'block')}"
             ) from None
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        """Number of each block by its name."""
+        return {name: k for k, name in enumerate(self.names)}
 
     def listed(self, blocks: np.ndarray, most: int) -> str:
         """Names of the first ``most`` blocks, by their numbers, and how many others there are."""

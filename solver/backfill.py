@@ -65,24 +65,26 @@ class Backfill:
 
     def load(self, assembly: Assembly, pose: Pose) -> np.ndarray:
         """(n_blocks, n_dof) array [N, N·m]: what the fill does to each block at a pose, moments about its centroid."""
-        corners, d = self.corners(assembly, pose), assembly.dimension
-        first = corners[:, 1] - corners[:, 0]
-        if self.thickness is not None:
-            areas = self.thickness[:, None] * np.stack([first[:, 1], -first[:, 0]], axis=1)
-        else:
-            areas = np.cross(first, corners[:, 2] - corners[:, 0]) / 2.0
-        along = -areas * np.where(np.arange(d) < d - 1, self.pressure_coefficient, 1.0)
-        along[areas[:, -1] <= 0.0] = 0.0
-        places = _PLACES[d]
-        level = corners[:, :, -1]
-        depth = np.maximum(self.surface - level, 0.0) - np.maximum(self.base - level, 0.0)
-        pressures = self.unit_weight * depth @ places.T / d
-        points = np.einsum("pk,nkj->npj", places, corners)
+        given, d = self.corners(assembly, pose), assembly.dimension
         load = np.zeros((assembly.n_blocks, d + pose.rotations.shape[1]))
-        for place in range(d):
-            force = pressures[:, place, None] * along
-            arms = cross_rows(points[:, place] - pose.positions[self.block])
-            np.add.at(load, self.block, np.hstack([force, np.einsum("nrd,nd->nr", arms, force)]))
+        places = _PLACES[d]
+        for level, unit_weight in ((self.surface, self.unit_weight), (self.base, -self.unit_weight)):
+            if (given[:, :, -1] >= level).all():
+                continue
+            corners, depth, piece = _below(level, given)
+            block, first = self.block[piece], corners[:, 1] - corners[:, 0]
+            if self.thickness is not None:
+                areas = self.thickness[piece, None] * np.stack([first[:, 1], -first[:, 0]], axis=1)
+            else:
+                areas = np.cross(first, corners[:, 2] - corners[:, 0]) / 2.0
+            along = -areas * np.where(np.arange(d) < d - 1, self.pressure_coefficient, 1.0)
+            along[areas[:, -1] <= 0.0] = 0.0
+            pressures = unit_weight * depth @ places.T / d
+            points = np.einsum("pk,nkj->npj", places, corners)
+            for place in range(d):
+                force = pressures[:, place, None] * along
+                arms = cross_rows(points[:, place] - pose.positions[block])
+                np.add.at(load, block, np.hstack([force, np.einsum("nrd,nd->nr", arms, force)]))
         return load
 
     def weight(self, assembly: Assembly) -> float:
@@ -99,3 +101,20 @@ class Backfill:
         """Return the fill in a drawing moved by (d,) [m]."""
         up = float(by[-1])
         return replace(self, pieces=self.pieces + by, surface=self.surface + up, base=self.base + up)
+
+
+def _below(level: float, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners, depth at each and number of pieces that sum up to the given ones, (n, d, d) [m], below a level."""
+    depth = level - corners[:, :, -1]
+    below, least = depth > 0.0, depth.min(axis=1)
+    if (least >= 0.0).all():
+        return corners, depth, np.arange(len(corners))
+    # Of a triangle with one corner above, the depth of the whole is too small by that of the part at this corner.
+    whole = (2 * below.sum(axis=1) > depth.shape[1]) | (least >= 0.0)
+    cut = below.any(axis=1) & (least < 0.0)
+    alone = below[cut] != whole[cut, None]
+    apex, height = corners[cut][alone][:, None], depth[cut][alone][:, None]
+    part = height / np.where(alone, height, height - depth[cut])
+    tips = apex + part[:, :, None] * (corners[cut] - apex)
+    depths = np.concatenate([depth[whole], alone * np.abs(height)])
+    return np.concatenate([corners[whole], tips]), depths, np.append(*map(np.flatnonzero, (whole, cut)))

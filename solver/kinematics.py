@@ -237,13 +237,7 @@ def point_velocities(points: np.ndarray, block: np.ndarray, pose: Pose, velocity
 
 
 def relative_velocities(contacts: Contacts, pose: Pose, velocity: np.ndarray) -> np.ndarray:
-    """(n_contacts, d) array: opening and slip of each contact point, block a against block b, in its own frame.
-
-    Parameters
-    ----------
-    velocity : (n_blocks, n_dof) array
-        Of the centroids, and angular, in any scale.
-    """
+    """(n_contacts, d) array: opening and slip of each contact point, in its own frame, by velocities in any scale."""
     a, b = (point_velocities(contacts.points, k, pose, velocity) for k in (contacts.block_a, contacts.block_b))
     return np.einsum("kij,kj->ki", contacts.frames, a - b)
 
@@ -266,14 +260,8 @@ def moving_together(
 ) -> np.ndarray:
     """(n_blocks,) int array: number of the group of each block.
 
-    Parameters
-    ----------
-    apart : (n_contacts,) array [m]
-        Relative movement of each contact point.
-    spins : (n_blocks, n_rot) array [m]
-        Rotation of each block times a length.
-    together : float [m]
-        Largest relative movement of the contact points, and of the rotations, of two blocks of one group.
+    The contact points of two blocks of one group have come apart, and their spins times a length, (n_blocks, n_rot),
+    differ, by less than ``together`` [m].
     """
     pairs, which = contacts.joints()
     most = np.zeros(len(pairs))

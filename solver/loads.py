@@ -102,6 +102,10 @@ class PointForces:
     force: np.ndarray
     point: np.ndarray
 
+    def __post_init__(self) -> None:
+        """Make arrays of what is given."""
+        make_plain(self)
+
     @classmethod
     def at(cls, block: int, force: Sequence[float] | np.ndarray, point: Sequence[float] | np.ndarray) -> PointForces:
         """Return one force."""
@@ -117,6 +121,7 @@ class PointForces:
     def load(self, assembly: Assembly) -> np.ndarray:
         """(n_blocks, n_dof) array [N, N·m]: of the blocks as drawn."""
         load = _no_load(assembly)
+        chosen_blocks(assembly, self.block)
         arms = cross_rows(self.point - assembly.centroids[self.block])
         np.add.at(load, self.block, np.hstack([self.force, np.einsum("nrd,nd->nr", arms, self.force)]))
         return load
@@ -257,10 +262,10 @@ class Settlement:
 
         Rotations follow the true arc about the (travelling) centre.
         """
-        part = self.taking_part(assembly)
-        positions, rotations = start.positions.copy(), start.rotations.copy()
         if self.profile is not None:
             return moved(start, s * self.rate(assembly, start, s))
+        part = self.taking_part(assembly)
+        positions, rotations = start.positions.copy(), start.rotations.copy()
         travel, angle, centre = self._motion(assembly, start, part, s)
         turn = np.broadcast_to(angle, rotations[part].shape)
         positions[part] = centre + travel + turned(start.positions[part] - centre, turn)
@@ -285,12 +290,12 @@ class Settlement:
 
     def check_dimension(self, assembly: Assembly) -> None:
         """Raise ``ValueError`` where the numbers are for the plane and the blocks in space, or the other way round."""
-        if self.dimension != assembly.dimension:
-            wanted, what = ("[x, y, z]", "in space") if assembly.dimension == 3 else ("[x, y]", "in the plane")
-            raise ValueError(
-                f"the blocks are {what}: give the settlement's direction and rotation_centre as {wanted}"
-                + ("" if self.radial_from is None else ", and leave out radial_from")
-            )
+        if self.radial_from is not None and assembly.dimension == 2:
+            raise ValueError("settlement has radial_from, and the blocks are in the plane: give a direction [x, y]")
+        given = {"direction": self.direction, "rotation_centre": self.rotation_centre}
+        check_fits(assembly, "settlement", given)
+        motions = {f"profile of '{name}'": motion for name, motion in (self.profile or {}).items()}
+        check_fits(assembly, "settlement", motions, ("[dx, dy, rotation]", "[dx, dy, dz, rx, ry, rz]"))
 
     def _motion(
         self, assembly: Assembly, start: Pose, part: np.ndarray, s: float
@@ -346,9 +351,36 @@ def set_vectors(owner: Any, what: str, counts: Mapping[str, tuple[int, ...]], un
         object.__setattr__(owner, name, tuple(vector.tolist()))
 
 
+def check_fits(
+    assembly: Assembly,
+    what: str,
+    given: Mapping[str, Sequence[float] | None],
+    wanted: tuple[str, str] = ("[x, y]", "[x, y, z]"),
+) -> None:
+    """Refuse vectors, by their names, that are for the plane where the blocks are in space, or the other way round."""
+    fitting = wanted[assembly.dimension - 2]
+    for name, vector in given.items():
+        if vector is not None and len(vector) != fitting.count(",") + 1:
+            where = "in the plane" if assembly.dimension == 2 else "in space"
+            raise ValueError(f"{what} {name} is {list(vector)}, and the blocks are {where}: give {fitting}")
+
+
 def _no_load(assembly: Assembly) -> np.ndarray:
     """(n_blocks, n_dof) array of zeros."""
     return np.zeros((assembly.n_blocks, assembly.dimension + rotation_count(assembly.dimension)))
+
+
+def chosen_blocks(assembly: Assembly, blocks: Any) -> np.ndarray:
+    """(n_blocks,) bool array: blocks that are given by their numbers, or as such an array."""
+    chosen = np.zeros(assembly.n_blocks, dtype=bool)
+    try:
+        chosen[blocks] = True
+    except IndexError:
+        last = assembly.n_blocks - 1
+        raise ValueError(
+            f"there are no blocks {blocks}; give numbers from 0 to {last}, assembly.index finds them"
+        ) from None
+    return chosen
 
 
 def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.ndarray | None = None) -> np.ndarray:
@@ -367,7 +399,7 @@ def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.nd
     (n_blocks, n_dof) array [N, N·m]
     """
     load, parts = _no_load(assembly), np.asarray(fraction)
-    chosen = slice(None) if blocks is None else blocks
+    chosen = slice(None) if blocks is None else chosen_blocks(assembly, blocks)
     if parts.shape != (assembly.dimension,):
         raise ValueError(
             f"a fraction of the weight is {parts.tolist()}; give {assembly.dimension} numbers, one per axis"
@@ -415,11 +447,16 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
         return self_weight(assembly)
     shape = _no_load(assembly).shape
     components = "fx, fy, moment" if assembly.dimension == 2 else "fx, fy, fz, mx, my, mz"
-    loads = replace(loads, dead=np.asarray(loads.dead, dtype=float), live=np.asarray(loads.live, dtype=float))
-    for name, array in (("dead", loads.dead), ("live", loads.live)):
-        if array.shape != shape:
-            raise ValueError(f"{name} loads have shape {array.shape}; give {shape}: {components}")
-        if not np.isfinite(array).all():
-            block = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+    of_arms = (*assembly.centroids.shape, assembly.dimension), "arm ⊗ force"
+    wanted = {"dead": (shape, components), "live": (shape, components), "dead_arms": of_arms, "live_arms": of_arms}
+    arrays: dict[str, Any] = {
+        name: np.asarray(given, dtype=float) for name in wanted if (given := getattr(loads, name)) is not None
+    }
+    for name, array in arrays.items():
+        size, words = wanted[name]
+        if array.shape != size:
+            raise ValueError(f"{name} loads have shape {array.shape}; give {size}: {words}")
+        if not (finite := np.isfinite(array.reshape(len(array), -1)).all(axis=1)).all():
+            block = int(finite.argmin())
             raise ValueError(f"{name} load on block '{assembly.names[block]}' is {array[block].tolist()}; not finite")
-    return loads
+    return replace(loads, **arrays)

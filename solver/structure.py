@@ -277,7 +277,7 @@ class Structure(Shown):
             For no free block, overlapping blocks, no live load on a free block, a law of torsion that is not known or
             that blocks in the plane do not have.
         SolveError
-            If HiGHS gives no solution that passes its check.
+            If no solution of the programs passes its check.
 
         Notes
         -----

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .assembly import Assembly
-from .loads import PointForces
+from .loads import PointForces, chosen_blocks
 
 
 def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) -> np.ndarray:
@@ -32,6 +32,7 @@ def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) ->
 
 def edge_force(assembly: Assembly, block: int, edge: int, pressure: float) -> PointForces:
     """Find the resultant of a uniform pressure on an edge, which keeps its direction; as :func:`edge_pressure`."""
+    chosen_blocks(assembly, block)
     ring = assembly.outline(block)
     if not 0 <= edge < len(ring):
         raise ValueError(f"block '{assembly.names[block]}' has {len(ring)} edges; edge {edge} is none of them")
@@ -84,8 +85,7 @@ def surface_forces(
         raise ValueError(f"pressure direction is {push.tolist()}; give the direction in which it pushes, two numbers")
     push = push / size
     across = np.array([-push[1], push[0]])
-    chosen = np.zeros(assembly.n_blocks, dtype=bool)
-    chosen[assembly.free if blocks is None else blocks] = True
+    chosen = assembly.free if blocks is None else chosen_blocks(assembly, blocks)
     strips, depth, block = _first_met(assembly, push, across)
     centre = (strips[:-1] + strips[1:]) / 2.0
     loaded = np.isfinite(depth)
@@ -142,14 +142,8 @@ def force_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1
 def _first_met(assembly: Assembly, push: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Divide the structure into strips along a direction, between all corners, and find what each meets first.
 
-    Returns
-    -------
-    strips : (n + 1,) array [m]
-        Where they begin and end, measured across.
-    depth : (n,) array [m]
-        Along the direction in the middle of the strip; infinite where there is no block.
-    block : (n,) int array
-        -1 where there is none.
+    Gives the ends of the strips, (n + 1,) [m] across, the depth in the middle of each, infinite where there is no
+    block, and the number of the block, -1 where there is none.
     """
     start, stop = assembly.vertices, assembly.vertices[assembly.next_vertex]
     a, b = start @ across, stop @ across

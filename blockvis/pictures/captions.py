@@ -266,7 +266,7 @@ def _state(response: solver.Response, increment: solver.Increment) -> str:
     if increment.status == solver.Status.FALLING:
         if response.swings:
             return "pseudo-motion: the mechanism at the limit load, followed to first order and out of scale"
-        return "no equilibrium, no dynamics: the mechanism followed step by step"
+        return "no equilibrium: the mechanism followed step by step"
     if response.limits:
         lowest = len(response.path) > 1 and not response.parameter.is_path and _decides(response, increment)
         words = f"limit state, {response.limits[0].flow} friction"

@@ -208,7 +208,7 @@ def _check_changes(
         if not 0 <= change.phase < len(phases):
             raise ValueError(f"a change comes before settlement phase {change.phase + 1}; there are {len(phases)}")
         if change.dead is not None:
-            checked_loads(assembly, Loads(change.dead, change.dead))
+            checked_loads(assembly, Loads(change.dead, change.dead, dead_arms=change.dead_arms))
         if change.removed is not None and np.shape(change.removed) != (assembly.n_blocks,):
             raise ValueError(f"removed has shape {np.shape(change.removed)}; give one per block, {assembly.n_blocks}")
         for name in change.ties:

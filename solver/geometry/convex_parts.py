@@ -103,13 +103,7 @@ class ConvexParts:
 
 @dataclass(frozen=True)
 class PlacedParts:
-    """Convex parts of blocks where their corners now are.
-
-    Attributes
-    ----------
-    vertices : (n_corners, 3) array [m]
-        Current corners of all parts.
-    """
+    """Convex parts of blocks where their corners, (n_corners, 3) [m], now are."""
 
     parts: ConvexParts
     vertices: np.ndarray
@@ -172,9 +166,9 @@ def convex_parts(solids: Solids) -> ConvexParts:
     for block in range(len(solids)):
         own, loops = solids.surface(block)
         start = int(solids.offsets[block])
-        frame = _spread_corners(own)
         parts = [(own, loops, [False] * len(loops))]
         if is_bent[block]:
+            frame = _spread_corners(own)
             try:
                 parts = _parts_of(own.tobytes(), tuple(map(tuple, loops)))
             except ValueError as error:
@@ -315,13 +309,7 @@ def _body(points: np.ndarray, triangles: np.ndarray) -> Manifold:
 def _parts_of(
     points: bytes, faces: tuple[tuple[int, ...], ...]
 ) -> list[tuple[np.ndarray, list[list[int]], list[bool]]]:
-    """Corners and faces of each part of a block, and which of the faces are inside the block; kept of the last blocks.
-
-    Raises
-    ------
-    ValueError
-        Says why there are none.
-    """
+    """Corners and faces of each part of a block, and which faces are inside the block; kept of the last blocks."""
     vertices, loops = np.frombuffer(points).reshape(-1, 3), [list(face) for face in faces]
     origin, size = vertices[0], float(np.linalg.norm(np.ptp(vertices, axis=0)))
     drawn = Solids.of_surfaces([((vertices - origin) / size, loops)])

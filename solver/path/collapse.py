@@ -52,23 +52,9 @@ class Fall:
     def time_steps(
         self, place: Place, largest: float = LARGEST_MOVEMENT
     ) -> Iterator[tuple[Place, np.ndarray, float, float]]:
-        """Steps in time from rest with the supports fixed.
+        """Steps in time from rest with the supports fixed, each repeated in a shorter time where it is too large.
 
-        Parameters
-        ----------
-        place : Place
-        largest : float
-            Movement of the blocks in a step, in block sizes, above which it is repeated with a shorter time.
-
-        Yields
-        ------
-        place : Place
-        motion : (n_blocks, n_dof) array
-            In units of the program.
-        acceleration : float
-            Largest, in units of g.
-        speed : float
-            Of the fastest block, in units of √(block size · g).
+        Yields places, motions in units of the program, the largest acceleration, in g, and speed, in √(block size · g).
         """
         # In units of √(block size / g).
         place, time, idle = replace(place, velocity=None), 0.01, 0
@@ -116,17 +102,10 @@ class Fall:
     def collapse(
         self, last: EquilibriumCheck, beyond: Place, upper_bound: float, multiplier_beyond: float | None
     ) -> Generator[Increment, None, Ending]:
-        """Yield the frames of the fall beyond the last equilibrium; return the collapse.
+        """Yield the frames of the fall from a place beyond the last equilibrium; return the collapse.
 
-        Parameters
-        ----------
-        last : EquilibriumCheck
-        beyond : Place
-            From which the structure falls.
-        upper_bound : float [m or rad]
-            Smallest parameter known to have no equilibrium.
-        multiplier_beyond : float, optional
-            There, at or below zero; None where equilibrium itself is lost.
+        No equilibrium is known from the upper bound of the parameter on; the multiplier there is at or below zero, or
+        None where equilibrium itself is lost.
         """
         driver, model = self.driver, self.model
         frames = list(self.frames(beyond))

@@ -2,42 +2,33 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
 from solver.assembly import Assembly
 from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_count, rotation_matrices
-from solver.loads import Settlement, check_steps, set_vectors
+from solver.loads import Settlement, check_fits, check_steps, set_vectors
 from solver.words import make_plain
 
 
-class Driver(Protocol):
-    """The parameter of a path: what it moves, how far, and in which increments.
+class Driver(ABC):
+    """The parameter of a path: what it moves, how far, and in which increments, from a pose."""
 
-    Attributes
-    ----------
-    increment, limit : float [m or rad]
-        Largest step that is reported, and largest value.
-    tolerance : float [m or rad]
-        Width of the bracket of a collapse.
-    unit, what : str
-        Unit of the parameter, m or rad, and its name.
-    lever : float
-        Largest displacement that it prescribes, per unit of it.
-    stops : tuple of float
-        Values that are reported, too.
-    """
-
-    increment: float
-    limit: float
-    tolerance: float
-    unit: str
+    #: Name of the parameter.
     what: str
-    lever: float
-    stops: tuple[float, ...]
+    #: Largest displacement that it prescribes, per unit of it.
+    lever = 1.0
+    #: Values that are reported, too.
+    stops: tuple[float, ...] = ()
+
+    def __init__(self, assembly: Assembly, given: Any, start: Pose) -> None:
+        self.assembly, self.start = assembly, start
+        self.increment, self.limit, self.unit = float(given.increment), float(given.limit), str(given.unit)
+        self.tolerance = float(given.tolerance)
 
     def next_stop(self, s: float) -> float:
         """Next parameter that is reported: a multiple of the increment, one of the stops, or the limit."""
@@ -46,9 +37,11 @@ class Driver(Protocol):
         stop = min([multiple, *(stop for stop in self.stops if stop > s + near)])
         return self.limit if self.limit - stop < near else stop
 
+    @abstractmethod
     def supports(self, s: float) -> Pose:
         """Pose of the supports; that of free blocks has no meaning."""
 
+    @abstractmethod
     def rate(self, s: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity of the supports per unit of the parameter."""
 
@@ -66,14 +59,13 @@ class Driver(Protocol):
 
 
 class SupportMotion(Driver):
-    """Supports that follow a settlement, from a pose."""
+    """Supports that follow a settlement."""
 
     what = "settlement"
 
     def __init__(self, assembly: Assembly, phase: Settlement, start: Pose) -> None:
-        self.assembly, self.phase, self.start = assembly, phase, start
-        self.increment, self.limit, self.unit = phase.increment, phase.limit, phase.unit
-        self.tolerance, self.stops = float(phase.tolerance or phase.increment / 100.0), phase.stops
+        super().__init__(assembly, phase, start)
+        self.phase, self.stops = phase, phase.stops
         points, block = moved_vertices(assembly, start), assembly.block_of_vertex
         self.lever = float(np.linalg.norm(point_velocities(points, block, start, self.rate(0.0)), axis=1).max())
 
@@ -151,24 +143,17 @@ class ControlDisplacement:
 
     def check_dimension(self, assembly: Assembly) -> None:
         """Raise ``ValueError`` where the numbers are for the plane and the blocks in space, or the other way round."""
-        for name in ("direction", "point"):
-            given = getattr(self, name)
-            if given is not None and len(given) != assembly.dimension:
-                what = "in space: give three numbers [x, y, z]" if assembly.dimension == 3 else "in the plane: give two"
-                raise ValueError(f"control {name} is {list(given)}, and the blocks are {what}")
+        check_fits(assembly, "control", {"direction": self.direction, "point": self.point})
 
 
 class ControlledLoad(Driver):
     """A live load whose multiplier makes a control displacement grow; all supports are fixed."""
 
-    what, lever = "control displacement", 1.0
-    stops: tuple[float, ...] = ()
+    what = "control displacement"
 
     def __init__(self, assembly: Assembly, chosen: ControlDisplacement, start: Pose) -> None:
-        self.assembly, self.chosen, self.start = assembly, chosen, start
-        self.increment, self.limit, self.unit = chosen.increment, chosen.limit, chosen.unit
-        self.tolerance = float(chosen.tolerance or chosen.increment / 100.0)
-        self.offset = chosen.displacement(assembly, start)
+        super().__init__(assembly, chosen, start)
+        self.chosen, self.offset = chosen, chosen.displacement(assembly, start)
 
     def supports(self, s: float) -> Pose:
         """As at the start."""

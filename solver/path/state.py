@@ -102,19 +102,10 @@ class PathState:
 
 @dataclass(frozen=True)
 class EquilibriumCheck:
-    """Equilibrium within friction at a place of the path.
+    """Equilibrium within friction at a place of the path, with the contact points at its pose.
 
-    Attributes
-    ----------
-    place : Place
-    contacts : Contacts
-        At its pose.
-    friction : (n_contacts,) array
-    forces : (n_contacts, d) array
-        In equilibrium where one exists; otherwise those of the path.
-    measured : float
-        Reaction [N or N·m] or multiplier of the live load.
-    bounds : EquilibriumBounds
+    Forces, (n_contacts, d), are in equilibrium where one exists; otherwise those that come nearest to it. What is
+    measured is the reaction [N or N·m] or the multiplier of the live load.
     """
 
     place: Place

@@ -45,7 +45,8 @@ EXACT_SLIDING, EXACT = 1e-6, 1e-8
 #: Change of the load of a fill that has followed the blocks, in block weights, up to which a step is not repeated.
 SAME_LOAD = 1e-6
 
-#: Penetration, in block sizes, at which a step is refused, and gap up to which blocks touch as drawn.
+#: Penetration, in block sizes, from which on a step is repeated with the points that it missed, and gap up to which
+#: blocks touch as drawn.
 LARGEST_PENETRATION = 1e-4
 
 #: Part of its friction bound from which on a contact point slides.

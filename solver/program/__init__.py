@@ -1,1 +1,1 @@
-"""Programs of an increment: stated on the model, solved, and corrected to an exact geometry."""
+"""Programs of one geometry: bounds of the reaction, limit loads, and the strength and torsion of its joints."""

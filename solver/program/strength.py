@@ -20,18 +20,10 @@ def point_strength(
     around: Contacts,
     bonded: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cohesive shear force, largest normal force and largest tension of each contact point.
+    """(n_contacts,) arrays [N]: cohesive shear force, largest normal force and largest tension of each contact point.
 
-    Parameters
-    ----------
-    around : Contacts
-        At the same geometry, with the open ones, which measure the faces.
-    bonded : (n_contacts,) array, optional [m²]
-        Parts of the faces that have cohesion and tension; by default all of them.
-
-    Returns
-    -------
-    cohesion, crushing, tension : (n_contacts,) arrays [N]
+    Those around are at the same geometry, with the open ones, which measure the faces; of these the parts that are
+    bonded [m²], by default all, have cohesion and tension.
     """
     n = len(contacts)
     if interfaces.dry:

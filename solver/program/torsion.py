@@ -45,13 +45,7 @@ class Faces:
 
     @classmethod
     def of(cls, contacts: Contacts, length: float) -> Faces:
-        """Gather contact points of the same two blocks in the same plane.
-
-        Parameters
-        ----------
-        length : float [m]
-            Block size.
-        """
+        """Gather contact points of the same two blocks, of a size [m], in the same plane."""
         face = _faces(contacts, length)
         count = np.bincount(face)
         order, first = np.argsort(face, kind="stable"), np.cumsum(count) - count
@@ -66,19 +60,9 @@ class Faces:
 def face_wrench_matrix(contacts: Contacts, faces: Faces, pose: Pose, length: float) -> sp.csc_array:
     """Make the matrix of :func:`solver.equilibrium.wrench_matrix` with shear and torsion at the centre of each face.
 
-    Parameters
-    ----------
-    length : float [m]
-        Moments are divided by it.
+    Of the 4 n_contacts columns each contact point has: normal force, there; both shear forces, at the centre of its
+    face; torsion over the radius of the face.
 
-    Returns
-    -------
-    (6 n_blocks, 4 n_contacts) sparse array
-        Columns of each contact point: normal force, there; both shear forces, at the centre of its face; torsion over
-        the radius of the face.
-
-    Notes
-    -----
     A face limited by |(T, M / r)| ≤ μ N, with N the sum over its points, is the sum of as many cones of four numbers,
     one for each of its points.
     """

@@ -238,9 +238,9 @@ class Increment(HasState):
         resultant at this multiplier.
     certificate : Certificate
     status : Status
-        ``EQUILIBRIUM``, or ``FALLING`` for pseudo-time frames: no equilibrium, no dynamics.
+        ``EQUILIBRIUM``, or ``FALLING`` for frames of the fall in pseudo-time.
     programs : int
-        Linear programs solved for this increment.
+        Programs solved for this increment: of steps, and linear or conic ones.
     seconds : float
         Time spent on this increment.
     held : State or StoredState

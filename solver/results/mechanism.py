@@ -138,7 +138,7 @@ def with_motion(increment: Increment, motion: np.ndarray) -> Increment:
     Parameters
     ----------
     increment : Increment
-    motion : (n_blocks, 3) array
+    motion : (n_blocks, n_dof) array
         Velocity of each centroid and angular velocity, in any scale.
     """
     rates = relative_velocities(increment.contacts, increment.pose, motion)

@@ -125,9 +125,9 @@ class Response(Shown):
     limits : tuple of LimitLoad
         Of increments in equilibrium that are limit states: one each, in their order.
     parameter : Quantity
-        What the increments run over.
+        What the increments run over, in the unit of the first settlement; others have their own, ``Settlement.unit``.
     measured : Quantity
-        What is measured along them.
+        What is measured along them, with the unit that belongs to it.
     control : optional
         What drives the parameter where no settlement does: the ControlDisplacement of a pushover.
     ties : tuple of Tie
@@ -192,7 +192,10 @@ class Response(Shown):
 
     @property
     def parameters(self) -> np.ndarray:
-        """(n,) array: parameter of each increment in equilibrium, phases one after another."""
+        """(n,) array: parameter of each increment in equilibrium, phases one after another.
+
+        Where some turn and others move, a running number without unit: :attr:`settlement` has the parameters in theirs.
+        """
         return path_parameters(self.path)
 
     @property
@@ -299,7 +302,7 @@ class Response(Shown):
 
 
 def path_parameters(path: Sequence[Increment]) -> np.ndarray:
-    """(n,) array: parameter of each increment, phases one after another."""
+    """(n,) array: parameter of each increment, phases one after another, in whichever unit each is."""
     total, before, last = np.zeros(len(path)), 0.0, 0.0
     for k, increment in enumerate(path):
         if k and increment.phase != path[k - 1].phase:
@@ -358,7 +361,7 @@ class LimitLoad(HasState, Shown):
     live_force : float [N]
         Resultant of the live loads on the free blocks at a multiplier of 1.
     programs : int
-        Linear programs solved.
+        Linear or conic programs solved.
     torsion : str
         Of the faces of blocks in space: that of their contact "points", or under a "uniform" pressure.
     held : State or StoredState, optional

@@ -64,6 +64,26 @@ def test_the_load_is_the_column_over_the_place_where_the_block_is() -> None:
     assert fill.load(block, risen)[0] == pytest.approx([0.0, 0.0, 0.0])
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_of_a_face_that_rises_through_the_surface_what_is_below_carries_fill(dimension: int) -> None:
+    """A slab of 4 × 1 m that turns about its centroid until the right end of its top is above the fill."""
+    turn, surface = 0.5, 1.2
+    if dimension == 2:
+        slab = solver.Assembly.from_outlines([rectangle(0.0, 0.0, 4.0, 1.0)])
+        turned = solver.Pose(slab.centroids, np.array([[turn]]))
+    else:
+        slab = solver.Assembly.from_solids([box([0.0, 0.0, 0.0], [4.0, 1.0, 1.0])])
+        turned = solver.Pose(slab.centroids, np.array([[0.0, -turn, 0.0]]))
+    load = lay(slab, "*", surface).load(slab, turned)[0]
+    left, depth = -2.0 * np.cos(turn) - 0.5 * np.sin(turn), surface - 0.5 + 2.0 * np.sin(turn) - 0.5 * np.cos(turn)
+    width = depth / np.tan(turn)
+    assert 0.0 < width < 4.0 * np.cos(turn)
+    down = WEIGHT * width * depth / 2.0
+    moment = (left + width / 3.0) * down
+    expected = [0.0, -down, -moment] if dimension == 2 else [0.0, 0.0, -down, 0.0, moment, 0.0]
+    assert load == pytest.approx(expected, abs=1e-12)
+
+
 CASE = """
 [geometry]
 layout = "segmental arch"

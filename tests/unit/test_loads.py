@@ -179,3 +179,44 @@ def test_a_moment_in_space_is_three_numbers():
     cube = solver.Assembly.from_solids([(corners, faces)])
     with pytest.raises(ValueError, match=r"moment in space is 5\.0; give three numbers"):
         solver.point_load(cube, 0, moment=5.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            {"direction": (0, -1), "rotation_centre": (0, 0, 0), "rotation_axis": (0, 0, 1), "rotation": 0.1},
+            r"settlement rotation_centre is \[0.0, 0.0, 0.0\], and the blocks are in the plane: give \[x, y\]",
+        ),
+        ({"direction": (0, 0, -1)}, r"settlement direction is \[0.0, 0.0, -1.0\], and the blocks are in the plane"),
+        ({"radial_from": (0, 0)}, "settlement has radial_from, and the blocks are in the plane"),
+        (
+            {"profile": {"base": (0, 0, -1, 0, 0, 0)}},
+            r"settlement profile of 'base' is \[.*\], and the blocks are in the plane: give \[dx, dy, rotation\]",
+        ),
+    ],
+)
+def test_what_of_a_settlement_is_for_space_is_named_in_the_plane(given, message):
+    structure = solver.Structure(ASSEMBLY, friction_coefficient=0.7)
+    with pytest.raises(ValueError, match=message):
+        structure.settle(solver.Settlement(**given))
+
+
+@pytest.mark.parametrize(
+    ("make", "numbers"),
+    [
+        (lambda: solver.weight_fraction(ASSEMBLY, (1, 0), ["brick"]), r"\['brick'\]"),
+        (lambda: solver.surface_forces(ASSEMBLY, 1.0, blocks=[5]), r"\[5\]"),
+        (lambda: solver.edge_force(ASSEMBLY, 7, 0, 1.0), "7"),
+        (lambda: solver.PointForces([3], [[1, 0]], [[1, 1]]).load(ASSEMBLY), r"\[3\]"),
+    ],
+)
+def test_blocks_that_are_not_there_are_told_from_those_that_are(make, numbers):
+    with pytest.raises(ValueError, match=f"there are no blocks {numbers}; give numbers from 0 to 2, assembly.index"):
+        make()
+
+
+def test_forces_at_points_take_lists():
+    forces = solver.PointForces([0, 0], [[3, 5], [0, -1]], [[2, 1], [1, 1]])
+    loads = solver.self_weight(ASSEMBLY).with_forces(ASSEMBLY, forces, "live")
+    assert loads.live[0] == pytest.approx([3, 4, 1 * 5 - 0.5 * 3])

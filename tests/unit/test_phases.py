@@ -374,6 +374,10 @@ def test_a_collapse_before_the_supports_turn_is_read_back_in_metres(
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        (
+            {"dead": np.zeros((6, 3)), "dead_arms": np.zeros((5, 2, 2))},
+            r"dead_arms loads have shape \(5, 2, 2\); give \(6, 2, 2\)",
+        ),
         ({"dead": np.full((6, 3), np.nan)}, "dead load on block 'left' is .*; not finite"),
         ({"dead": np.zeros((6, 2))}, r"dead loads have shape \(6, 2\); give \(6, 3\)"),
         ({"removed": np.array([3])}, r"removed has shape \(1,\); give one per block, 6"),
