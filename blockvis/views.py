@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 import solver
 
@@ -51,10 +48,13 @@ def html(value: Any) -> str:
 def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.UnstructuredGrid:
     """Make a dataset of blocks, joints, contact points or ties of an increment, below 0 from the end of the path."""
     from .results.datasets import block_dataset, contact_dataset, joint_dataset
+    from .results.increments import numbered
     from .results.mechanism_arrays import at_last_equilibrium, falling_in
 
     assembly, path = response.assembly, response.path
-    increment = _increment(path if path and isinstance(k, int) and k < 0 else response.increments, k)
+    increment = numbered(response.increments, k)
+    if path and k < 0:
+        increment = numbered(path, k)
     ends = bool(path) and increment is path[-1] and response.collapse is not None
     if ends:
         increment = at_last_equilibrium(response)
@@ -95,12 +95,3 @@ def animate(response: solver.Response, path: str | os.PathLike[str], **options: 
     from .pictures.render import animate as write
 
     return write(response, path, **options)
-
-
-def _increment(increments: Sequence[solver.Increment], k: int) -> solver.Increment:
-    n = len(increments)
-    if not isinstance(k, (int, np.integer)):
-        raise TypeError(f"k is {k!r}; it is the number of an increment, 0 to {n - 1}, or -1 for the last")
-    if not -n <= k < n:
-        raise IndexError(f"there is no increment {k}; the response has {n}, 0 to {n - 1}, or -1 for the last")
-    return increments[k]

@@ -120,8 +120,11 @@ class PointForces:
 
     def load(self, assembly: Assembly) -> np.ndarray:
         """(n_blocks, n_dof) array [N, N·m]: of the blocks as drawn."""
-        load = _no_load(assembly)
+        load, d = _no_load(assembly), assembly.dimension
         chosen_blocks(assembly, self.block)
+        for name, given in (("force", self.force), ("point", self.point)):
+            if given.shape[1:] != (d,):
+                raise ValueError(f"a {name} is {given[0].tolist()}; give {d} numbers, one per axis")
         arms = cross_rows(self.point - assembly.centroids[self.block])
         np.add.at(load, self.block, np.hstack([self.force, np.einsum("nrd,nd->nr", arms, self.force)]))
         return load

@@ -392,7 +392,7 @@ def pushover(
     assembly: Assembly,
     control: ControlDisplacement,
     *,
-    loads: Loads,
+    loads: Loads | None = None,
     friction_coefficient: float = InterfaceLaw.friction_coefficient,
     interfaces: Interfaces | None = None,
     **options: Any,
@@ -404,7 +404,7 @@ def pushover(
 def limit_load(
     assembly: Assembly,
     *,
-    loads: Loads,
+    loads: Loads | None = None,
     friction_coefficient: float = InterfaceLaw.friction_coefficient,
     interfaces: Interfaces | None = None,
     **options: Any,

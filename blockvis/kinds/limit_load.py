@@ -19,6 +19,7 @@ from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import collapse_phase, in_phase, unit_in
 from blockvis.results.swinging import swing_factors, swung_increment
+from blockvis.results.tables import finite
 from blockvis.text import force_text
 from solver import mechanics
 
@@ -193,16 +194,16 @@ class LimitLoadKind(AnalysisKind):
         limit = next((limit for limit, state in states if state is chosen), states[0][0] if states else None)
         summary: dict[str, Any] = {
             "settlements": [asdict(settlement) for settlement in response.settlements],
-            "limit_load_multiplier": None if limit is None else _finite(limit.multiplier),
-            "limit_load_bounds": None if limit is None else [_finite(bound) for bound in limit.bounds],
+            "limit_load_multiplier": None if limit is None else finite(limit.multiplier),
+            "limit_load_bounds": None if limit is None else [finite(bound) for bound in limit.bounds],
             "limit_load_flow": None if limit is None else limit.flow,
             "limit_load_status": None if limit is None else str(limit.status),
             "live_load": None if limit is None else limit.live_force,
             "limit_loads": [
                 {
                     "increment": number,
-                    "multiplier": _finite(limit.multiplier),
-                    "bounds": [_finite(bound) for bound in limit.bounds],
+                    "multiplier": finite(limit.multiplier),
+                    "bounds": [finite(bound) for bound in limit.bounds],
                     "status": str(limit.status),
                     "flow": limit.flow,
                     "live_load": limit.live_force,
@@ -400,10 +401,6 @@ def _stored_limits(summary: Mapping[str, Any], increments: Sequence[solver.Incre
             )
         )
     return tuple(limits)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, found: Sequence[solver.Increment]) -> Steps:

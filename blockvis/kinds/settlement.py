@@ -275,17 +275,20 @@ def settlement_steps(
     case = given.case
     if not case.settlements:
         return without_increments()
-    return mechanics.settlement_increments(
-        given.assembly,
-        case.settlements,
-        interfaces=given.interfaces,
-        loads=given.loads,
-        controls=replace(case.controls, local_loss=0.0) if whole else case.controls,
-        changes=given.changes,
-        ties=given.ties,
-        resume=resume,
-        on_step=given.step,
-    )
+    try:
+        return mechanics.settlement_increments(
+            given.assembly,
+            case.settlements,
+            interfaces=given.interfaces,
+            loads=given.loads,
+            controls=replace(case.controls, local_loss=0.0) if whole else case.controls,
+            changes=given.changes,
+            ties=given.ties,
+            resume=resume,
+            on_step=given.step,
+        )
+    except ValueError as error:
+        raise ValueError(f"{case.source}: {error}") from None
 
 
 def not_reached(before: mechanics.Ending, what: str) -> mechanics.Ending:

@@ -47,6 +47,9 @@ def film_of(
     frames : iterator of PIL.Image.Image
         Drawn as they are asked for; what stands still is drawn once.
     """
+    for name, value in (("fps", fps), ("seconds", seconds)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise ValueError(f"{name} is {value:g}; it must be a positive number")
     path = [increment for increment in drawer.increments if matters(increment, drawer.response)]
     pause = max(1, round(PAUSE * fps))
     along = _along(drawer, path, max(2, round(fps * seconds)), pause, round(TOLD * fps))

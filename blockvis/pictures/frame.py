@@ -101,6 +101,8 @@ class Sheet:
         right = beside_width + (round(7.6 * self.text) if colour_bar else 0)
         #: Left, top, right, bottom of the blocks' picture, in pixels.
         self.inside = (0, self.header, width - right, height - self.footer)
+        if min(self.inside_size) < 1:
+            raise ValueError(f"size is {width} × {height} pixels, which leave the blocks none; give more")
         self.beside = (width - beside_width, self.header, width, height - self.footer)
         self._shared: dict[_Shared, Image.Image] = {}
 

@@ -14,6 +14,7 @@ import solver
 from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.layout.sights import Cut, Sight, read_cut, read_sight
 from blockvis.results.about import loss_of
+from blockvis.results.increments import numbered
 from blockvis.system.atomic_files import atomic_file
 from solver import mechanics
 
@@ -49,7 +50,7 @@ def draw_still(
     ----------
     response : solver.Response
     increment : int or solver.Increment
-        An increment of the response, or its number; -1 is the last.
+        An increment of the response, or its number; -1 is the last, of what collapses a frame of its fall.
     path : path
         Any format Pillow writes; PNG is meant.
     size : (int, int)
@@ -84,7 +85,7 @@ def draw_still(
         For a view or a section of blocks in the plane, and a plane that misses the blocks.
     """
     _check_response(response)
-    chosen = increment if isinstance(increment, solver.Increment) else response.increments[increment]
+    chosen = increment if isinstance(increment, solver.Increment) else numbered(response.increments, increment)
     look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
     drawer = Drawer(response, look, size, (chosen,), curve=curve, underlay=underlay, still=True)
     return _save(drawer.picture(chosen, widths=True), path)

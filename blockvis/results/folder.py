@@ -77,7 +77,8 @@ def refuse_results(path: str | Path, overwrite: bool = False) -> None:
         go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
         found = next(name for name in names if (path / name).exists())
         raise ResultsExist(
-            f"'{path}' holds results already ({found}); {go_on}choose another folder with -o or add --force"
+            f"'{path}' holds results already ({found}); {go_on}choose another folder with -o or add --force "
+            "(in Python overwrite=True)"
         )
 
 

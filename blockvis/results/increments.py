@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -177,6 +177,16 @@ def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
         named, mechanics.State, ties=from_flat(ties, mechanics.TieForces) if ties else mechanics.TieForces()
     )
     return from_flat(named, solver.Increment, held=state, checkpoint=None)
+
+
+def numbered(increments: Sequence[solver.Increment], k: int) -> solver.Increment:
+    """Choose an increment by its number; below 0 from the end."""
+    n = len(increments)
+    if not isinstance(k, (int, np.integer)):
+        raise TypeError(f"k is {k!r}; it is the number of an increment, 0 to {n - 1}, or -1 for the last")
+    if not -n <= k < n:
+        raise IndexError(f"there is no increment {k}; the response has {n}, 0 to {n - 1}, or -1 for the last")
+    return increments[k]
 
 
 def _tie_arrays(ties: mechanics.TieForces) -> dict[str, np.ndarray]:

@@ -12,7 +12,10 @@ import solver
 #: Blocks leave no slit between them wider than this, in block sizes.
 SLIT = 1e-3
 
-#: A place belongs to an edge that is no farther off than this, in block sizes.
+#: A place is at what is no farther off than this, in block sizes: less than the course between two bed joints.
+AT = 0.25
+
+#: It has the name of an edge or a corner that is no farther off than this, in block sizes.
 NEAR = 0.75
 
 #: A wall fills its box by this share at least; an arch has no edges to the left and right.
@@ -36,7 +39,7 @@ class Places:
 
     def __init__(self, assembly: solver.Assembly) -> None:
         outlines = np.array([shapely.Polygon(assembly.outline(block)) for block in range(assembly.n_blocks)])
-        self._near, slit = NEAR * assembly.block_size, SLIT * assembly.block_size
+        self._at, self._near, slit = (part * assembly.block_size for part in (AT, NEAR, SLIT))
         free = assembly.free
         stones = shapely.buffer(outlines, slit, join_style="mitre")
         supports = sorted(shapely.get_parts(shapely.union_all(stones[~free])), key=lambda one: float(one.centroid.x))
@@ -72,7 +75,7 @@ class Places:
             which = f"opening {number}" if len(self._openings) > 1 else "the opening"
             found.append((place.distance(opening), f"the {self._side(point, opening)} of {which}"))
         distance, words = min(found)
-        return words if distance <= self._near else "inside"
+        return words if distance <= self._at else "inside"
 
     def _side(self, point: np.ndarray, opening: shapely.Polygon) -> str:
         """Name the part of an opening that is nearest to a point."""

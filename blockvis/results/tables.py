@@ -59,7 +59,6 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
     """
     path, collapse, phase = response.path, response.collapse, collapse_phase(response)
     worst = mechanics.worst_of(i.certificate for i in path)
-    residuals = {name: getattr(worst, name, math.nan) for name in MEASURES}
     return {
         "status": str(response.stop),
         "message": response.message,
@@ -69,7 +68,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "collapse_bracket": list(collapse.bracket) if collapse else None,
         "settlement_unit": response.settlements[-1].unit if response.settlements else response.parameter.unit,
         "initial_reaction": _initial_reaction(response),
-        "reaction_at_rest": path[0].reaction if path else None,
+        "reaction_at_rest": finite(path[0].reaction) if path else None,
         "collapse_lost": collapse.lost if collapse else None,
         "collapse_reaction": collapse.reaction if collapse else None,
         "mechanism": mechanism_text(response) if collapse else None,
@@ -81,7 +80,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "parameter": response.parameter.name,
         **own,
         "last_settlement": path[-1].parameter if path else None,
-        "last_reaction": path[-1].reaction if path else None,
+        "last_reaction": finite(path[-1].reaction) if path else None,
         "total_weight": response.total_weight,
         "fill_weight": sum(fill.weight(response.assembly) for fill in response.loads.fills),
         "n_blocks": response.assembly.n_blocks,
@@ -89,7 +88,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "n_increments": len(path),
         "n_falling_frames": len(response.increments) - len(path),
         "n_programs": sum(i.programs for i in response.increments),
-        "largest_residuals": {name: value if math.isfinite(value) else None for name, value in residuals.items()},
+        "largest_residuals": {name: finite(getattr(worst, name, math.nan)) for name in MEASURES},
         "seconds": seconds,
         "finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "versions": record.versions,
@@ -103,7 +102,12 @@ def _initial_reaction(response: solver.Response) -> float | None:
     if not response.path:
         return None
     first = response.path[0]
-    return least_reaction(first) if response.measured.is_force else first.reaction
+    return finite(least_reaction(first) if response.measured.is_force else first.reaction)
+
+
+def finite(value: float) -> float | None:
+    """Return a number for JSON, which has none for what is unbounded or not known."""
+    return float(value) if math.isfinite(value) else None
 
 
 def _removed(response: solver.Response) -> list[dict[str, Any]]:

@@ -269,7 +269,8 @@ def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, s
     where = f"{sense} {at} {place(course.at, course.phase)}"
     largest = f"{force_text(abs(course.force))} {where}" if course.force else "no force"
     fates = (("yields", course.yields_at, course.yields_in), ("breaks", course.breaks_at, course.breaks_in))
-    fate = [f"{word} by {place(at, phase)}" for word, at, phase in fates if at is not None and phase is not None]
+    told = ((word, place(at, phase)) for word, at, phase in fates if at is not None and phase is not None)
+    fate = [f"{word} at {where} or before" for word, where in told]
     # What yields and breaks was told.
     said = {"yielding": course.yields_at, "broken": course.breaks_at}.get(course.state)
     if said is None:

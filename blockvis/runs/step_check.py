@@ -18,6 +18,7 @@ from blockvis.results.about import unit_in
 from blockvis.results.folder import STEP_CHECK, add_to_summary
 from blockvis.results.record import read_record
 from blockvis.system.atomic_files import write_atomic
+from solver import mechanics
 
 from .once_more import LINEAR_PROGRAM, OnceMore, Traced, followed, takes_steps, traced
 from .reopen import open_results
@@ -111,8 +112,8 @@ class StepCheck:
             return ""
         return (
             f"the steps matter by more than {100.0 * NOTABLE:g} %: take a smaller step_tolerance; where that changes "
-            "nothing, as where stones slip off each other, a wall may have several paths: give results with their "
-            "range (--range, of settlements)"
+            "nothing, as where stones slip off each other, a wall may have several paths"
+            + (": give results with their range (--range)" if self.what == mechanics.REACTION.name else "")
         )
 
 

@@ -409,13 +409,13 @@ class LimitLoad(HasState, Shown):
         """The state at the limit as an increment, for pictures and tables; its velocity is the mechanism."""
         if self.held is None:
             raise ValueError("this limit load has only its numbers; its arrays are with the increment that reports it")
-        finite = self.multiplier if np.isfinite(self.multiplier) else 0.0
         return Increment(
             parameter=0.0,
             measured=self.multiplier,
             phase=0,
             load_multiplier=self.multiplier,
-            reaction=finite * self.live_force,
+            # A moment has no resultant, at any multiplier.
+            reaction=self.multiplier * self.live_force if self.live_force else 0.0,
             certificate=self.certificate,
             status=Status.FALLING if self.status is LimitStatus.NO_EQUILIBRIUM else Status.EQUILIBRIUM,
             programs=self.programs,

@@ -380,7 +380,10 @@ def test_a_load_without_limit_is_unbounded(tmp_path, capsys):
     assert summary["limit_load_multiplier"] is None
     assert summary["limit_load_status"] == "unbounded"
     assert "unbounded: no live load of this pattern" in capsys.readouterr().out
-    assert blockvis.open_results(folder).limits[0].multiplier == np.inf
+    assert summary["initial_reaction"] is summary["reaction_at_rest"] is summary["last_reaction"] is None
+    opened = blockvis.open_results(folder)
+    assert opened.limits[0].multiplier == opened.path[0].reaction == np.inf
+    assert next(csv.DictReader((folder / "response.csv").open()))["reaction"] == "inf"
 
 
 def test_live_loads_in_a_settlement_are_left_out_with_a_note(tmp_path, capsys):

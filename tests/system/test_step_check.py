@@ -150,6 +150,9 @@ def test_what_has_no_steps_is_refused(tmp_path):
 def test_the_error_is_twice_the_difference_and_what_matters_is_warned_of():
     assert str(CHECK) == "error of the steps: reaction ± 2 % (at 0.1 m), blocks ± 4 mm"
     assert "the steps matter by more than 1 %: take a smaller step_tolerance" in CHECK.warning
+    assert CHECK.warning.endswith("give results with their range (--range)")
+    # Limit loads and pushovers have none.
+    assert replace(CHECK, what="load multiplier").warning.endswith("a wall may have several paths")
     assert str(replace(CHECK, position=0.117)).endswith(", blocks ± 230 mm")
     assert ", collapse ± 0.6 %, blocks" in str(replace(CHECK, collapse=0.003))
     small = replace(CHECK, difference=1e-7, position=1e-9, collapse=0.0)

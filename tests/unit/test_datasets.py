@@ -119,6 +119,9 @@ def test_blocks_say_how_they_move_on_and_what_falls():
     mechanism = mechanics.mechanism_of(assembly, falling)
     np.testing.assert_array_equal(last["macro_block"], mechanism.parts)
     np.testing.assert_array_equal(last["falls"], mechanism.parts >= 0)
+    # Integers of NumPy, too.
+    for number in (-1, np.int64(-1)):
+        assert response.mesh(number)["translation"].tolist() == last["translation"].tolist()
     np.testing.assert_allclose(last["mechanism_velocity"][:, :2], response.collapse.mechanism[:, :2])
     np.testing.assert_allclose(last["mechanism_rotation"], response.collapse.mechanism[:, 2])
     before, here = (response.path[k].pose.positions for k in (5, 4))

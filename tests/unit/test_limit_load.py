@@ -224,6 +224,13 @@ def test_lengths_that_are_none_are_refused(name, value):
         structure.limit_load(acceleration=(1, 0), **{name: value})
 
 
+def test_an_acceleration_alone_is_a_load_in_one_call():
+    found = limit_load(block(), friction_coefficient=0.5, acceleration=(1, 0))
+    assert found.multiplier == pytest.approx(0.5)
+    with pytest.raises(ValueError, match="no live load acts on any free block"):
+        limit_load(block())
+
+
 def test_of_equal_positions_the_first_governs():
     """Symmetric places of an arch differ by rounding alone, which is another with other processors."""
     arch = generators.arch()

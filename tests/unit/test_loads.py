@@ -43,6 +43,21 @@ def test_point_load_has_the_moment_of_its_arm():
     assert solver.point_load(ASSEMBLY, 0, (3, 5))[0].tolist() == [3, 5, 0]
 
 
+@pytest.mark.parametrize(
+    ("force", "point", "message"),
+    [
+        ((1, 0), (1.5,), r"a point is \[1.5\]; give 2 numbers, one per axis"),
+        ((1, 0), 1.5, r"a point is 1.5; give 2 numbers"),
+        ((5,), None, r"a force is \[5.0\]; give 2 numbers"),
+        ((1, 0, 0), (0, 0), r"a force is \[1.0, 0.0, 0.0\]; give 2 numbers"),
+    ],
+)
+def test_a_force_and_its_point_have_a_number_per_axis(force, point, message):
+    """One number was the point (1.5, 1.5)."""
+    with pytest.raises(ValueError, match=message):
+        solver.point_load(ASSEMBLY, 0, force, point=point)
+
+
 @pytest.mark.parametrize("s", [0.0, 0.3, 2.0])
 def test_rotation_follows_the_true_arc(s):
     settlement = solver.Settlement(rotation_centre=(2, 7), rotation=-5)

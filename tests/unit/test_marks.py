@@ -541,6 +541,15 @@ def test_places_are_told_by_openings():
     assert below.places[1] == "the lower right corner of the opening"
 
 
+def test_a_crack_that_ends_a_course_above_the_foot_ends_inside():
+    """Courses are lower than bricks are long: the joint below it is shut."""
+    wall = squares(*((0.25 * x, 0.1 * y) for y in range(4) for x in range(4)), size=(0.25, 0.1))
+    parted = {f"block_{4 * y + x}": (0.02, 0.0, 0.0) for y in range(1, 4) for x in (2, 3)}
+    (crack,) = cracks_of(wall, moved(wall, **parted))
+    assert crack.ends.tolist() == pytest.approx(np.array([[0.5, 0.1], [0.5, 0.4]]))
+    assert crack.places == ("inside", "the top")
+
+
 def test_an_arch_has_an_opening_that_the_ground_closes_and_an_outer_face():
     arch = generators.arch(voussoirs=10, thickness_ratio=0.2)
     parts = {f"voussoir {k}": (0.02 * (k > 7) - 0.03 * (k < 4) + 0.01 * (k > 5), 0.0, 0.0) for k in range(1, 11)}

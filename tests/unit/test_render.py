@@ -189,6 +189,14 @@ def test_wrong_options_are_named(tmp_path):
         draw_still(arch_response(), 0, tmp_path / "a.png", colour_by="weight")
     with pytest.raises(ValueError, match="magnification is -1"):
         draw_still(arch_response(), 0, tmp_path / "a.png", magnification=-1.0)
+    with pytest.raises(ValueError, match="size is 0 × 10 pixels, which leave the blocks none"):
+        draw_still(arch_response(), 0, tmp_path / "a.png", size=(0, 10))
+    with pytest.raises(IndexError, match=r"there is no increment 99; the response has \d+, 0 to"):
+        draw_still(arch_response(), 99, tmp_path / "a.png")
+    with pytest.raises(ValueError, match="fps is 0; it must be a positive number"):
+        animate(arch_response(), tmp_path / "a.mp4", fps=0, size=SMALL)
+    with pytest.raises(ValueError, match="seconds is -1; it must be a positive number"):
+        animate(arch_response(), tmp_path / "a.mp4", seconds=-1, size=SMALL)
 
 
 def test_huge_supports_do_not_shrink_the_structure():

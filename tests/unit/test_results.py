@@ -62,7 +62,7 @@ def test_no_results(tmp_path):
 
 
 def test_refuses_to_overwrite(response, folder):
-    with pytest.raises(ValueError, match="holds results already"):
+    with pytest.raises(ValueError, match=r"holds results already .*add --force \(in Python overwrite=True\)"):
         blockvis.write(response, folder)
 
 
