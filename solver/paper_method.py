@@ -57,7 +57,7 @@ from solver.programs.problem import LinearProgram, SolveError, Unbounded
 from solver.programs.solve import solve_lp
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Increment, State, Status, carries, used_up
-from solver.results.mechanism import mechanism_of
+from solver.results.mechanism import mechanism_of, with_motion
 from solver.results.response import Collapse
 from solver.words import counted
 
@@ -357,7 +357,10 @@ class _Phase:
         """Give the fall and the collapse, from the program without equilibrium beyond the last one."""
         fall = self.reported(solution, bound, 0.0, Status.FALLING)
         bracket, motion = (current.s, bound), solution.state.velocity
-        mechanism, words = motion / motion_size(motion, self.length).max(), str(mechanism_of(self.assembly, fall))
+        mechanism = motion / motion_size(motion, self.length).max()
+        # Its joints are those of the last equilibrium, whose forces say what slides.
+        at_last = with_motion(replace(fall, held=current.solution.state), mechanism)
+        words = str(mechanism_of(self.assembly, at_last))
         collapse = Collapse(sum(bracket) / 2.0, bracket, current.reaction, mechanism, self.phase.unit, words)
         return fall, Ending(Status.COLLAPSED, str(collapse), collapse)
 

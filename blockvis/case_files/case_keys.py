@@ -440,8 +440,9 @@ SETTLEMENT = Section(
             "holds", 0.002, default=_CONTROLS.step_tolerance, elsewhere=True),
         Key("local_loss", SHARE, "Share of the weight up to which blocks that leave for good are let go and the path "
             "goes on without them; 0 ends it at the first", 0.0, default=_CONTROLS.local_loss, elsewhere=True),
-        Key("profile", PROFILES, "How far each support goes, in proportion: a Gaussian trough or heave along x, points "
-            "of a table, or one vector and rotation per support; s is the largest displacement of a support's centroid",
+        Key("profile", PROFILES, "In the plane, how far each support goes, in proportion: a Gaussian trough or heave "
+            "along x, points of a table, or one vector and rotation per support; s is the largest displacement of a "
+            "support's centroid",
             {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),
         Key("blocks", _SUPPORT_NAMES, "Names of the moving supports that take part; the others stand still",
             ["ground right"], otherwise="all moving supports"),

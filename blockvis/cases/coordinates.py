@@ -40,6 +40,11 @@ def _of_settlements(case: Case, d: int) -> Iterator[tuple[str, str, Any]]:
     """Table, key and numbers of the directions and points of settlements of d dimensions."""
     for k, settlement in enumerate(case.settlements, start=1):
         table = f"settlement {k}" if len(case.settlements) > 1 else "settlement"
+        if d == 3 and (settlement.profile is not None or any(case.profiles[k - 1 : k])):
+            raise ValueError(
+                f"{case.source}: [{table}] profile belongs to blocks in the plane; in space give a direction of three "
+                "numbers, or in Python solver.Settlement(profile=...) of six numbers for each support"
+            )
         for key in ("rotation_axis", "radial_from"):
             if d == 2 and getattr(settlement, key) is not None:
                 raise ValueError(f"{case.source}: [{table}] {key} belongs to blocks in space; these are {_where(d)}")

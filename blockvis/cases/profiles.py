@@ -151,7 +151,7 @@ _MOTIONS = ValueKind(
 
 PROFILE = Section(
     "settlement.profile",
-    "How far each support goes, in proportion, by one of three kinds of profile",
+    "How far each support goes, in proportion, by one of three kinds of profile, in the plane",
     (
         Key("kind", one_of(("gaussian", "points", "supports")), "A Gaussian trough or heave along x, points of a "
             "table, or the motion of each support", "gaussian", otherwise="the kind whose keys are there"),
@@ -224,8 +224,6 @@ def with_profiles(
         settlement = replace(given, blocks=given.blocks and pieces_named(given.blocks, assembly))
         profile = profiles[k] if k < len(profiles) else None
         where = f"{source}: [settlement{f' {k + 1}' if len(settlements) > 1 else ''}] profile"
-        if assembly.dimension != 2 and (profile is not None or settlement.profile is not None):
-            raise ValueError(f"{where} is of structures in the plane; this one is in space: give a direction")
         if profile is None:
             for name in settlement.profile or ():
                 _check_support(name, assembly, where)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from itertools import pairwise
 from pathlib import Path
+from textwrap import wrap
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -51,8 +53,8 @@ WORDS = 0.35
 #: The word in a band that takes less of the width than this stands upright.
 WIDE_BAND = 0.2
 
-#: Height of the text of the file [points].
-TEXT = 11.0
+#: Height of the text of the file [points], and how many letters a smaller line of it has per inch.
+TEXT, LETTERS = 11.0, 11.0
 
 
 def draw_curve(
@@ -99,7 +101,8 @@ def draw_curve(
         _draw_ties(below, response, ties)
         axes.set_xlabel("")
     name += "" if band is None else f"   ·   band: range of {mechanics.counted(band.runs.max(initial=0), 'run')}"
-    axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK))
+    above = _mark_phases(axes, response, int(LETTERS * size[0])) if response.settlements else 0.0
+    axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK), pad=6.0 + above)
     with atomic_file(path) as partial:
         figure.savefig(partial, dpi=200)
     return path
@@ -199,9 +202,8 @@ def _draw(
         _mark_lowest(axes, response, text, events)
         if events and len(known):
             _mark_unbounded(axes, total, values, text)
-    lines = _mark_phases(axes, response, total, text) if events and response.settlements else 0
     if response.collapse is not None and len(path):
-        _mark_collapse(axes, response, total, values, text, events, lines)
+        _mark_collapse(axes, response, total, values, text, events)
     if response.stop is solver.Status.SOLVER_FAILED:
         _mark_failure(axes, response, total, values, text, events)
 
@@ -236,14 +238,19 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
     axes.legend(loc="best", fontsize=0.9 * TEXT, frameon=False, ncols=min(3, len(ties.names)))
 
 
-def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text: float) -> int:
-    """Mark where a settlement begins and what changes before it; returns the most lines that are written at one."""
-    path, grey, lines = response.path, palette.hexadecimal(palette.FAINT), 0
-    others = new_motions(response)
+def _mark_phases(axes: Axes, response: solver.Response, letters: int) -> float:
+    """Mark by numbers where settlements begin, list above what changes before each; returns the height in points.
+
+    The list leaves the plot to the curve, of whose phases the shortest may be narrower than a word.
+    """
+    path, grey, lines = response.path, palette.hexadecimal(palette.FAINT), list[str]()
+    (per_length, unit), others, height = parameter_unit(response), new_motions(response), 0.85 * TEXT
+    total = response.parameters * per_length
+    style: dict[str, Any] = {"textcoords": "offset points", "va": "bottom", "fontsize": height, "color": grey}
     for k in range(1, len(path)):
         if path[k].phase == path[k - 1].phase:
             continue
-        words = [f"phase {path[k].phase + 1} from here on"] + ["reaction along another motion"] * (k in others)
+        words = ["reaction along another motion"] * (k in others)
         taken = int(path[k].removed.sum()) - int(path[k - 1].removed.sum())
         if taken:
             words.append(f"{mechanics.counted(taken, 'block')} taken away")
@@ -253,11 +260,14 @@ def _mark_phases(axes: Axes, response: solver.Response, total: np.ndarray, text:
         words += [f"'{tie.name}' installed" for tie in known_ties(response) if tie.phase == path[k].phase + 1]
         axes.axvline(total[k - 1], color=grey, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1)
         axes.annotate(
-            "\n".join(words), (total[k - 1], 0.98), xycoords=("data", "axes fraction"), xytext=(5, 0),
-            textcoords="offset points", va="top", fontsize=0.85 * text, color=grey,
-        )  # fmt: skip
-        lines = max(lines, len(words))
-    return lines
+            str(path[k].phase + 1), (total[k - 1], 1.0), (0, 2), ("data", "axes fraction"), ha="center", **style
+        )
+        where = f"phase {path[k].phase + 1} from {total[k - 1]:.4g} {unit}"
+        lines += wrap(f"{where}: {', '.join(words)}" if words else where, letters, subsequent_indent="    ")
+    if not lines:
+        return 0.0
+    axes.annotate("\n".join(lines), (0.0, 1.0), (0.0, 2.0 + 1.4 * height), "axes fraction", ha="left", **style)
+    return 1.4 * height * (len(lines) + 1)
 
 
 def _draw_band(
@@ -388,9 +398,7 @@ def _mark_collapse(
     reactions: np.ndarray,
     text: float,
     words: bool,
-    lines: int,
 ) -> None:
-    """Mark the collapse, its words below so many ``lines`` that say what changes."""
     collapse = response.collapse
     assert collapse is not None
     red = palette.hexadecimal(palette.WARNING)
@@ -413,7 +421,7 @@ def _mark_collapse(
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}",
             (middle, 0.96 if above else 0.04),
             xycoords=("data", "axes fraction"),
-            xytext=(-6, -1.25 * text * lines if above else 0),
+            xytext=(-6, 0),
             textcoords="offset points",
             ha="right",
             va="top" if above else "bottom",

@@ -516,7 +516,7 @@ def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tu
         ("weight W", force_text(response.total_weight)),
         *((f"fill up to {fill.surface:g} m", force_text(fill.weight(assembly))) for fill in response.loads.fills),
         ("blocks", f"{assembly.n_blocks} ({int(assembly.free.sum())} free)"),
-        *([("contact points", str(len(response.increments[0].contacts.points)))] if response.increments else []),
+        *([("contact points", str(len(path[-1].contacts)))] if path else []),
         ("increments", f"{len(path)} in equilibrium{follows}"),
         ("solver time", f"{sum(i.seconds for i in response.increments):.1f} s"),
     ]

@@ -23,6 +23,7 @@ from .cracks import MOST_LISTED, cracks_of
 from .fall_files import remove_fall
 from .increments import StoredIncrements, packed_increment
 from .joints import LargestMovements
+from .mechanism_arrays import at_last_equilibrium
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
@@ -177,7 +178,7 @@ class ResultsFolder:
         results = cls.__new__(cls)
         results.path, results.parameter, results.vtu = Path(path), parameter, vtu
         results.record = read_record(results.path)
-        results.assembly, results.ties = stored_assembly(results.path), stored_ties(results.path)
+        results.assembly = stored_assembly(results.path)
         results._release = _locked(results, results.path)
         results._files = StoredIncrements(results.path)
         results.increments, checkpoint, count = [], None, 0
@@ -189,6 +190,7 @@ class ResultsFolder:
                 results.increments = [results._files.opened(k) for k in range(count)]
             except (ValueError, KeyError, OSError) as error:
                 raise ValueError(f"'{results.path}' cannot go on ({error}); run the case again with --force") from None
+        results.ties = stored_ties(results.path, results.increments)
         (results.path / "summary.json").unlink(missing_ok=True)
         remove_fall(results.path)
         results._start_table()
@@ -238,8 +240,12 @@ class ResultsFolder:
         """
         if not self.viewer.finish():
             restore_grids(self.path, self.assembly, self.increments, self.vtu)
-        if len(response.path) <= len(self.increments):
+        if response.path and response.collapse is not None:
+            # What follows the last equilibrium is known by now, and with it the states of its joints.
             write_end(self.path, response, self.vtu, self._movements.joints)
+            self._rows.seek(self._last_row)
+            self._rows.truncate()
+            self._write_row(len(response.path) - 1, at_last_equilibrium(response))
         self._write_table(durable=True)
         write_lists(self.path, self.increments, durable=True)
         write_atomic(self.path / "joints.csv", self._movements.table())
@@ -273,11 +279,15 @@ class ResultsFolder:
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
-            self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
+            self._last_row = self._rows.tell()
+            self._write_row(number, increment)
             self._movements.add(increment)
             if self.ties:
                 self._tie_table.writerows(tie_rows(self.ties, number, increment))
                 self._courses.add(increment)
+
+    def _write_row(self, number: int, increment: solver.Increment) -> None:
+        self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
 
     def _write_table(self, *, durable: bool = False) -> None:
         write_atomic(self.path / "response.csv", self._rows.getvalue(), last=False, durable=durable)
@@ -423,11 +433,13 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
     """
     assembly = stored_assembly(folder)
     files = StoredIncrements(folder)
-    increments = [files.opened(k) for k in range(len(files))]
     nothing = f"the run in '{folder}' has found nothing yet; go on with it by blockvis run --resume {folder}"
     summary: dict[str, Any] = {}
     if (folder / "summary.json").is_file():
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    # A copy that broke off has fewer files than the run wrote, whose path would seem to end there.
+    count = max(len(files), summary.get("n_increments", 0) + summary.get("n_falling_frames", 0))
+    increments = [files.opened(k) for k in range(count)]
     response = solver.Response(
         assembly=assembly,
         settlements=(),
@@ -437,7 +449,7 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
         stop=solver.Status(summary.get("status", solver.Status.INTERRUPTED)),
         message=summary.get("message", "" if increments else nothing),
         collapse=_collapse_of(summary, increments, assembly),
-        ties=stored_ties(folder),
+        ties=stored_ties(folder, increments),
     )
     return response, summary
 

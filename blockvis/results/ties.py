@@ -49,20 +49,26 @@ def write_ties(folder: Path, ties: Sequence[solver.Tie]) -> None:
         (folder / TIES).unlink(missing_ok=True)
 
 
-def stored_ties(folder: Path) -> tuple[solver.Tie, ...]:
-    """Read the ties of a results folder; none where it has none.
+def stored_ties(folder: Path, increments: Sequence[solver.Increment] = ()) -> tuple[solver.Tie, ...]:
+    """Read the ties of a results folder, and of its ``increments``; none where it has none.
 
     Raises
     ------
     ValueError
-        For a file that no run has written.
+        For a file that no run has written, and where increments have other ties than the file.
     """
-    if not (folder / TIES).is_file():
-        return ()
+    file, ties = folder / TIES, tuple[solver.Tie, ...]()
     try:
-        return unpacked((folder / TIES).read_bytes(), _Members)[0].ties
+        if file.is_file():
+            ties = unpacked(file.read_bytes(), _Members)[0].ties
     except ValueError as error:
-        raise ValueError(f"'{folder / TIES}' cannot be read ({error}); run the case again") from None
+        raise ValueError(f"'{file}' cannot be read ({error}); run the case again") from None
+    told = len(increments[0].ties.forces) if increments else 0
+    if told not in (0, len(ties)):
+        what = "is missing" if not file.is_file() else f"has {len(ties)}"
+        carried = mechanics.counted(told, "tie")
+        raise ValueError(f"'{file}' {what}, but increments have {carried}; copy it again or run the case again")
+    return ties
 
 
 def known_ties(response: solver.Response) -> tuple[solver.Tie, ...]:

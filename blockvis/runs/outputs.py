@@ -162,10 +162,8 @@ class Drawing(Output):
         if not self._pictures:
             return ()
         with clock.counting("report"):
-            from blockvis.pictures.paraview import write_paraview_macro
             from blockvis.report.page import write_report
 
-            write_paraview_macro(folder)
             write_report(response, folder / "report.html", case.text, fall=fall)
         problem = ""
         if apart is not None:

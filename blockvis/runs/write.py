@@ -6,6 +6,7 @@ from pathlib import Path
 
 import solver
 from blockvis.kinds.kinds import KINDS
+from blockvis.pictures.paraview import write_paraview_macro
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.increments import folder_of
 from blockvis.results.ties import known_ties
@@ -43,4 +44,5 @@ def finish(results: ResultsFolder, response: solver.Response) -> dict[str, objec
     """Write and return the summary of a response whose increments are in the folder, and the tables of its kind."""
     kind = KINDS[response.analysis]
     seconds = sum(i.seconds for i in response.increments)
+    write_paraview_macro(results.path)
     return results.finish(response, seconds, own=kind.summary(response), tables=kind.tables(response))

@@ -73,8 +73,8 @@ blockvis.draw_mechanism(response, "mechanism.png")
 #
 # Open ``blocks.pvd``, ``joints.pvd`` and ``contacts.pvd``; time is the settlement. The blocks stand where they are;
 # *Warp By Vector* leads on along the mechanism, with ``to_reference`` back to the drawing. Colour the blocks by
-# ``macro_block``, and draw *Glyphs* of ``force`` at the contact points; ``paraview_colours.py``, which a run with
-# pictures leaves, colours them as the pictures do. The same files in PyVista:
+# ``macro_block``, and draw *Glyphs* of ``force`` at the contact points; ``paraview_colours.py`` in the
+# folder colours them as the pictures do. The same files in PyVista:
 last = pv.read(sorted((folder / "out" / "increments").glob("*blocks*.vtu"))[len(response.path) - 1])
 print(sorted(last.cell_data))
 assert {"rotation", "macro_block", "role_name"} <= set(last.cell_data)

@@ -38,7 +38,8 @@ class Collapse(Shown):
     reaction : float, optional [N or N·m]
         At the last equilibrium; None where its phase begins with the fall.
     mechanism : (n_blocks, n_dof) array
-        Direction in which the blocks move when they fall, largest movement 1 (rotations times block size).
+        Direction in which the blocks move when they fall, largest movement 1 (rotations times block size): what files
+        and pictures have at the last equilibrium, whose increment has the motion in which the supports move on.
     unit : str
     words : str
         How it fails: macro-blocks, hinges and sliding joints.

@@ -79,7 +79,11 @@ def test_rotations_and_loads_have_three_numbers(tmp_path):
         (DOME + DOWN + '[[supports]]\noutline = [[0, 0], [1, 0], [1, 1]]\n',
          r"case\.toml: \[\[supports\]\] .* levels = \[bottom, top\] in m"),
         (ARCH + DOWN.replace("0, 0", "0") + '[[supports]]\noutline = [[0, 0], [1, 0], [1, 1]]\nlevels = [0, 1]\n',
-         r"case\.toml: \[\[supports\]\] .* 'levels', which no support in the plane has; leave it out"),
+         r"case\.toml: \[\[supports\]\] .* 'levels', which no support in the plane has; leave it out, "
+         r"or give \[geometry\] dimension = 3 if the blocks are in space"),
+        (DOME + "[settlement]\nprofile = { points = [[0, 0], [4, 1]] }", r"\[settlement\] profile belongs to blocks in "
+         r"the plane; in space give a direction of three numbers, or in Python solver\.Settlement"),
+        (DOME + "[settlement]\nprofile = { supports = { g = [0, -1] } }", r"profile belongs to blocks in the plane"),
         (DOME + DOWN + '[roles]\n"sprinter 1" = "fixed"\n', r"roles: 'sprinter 1' matches no block"),
     ],
 )  # fmt: skip

@@ -44,6 +44,11 @@ def test_a_structure_without_any_equilibrium_has_an_empty_curve(tmp_path):
     assert draw_curve(nothing, tmp_path / "curve.png").stat().st_size > 1000
 
 
+def height_of(words, text):
+    """Where a text that begins so stands in an SVG, downwards."""
+    return float(re.search(rf"<!-- {words}.*?translate\([\d.]+ ([\d.]+)\)", text, re.DOTALL)[1])
+
+
 def said(response, path):
     return re.findall(r"<!-- (.*?) -->", draw_curve(response, path).read_text(encoding="utf-8"))
 
@@ -149,7 +154,7 @@ def test_reactions_along_different_motions_are_not_joined(tmp_path):
     for then, joined in ((replace(down, increment=0.05), True), (aside, False)):
         response = solver.settle(assembly, [down, then], friction_coefficient=0.6)
         text = draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
-        assert "<!-- phase 2 from here on" in text
+        assert "<!-- phase 2 from 0.2 m" in text
         assert ("reaction along another motion" in text) is not joined
         assert len(re.findall("stroke-width: 2; stroke-linecap", text)) == (1 if joined else 2)
         assert f'"breaks":{"[]" if joined else "[3]"}' in report_of(response).replace(" ", "")
@@ -157,7 +162,7 @@ def test_reactions_along_different_motions_are_not_joined(tmp_path):
 
 @pytest.mark.slow
 def test_phases_and_collapse_are_told_apart_and_ties_in_kilonewtons(tmp_path):
-    """The words of both stand at the top, one below the other; a tie that comes later has no force before."""
+    """What begins is told above the plot, the collapse in it; a tie that comes later has no force before."""
     outlines = [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
     post = solver.Tie("post", (1, None), ((0.0, 0.9), (0.0, 3.0)), stiffness=1e7, phase=2)
@@ -174,12 +179,19 @@ def test_phases_and_collapse_are_told_apart_and_ties_in_kilonewtons(tmp_path):
     half = len(response.path) // 2
     increments = [replace(one, phase=int(k >= half)) for k, one in enumerate(response.increments)]
     phased = replace(response, increments=tuple(increments), settlements=response.settlements * 2)
-    heights = []
-    for one in (response, phased):
-        text = draw_curve(one, tmp_path / "curve.svg").read_text(encoding="utf-8")
-        heights.append(float(re.search(r"<!-- collapse at .*?translate\([\d.]+ ([\d.]+)\)", text, re.DOTALL)[1]))
-        told = re.search(r"<!-- phase 2 from here on -->\s*<g [^>]*translate\([\d.]+ ([\d.]+)\)", text)
-    assert heights[1] > float(told[1]) + 5.0
+    text = draw_curve(phased, tmp_path / "curve.svg").read_text(encoding="utf-8")
+    assert height_of("collapse at ", text) > height_of("phase 2 from ", text) + 5.0
+
+
+def test_words_of_short_phases_stand_apart_and_above_the_plot(tmp_path):
+    response = parted(wall(4, 3), 9, 0)
+    phases = [solver.Settlement((1, 0) if k % 2 else (0, -1)) for k in range(3)]
+    increments = [replace(one, phase=max(k - 6, 0)) for k, one in enumerate(response.increments)]
+    told = replace(response, increments=tuple(increments), settlements=tuple(phases))
+    text = draw_curve(told, tmp_path / "curve.svg").read_text(encoding="utf-8")
+    top = float(re.search(r'id="patch_2">\s*<path d="M [\d.]+ [\d.]+ \nL [\d.]+ [\d.]+ \nL [\d.]+ ([\d.]+)', text)[1])
+    second, third = height_of("phase 2 from ", text), height_of("phase 3 from ", text)
+    assert second + 8.0 < third < top
 
 
 @pytest.mark.parametrize(("positions", "upright"), [(17, True), (5, False)])

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -54,6 +55,44 @@ def test_summary_reports_the_worst_residuals(response, folder):
     worst = max(i.certificate.equilibrium_residual for i in response.path)
     assert summary["largest_residuals"]["equilibrium_residual"] == worst
     assert worst < 1e-8
+
+
+def test_the_last_equilibrium_has_the_joints_of_the_collapse_in_every_file(response, folder):
+    *_, row = csv.DictReader((folder / "response.csv").read_text(encoding="utf-8").splitlines())
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    again, states = blockvis.open_results(folder), ("open", "sticking", "sliding", "hinging")
+    told = np.bincount(again.contacts(-1)["state"], minlength=len(states))
+    assert [int(row[f"contacts_{state}"]) for state in states] == told.tolist()
+    joints = [int(row[name]) for name in ("hinges", "sliding_joints")]
+    assert joints == [summary[name] for name in ("hinges", "sliding_joints")]
+    alone = mechanics.mechanism_of(response.assembly, response.path[-1])
+    assert joints != [len(alone.hinges), len(alone.sliding)], "the motion in which the supports move on has others"
+    assert len(again.increments[0].contacts) != summary["n_contacts"]
+    report = blockvis.write_report(again, folder.parent / "report.html").read_text(encoding="utf-8")
+    assert f"<td>contact points</td><td>{summary['n_contacts']}</td>" in report
+
+
+def test_linear_programs_word_their_mechanism_as_the_summary_does(tmp_path):
+    arch, controls = generators.arch(thickness_ratio=0.2, voussoirs=7), solver.Controls(increments="linear program")
+    spread = solver.Settlement((1, 0), increment=0.1, limit=3.0)
+    response = solver.settle(arch, spread, friction_coefficient=1.5, controls=controls)
+    folder = blockvis.write(response, tmp_path / "out")
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert response.collapse.words == summary["mechanism"] == blockvis.open_results(folder).collapse.words
+    assert summary["message"].endswith(summary["mechanism"])
+
+
+def test_results_that_lack_their_last_states_are_refused(response, folder, tmp_path):
+    """As a copy that broke off leaves them: they would open as a shorter path."""
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    for number in range(2, len(response.increments)):
+        (copy / "increments" / f"state_{number:05d}.npz").unlink()
+    with pytest.raises(ValueError, match=r"state_00002\.npz' cannot be read .* run the case again"):
+        blockvis.open_results(copy)
+
+
+def test_what_colours_the_files_in_paraview_needs_no_picture(folder):
+    assert (folder / "paraview_colours.py").is_file()
 
 
 def test_no_results(tmp_path):

@@ -338,6 +338,16 @@ def test_the_label_of_a_tie_leaves_its_line_free(run, tmp_path):
     assert len(found) > 0.95 * np.ptp(found)
 
 
+def test_a_folder_that_has_lost_its_ties_neither_opens_nor_goes_on(run, tmp_path, capsys):
+    folder = shutil.copytree(run.folder, tmp_path / "lost")
+    (folder / "ties.npz").unlink()
+    with pytest.raises(ValueError, match=r"ties\.npz' is missing, but increments have 1 tie; .*run the case again"):
+        blockvis.open_results(folder)
+    (folder / "summary.json").unlink()
+    assert main(["run", "--resume", str(folder), "--no-pictures"]) == 2
+    assert "ties.npz' is missing" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_a_run_that_was_stopped_goes_on_with_its_ties(run, tmp_path):
     folder = tmp_path / "stopped"
