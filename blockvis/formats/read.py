@@ -448,7 +448,7 @@ def _module_of(path: Path, verb: str) -> Any:
 def _format(path: Path, verb: str) -> Format:
     suffix = path.suffix.lower()
     known = FORMATS.get(suffix)
-    if known is None or not (known.reads if verb == "read" else known.writes):
+    if known is None or (verb == "write" and not known.writes):
         if verb == "read":
             raise ValueError(f"'{path}': {cannot_read(suffix)}")
         able = " ".join(sorted(key for key, value in FORMATS.items() if value.writes))
