@@ -134,7 +134,7 @@ def test_any_wall_is_filled_whatever_its_openings_are(wall, openings, bond, head
 
 
 def test_a_seed_that_is_too_large_is_refused_as_a_number():
-    with pytest.raises(ValueError, match="seed is 3e.09; give a whole number of at most 2147483648"):
+    with pytest.raises(ValueError, match=r"seed is 3e.09; give a whole number of at most 2147483648"):
         generators.bond(shapely.box(0, 0, 2, 1), bond="rubble", stone=0.5, seed=3_000_000_000)
 
 
