@@ -427,7 +427,13 @@ def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     module = _module_of(path, "read")
     if _format(path, "read").module not in HOLD_IMAGES:
         reading.refuse_image_keys(path)
-    found: Layout | Bodies = module.read(path, reading)
+    try:
+        found: Layout | Bodies = module.read(path, reading)
+    except ValueError as error:
+        # Block tables are read alike in all formats, which know their file.
+        if type(error) is ValueError and f"'{path}'" not in str(error):
+            raise ValueError(f"'{path}': {error}") from None
+        raise
     return found
 
 

@@ -49,23 +49,25 @@ def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
     def words(key: str, default: Sequence[str]) -> tuple[str, ...]:
         return tuple(str(row.get(key, value)) for row, value in zip(entries, default, strict=True))
 
+    def number(name: str, key: str, value: Any) -> float:
+        try:
+            return float(value)
+        except (TypeError, ValueError, OverflowError):
+            raise ValueError(f"block '{name}' has {key} {repr(value)[:60]}; give a number") from None
+
     def numbers(key: str) -> np.ndarray | None:
         if not any(key in row for row in entries):
             return None
-        try:
-            return np.array([float(row.get(key, math.nan)) for row in entries])
-        except (TypeError, ValueError):
-            bad = next(row[key] for row in entries if key in row and not isinstance(row[key], int | float))
-            raise ValueError(f"a block has {key} {bad!r}; give a number") from None
+        return np.array([number(name, key, row.get(key, math.nan)) for name, row in zip(names, entries, strict=True)])
 
-    roles = words("role", [""] * layout.n_blocks)
-    for name, role in zip(words("name", layout.names), roles, strict=True):
+    names, roles = words("name", layout.names), words("role", [""] * layout.n_blocks)
+    for name, role in zip(names, roles, strict=True):
         if role and role not in mechanics.ROLES:
             raise ValueError(f"block '{name}' has role '{role}' in the file; roles are {', '.join(mechanics.ROLES)}")
     return replace(
         layout,
         thickness=numbers("thickness") if layout.dimension == 2 else None,
-        names=words("name", layout.names),
+        names=names,
         groups=words("group", [""] * layout.n_blocks),
         roles=roles,
         materials=words("material", [""] * layout.n_blocks),

@@ -383,6 +383,9 @@ def test_annotations_that_cannot_be_read_say_why(tmp_path, capsys):
         "annotates 2 images (a.jpg, b.jpg); export one of them alone": two,
         "outlines no stone, it has 1 boxes without an outline": boxes,
         "does not say how many pixels its image has; give pixel": _via(),
+        "w.json' has annotations of COCO that cannot be read": _coco(
+            annotations=[{"image_id": 7, "category_id": 1, "segmentation": [[0, 0, 10, 0, 10, 10, 5]]}]
+        ),
     }
     for says, content in cases.items():
         (tmp_path / "w.json").write_text(json.dumps(content), encoding="utf-8")
