@@ -123,8 +123,9 @@ def _places(table: Table, key: Key) -> tuple[float, ...] | None:
     given = table.numbers(key.name)
     if given is None:
         return None
-    if len(given) != 3 or given[2] != int(given[2]) or given[2] < 2 or given[0] >= given[1]:
-        raise table.error(key.name, f"is {list(given)}; give [first x, last x, number of places], at least 2 places")
+    if len(given) != 3 or given[2] != int(given[2]) or not 2 <= given[2] <= MOST_STEPS or given[0] >= given[1]:
+        says = f"[first x, last x, number of places], from 2 to {MOST_STEPS} places"
+        raise table.error(key.name, f"is {list(given)}; give {says}")
     return tuple(np.linspace(given[0], given[1], int(given[2])).tolist())
 
 
