@@ -149,4 +149,4 @@ def test_layouts_that_would_fill_the_memory_are_refused(tmp_path, capsys):
             encoding="utf-8",
         )
         assert run_command(path, "-o", tmp_path / "out") == 2, name
-        assert "blocks" in capsys.readouterr().err
+        assert "at most" in capsys.readouterr().err
