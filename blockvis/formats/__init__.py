@@ -51,7 +51,7 @@ FORMATS = {
     **dict.fromkeys((".geo", ".geo_unrolled", ".step", ".stp", ".brep"), Format("gmsh_cad")),
     **dict.fromkeys((".png", ".tif", ".tiff", ".jpg", ".jpeg"), Format("images", alone=True)),
     **dict.fromkeys((
-        ".inp", ".bdf", ".fem", ".nas", ".med", ".mesh", ".meshb", ".su2", ".ugrid", ".unv", ".vol", ".xdmf", ".xmf",
+        ".inp", ".bdf", ".fem", ".nas", ".med", ".mesh", ".meshb", ".su2", ".ugrid", ".vol", ".xdmf", ".xmf",
         ".mdpa", ".avs", ".cgns", ".exo", ".f3grid", ".tec", ".wkt", ".h5m", ".xml", ".post", ".dato", ".hmf",
     ), Format("meshio_files")),
 }  # fmt: skip

@@ -347,6 +347,9 @@ def _selected(found: Bodies, path: Path | str, reading: Reading) -> _Selection:
     if not kept:
         raise ValueError(f"'{path}' draws no block: all that it draws is left out as asked (ignore, only)")
     bodies = [found.bodies[k] for k in kept]
+    bare = next((body.name for body in bodies if not len(body.faces)), None)
+    if bare is not None:
+        raise ValueError(f"'{path}': body '{bare}' has no surface, as of cells that are there twice; export it once")
     every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
     size = float(spread_of(every, f"'{path}'").max())
     if not 0.0 < size < LARGEST_SIZE:
@@ -455,8 +458,9 @@ def _not_flat(seen: Sequence[_Projection], bodies: Sequence[Body], path: Path | 
         holed = [one.refused for one in seen if "no extrusion" not in one.refused]
         if holed:
             return NotFlat(f"'{path}': {holed[0]}; dimension = 3 reads the blocks in space", holed[0])
-        name = seen[0].refused.split("'")[1]
-        reason = f"body '{name}' is no extrusion along x, y or z"
+        size = _size(bodies)
+        alone = next((body.name for body in bodies if not any(_is_prism(body, axis, size) for axis in range(3))), None)
+        reason = f"body '{alone}' is no extrusion along x, y or z" if alone else "; ".join(one.refused for one in seen)
         return NotFlat(
             f"'{path}' is not prismatic: {reason}; dimension = 3 reads the blocks in space, in the plane export "
             "extrusions of their outlines along an axis",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +23,10 @@ from .bodies import Bodies, Body
 from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
 
 #: Names of the cell array that numbers the blocks, in order of preference.
-BLOCK_ARRAYS = ("block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags")
+BLOCK_ARRAYS = (
+    "block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags", "nastran:ref",
+    "netgen:index", "avsucd:material", "ugrid:ref",
+)  # fmt: skip
 
 
 def block_array(data: Mapping[str, np.ndarray]) -> str | None:
@@ -194,8 +199,21 @@ def _merged_bodies(parts: Sequence[tuple[Bodies, str]]) -> Bodies:
         bodies += [replace(body, name=name) for body, name in zip(part.bodies, names, strict=True)]
         group = {"group": label} if label else {}
         rows += [{**group, **row, "name": name} for row, name in zip(part.rows, names, strict=True)]
-    notes = tuple(dict.fromkeys(note for part, _ in parts for note in part.notes))
-    return Bodies(tuple(bodies), tuple(rows), parts[0][0].unit, notes)
+    return Bodies(tuple(bodies), tuple(rows), parts[0][0].unit, _joined_notes([part for part, _ in parts]))
+
+
+def _joined_notes(parts: Sequence[Layout | Bodies]) -> tuple[str, ...]:
+    """Join the notes of parts: each once, with the sum of the blocks or bodies that it counts."""
+    totals, joined = Counter[str](), dict[str, str]()
+    for note in (note for part in parts for note in part.notes):
+        match = re.fullmatch(r"(\d+) (?:(blocks?)|body|bodies), (.*)", note)
+        if match is None:
+            joined.setdefault(note, note)
+            continue
+        totals[match[3]] += int(match[1])
+        word = ("block",) if match[2] else ("body", "bodies")
+        joined[match[3]] = f"{counted(totals[match[3]], *word)}, {match[3]}"
+    return tuple(joined.values())
 
 
 def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> Layout:
@@ -210,7 +228,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
         blocks=joined("blocks"),
         names=joined("names"),
         unit=named[0].unit,
-        notes=tuple(dict.fromkeys(joined("notes"))),
+        notes=_joined_notes(named),
         left_out=joined("left_out"),
         looks=joined("looks"),
     )

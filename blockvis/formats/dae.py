@@ -23,13 +23,17 @@ UP = {"X_UP": ([1, 2, 0], "z"), "Y_UP": ([0, 1, 2], "y"), "Z_UP": ([0, 1, 2], "z
 
 @dataclass(frozen=True)
 class Drawn:
-    """Meshes of a file: name, (n, 3) points in place and (m, 3) faces of each; unit, axis that points up, rows."""
+    """Meshes of a file: name, (n, 3) points in place and (m, 3) faces of each; unit, axis that points up, rows.
+
+    ``grouped`` are those that may be parts of stones.
+    """
 
     parts: list[tuple[str, np.ndarray, np.ndarray]]
     unit: str
     up: str
     up_says: str
     rows: list[dict[str, Any]] = field(default_factory=list)
+    grouped: bool = False
 
 
 def drawn_in(path: Path) -> Drawn:

@@ -24,7 +24,7 @@ from blockvis.layout.units import metres_per
 from blockvis.layout.views import VIEWS, axis_across, upright_note
 
 from .bodies import Bodies
-from .dxf_bodies import DrawnMesh, drawn_mesh, is_mesh, layout_of_meshes
+from .dxf_bodies import DrawnMesh, drawn_mesh, is_mesh, layout_of_meshes, meshes_of_faces
 from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
@@ -68,6 +68,7 @@ class _Outlines:
     left_out: list[LeftOut] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     meshes: list[DrawnMesh] = field(default_factory=list)
+    faces: list[int] = field(default_factory=list)
 
     def add(self, ring: np.ndarray, entity: Any, handle: str) -> None:
         self.rings.append(ring)
@@ -125,6 +126,12 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
             found.hidden[entity.dxf.layer] += 1
         else:
             _add(entity, handle, found, tolerance)
+    closed = meshes_of_faces([(found.layers[k], found.names[k], found.rings[k]) for k in found.faces], path)
+    if closed:
+        found.meshes += closed
+        for k in reversed(found.faces):
+            for each in (found.rings, found.names, found.layers, found.rows, found.looks):
+                del each[k]
     meshes = _chosen_meshes(found, reading)
     if meshes:
         return layout_of_meshes(meshes, path, reading, stated, _faults(audit) + _skipped(found))
@@ -196,7 +203,8 @@ def _elevations(found: _Outlines, view: str | None) -> list[str]:
     if not any(abs(ring[:, 2] - (ring[0, 2] if upright else 0.0)).max() > 0 for ring in found.rings):
         return []
     seen = "from above" if view in (None, "xy") else f"along {'xyz'[axis_across(view)]}"
-    return [Note(CHANGED, f"elevations were ignored: the drawing was read as seen {seen}")]
+    remedy = "; 3DFACEs of a layer are read as bodies in space where they close one" if found.faces else ""
+    return [Note(CHANGED, f"elevations were ignored: the drawing was read as seen {seen}{remedy}")]
 
 
 def _turned(found: _Outlines, view: str | None, path: Path) -> list[str]:
@@ -311,6 +319,7 @@ def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | No
     kind = entity.dxftype()
     if kind in ("SOLID", "TRACE", "3DFACE"):
         ring = np.array([(p.x, p.y, p.z) for p in entity.wcs_vertices()])
+        found.faces += [len(found.rings)] if kind == "3DFACE" else []
         found.add(ring, entity, handle)
         return
     if kind == "SPLINE":

@@ -13,9 +13,9 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import FLAT, spread_of
 from blockvis.layout.solids import fans
 
-from .bodies import Bodies, Body
+from .bodies import Bodies
 from .cells import layout_of_cells
-from .closed_surfaces import closed_bodies
+from .closed_surfaces import closed_bodies, enclosed
 from .reading import Reading
 
 #: Solids whose geometry is that of the ACIS kernel, of which ezdxf knows the flat faces.
@@ -79,6 +79,31 @@ def _flat_faces(entity: Any) -> tuple[list[Any], str]:
     return meshes, "" if whole else entity.dxftype()
 
 
+def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]], path: Path) -> list[DrawnMesh]:
+    """Join 3DFACEs, those of a layer and of an inserted block together; none where none of these encloses a body.
+
+    Parameters
+    ----------
+    drawn : sequence of (layer, name, (n, 3) corners)
+    path : Path
+    """
+    together: dict[tuple[str, str], list[tuple[str, np.ndarray]]] = {}
+    for layer, name, ring in drawn:
+        together.setdefault((layer, name.rpartition(".")[0]), []).append((name, ring))
+    meshes, closed = [], False
+    for (layer, _), faces in together.items():
+        rings = [ring for _, ring in faces]
+        starts = np.cumsum([0, *map(len, rings)])
+        numbers = [list(range(start, start + len(ring))) for start, ring in zip(starts.tolist(), rings, strict=False)]
+        meshes.append(DrawnMesh(faces[0][0], layer, np.concatenate(rings), numbers))
+        try:
+            size = float(np.ptp(meshes[-1].points, axis=0).max())
+            closed = closed or bool(closed_bodies("", meshes[-1].points, fans(numbers), size, path))
+        except ValueError:
+            continue
+    return meshes if closed else []
+
+
 def layout_of_meshes(
     meshes: Sequence[DrawnMesh], path: Path, reading: Reading, unit: str, notes: Sequence[str]
 ) -> Layout | Bodies:
@@ -112,13 +137,12 @@ def layout_of_meshes(
     size = float(spread.max())
     if spread.min() <= FLAT * size:
         return _flat(meshes, path, reading, unit, notes)
-    bodies: list[Body] = []
-    rows: list[dict[str, Any]] = []
-    for mesh in meshes:
-        for body in closed_bodies(mesh.name, mesh.points, fans(mesh.faces), size, path):
-            bodies.append(body)
-            rows.append({"name": body.name, "group": mesh.layer, **_material(mesh)})
-    return Bodies(tuple(bodies), tuple(rows), unit, notes=tuple(notes))
+    closed = enclosed([(mesh.name, mesh.points, fans(mesh.faces)) for mesh in meshes], size, path, reading)
+    rows = [
+        {"name": body.name, "group": meshes[k].layer, **_material(meshes[k])}
+        for body, k in zip(closed.bodies, closed.owners.tolist(), strict=True)
+    ]
+    return Bodies(tuple(closed.bodies), tuple(rows), unit, notes=(*notes, *closed.notes))
 
 
 def _material(mesh: DrawnMesh) -> dict[str, str]:

@@ -26,6 +26,7 @@ ELSEWHERE = {
     ".dbf": "give the .shp beside it",
     ".shx": "give the .shp beside it",
     ".prj": "give the .shp beside it",
+    ".unv": "in gmsh: File, Open, then File, Export as .msh (gmsh a.unv -save -o a.msh)",
     ".toml": "it is a case or a study; give the drawing that it names under [geometry] file",
     **dict.fromkeys((".dwg", ".dgn", ".pln"), _CAD),
     **dict.fromkeys(

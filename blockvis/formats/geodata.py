@@ -27,6 +27,7 @@ from blockvis.layout.views import VIEWS, axis_across, upright_note
 from blockvis.system.extras import require
 from solver import mechanics
 
+from .bodies import ROLE_WORDS
 from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
@@ -289,6 +290,10 @@ def layout_of_features(
         raise ValueError(f"'{path}' has no polygon (found: {listed or 'nothing'}); draw each block as one polygon")
     order, notes = _order(every, reading.view, path)
     rows = _rows(features)
+    strange = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)
+    if strange:
+        listed_roles = ", ".join(f"'{role}'" for role in strange)
+        notes.append(Note(CHANGED, f"roles were left out ({listed_roles}): roles are {', '.join(mechanics.ROLES)}"))
     rings = [ring[:, order] for ring in found.rings]
     outlines = [*rings, *(holed[0][:, order] for holed, _ in found.holed)]
     far = not (unit or degrees or lengths) and list(order) == [0, 1]
@@ -463,7 +468,7 @@ def _row(name: str, group: str, attributes: Mapping[str, Any]) -> dict[str, Any]
     material = str(attributes.get("material", "" if group.strip().lower() in mechanics.ROLES else group))
     role = str(attributes.get("role", "")).strip().lower()
     row |= {"material": material} if material else {}
-    row |= {"role": role} if role in mechanics.ROLES else {}
+    row |= {"role": ROLE_WORDS.get(role, role)} if role else {}
     return row | {key: attributes[key] for key in ("thickness", "density") if key in attributes}
 
 

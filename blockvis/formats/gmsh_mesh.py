@@ -29,7 +29,7 @@ from .volumes import GMSH_SOLIDS, Faces, bodies_of_cells
 N_NODES = {
     1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 8: 3, 9: 6, 10: 9, 11: 10, 12: 27, 13: 18, 14: 14, 15: 1, 16: 8, 17: 20,
     18: 15, 19: 13, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21, 26: 4, 27: 5, 28: 6, 29: 20, 30: 35, 31: 56, 36: 16,
-    37: 25, 92: 64, 93: 125,
+    37: 25, 38: 36, 39: 12, 40: 16, 41: 20, 92: 64, 93: 125,
 }  # fmt: skip
 
 #: Our own section with the block table, which physical groups cannot hold; other programs skip it.
@@ -40,14 +40,15 @@ TABLE = "BlockvisBlocks"
 class _Mesh:
     """Content of the sections of a file; of elements only those of surfaces and volumes.
 
-    Groups are those of an entity by its dimension and number. Cells of volumes are kept by their shape, with the
-    number of the volume of each.
+    Groups are those of an entity by its dimension and number, parents the numbers of the entities that were partitioned
+    by those of their parts. Cells of volumes are kept by their shape, with the number of the volume of each.
     """
 
     points: dict[int, int] = field(default_factory=dict)
     coordinates: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     group_names: dict[tuple[int, int], str] = field(default_factory=dict)
     groups: dict[tuple[int, int], list[int]] = field(default_factory=dict)
+    parents: dict[tuple[int, int], int] = field(default_factory=dict)
     rings: list[np.ndarray] = field(default_factory=list)
     surfaces: list[np.ndarray] = field(default_factory=list)
     solids: list[tuple[Faces, np.ndarray]] = field(default_factory=list)
@@ -256,13 +257,13 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
         parts = line.strip().split(None, 2)
         if len(parts) == 3 and parts[0].isdigit() and parts[1].lstrip("-").isdigit():
             mesh.group_names[int(parts[0]), int(parts[1])] = parts[2].strip().strip('"')
-    nodes, elements, entities = numbers("Nodes"), numbers("Elements"), numbers("Entities")
+    nodes, elements = numbers("Nodes"), numbers("Elements")
     if nodes is None or elements is None:
         missing = "Nodes" if nodes is None else "Elements"
         raise ValueError(f"'{path}' has no section ${missing}; mesh the surfaces (gmsh -2) and export again")
     if version == "4.1":
-        if entities is not None:
-            _entities_41(entities, mesh)
+        for section in ("Entities", "PartitionedEntities"):
+            _entities_41(numbers(section), mesh)
         _nodes_41(nodes, mesh)
         _elements_41(elements, mesh)
     else:
@@ -312,16 +313,29 @@ def _section(data: bytes, name: str) -> bytes | None:
     return _section_between(data, name, f"End{name}")
 
 
-def _entities_41(numbers: _Numbers, mesh: _Mesh) -> None:
+def _entities_41(numbers: _Numbers | None, mesh: _Mesh) -> None:
+    if numbers is None:
+        return
+    partitioned = numbers.section == "PartitionedEntities"
+    if partitioned:
+        # How many partitions there are, and cells that some of them have from others.
+        numbers.one("size")
+        numbers.take("int", 2 * numbers.one("size"))
     counts = numbers.take("size", 4)
     for dimension in range(4):
         for _ in range(counts[dimension]):
             tag = numbers.one("int")
+            if partitioned:
+                of, parent = numbers.take("int", 2).tolist()
+                numbers.take("int", numbers.one("size"))
+                if of == dimension:
+                    mesh.parents[dimension, tag] = parent
             numbers.take("double", 3 if dimension == 0 else 6)
             groups = numbers.take("int", numbers.one("size"))
             if dimension:
                 numbers.take("int", numbers.one("size"))
-            mesh.groups[dimension, tag] = [int(abs(group)) for group in groups]
+            whole = mesh.parents.get((dimension, tag), tag)
+            mesh.groups[dimension, whole] = [int(abs(group)) for group in groups]
 
 
 def _nodes_41(numbers: _Numbers, mesh: _Mesh) -> None:
@@ -367,6 +381,7 @@ def _elements_41(numbers: _Numbers, mesh: _Mesh) -> None:
     n_blocks = int(numbers.take("size", 4)[0])
     for _ in range(n_blocks):
         dimension, tag, kind = map(int, numbers.take("int", 3))
+        tag = mesh.parents.get((dimension, tag), tag)
         n = numbers.one("size")
         width = _width(kind, numbers)
         values = numbers.take("size", n * (width + 1)).reshape(n, width + 1)[:, 1:]
@@ -402,7 +417,7 @@ def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
 def _width(kind: int, numbers: _Numbers) -> int:
     if kind not in N_NODES:
         raise ValueError(
-            f"'{numbers.path}' has elements of gmsh's type {kind}, which is not known; mesh with triangles"
+            f"'{numbers.path}' has elements of gmsh's type {kind}, which is not known; mesh with order 2 at most"
         )
     return N_NODES[kind]
 

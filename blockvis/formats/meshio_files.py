@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,28 +27,44 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     import meshio
 
     _check_text(path)
+    suffix = path.suffix.lower()
+    cards = _abaqus_cards(path) if suffix == ".inp" else []
     said = io.StringIO()
     try:
         # meshio prints to the terminal, and raises SystemExit for some files.
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            if path.suffix.lower() in (".tec", ".dat"):
+            if suffix in (".tec", ".dat"):
                 mesh = meshio.read(_Ending(path.read_text(encoding="utf-8", errors="replace")), "tecplot")
+            elif cards:
+                mesh = meshio.read(io.StringIO(_mesh_alone(cards)), "abaqus")
+            elif suffix in (".bdf", ".fem", ".nas") and "BEGIN BULK" not in (text := path.read_text(errors="replace")):
+                # gmsh leaves out the line for which meshio waits.
+                mesh = meshio.read(io.StringIO(f"BEGIN BULK\n{text}"), "nastran")
             else:
                 mesh = meshio.read(path)
+            sets = _abaqus_sets(cards, mesh.cells) if cards else {}
     except (SystemExit, Exception) as error:  # noqa: BLE001
         if isinstance(error, ModuleNotFoundError):
             raise ValueError(f"'{path}' needs the package {error.name}: pip install {error.name}") from None
-        reason = " ".join((str(error) or said.getvalue() or type(error).__name__).split())
+        words = said.getvalue() if isinstance(error, SystemExit) else str(error)
+        name = type(error).__name__
+        reason = " ".join((f"{name} {words}" if isinstance(error, LookupError) else words or name).split())
         raise ValueError(
-            f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again"
+            f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again, with straight cells "
+            "(order 1), or as .msh or .vtu"
         ) from None
+    if path.suffix.lower() == ".f3grid":
+        mesh.cell_sets = _groups(mesh)
     points = np.asarray(mesh.points, dtype=float)
+    sets = sets or _sets_of_mesh(mesh)
     solid = [(k, shape) for k, block in enumerate(mesh.cells) if (shape := _shape(block.type))]
     if solid:
         # Surface cells beside cells with a volume are their skin.
         chosen = [(k, len(mesh.cells[k].data)) for k, _ in solid]
         cells = [(shape, np.asarray(mesh.cells[k].data, dtype=np.int64)) for k, shape in solid]
-        return _bodies(points, cells, _cell_data(mesh, chosen))
+        data, notes = _cell_data(mesh, chosen, sets)
+        bodies = _bodies(points, cells, data)
+        return replace(bodies, notes=bodies.notes + notes)
     rings: list[np.ndarray] = []
     chosen = []
     for k, block in enumerate(mesh.cells):
@@ -55,7 +73,21 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
             continue
         rings += [ring_of_nodes(np.asarray(cell, dtype=np.int64), MESHIO[kind]) for cell in block.data]
         chosen.append((k, len(block.data)))
-    return layout_of_cells(points, rings, _cell_data(mesh, chosen), path, reading.view)
+    data, notes = _cell_data(mesh, chosen, sets)
+    found = layout_of_cells(points, rings, data, path, reading.view)
+    return replace(found, notes=found.notes + notes)
+
+
+def _groups(mesh: Any) -> dict[str, list[np.ndarray]]:
+    """Take the groups of FLAC3D, which meshio calls "zone:NAME:SLOT", with numbers of cells in each block of cells."""
+    # It numbers them through all blocks of cells.
+    starts = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+    return {
+        re.sub(r"^(zone|face):(.*):[^:]*$", r"\2", name): [
+            part - start for part, start in zip(parts, starts[:-1], strict=True)
+        ]
+        for name, parts in mesh.cell_sets.items()
+    }
 
 
 def _shape(kind: str) -> Faces | None:
@@ -63,24 +95,40 @@ def _shape(kind: str) -> Faces | None:
     return MESHIO_SOLIDS.get(kind.rstrip("0123456789"))
 
 
-def _cell_data(mesh: Any, chosen: list[tuple[int, int]]) -> dict[str, np.ndarray]:
-    """Cell arrays of the chosen blocks of cells, given by number and count."""
+def _cell_data(
+    mesh: Any, chosen: list[tuple[int, int]], sets: Mapping[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Cell arrays of the chosen blocks of cells, given by number and count, and notes on sets that are none of them."""
     data: dict[str, np.ndarray] = {}
     for key, arrays in mesh.cell_data.items():
         data[key] = np.concatenate([np.asarray(arrays[k]) for k, _ in chosen]) if chosen else np.zeros(0)
-    if "block_id" not in data:
-        data.update(_sets(mesh, chosen))
-    return data
+    if "block_id" in data:
+        return data, ()
+    starts, total = _starts(mesh.cells), sum(n for _, n in chosen)
+    position, end = np.full(starts[-1], -1), 0
+    for k, n in chosen:
+        position[starts[k] : starts[k + 1]] = np.arange(end, end + n)
+        end += n
+    members = {name: np.unique(position[index]) for name, index in sets.items()}
+    of_sets, notes = _arrays_of_sets({name: index[index >= 0] for name, index in members.items()}, total)
+    return data | of_sets, notes
+
+
+def _starts(cells: Sequence[Any]) -> np.ndarray:
+    """(n + 1,) int array: number of the first cell of each block of cells, and of all cells."""
+    return np.cumsum([0, *(len(block.data) for block in cells)])
 
 
 def _bodies(points: np.ndarray, cells: list[tuple[Faces, np.ndarray]], data: dict[str, np.ndarray]) -> Bodies:
     key = block_array(data)
     total = sum(len(nodes) for _, nodes in cells)
-    values, owner = np.unique(data[key] if key else np.zeros(total, dtype=np.int64), return_inverse=True)
-    names = [f"block {value}" for value in values.tolist()] if key else ["block"]
-    bodies, owners = bodies_of_cells(points, cells, owner, names)
-    first = np.unique(owner, return_index=True)[1]
-    rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
+    values, first, owner = np.unique(
+        data[key] if key else np.zeros(total, dtype=np.int64), return_index=True, return_inverse=True
+    )
+    numbered = [f"block {value}" for value in values.tolist()] if key else ["block"]
+    found = [row_of(data, cell, name) for cell, name in zip(first.tolist(), numbered, strict=True)]
+    bodies, owners = bodies_of_cells(points, cells, owner, [row["name"] for row in found])
+    rows = [{**found[whose], "name": body.name} for body, whose in zip(bodies, owners.tolist(), strict=True)]
     how = f"one per value of the cell array '{key}'" if key else "one per piece that hangs together"
     return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}",))
 
@@ -118,26 +166,119 @@ def _check_text(path: Path) -> None:
                 raise ValueError(f"'{path}' announces {match[0].decode()} in {size} bytes; export it again")
 
 
-def _sets(mesh: Any, chosen: list[tuple[int, int]]) -> dict[str, np.ndarray]:
-    """Cell arrays of blocks from named cell sets (Abaqus ELSET, XDMF sets), if every surface cell is in one of them."""
-    total = sum(n for _, n in chosen)
-    start = (
-        dict(zip((k for k, _ in chosen), np.cumsum([0] + [n for _, n in chosen[:-1]]), strict=True)) if chosen else {}
-    )
-    owner, names = np.full(total, -1), list[str]()
+def _sets_of_mesh(mesh: Any) -> dict[str, np.ndarray]:
+    """Numbers of the cells of each named set, counted through all blocks of cells."""
+    sets, starts = {}, _starts(mesh.cells)
     for name, parts in mesh.cell_sets.items():
-        members = [
-            start[k] + np.asarray(part, dtype=np.int64)
-            for k, part in enumerate(parts)
-            if k in start and part is not None and len(part)
-        ]
-        if not members:
+        members = [starts[k] + np.asarray(part, dtype=np.int64) for k, part in enumerate(parts) if part is not None]
+        sets[str(name)] = np.concatenate([np.zeros(0, dtype=np.int64), *members])
+    return sets
+
+
+def _arrays_of_sets(sets: Mapping[str, np.ndarray], total: int) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Cell arrays of blocks from named sets (Abaqus ELSET, XDMF sets), and a note on those that are not used.
+
+    The smallest sets that hold every cell once are the blocks, and sets of several blocks their groups.
+    """
+    names_of: dict[bytes, list[str]] = {}
+    for name, index in sets.items():
+        if len(index):
+            names_of.setdefault(index.tobytes(), []).append(name)
+    distinct = [(names[0], sets[names[0]]) for names in names_of.values()]
+    by_size = sorted(distinct, key=lambda one: len(one[1]))
+    if not by_size:
+        return {}, ()
+    # Sets of cells at a loaded or supported face are parts of blocks: beside them the largest hold every cell once.
+    blocks = _dividing(by_size, total) or _dividing(by_size[::-1], total)
+    if not blocks:
+        return {}, (f"the cell sets {_listed(by_size)} were not used: no choice of them holds every cell once",)
+    owner = np.zeros(total, dtype=np.int64)
+    for k, (_, index) in enumerate(blocks):
+        owner[index] = k
+    groups, cutting = [(*names_of[index.tobytes()], "")[1] for _, index in blocks], []
+    for name, index in by_size:
+        within, counts = np.unique(owner[index], return_counts=True)
+        if (counts < np.bincount(owner)[within]).any():
+            cutting.append((name, index))
+        elif 1 < len(within) < len(blocks):
+            groups = [group or (name if k in within else "") for k, group in enumerate(groups)]
+    names = [name for name, _ in blocks]
+    notes = (f"the cell sets {_listed(cutting)} were not used: they cut blocks",) if cutting else ()
+    return {"block_id": owner, "name": np.array(names)[owner], "group": np.array(groups)[owner]}, notes
+
+
+def _dividing(sets: Sequence[tuple[str, np.ndarray]], total: int) -> list[tuple[str, np.ndarray]]:
+    """Take each set that shares no cell with those before; none unless they hold all cells."""
+    free, taken = np.full(total, True), []
+    for name, index in sets:
+        if free[index].all():
+            free[index] = False
+            taken.append((name, index))
+    return [] if free.any() else sorted(taken, key=lambda one: int(one[1][0]))
+
+
+def _listed(sets: Sequence[tuple[str, np.ndarray]]) -> str:
+    more = f" and {len(sets) - 6} more" if len(sets) > 6 else ""
+    return ", ".join(f"'{name}'" for name, _ in sets[:6]) + more
+
+
+def _abaqus_cards(path: Path) -> list[tuple[str, str, str]]:
+    """Keyword, parameters and data of each card of an .inp file without comments; none where it includes others."""
+    text = re.sub(r"(?m)^\*\*.*\n?", "", path.read_text(encoding="utf-8", errors="replace"))
+    cards = []
+    for card in re.split(r"(?m)^[ \t]*\*", text)[1:]:
+        head, _, data = card.partition("\n")
+        word, _, parameters = head.partition(",")
+        cards.append((word.strip().upper(), parameters, data.rstrip()))
+    nodes = [number for word, _, data in cards if word == "NODE" for number in re.findall(r"(?m)^\s*(\d+)", data)]
+    words = [word for word, _, _ in cards]
+    moved = any(word in ("INSTANCE", "SYSTEM") and data for word, _, data in cards)
+    if moved or words.count("INSTANCE") > 1 or len(set(nodes)) < len(nodes):
+        raise ValueError(
+            f"'{path}' is written in parts with nodes of their own, or in a moved system; one list of nodes is read: "
+            "in Abaqus/CAE Model, Edit Attributes, 'Do not use parts and assemblies in input files'"
+        )
+    return [] if "INCLUDE" in words else cards
+
+
+def _mesh_alone(cards: Sequence[tuple[str, str, str]]) -> str:
+    """Text of the nodes and cells of an .inp file; of several lists of nodes meshio keeps the last."""
+    nodes = [data for word, _, data in cards if word == "NODE"]
+    cells = [f"*ELEMENT,{parameters}\n{data}" for word, parameters, data in cards if word == "ELEMENT"]
+    return "\n".join(["*NODE", *nodes, *cells, ""])
+
+
+def _abaqus_sets(cards: Sequence[tuple[str, str, str]], blocks: Sequence[Any]) -> dict[str, np.ndarray]:
+    """Numbers of the cells of each ELSET; meshio mixes up those of several blocks of cells and those of other sets.
+
+    The name of ``*ELSET`` is that of the same cells: programs number those of ``*ELEMENT``.
+    """
+    named = [(word, re.search(r"(?i)\belset\s*=\s*\"?([^,\"]+)", parameters), parameters, data)
+             for word, parameters, data in cards if word in ("ELEMENT", "ELSET")]  # fmt: skip
+    numbers: list[np.ndarray] = []
+    of_elements: dict[str, list[np.ndarray]] = {}
+    for (_, name, _, data), block in zip((one for one in named if one[0] == "ELEMENT"), blocks, strict=True):
+        cells = np.fromstring(data.replace(",", " "), dtype=np.int64, sep=" ")
+        numbers.append(cells[:: max(1, len(cells) // max(1, len(block.data)))])
+        if name:
+            of_elements.setdefault(name[1].strip(), []).append(numbers[-1])
+    every = np.concatenate([*numbers, np.zeros(0, dtype=np.int64)])
+    sets: dict[str, list[np.ndarray]] = {}
+    for word, name, parameters, data in named:
+        if word == "ELEMENT" or not name:
             continue
-        index = np.concatenate(members)
-        if (owner[index] >= 0).any():
-            return {}
-        owner[index] = len(names)
-        names.append(str(name))
-    if total == 0 or (owner < 0).any():
-        return {}
-    return {"block_id": owner, "name": np.array(names)[owner]}
+        own = sets.setdefault(name[1].strip(), [])
+        rows = [line.replace(",", " ").split() for line in data.splitlines() if line.strip()]
+        if re.search(r"(?i)\bgenerate\b", parameters):
+            ranges = [(int(row[0]), int(row[1]), int(row[2]) if len(row) > 2 else 1) for row in rows]
+            own += [every[(every >= a) & (every <= b) & ((every - a) % step == 0)] for a, b, step in ranges]
+        else:
+            words = [one for row in rows for one in row]
+            own.append(np.array([one for one in words if one.isdigit()], dtype=np.int64))
+            own += [part for one in words for part in (*sets.get(one, ()), *of_elements.get(one, ()))]
+    found = {}
+    for key in dict.fromkeys((*sets, *of_elements)):
+        members = np.concatenate([*sets.get(key, ()), *of_elements.get(key, ())])
+        found[key] = np.flatnonzero(np.isin(every, members))
+    named_twice = {found[key].tobytes() for key in sets}
+    return {key: index for key, index in found.items() if key in sets or index.tobytes() not in named_twice}

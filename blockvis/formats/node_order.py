@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-#: Nodes from corner to corner around a cell, the nodes of curved sides between them, nodes inside the cell left out.
-QUADRATIC_TRIANGLE = (0, 3, 1, 4, 2, 5)
-QUADRATIC_QUADRANGLE = (0, 4, 1, 5, 2, 6, 3, 7)
-CUBIC_TRIANGLE = (0, 3, 4, 1, 5, 6, 2, 7, 8)
-CUBIC_QUADRANGLE = (0, 4, 5, 1, 6, 7, 2, 8, 9, 3, 10, 11)
+
+def _around(corners: int, order: int) -> tuple[int, ...]:
+    """List the nodes from corner to corner, those of curved sides between them; nodes inside the cell are left out."""
+    sides = [range(corners + k * (order - 1), corners + (k + 1) * (order - 1)) for k in range(corners)]
+    return tuple(node for k, side in enumerate(sides) for node in (k, *side))
+
+
+QUADRATIC_TRIANGLE, QUADRATIC_QUADRANGLE = _around(3, 2), _around(4, 2)
 
 #: VTK numbers the corners of a pixel row by row.
 PIXEL = (0, 1, 3, 2)
@@ -19,7 +22,8 @@ STRAIGHT = None
 #: By gmsh's element type.
 GMSH = {
     2: STRAIGHT, 3: STRAIGHT, 9: QUADRATIC_TRIANGLE, 10: QUADRATIC_QUADRANGLE, 16: QUADRATIC_QUADRANGLE,
-    21: CUBIC_TRIANGLE, 36: CUBIC_QUADRANGLE,
+    20: _around(3, 3), 21: _around(3, 3), 22: _around(3, 4), 23: _around(3, 4), 24: _around(3, 5), 25: _around(3, 5),
+    36: _around(4, 3), 39: _around(4, 3), 37: _around(4, 4), 40: _around(4, 4), 38: _around(4, 5), 41: _around(4, 5),
 }  # fmt: skip
 
 #: By meshio's name of the cell type.

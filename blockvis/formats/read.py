@@ -416,9 +416,9 @@ def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     try:
         found: Layout | Bodies = module.read(path, reading)
     except ValueError as error:
-        # Block tables are read alike in all formats, which know their file.
-        if type(error) is ValueError and f"'{path}'" not in str(error):
-            raise ValueError(f"'{path}': {error}") from None
+        if str(path) not in str(error):
+            # What is wrong with a block is found where its file is not known.
+            error.args = (f"'{path}': {error}", *error.args[1:])
         raise
     return found
 

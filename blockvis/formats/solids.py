@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,15 +14,16 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
+from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import FLAT, spread_of
-from blockvis.layout.solids import Solid, area_vectors, prism, triangles_of
+from blockvis.layout.solids import Solid, area_vectors, fans, prism, triangles_of
 from blockvis.system.extras import MissingExtra
 from solver.mechanics import counted
 
 from . import dae
 from .bodies import Bodies, Body
 from .cells import layout_of_cells, merged
-from .closed_surfaces import enclosed
+from .closed_surfaces import Enclosed, OpenSurface, enclosed
 from .reading import Reading
 
 #: Programs that write coordinates to .glb as they are, whichever of them is up, in small letters.
@@ -40,40 +42,101 @@ LARGEST_HEADER = 64 * 2**20
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read bodies or a flat mesh; .glb is in metres, .dae states its unit, the other formats state none."""
     suffix = path.suffix.lower()
-    drawn = _dae(path) if suffix == ".dae" else _scene(path, suffix)
+    drawn = {".dae": _dae, ".obj": _obj}.get(suffix, _scene)(path)
     size = _checked_size(drawn.parts, path)
     if _are_flat(drawn.parts, size):
         return replace(_flat(drawn.parts, path, drawn.rows, reading.view), unit=drawn.unit)
-    closed = enclosed(drawn.parts, size, path, reading)
+    closed = _enclosed(drawn, size, path, reading)
     bodies, rows = closed.bodies, drawn.rows
-    if suffix == ".obj":
-        # The reader returns the objects in an order of its own: rows are matched to them by name.
-        by_name = {row.get("name"): row for row in rows}
-        rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
     up, up_says = _up(path, bodies, size) if suffix == ".glb" else (drawn.up, drawn.up_says)
     return Bodies(tuple(bodies), tuple(known), drawn.unit, tuple(closed.notes), up=up, up_says=up_says)
 
 
-def _scene(path: Path, suffix: str) -> dae.Drawn:
+def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> Enclosed:
+    try:
+        return enclosed(drawn.parts, size, path, reading)
+    except OpenSurface as error:
+        if not drawn.grouped:
+            raise
+        # Groups may be those of the faces of one stone.
+        starts = np.cumsum([0, *(len(points) for _, points, _ in drawn.parts)])
+        points = np.concatenate([points for _, points, _ in drawn.parts])
+        faces = np.concatenate([part[2] + start for part, start in zip(drawn.parts, starts[:-1], strict=True)])
+        try:
+            found = enclosed([(path.name, points, faces)], size, path, reading)
+        except ValueError:
+            raise error from None
+        said = f"the names of {len(drawn.parts)} groups, which are not closed by themselves; name blocks by 'o' lines"
+        return replace(found, notes=[*found.notes, Note(LEFT_OUT, f"not read: {said}")])
+
+
+def _obj(path: Path) -> dae.Drawn:
+    """Read the objects of an .obj file, or, where it has none, its groups, in the order of the file."""
+    data = path.read_bytes()
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    text = re.sub(r"\\\r?\n", " ", text)
+    word = "o" if re.search(r"^[ \t]*o[ \t]", text, re.MULTILINE) else "g"
+    name, points, objects = path.name, list[list[float]](), dict[str, list[list[int]]]()
+    for line in text.split("\n"):
+        first, *rest = line.split() or [""]
+        try:
+            if first == word:
+                # SketchUp puts a number before the names of a group and of those around it, and "Model" behind.
+                name = re.sub(r"^Mesh\d+ (.+) Model$", r"\1", " ".join(rest)) or path.name
+            elif first == "v":
+                x, y, z = rest[:3]
+                points.append([float(x), float(y), float(z)])
+            elif first == "f":
+                numbers = [int(corner.split("/")[0]) for corner in rest]
+                # Negative numbers count back from the last point before the line.
+                objects.setdefault(name, []).append([k - 1 if k > 0 else len(points) + k for k in numbers])
+        except ValueError:
+            raise ValueError(f"'{path}' cannot be read as .obj ('{line.strip()[:60]}'); export it again") from None
+    every, parts = np.array(points).reshape(-1, 3), []
+    for name, faces in objects.items():
+        outside = next((k for face in faces for k in face if not 0 <= k < len(points)), None)
+        if outside is not None:
+            raise ValueError(
+                f"'{path}': a face of '{name}' uses point {outside + 1}, but there are {len(points)}; export it again"
+            )
+        own, triangles = np.unique(fans(faces), return_inverse=True)
+        if len(own):
+            parts.append((name, every[own], triangles.reshape(-1, 3)))
+    rows = _own_rows(path)
+    rows = rows if _distinct(rows) == [name for name, _, _ in parts] else []
+    return dae.Drawn(parts, "", "z", "", rows, grouped=word == "g")
+
+
+def _distinct(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Names on one line each, with a number where one is empty or there already."""
+    found = dict[str, None]()
+    for number, row in enumerate(rows):
+        name = " ".join(str(row.get("name", "")).split())
+        while not name or name in found:
+            name = f"{name} ({number})".strip()
+        found[name] = None
+    return list(found)
+
+
+def _scene(path: Path) -> dae.Drawn:
     """Read the meshes of a file by trimesh."""
     import trimesh
 
     # What it would print of a missing texture is no fault of a stone.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL + 1)
+    suffix = path.suffix.lower()
     try:
-        options = {"split_objects": True, "group_material": False} if suffix == ".obj" else {}
-        scene = trimesh.load_scene(str(path), process=False, **options)
+        scene = trimesh.load_scene(str(path), process=False)
         parts = [
             (str(name), np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
             for name, mesh in _placed(scene, path)
             if len(mesh.faces)
         ]
         parts = _numbered(parts, scene) if suffix == ".ply" else parts
-        if suffix == ".obj":
-            # trimesh returns objects last first; the file's order is kept instead.
-            named = {name: k for k, name in enumerate(_object_names(path))}
-            parts.sort(key=lambda part: named.get(part[0], len(named)))
     except Exception as error:  # noqa: BLE001
         # trimesh passes on the errors of whatever parser it uses.
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
@@ -209,12 +272,6 @@ def _flat(
     return with_rows(layout, rows) if len(rows) == layout.n_blocks else layout
 
 
-def _object_names(path: Path) -> list[str]:
-    """Names of the objects of an .obj file, in the order of the file."""
-    with path.open("rb") as stream:
-        return [line[2:].decode("utf-8", "replace").strip() for line in stream if line.startswith(b"o ")]
-
-
 def _own_rows(path: Path) -> list[dict[str, Any]]:
     """Read the rows of the block table that our own writer puts into comments, one line of JSON per block."""
     if path.suffix.lower() not in (".obj", ".ply"):
@@ -254,9 +311,8 @@ def _glb(solids: list[Solid], rows: list[dict[str, Any]]) -> bytes:
     import trimesh
 
     scene = trimesh.Scene()
-    for number, ((points, faces), row) in enumerate(zip(solids, rows, strict=True)):
+    for (points, faces), row, name in zip(solids, rows, _distinct(rows), strict=True):
         mesh = trimesh.Trimesh(points, triangles_of(points, faces), process=False, metadata={"blockvis": row})
-        name = row["name"] if row["name"] not in scene.geometry else f"{row['name']} ({number})"
         scene.add_geometry(mesh, node_name=name, geom_name=name)
 
     def signed(tree: dict[str, Any]) -> None:
@@ -282,8 +338,8 @@ def _stl_lines(solids: list[Solid], rows: list[dict[str, Any]], _: str) -> list[
 
 def _obj_lines(solids: list[Solid], rows: list[dict[str, Any]], what: str) -> list[str]:
     lines, start = [f"# {what}"], 1
-    for (points, faces), row in zip(solids, rows, strict=True):
-        lines += [f"# blockvis {json.dumps(row)}", f"o {row['name']}"]
+    for (points, faces), row, name in zip(solids, rows, _distinct(rows), strict=True):
+        lines += [f"# blockvis {json.dumps(row)}", f"o {name}"]
         lines += ["v " + " ".join(repr(float(x)) for x in p) for p in points]
         lines += ["f " + " ".join(str(int(k) + start) for k in face) for face in _whole_faces(points, faces)]
         start += len(points)

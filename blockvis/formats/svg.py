@@ -98,11 +98,11 @@ def read(path: Path, reading: Reading) -> Layout:
     if reading.view not in (None, "xy"):
         raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
     root = _root(path)
-    stated = root.get("data-blockvis-unit") or _unit(root)
+    stated, doubts = (root.get("data-blockvis-unit", ""), []) if root.get("data-blockvis-unit") else _unit(root)
     tolerance = None
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
-    found = _Outlines(notes=[*_styled(root), *_pattern_fills(root)])
+    found = _Outlines(notes=[*doubts, *_styled(root), *_pattern_fills(root)])
     if stated and stated not in UNITS and reading.unit is None:
         found.notes.append(f"1 unit of the drawing is {stated}, by its width and its viewBox")
     _walk(root, _Context(np.eye(3), (), tolerance, path), found)
@@ -187,18 +187,54 @@ def _wanted_lines(found: _Outlines, reading: Reading) -> list[Line]:
     return wanted
 
 
-def _unit(root: ElementTree.Element) -> str:
-    """Find the unit of length that one user unit is; "" if the file does not state it."""
-    width, box = root.get("width", ""), root.get("viewBox", "").replace(",", " ").split()
-    match = re.fullmatch(rf"\s*({_NUMBER})\s*([a-z]+)\s*", width)
-    if not match or match[2] not in UNITS or match[2] == "px":
-        return ""
-    if len(box) != 4:
-        return "px"
-    number = float(match[1]) / max(float(box[2]), 1e-300)
-    scale = number * UNITS[match[2]]
+def _unit(root: ElementTree.Element) -> tuple[str, list[str]]:
+    """Find the unit of length that one user unit is; "" if the file does not state it, with a note if it states two."""
+    sides = (re.fullmatch(rf"\s*({_NUMBER})\s*([a-z]+)\s*", root.get(side, "")) for side in ("width", "height"))
+    width, height = (side if side and side[2] in UNITS and side[2] != "px" else None for side in sides)
+    if width is None:
+        return "", []
+    box = _view_box(root)
+    if box is None:
+        return "px", []
+    number = float(width[1]) / max(box[2], 1e-300)
+    upright = float(height[1]) * UNITS[height[2]] / UNITS[width[2]] / max(box[3], 1e-300) if height else number
+    if not math.isclose(number, upright, rel_tol=1e-3):
+        ratio = root.get("preserveAspectRatio", "")
+        if "none" in ratio or "slice" in ratio:
+            remedy = "give a page of the shape of the viewBox, or the unit"
+            return "", [
+                f'the page has another shape than the viewBox, and preserveAspectRatio="{ratio}": no scale; {remedy}'
+            ]
+        # The drawing is shown as large as fits into the page.
+        number = min(number, upright)
+    scale = number * UNITS[width[2]]
     named = (unit for unit, metres in UNITS.items() if math.isclose(scale, metres, rel_tol=1e-3))
-    return next(named, f"{number:.9g} {match[2]}" if 0.0 < number < math.inf else "")
+    return next(named, f"{number:.9g} {width[2]}" if 0.0 < number < math.inf else ""), []
+
+
+def _view_box(element: ElementTree.Element) -> list[float] | None:
+    """Return the four numbers of the viewBox; None where there are not four."""
+    numbers = [float(word) for word in element.get("viewBox", "").replace(",", " ").split()]
+    return numbers if len(numbers) == 4 else None
+
+
+def _viewport(element: ElementTree.Element) -> np.ndarray:
+    """(3, 3) array: where an inner <svg> shows what it holds, its viewBox in its rectangle; SVG 1.1, 7.8."""
+    corner, box = [_length(element, "x"), _length(element, "y")], _view_box(element)
+    matrix = np.eye(3)
+    matrix[:2, 2] = corner
+    if box is not None:
+        start, span = np.array(box[:2]), np.array(box[2:])
+        size = np.array([_length(element, "width"), _length(element, "height")])
+        if not (size > 0.0).all() or not (span > 0.0).all():
+            raise ValueError("has no width, height or viewBox above 0; give them")
+        scale, ratio = size / span, element.get("preserveAspectRatio", "xMidYMid")
+        if "none" not in ratio:
+            scale = np.full(2, scale.max() if "slice" in ratio else scale.min())
+        free = [0.0 if f"{axis}Min" in ratio else 1.0 if f"{axis}Max" in ratio else 0.5 for axis in "xY"]
+        matrix[:2, :2] = np.diag(scale)
+        matrix[:2, 2] += free * (size - scale * span) - scale * start
+    return matrix
 
 
 def _styled(root: ElementTree.Element) -> list[str]:
@@ -272,7 +308,14 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> No
     if tag == "use":
         found.notes.append(Note(LEFT_OUT, "a <use> (clone) was skipped; unlink clones to have them read"))
         return
-    where = replace(where, matrix=where.matrix @ _matrix(_transform(element), where.path), depth=where.depth + 1)
+    matrix = where.matrix @ _matrix(_transform(element), where.path)
+    if tag == "svg" and where.depth:
+        try:
+            matrix = matrix @ _viewport(element)
+        except ValueError as error:
+            found.notes.append(Note(LEFT_OUT, f"an inner {_called(element)} was skipped: it {error}"))
+            return
+    where = replace(where, matrix=matrix, depth=where.depth + 1)
     fill, stroke = _style(element, "fill") or where.fill, _style(element, "stroke") or where.stroke
     where = replace(where, fill=fill, stroke=stroke, visibility=_style(element, "visibility") or where.visibility)
     if tag == "g":

@@ -48,8 +48,10 @@ CHANGES = (
     "block delete",
     "block densify",
     "block excavate",
-    "block generate",
 )
+
+#: Commands that make blocks from what is not in the file.
+IMPORTS = ("block import", "block generate")
 
 #: Words that say something of a block by the number after them.
 ABOUT = ("region", "reg", "r", "mat", "material", "con", "cons", "constitutive", "join", "joint", "id")
@@ -180,6 +182,11 @@ def _follow(line: int, words: list[str], model: _Model) -> None:
     elif two == "block property" and small[2:3] == ["density"] and len(words) > 3:
         for block in _in_range(words[4:], model) if len(words) > 4 else model.blocks:
             block.density = _number(words[3])
+    elif two in IMPORTS:
+        raise ValueError(
+            f"'{model.path}': line {line} makes blocks ('{' '.join(words)[:60]}'), which only 3DEC does; write them by "
+            "poly prism or block create, or take the line out"
+        )
     elif model.blocks and (small[0] in CHANGES or two in CHANGES):
         raise ValueError(
             f"'{model.path}': line {line} changes the blocks ('{' '.join(words)[:60]}'), which only 3DEC does; write "
@@ -273,7 +280,7 @@ def _in_range(words: list[str], model: _Model) -> list[_Block]:
     regions = {name.lower(): region for region, name in model.names.items()}
     chosen, k = model.blocks if words else [], 0
     while k < len(words):
-        key = small[k].removeprefix("pos-")
+        key = small[k].removeprefix("position-").removeprefix("pos-")
         after = words[k + 1 : k + 3]
         if key in ("region", "group") and after:
             chosen, k = [block for block in chosen if block.words.get(key) == after[0]], k + 2

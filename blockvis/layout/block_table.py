@@ -49,16 +49,10 @@ def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
     def words(key: str, default: Sequence[str]) -> tuple[str, ...]:
         return tuple(str(row.get(key, value)) for row, value in zip(entries, default, strict=True))
 
-    def number(name: str, key: str, value: Any) -> float:
-        try:
-            return float(value)
-        except (TypeError, ValueError, OverflowError):
-            raise ValueError(f"block '{name}' has {key} {repr(value)[:60]}; give a number") from None
-
     def numbers(key: str) -> np.ndarray | None:
         if not any(key in row for row in entries):
             return None
-        return np.array([number(name, key, row.get(key, math.nan)) for name, row in zip(names, entries, strict=True)])
+        return np.array([_number(row.get(key, math.nan), key, name) for name, row in zip(names, entries, strict=True)])
 
     names, roles = words("name", layout.names), words("role", [""] * layout.n_blocks)
     for name, role in zip(names, roles, strict=True):
@@ -73,6 +67,13 @@ def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
         materials=words("material", [""] * layout.n_blocks),
         density=numbers("density"),
     )
+
+
+def _number(value: Any, key: str, name: str) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"block '{name}' has {key} {value!r}; give a number") from None
 
 
 def layers_of(layout: Layout, default: str) -> list[str]:

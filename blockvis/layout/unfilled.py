@@ -54,7 +54,8 @@ def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
         return {}
     import shapely
 
-    blocks = [shapely.Polygon(ring) for ring in layout.outlines]
+    # Of two points a hatch has an outline, too.
+    blocks = [shapely.Polygon(ring if len(ring) > 2 else None) for ring in layout.outlines]
     blocks = [shape if shape.is_valid else shapely.Polygon() for shape in blocks]
     found: dict[str, str] = {}
     counted, walls = np.zeros(layout.n_blocks, bool), list[Any]()

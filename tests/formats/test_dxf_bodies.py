@@ -43,7 +43,11 @@ def render_solid(mesh, space, **attributes):
     acis.export_dxf(space.add_3dsolid(dxfattribs=attributes), [acis.body_from_mesh(mesh)])
 
 
-KINDS = pytest.mark.parametrize("render", [render_polyface, render_mesh, render_solid])
+def render_faces(mesh, space, **attributes):
+    mesh.render_3dfaces(space, dxfattribs=attributes)
+
+
+KINDS = pytest.mark.parametrize("render", [render_polyface, render_mesh, render_solid, render_faces])
 
 
 @KINDS
@@ -103,6 +107,20 @@ def test_outlines_go_before_bodies_beside_them_unless_one_layer_is_asked_for(tmp
     layout = blockvis.read_layout(path, only="stone")
     assert (layout.dimension, layout.n_blocks) == (3, 1)
     assert "skipped: 1 outlines and lines beside bodies in space" in layout.notes
+
+
+def test_faces_that_enclose_nothing_are_outlines(tmp_path):
+    def draw(space):
+        for k in range(3):
+            space.add_3dface([(k, 0, 0.1 * k), (k + 1, 0, 0.1 * k), (k + 1, 1, 0.1 * k), (k, 1, 0.1 * k)])
+
+    path = drawing(tmp_path / "relief.dxf", draw)
+    layout = blockvis.read_layout(path)
+    assert (layout.dimension, layout.n_blocks) == (2, 3)
+    assert any("3DFACEs of a layer are read as bodies in space where they close one" in note for note in layout.notes)
+    drawing(path, lambda space: [draw(space), render_faces(voussoir(1.0), space, layer="stone")])
+    layout = blockvis.read_layout(path, only="stone")
+    assert (layout.dimension, layout.n_blocks) == (3, 1)
 
 
 def test_solids_with_curved_faces_are_refused_with_what_to_export(tmp_path):

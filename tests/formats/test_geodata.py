@@ -59,6 +59,19 @@ def refusal(path, **options):
     return str(caught.value)
 
 
+def test_words_for_roles(tmp_path):
+    words = ("support", " Moving ", "wall", "")
+    path = geojson(tmp_path / "a.geojson", [polygon(one, role=role) for one, role in zip(SQUARES, words, strict=True)])
+    layout = blockvis.read_layout(path)
+    assert layout.roles == ("fixed", "moving", "", "")
+    assert any("roles were left out ('wall'): roles are free, fixed, moving" in note for note in layout.notes)
+
+
+def test_a_thickness_that_is_no_number_is_refused_by_its_block(tmp_path):
+    path = geojson(tmp_path / "a.geojson", [polygon(SQUARES[0], thickness="0.3"), polygon(SQUARES[1], thickness="0,4")])
+    assert "block 'block 1' has thickness '0,4'; give a number" in refusal(path)
+
+
 def test_properties_give_names_groups_and_roles(tmp_path):
     features = [
         polygon(SQUARES[0], kind="ground", Name="foot", role="fixed"),

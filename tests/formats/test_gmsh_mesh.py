@@ -27,7 +27,7 @@ def quad(gmsh, x, y, w, h):
 @pytest.mark.cad
 @pytest.mark.parametrize("binary", [0, 1])
 @pytest.mark.parametrize("version", [2.2, 4.1])
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [1, 2, 4])
 def test_versions(gmsh, tmp_path, version, binary, order):
     a, b, c = quad(gmsh, 0, 0, 2, 1), quad(gmsh, 2, 0, 2, 1), gmsh.model.occ.addDisk(6, 0, 0, 1, 1)
     gmsh.model.occ.synchronize()
@@ -49,6 +49,25 @@ def test_versions(gmsh, tmp_path, version, binary, order):
     assert assembly.areas[:2] == pytest.approx([2, 2])
     assert len(assembly.outline(0)) == 4
     assert assembly.areas[2] == pytest.approx(np.pi, rel=0.05)
+
+
+@pytest.mark.cad
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_partitions_are_no_blocks(gmsh, tmp_path, version, binary):
+    parts, _ = gmsh.model.occ.fragment([(2, quad(gmsh, 0, 0, 2, 1))], [(2, quad(gmsh, 2, 0, 1, 1))])
+    gmsh.model.occ.synchronize()
+    for (_, tag), name in zip(parts, ("stone", "fixed"), strict=True):
+        gmsh.model.addPhysicalGroup(2, [tag], name=name)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 0.4)
+    gmsh.model.mesh.generate(2)
+    gmsh.model.mesh.partition(3)
+    gmsh.option.setNumber("Mesh.MshFileVersion", version)
+    gmsh.option.setNumber("Mesh.Binary", binary)
+    gmsh.write(str(tmp_path / "a.msh"))
+    drawing = read_layout(tmp_path / "a.msh")
+    assert drawing.names == drawing.groups == ("stone", "fixed")
+    assert read(tmp_path / "a.msh").areas == pytest.approx([2, 1])
 
 
 @pytest.mark.cad

@@ -29,6 +29,18 @@ def test_cell_sets_name_the_blocks(tmp_path):
     assert sorted(len(ring) for ring in drawing.outlines) == [4, 4]
 
 
+def test_groups_of_flac3d_name_the_blocks_and_their_roles(tmp_path):
+    points = [[x, y, z] for z in range(3) for y in range(2) for x in range(2)]
+    cells = [("hexahedron", [[0, 1, 3, 2, 4, 5, 7, 6]]), ("wedge", [[4, 5, 6, 8, 9, 10], [5, 7, 6, 9, 11, 10]])]
+    none = np.zeros(0, int)
+    sets = {"fixed base": [np.array([0]), none], "stone: top": [none, np.array([0, 1])]}
+    meshio.write(tmp_path / "a.f3grid", meshio.Mesh(points, cells, cell_sets=sets))
+    drawing = read_layout(tmp_path / "a.f3grid", dimension=3)
+    assert drawing.names == ("fixed base", "stone: top")
+    assert drawing.roles == ("fixed", "")
+    np.testing.assert_allclose(drawing.volumes, 1.0)
+
+
 def test_lines_are_no_blocks(tmp_path):
     meshio.write(tmp_path / "a.inp", meshio.Mesh(POINTS, [("line", [[0, 1]])]))
     with pytest.raises(ValueError, match="has no surface cells"):
@@ -42,5 +54,104 @@ def test_a_reader_that_leaves_the_program_is_held(tmp_path, monkeypatch):
 
     monkeypatch.setattr(meshio, "read", leave)
     (tmp_path / "a.inp").write_text("x", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"cannot be read by meshio as \.inp: 1; export it again"):
+    with pytest.raises(ValueError, match=r"cannot be read by meshio as \.inp: unknown element; export it again"):
         read(tmp_path / "a.inp")
+
+
+def strip(tail, *, nodes_in="*NODE", cells_in="*ELEMENT, TYPE=S3"):
+    """Four squares side by side, of the triangles 1 to 8, in an .inp file; its nodes are in two lists."""
+    corners = [f"{2 * i + j + 1}, {i}., {j}., 0." for i in range(5) for j in range(2)]
+    triangles = [three for a in (1, 3, 5, 7) for three in ((a, a + 2, a + 3), (a, a + 3, a + 1))]
+    cells = [f"{k + 1}, {a}, {b}, {c}" for k, (a, b, c) in enumerate(triangles)]
+    lines = ["*HEADING", "*NODE", *corners[:5], "** more", nodes_in, *corners[5:]]
+    return "\n".join([*lines, cells_in, *cells[:3], "** more", *cells[3:], tail, ""])
+
+
+STONES = """*ELSET, ELSET=fixed
+1, 2
+*ELSET, ELSET=a, GENERATE
+3, 4, 1
+*ELSET, ELSET=b
+5,
+6
+*ELSET, ELSET=c, internal, generate
+7, 8"""
+
+
+@pytest.mark.parametrize(
+    ("tail", "groups", "note"),
+    [
+        (STONES, ("", "", "", ""), "4 blocks"),
+        (f"{STONES}\n*ELSET, ELSET=all\nfixed, a\nb, c", ("", "", "", ""), "4 blocks"),
+        (f"{STONES}\n*ELSET, ELSET=section\na, b", ("", "section", "section", ""), "4 blocks"),
+        (f"{STONES}\n*ELSET, ELSET=moving\nc", ("", "", "", "moving"), "4 blocks"),
+        (f"{STONES}\n*ELSET, ELSET=_loaded\n2, 4", ("", "", "", ""), "the cell sets '_loaded' were not used: they cut"),
+    ],
+)
+def test_cell_sets_may_hold_each_other(tmp_path, tail, groups, note):
+    (tmp_path / "a.inp").write_text(strip(tail), encoding="utf-8")
+    drawing = read_layout(tmp_path / "a.inp")
+    assert drawing.names == ("fixed", "a", "b", "c")
+    assert drawing.groups == groups
+    assert drawing.sizes == pytest.approx([1.0] * 4)
+    assert any(note in said for said in drawing.notes)
+
+
+def test_cell_sets_that_hold_no_cell_once_are_told(tmp_path):
+    (tmp_path / "a.inp").write_text(strip("*ELSET, ELSET=fixed\n1, 2"), encoding="utf-8")
+    drawing = read_layout(tmp_path / "a.inp")
+    assert drawing.n_blocks == 1
+    assert any(
+        "the cell sets 'fixed' were not used: no choice of them holds every cell once" in n for n in drawing.notes
+    )
+
+
+def test_cell_sets_of_gmsh_are_its_surfaces_and_groups(tmp_path):
+    text = strip(
+        "*ELEMENT, TYPE=S4, ELSET=Surface2\n9, 9, 11, 12, 10\n*NODE\n11, 5., 0., 0.\n12, 5., 1., 0.\n"
+        "*ELEMENT, TYPE=S3, ELSET=Surface2\n10, 11, 13, 12\n*NODE\n13, 6., 0., 0.\n*ELSET, ELSET=moving\n9, 10",
+        cells_in="*ELEMENT, TYPE=S3, ELSET=Surface1",
+    )
+    (tmp_path / "a.inp").write_text(text, encoding="utf-8")
+    drawing = read_layout(tmp_path / "a.inp")
+    assert drawing.names == ("Surface1", "moving")
+    assert read(tmp_path / "a.inp").areas == pytest.approx([4.0, 1.5])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        strip("", nodes_in="*End Part\n*Part, name=b\n*Node\n1, 7., 7., 7."),
+        strip("*Assembly\n*Instance, name=a-1, part=a\n*End Instance\n*Instance, name=a-2, part=a"),
+        strip("*Assembly\n*Instance, name=a-1, part=a\n 0., 0., 0.5\n*End Instance"),
+    ],
+)
+def test_parts_and_instances_of_abaqus_are_refused(tmp_path, text):
+    (tmp_path / "a.inp").write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=r"a\.inp' is written in parts .*'Do not use parts and assemblies in input"):
+        read(tmp_path / "a.inp")
+
+
+def test_cells_that_are_there_twice_are_refused(tmp_path):
+    points = [[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    meshio.write(tmp_path / "a.inp", meshio.Mesh(points, [("hexahedron", [list(range(8))] * 2)]))
+    with pytest.raises(ValueError, match=r"a\.inp': body 'block' has no surface, as of cells that are there twice"):
+        read(tmp_path / "a.inp")
+
+
+@pytest.mark.parametrize(
+    ("suffix", "key"), [(".bdf", "nastran:ref"), (".vol", "netgen:index"), (".avs", "avsucd:material")]
+)
+def test_references_number_the_blocks(tmp_path, suffix, key):
+    points = np.array([[x, y, z] for x in range(3) for y, z in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float)
+    cells = [list(range(8)), list(range(4, 12))]
+    meshio.write(tmp_path / f"a{suffix}", meshio.Mesh(points, [("hexahedron", cells)], cell_data={key: [[1, 2]]}))
+    assert read_layout(tmp_path / f"a{suffix}").names == ("block 1", "block 2")
+
+
+def test_nastran_without_its_first_line(tmp_path):
+    meshio.write(tmp_path / "a.bdf", meshio.Mesh(POINTS[:6], [("quad", [[0, 1, 2, 3], [1, 4, 5, 2]])]))
+    text = (tmp_path / "a.bdf").read_text(encoding="utf-8")
+    # As gmsh writes it.
+    (tmp_path / "b.bdf").write_text(text.replace("BEGIN BULK\n", ""), encoding="utf-8")
+    assert read(tmp_path / "b.bdf").areas == pytest.approx([1, 1], rel=1e-6)

@@ -93,6 +93,22 @@ def test_what_is_no_prism_is_refused(tmp_path):
         read(tmp_path / "a.stl", dimension=2)
 
 
+def test_what_is_told_to_be_no_prism_is_none_along_any_axis(tmp_path):
+    scene = trimesh.Scene()
+    ell = trimesh.creation.extrude_triangulation([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]], 1.0)
+    for k, (name, turn) in enumerate({"along z": (0, 0, 1), "along x": (0, 1, 0)}.items()):
+        tilted = ell.copy().apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, turn))
+        scene.add_geometry(tilted.apply_translation((3 * k, 0, 0)), geom_name=name)
+    scene.export(tmp_path / "a.obj")
+    told = "body 'along x' is no extrusion along z; .*'along z' is no extrusion along y; .*'along z' is .* along x;"
+    with pytest.raises(ValueError, match=rf"is not prismatic: {told}"):
+        read(tmp_path / "a.obj", dimension=2)
+    scene.add_geometry(trimesh.creation.icosphere(1).apply_translation((0, 9, 0)), geom_name="ball")
+    scene.export(tmp_path / "a.obj")
+    with pytest.raises(ValueError, match=r"is not prismatic: body 'ball' is no extrusion along x, y or z"):
+        read(tmp_path / "a.obj", dimension=2)
+
+
 def test_open_bodies_are_refused(tmp_path):
     body = bricks(1)[0]
     trimesh.Trimesh(body.vertices, body.faces[:-1]).export(tmp_path / "a.ply")
@@ -109,6 +125,55 @@ def test_a_flat_mesh_is_a_layout(tmp_path):
     assembly = read(tmp_path / "a.obj")
     assert assembly.names == ("left", "right")
     assert assembly.areas.tolist() == [1, 1]
+
+
+BOX = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
+
+
+def wavefront(path, *stones, relative=False, faces=BOX, per_face=()):
+    """Write boxes, each the line that names it and its width, one above the other."""
+    lines = []
+    for k, (line, width) in enumerate(stones):
+        lines += [line, *(f"v {x} {y} {k + z}" for z in (0, 1) for y in (0, 1) for x in (0, width))]
+        for number, face in enumerate(faces):
+            lines += [line for line in per_face[number : number + 1]]
+            lines.append("f " + " ".join(f"{n - 9 if relative else n + 8 * k}/1/1" for n in face))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_points_of_an_obj_file_may_be_counted_back_from_their_line(tmp_path):
+    stones = ("o fixed base", 3), ("o\tpier", 2), ("o top", 1)
+    for relative in (False, True):
+        found = read_layout(wavefront(tmp_path / "a.obj", *stones, relative=relative), dimension=3)
+        assert found.names == ("fixed base", "pier", "top")
+        assert [np.ptp(points, axis=0).tolist() for points, _ in found.solids] == [[3, 1, 1], [2, 1, 1], [1, 1, 1]]
+
+
+def test_groups_name_the_stones_of_an_obj_file_without_objects(tmp_path):
+    path = wavefront(tmp_path / "a.obj", ("g Mesh1 fixed_base1 Model", 3), ("g pier left", 2))
+    found = read_layout(path, dimension=3)
+    assert found.names == ("fixed_base1", "pier left")
+    assert found.roles == ("fixed", "")
+    wavefront(path, ("g stone", 3), per_face=[f"g face {k}" for k in range(len(BOX))])
+    found = read_layout(path, dimension=3)
+    assert found.names == ("a.obj",)
+    assert any("not read: the names of 6 groups, which are not closed by themselves" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("f 1 2 x", r"cannot be read as \.obj \('f 1 2 x'\); export it again"),
+        ("v 1,5 0", r"cannot be read as \.obj \('v 1,5 0'\); export it again"),
+        ("f 1 2 30", r"a face of 'a' uses point 30, but there are 8; export it again"),
+    ],
+)
+def test_lines_of_an_obj_file_that_cannot_be_read_are_named(tmp_path, line, says):
+    path = wavefront(tmp_path / "a.obj", ("o a", 1))
+    path.write_text(f"{path.read_text(encoding='utf-8')}{line}\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=says):
+        read_layout(path)
 
 
 def test_not_finite(tmp_path):

@@ -1,5 +1,7 @@
 """Blocks in space by round trip through every format that holds them: shapes, names, roles, materials, density."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from structures import layout_of
@@ -64,6 +66,26 @@ def test_everything_comes_back(vault, suffix, tmp_path):
         assert tuple(again.materials[j] for j in order) == vault.materials
     if "density" not in silent:
         assert np.allclose(again.density[order], vault.density)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".glb"])
+def test_names_that_repeat_or_are_empty_lose_nothing(suffix, tmp_path):
+    wall = layout_of(generators.build("two-leaf wall"))
+    names = ("a", "a", "", "  b\t c ", "a (1)", "")
+    layout = replace(
+        wall.chosen(np.arange(len(names))),
+        names=names,
+        groups=tuple(f"group {k}" for k in range(len(names))),
+        materials=tuple(f"stone {k}" for k in range(len(names))),
+        density=2000.0 + np.arange(len(names)),
+    )
+    write_layout(layout, tmp_path / f"a{suffix}")
+    again = read_layout(tmp_path / f"a{suffix}", dimension=3)
+    for key in ("names", "groups", "materials"):
+        assert getattr(again, key) == getattr(layout, key)
+    np.testing.assert_array_equal(again.density, layout.density)
+    for (points, _), (drawn, _) in zip(again.solids, layout.solids, strict=True):
+        np.testing.assert_allclose(points.mean(axis=0), drawn.mean(axis=0), atol=1e-6)
 
 
 @pytest.mark.parametrize("suffix", [".stl", ".compas.json"])

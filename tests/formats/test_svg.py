@@ -154,6 +154,36 @@ def test_a_scale_of_width_and_view_box_that_is_no_unit_is_kept(tmp_path):
         read_layout(sheet, unit="0 mm")
 
 
+@pytest.mark.parametrize(("ratio", "unit"), [("", "20 mm"), ("xMinYMin meet", "20 mm"), ("none", "")])
+def test_a_drawing_is_as_large_as_fits_into_a_page_of_another_shape(tmp_path, ratio, unit):
+    head = f'width="4000mm" height="2m" viewBox="0 0 100 100" preserveAspectRatio="{ratio}"'
+    layout = read_layout(saved(tmp_path, '<rect width="50" height="20"/>', head))
+    assert layout.unit == (unit or "m")
+    assert any("another shape than the viewBox" in note for note in layout.notes) == (not unit)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "low", "high"),
+    [
+        ("", [1.2, -1.1], [2.2, -0.7]),
+        ('preserveAspectRatio="xMidYMax"', [1.2, -1.6], [2.2, -1.2]),
+        ('preserveAspectRatio="none"', [1.2, -0.9], [2.2, -0.3]),
+    ],
+)
+def test_an_inner_svg_is_placed_and_scaled_by_its_view_box(tmp_path, ratio, low, high):
+    inner = f'<svg x="1" width="2" height="3" viewBox="0 0 100 100" {ratio}>'
+    inner += '<rect x="10" y="10" width="50" height="20"/></svg>'
+    layout = read_layout(saved(tmp_path, inner, 'width="4m" height="4m" viewBox="0 0 4 4"'))
+    np.testing.assert_allclose([layout.outlines[0].min(axis=0), layout.outlines[0].max(axis=0)], [low, high])
+
+
+def test_an_inner_svg_without_size_is_missed_in_a_note(tmp_path):
+    inner = '<svg id="a" width="50%" viewBox="0 0 9 9"><rect width="9" height="9"/></svg><rect width="9" height="9"/>'
+    layout = read_layout(saved(tmp_path, inner))
+    assert layout.n_blocks == 1
+    assert any("an inner <svg> 'a' was skipped: it has width='50%'; give a number" in note for note in layout.notes)
+
+
 def test_lines_of_patterns_that_fill_shapes_are_missed_in_a_note(tmp_path):
     path = tmp_path / "filled.svg"
     path.write_text(

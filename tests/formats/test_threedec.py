@@ -107,7 +107,7 @@ def test_gravity_says_which_way_is_up_and_groups_and_places_what_is_fixed(tmp_pa
     block create brick 0.2 0.7 1 2 0.1 0.8
     block create prism face-1 0 2 0 1 2 0 0 2 1 face-2 0 3 0 1.1 3 0 0 3 1 group 'high'
     block fix range group 'low'
-    block fix range pos-y 1.9 3.1
+    block fix range position-y 1.9 3.1 pos-x -1 2
     block apply vel-x 1 range group 'high'
     model gravity 0 -9.81 0
     """
@@ -131,6 +131,8 @@ def test_gravity_says_which_way_is_up_and_groups_and_places_what_is_fixed(tmp_pa
             "line 4 makes blocks by FISH",
         ),
         ("poly face 0,0,0 1,0,0 0,1,0 face 0,0,0 1,0,0", "line 1 takes four faces or more of three corners"),
+        ("block import filename 'a.stl'\npoly brick 0 1 0 1 0 1", "line 1 makes blocks ('block import filename"),
+        ("block generate from-vrml 'a.wrl'\npoly brick 0 1 0 1 0 1", "line 1 makes blocks ('block generate from"),
         ("block create tunnel radius 1", "line 1 makes a block by 'tunnel', which is not read"),
         ("poly brick 0 1 0 1 0 nan", "line 1 has a corner that is not finite"),
         ("hist xdis 1 2 3", "makes no block by 3DEC's commands"),

@@ -141,6 +141,7 @@ def test_missing_and_empty_files(tmp_path):
         (".xyz", r"'.xyz' is not read; give drawings .dxf .svg, .*; docs/formats.md has all"),
         ("", r"a file without suffix is not read; give drawings"),
         (".DWG", r"'.dwg' is not read: save it as .dxf .*ODA File Converter"),
+        (".unv", r"'.unv' is not read: in gmsh: .*-o a\.msh"),
         (".3dm", r"in Rhino: Export Selected, .*\.obj"),
         (".ifc", r"Bonsai"),
         (".pdf", r"Inkscape"),

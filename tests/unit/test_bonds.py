@@ -349,6 +349,17 @@ def test_info_and_run_say_that_the_wall_wants_a_bond(facade, capsys):
 
 
 @pytest.mark.slow
+def test_a_hatch_of_two_points_is_no_wall(tmp_path):
+    document = ezdxf.new()
+    space = document.modelspace()
+    for x in range(2):
+        space.add_lwpolyline([(x, 0), (x + 1, 0), (x + 1, 1), (x, 1)], close=True)
+    space.add_hatch().paths.add_polyline_path([(3, 0), (4, 0)], is_closed=True)
+    document.saveas(tmp_path / "a.dxf")
+    assert main(["new", str(tmp_path / "a.dxf"), "-o", str(tmp_path / "a.toml")]) == 0
+
+
+@pytest.mark.slow
 def test_new_writes_the_bond_into_the_case(tmp_path):
     window = arched(0.4, 0.2, 0.6, 0.2, 0.3, n=8)
     drawing = drawn(tmp_path / "small.dxf", ("A-WALL", shapely.box(0, 0, 1.5, 0.9)), ("A-WIN", window))
