@@ -878,8 +878,11 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _convert(options: argparse.Namespace) -> int:
-    from .formats.read import read_layout, save_layout, write_layout
+    from dataclasses import replace
+
+    from .formats.read import read_layout, write_layout
     from .layout.assemble import assemble, without_twins
+    from .layout.layout import layout_of
 
     target = _new_file(options.target, options.force)
     if (Path(options.source) / "assembly.npz").is_file():
@@ -889,11 +892,11 @@ def _convert(options: argparse.Namespace) -> int:
     layout, twins = without_twins(layout, {})
     for note in (*layout.notes, *([twins] if twins else [])):
         print(f"blockvis: note: {note}", file=sys.stderr)
-    joint = options.joint_thickness
-    if joint == "0":
-        write_layout(layout, target)
-    else:
-        save_layout(assemble(layout, joint_thickness=joint if joint == "auto" else _number(joint)), target)
+    joint = options.joint_thickness if options.joint_thickness == "auto" else _number(options.joint_thickness)
+    if joint:
+        # An assembly says of every block what the drawing may leave open: thickness, density and role.
+        layout = replace(layout, blocks=layout_of(assemble(layout, joint_thickness=joint)).blocks)
+    write_layout(layout, target)
     print(f"{counted(layout.n_blocks, 'block')} written to {target}")
     return 0
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -38,18 +38,16 @@ from blockvis.cases.key import (
 from blockvis.cases.profiles import PROFILE, PROFILES
 from blockvis.cases.removals import REMOVE
 from blockvis.cases.ties import TIES
-from blockvis.cases.toml_table import Table, is_number, shortened
+from blockvis.cases.toml_table import Table, shortened
 from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
 from blockvis.layout.joints.close import WAYS
-from blockvis.layout.sights import SIGHTS, Cut, Sight, read_cut, read_sight
+from blockvis.layout.sights import SIGHTS, read_cut, read_sight
 from blockvis.layout.units import UNITS
-from blockvis.layout.views import VIEWS
+from blockvis.layout.views import VIEWS, checked_dimension
 from blockvis.layout.window import checked_window
 from blockvis.results.folder import FOLDERS, VIDEO_SUFFIXES
 from solver import mechanics
-
-_Read = TypeVar("_Read")
 
 _FRICTION = solver.InterfaceLaw.friction_coefficient
 _CONTROLS = solver.Controls()
@@ -94,13 +92,6 @@ def _film(table: Table, key: Key) -> str | bool | None:
     return name
 
 
-def _dimension(table: Table, key: Key) -> int | str | None:
-    value: int | str | None = table.take(key.name)
-    if value is not None and (isinstance(value, bool) or value not in (2, 3, "auto")):
-        raise table.error(key.name, f'is {shortened(value)}; give 2, 3 or "auto"')
-    return value
-
-
 def _background(table: Table, key: Key) -> int | str | None:
     value: int | str | None = table.take(key.name)
     if value is not None and (isinstance(value, bool) or not isinstance(value, int | str)):
@@ -132,47 +123,23 @@ def _places(table: Table, key: Key) -> tuple[float, ...] | None:
     given = table.numbers(key.name)
     if given is None:
         return None
-    if len(given) != 3 or given[2] != int(given[2]) or given[2] < 2 or given[0] >= given[1]:
-        raise table.error(key.name, f"is {list(given)}; give [first x, last x, number of places], at least 2 places")
+    if len(given) != 3 or given[2] != int(given[2]) or not 2 <= given[2] <= MOST_STEPS or given[0] >= given[1]:
+        says = f"[first x, last x, number of places], from 2 to {MOST_STEPS} places"
+        raise table.error(key.name, f"is {list(given)}; give {says}")
     return tuple(np.linspace(given[0], given[1], int(given[2])).tolist())
 
 
-def _read_window(table: Table, key: Key) -> tuple[float, ...] | None:
-    corners = table.take(key.name)
-    if corners is None:
-        return None
-    if not isinstance(corners, list) or len(corners) != 4 or not all(map(is_number, corners)):
-        raise table.error(key.name, f"is {shortened(corners)}; give [x0, y0, x1, y1] in m")
-    try:
-        return checked_window(corners)
-    except ValueError as error:
-        raise table.error(key.name, str(error).removeprefix("window ")) from None
+def _read_by(read: Callable[[Any], Any], take: Callable[[Table, str], Any] = Table.take) -> Callable[[Table, Key], Any]:
+    """Make the reader of values that ``read`` checks."""
 
+    def checked(table: Table, key: Key) -> Any:
+        value = take(table, key.name)
+        try:
+            return None if value is None else read(value)
+        except ValueError as error:
+            raise table.error(key.name, str(error).removeprefix(f"{key.name} ")) from None
 
-def _support_names(table: Table, key: Key) -> tuple[str, ...] | None:
-    given = table.take(key.name)
-    if given is None:
-        return None
-    names = tuple([given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else [None])
-    if not all(isinstance(name, str) for name in names):
-        raise table.error(key.name, f"is {shortened(given)}; give names of supports in quotes")
-    return names
-
-
-def _sight(table: Table, key: Key) -> Sight | None:
-    return _read_by(read_sight, table, key)
-
-
-def _cut(table: Table, key: Key) -> Cut | None:
-    return _read_by(read_cut, table, key)
-
-
-def _read_by(read: Callable[[Any], _Read], table: Table, key: Key) -> _Read | None:
-    value = table.take(key.name)
-    try:
-        return None if value is None else read(value)
-    except ValueError as error:
-        raise table.error(key.name, str(error)) from None
+    return checked
 
 
 _LAYOUT = ValueKind(
@@ -192,7 +159,7 @@ _FILM = ValueKind(
     {"anyOf": [{"type": "string", "pattern": rf"^[^/\\]*({_endings})$|^[^/\\.]+/$"}, {"const": False}]},
     _film,
 )
-_DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]}, _dimension)
+_DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]}, _read_by(checked_dimension))
 _BACKGROUND = ValueKind("whole number or colour", {"anyOf": [{"type": "integer"}, {"type": "string"}]}, _background)
 _MOMENT = ValueKind("number, in space three", {"anyOf": [NUMBER.schema, TRIPLE.schema]}, _moment)
 _TWO_NAMES = ValueKind(
@@ -208,9 +175,10 @@ _LEVELS = replace(PAIR, read=lambda table, key: table.pair(key.name, words="[bot
 _KIND = replace(one_of(tuple(KINDS)), read=lambda table, key: table.text(key.name, among=tuple(KINDS)))
 _PUSHES = replace(PAIR, read=_direction_of_pressure)
 _WINDOW = ValueKind(
-    "four numbers", {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}, _read_window
+    "four numbers",
+    {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4},
+    _read_by(checked_window, Table.numbers),
 )
-_SUPPORT_NAMES = replace(TEXTS, read=_support_names)
 _SIGHT = ValueKind(
     "a word, or table: azimuth, elevation",
     {
@@ -227,7 +195,7 @@ _SIGHT = ValueKind(
             },
         ]
     },
-    _sight,
+    _read_by(read_sight),
 )
 _CUT = ValueKind(
     'text as "y = 1.2", or table: normal, point',
@@ -242,7 +210,7 @@ _CUT = ValueKind(
             },
         ]
     },
-    _cut,
+    _read_by(read_cut),
 )
 
 
@@ -444,7 +412,7 @@ SETTLEMENT = Section(
             "along x, points of a table, or one vector and rotation per support; s is the largest displacement of a "
             "support's centroid",
             {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),
-        Key("blocks", _SUPPORT_NAMES, "Names of the moving supports that take part; the others stand still",
+        Key("blocks", TEXTS, "Names of the moving supports that take part; the others stand still",
             ["ground right"], otherwise="all moving supports"),
     ),
     several=True,

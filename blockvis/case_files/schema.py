@@ -14,7 +14,7 @@ from blockvis.generators.catalogue import described
 DRAFT = "http://json-schema.org/draft-07/schema#"
 
 #: Types of the parameters of layouts as their signatures have them.
-_TYPES = {"int": "integer", "float": "number", "str": "string", "Sequence": "array"}
+_TYPES = {"int": "integer", "float": "number", "str": "string", "bool": "boolean", "Sequence": "array"}
 
 
 def case_schema() -> dict[str, Any]:

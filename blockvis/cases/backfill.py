@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 import solver
+from blockvis.layout.left_out import matches
 from blockvis.text import nearest
 
 from .extrados import SLIVER, extrados
@@ -33,45 +33,22 @@ BACKFILL = Section(
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class BackfillCase:
-    """A table [[backfill]].
-
-    Attributes
-    ----------
-    over : tuple of str
-        Names or materials of blocks, or patterns.
-    surface : float [m]
-    unit_weight : float [N/m³]
-    pressure_coefficient : float
-    where : str
-        File and table, for messages.
-    """
-
-    over: tuple[str, ...]
-    surface: float
-    unit_weight: float
-    pressure_coefficient: float = 0.0
-    where: str = ""
-
-
-def read_backfill(table: Table) -> BackfillCase:
-    """Read a table [[backfill]]."""
+def read_backfill(table: Table) -> dict[str, Any]:
+    """Read a table [[backfill]]: what :func:`lay_backfill` takes beside an assembly."""
     values = BACKFILL.read(table)
     if not values["over"]:
         raise table.error("over", 'is empty; name the blocks under the fill: over = ["voussoir *"]')
-    return BackfillCase(**values, where=table.where)
+    return values | {"where": f"{table.source}: [{table.where}]"}
 
 
-def backfills(entries: Sequence[BackfillCase], assembly: solver.Assembly, source: Path) -> tuple[solver.Backfill, ...]:
+def backfills(entries: Sequence[Mapping[str, Any]], assembly: solver.Assembly) -> tuple[solver.Backfill, ...]:
     """Make the fills of a case, over blocks that several of them name one on another.
 
     Parameters
     ----------
-    entries : sequence of BackfillCase
+    entries : sequence of mappings
+        As of :func:`read_backfill`.
     assembly : solver.Assembly
-    source : Path
-        The case file, for messages.
 
     Raises
     ------
@@ -79,23 +56,13 @@ def backfills(entries: Sequence[BackfillCase], assembly: solver.Assembly, source
         For a name that no free block has, a surface below the extrados of a block, blocks of which none sees it, and
         two fills over a block up to the same surface.
     """
-    laid = [
-        lay_backfill(
-            assembly,
-            entry.over,
-            entry.surface,
-            entry.unit_weight,
-            entry.pressure_coefficient,
-            where=f"{source}: [{entry.where}]",
-        )
-        for entry in entries
-    ]
+    laid = [lay_backfill(assembly, **entry) for entry in entries]
     for number, fill in enumerate(laid):
         for other in range(number):
             same = np.intersect1d(fill.block, laid[other].block)
             if len(same) and fill.surface == laid[other].surface:
                 raise ValueError(
-                    f"{source}: [{entries[other].where}] and [{entries[number].where}] both fill up to "
+                    f"{entries[other]['where']} and {entries[number]['where'].rpartition(': ')[2]} both fill up to "
                     f"{fill.surface:g} m over block '{assembly.names[same[0]]}'; leave the block out of one, or give "
                     "another surface"
                 )
@@ -180,7 +147,7 @@ def _chosen(over: Sequence[str], assembly: solver.Assembly, where: str) -> np.nd
     names, chosen = assembly.names, np.zeros(assembly.n_blocks, dtype=bool)
     for pattern in over:
         meant = [
-            fnmatchcase(name, pattern) or (material != "" and fnmatchcase(material, pattern))
+            matches(filter(None, (name, material)), [pattern])
             for name, material in zip(names, assembly.materials, strict=True)
         ]
         if not any(meant):

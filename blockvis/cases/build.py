@@ -308,7 +308,7 @@ def case_interfaces(case: Case) -> solver.Interfaces:
 def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
     """Sum self-weight and the loads of a case that do not move [N, N·m], and lay its fill over the blocks."""
     loads = loads_of(case.loads, assembly, case.source)
-    return replace(loads, fills=backfills(case.backfills, assembly, case.source))
+    return replace(loads, fills=backfills(case.backfills, assembly))
 
 
 def case_changes(case: Case, assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> tuple[solver.PhaseChange, ...]:

@@ -12,7 +12,6 @@ import solver
 from blockvis.formats.image_scale import ImageKeys
 from blockvis.layout.sights import Cut, Sight
 
-from .backfill import BackfillCase
 from .bonds import Bonding
 from .explain_settings import ExplainSettings
 from .imperfections import Imperfection
@@ -100,7 +99,7 @@ class Case:
     settlements: tuple[solver.Settlement, ...] = ()
     profiles: tuple[Profile | None, ...] = ()
     loads: tuple[LoadCase, ...] = ()
-    backfills: tuple[BackfillCase, ...] = ()
+    backfills: tuple[Mapping[str, Any], ...] = ()
     removals: tuple[Removal, ...] = ()
     ties: tuple[TieCase, ...] = ()
     analysis: str = "settlement"

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 import shapely
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
 import solver
+from blockvis.layout.linked import linked
 
 from .distributions import DISTRIBUTION_KEYS, FORMS, Distribution, distribution_of
 from .key import Key, Section, one_of, whole
@@ -206,9 +206,8 @@ def _places(vertices: np.ndarray, near: float) -> np.ndarray:
     """(n_vertices,) int array: number of the place of each corner; corners at one place share it."""
     from scipy.spatial import cKDTree
 
-    pairs = cKDTree(vertices).query_pairs(near, output_type="ndarray")
-    graph = sp.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(vertices),) * 2)
-    return connected_components(graph, directed=False)[1].astype(int)
+    one, other = cKDTree(vertices).query_pairs(near, output_type="ndarray").T
+    return linked(one, other, len(vertices))
 
 
 def _rails(assembly: solver.Assembly, positions: np.ndarray, place: np.ndarray, near: float) -> dict[int, int]:

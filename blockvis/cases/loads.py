@@ -5,12 +5,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
 
 import solver
+from blockvis.layout.left_out import matches
 from blockvis.text import force_text, nearest
 
 from .block_at import block_at, note_outside
@@ -200,7 +200,7 @@ def _loaded(load: LoadCase, chosen: np.ndarray, assembly: solver.Assembly, where
 
 
 def _chosen(load: LoadCase, assembly: solver.Assembly, where: str) -> np.ndarray:
-    named = [i for i, name in enumerate(assembly.names) if fnmatchcase(name, load.blocks)]
+    named = [i for i, name in enumerate(assembly.names) if matches([name], [load.blocks])]
     chosen = [i for i in named if assembly.free[i]]
     if not chosen and named:
         raise ValueError(f"{where} '{load.blocks}' matches supports only; loads act on free blocks: name one")

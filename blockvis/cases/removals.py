@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 
 import numpy as np
 
 import solver
+from blockvis.layout.left_out import matches
 from blockvis.text import nearest
 
 from .key import TEXTS, Key, Section, whole
@@ -83,7 +83,7 @@ def _matching(patterns: Sequence[str], names: Sequence[str], where: str, what: s
     """Names that match patterns, each at least one."""
     chosen = []
     for pattern in patterns:
-        found = [name for name in names if fnmatchcase(name, pattern)]
+        found = [name for name in names if matches([name], [pattern])]
         if not found:
             listed = f"the {what}s are {', '.join(names[:12])}" if names else f"the case has no {what}s"
             more = " ..." if len(names) > 12 else ""

@@ -20,82 +20,38 @@ class Format:
     ----------
     module : str
         In this room.
-    reads, writes, writes_space : bool
-        Whether it reads and writes them, also blocks in space.
+    writes, writes_space : bool
+        Whether it writes them, also blocks in space.
     alone : bool
         Whether a file holds all blocks: in a folder of one file per stone it is something else, such as a picture.
     """
 
     module: str
-    reads: bool = True
     writes: bool = False
     writes_space: bool = False
     alone: bool = False
 
 
-_CAD = Format("gmsh_cad")
-_PYVISTA = Format("pyvista_files")
-_SOLID = Format("solids", writes=True, writes_space=True)
-_MESHIO = Format("meshio_files")
-_IMAGE = Format("images", alone=True)
-
-#: By suffix. Every other suffix that meshio knows goes to meshio.
+#: By suffix.
 FORMATS = {
     ".msh": Format("gmsh_mesh", writes=True),
     ".json": Format("layout_json", writes=True, writes_space=True),
     ".geojson": Format("layout_json", writes=True),
-    ".gpkg": Format("geodata"),
-    ".shp": Format("geodata"),
     ".dxf": Format("dxf", writes=True),
     ".svg": Format("svg", writes=True),
     ".vtu": Format("pyvista_files", writes=True, writes_space=True),
     ".vtp": Format("pyvista_files", writes=True),
     ".vtk": Format("pyvista_files", writes=True, writes_space=True),
-    ".vtm": _PYVISTA,
-    ".vtmb": _PYVISTA,
-    ".pvd": _PYVISTA,
-    ".stl": _SOLID,
-    ".obj": _SOLID,
-    ".ply": _SOLID,
-    ".off": Format("solids"),
-    ".dae": Format("solids"),
-    ".glb": _SOLID,
-    ".3ddat": Format("threedec"),
-    ".3dec": Format("threedec"),
     ".txt": Format("threedec", alone=True),
-    ".geo": _CAD,
-    ".geo_unrolled": _CAD,
-    ".step": _CAD,
-    ".stp": _CAD,
-    ".brep": _CAD,
-    ".png": _IMAGE,
-    ".tif": _IMAGE,
-    ".tiff": _IMAGE,
-    ".jpg": _IMAGE,
-    ".jpeg": _IMAGE,
-    ".inp": _MESHIO,
-    ".bdf": _MESHIO,
-    ".fem": _MESHIO,
-    ".nas": _MESHIO,
-    ".med": _MESHIO,
-    ".mesh": _MESHIO,
-    ".meshb": _MESHIO,
-    ".su2": _MESHIO,
-    ".ugrid": _MESHIO,
-    ".vol": _MESHIO,
-    ".xdmf": _MESHIO,
-    ".xmf": _MESHIO,
-    ".mdpa": _MESHIO,
-    ".avs": _MESHIO,
-    ".cgns": _MESHIO,
-    ".exo": _MESHIO,
-    ".f3grid": _MESHIO,
-    ".tec": _MESHIO,
-    ".dat": Format("threedec"),
-    ".wkt": _MESHIO,
-    ".h5m": _MESHIO,
-    ".xml": _MESHIO,
-    ".post": _MESHIO,
-    ".dato": _MESHIO,
-    ".hmf": _MESHIO,
-}
+    **dict.fromkeys((".vtm", ".vtmb", ".pvd"), Format("pyvista_files")),
+    **dict.fromkeys((".gpkg", ".shp"), Format("geodata")),
+    **dict.fromkeys((".stl", ".obj", ".ply", ".glb"), Format("solids", writes=True, writes_space=True)),
+    **dict.fromkeys((".off", ".dae"), Format("solids")),
+    **dict.fromkeys((".3ddat", ".3dec", ".dat"), Format("threedec")),
+    **dict.fromkeys((".geo", ".geo_unrolled", ".step", ".stp", ".brep"), Format("gmsh_cad")),
+    **dict.fromkeys((".png", ".tif", ".tiff", ".jpg", ".jpeg"), Format("images", alone=True)),
+    **dict.fromkeys((
+        ".inp", ".bdf", ".fem", ".nas", ".med", ".mesh", ".meshb", ".su2", ".ugrid", ".vol", ".xdmf", ".xmf",
+        ".mdpa", ".avs", ".cgns", ".exo", ".f3grid", ".tec", ".wkt", ".h5m", ".xml", ".post", ".dato", ".hmf",
+    ), Format("meshio_files")),
+}  # fmt: skip

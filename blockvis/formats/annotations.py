@@ -98,7 +98,9 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
         raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
     try:
         found = _READERS[program](content, path)
-    except (LookupError, TypeError, AttributeError, OverflowError) as error:
+    except (LookupError, TypeError, AttributeError, ValueError, OverflowError) as error:
+        if str(error).startswith(f"'{path}'"):
+            raise
         raise ValueError(
             f"'{path}' has annotations of {program} that cannot be read ({type(error).__name__} {error}); export again"
         ) from None

@@ -81,7 +81,7 @@ def checksum_of_files(path: Path) -> str:
 
 def _readable(file: Path) -> bool:
     known = FORMATS.get(file.suffix.lower())
-    return known is not None and known.reads and not known.alone and not file.name.startswith(".")
+    return known is not None and not known.alone and not file.name.startswith(".")
 
 
 def _counting(file: Path) -> list[tuple[int, int, str]]:

@@ -169,7 +169,8 @@ def _read_geopackage(path: Path, reading: Reading) -> Layout:
         # Read only, as it is: a journal beside it is not played back.
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as base:
             layers = _layers(base, path)
-    except sqlite3.Error as error:
+    except (sqlite3.Error, IndexError) as error:
+        # Python's error where a table lacks the column that the contents name.
         raise ValueError(f"'{path}' is no readable GeoPackage ({error}); export it again") from None
     named = [layer.name for layer in layers]
     chosen = [name for name in named if matches([name], reading.only)] or named

@@ -57,8 +57,11 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         if bodies is not None:
             return _bodies_of_volumes(bodies, path, unit, per_mm)
         surfaces = gmsh_mesh.layout_of_mesh(target.read_bytes(), path, reading)
-    assert isinstance(surfaces, Layout)
-    return replace(surfaces, blocks=tuple(ring * per_mm for ring in surfaces.outlines), unit=unit)
+    if isinstance(surfaces, Bodies):
+        scaled = tuple(replace(body, points=per_mm * body.points) for body in surfaces.bodies)
+        return replace(surfaces, bodies=scaled, unit=unit)
+    left_out = tuple(item.mapped(per_mm) for item in surfaces.left_out)
+    return replace(surfaces, blocks=tuple(ring * per_mm for ring in surfaces.outlines), left_out=left_out, unit=unit)
 
 
 def _meshed(path: Path, target: Path, chords: int) -> list[dict[str, object]] | None:

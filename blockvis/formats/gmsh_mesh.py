@@ -240,7 +240,7 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
         raise ValueError(f"'{path}' is not a gmsh mesh: it has no section $MeshFormat; export it as .msh 4.1 or 2.2")
     version, binary, width = words[0].decode("ascii", "replace"), words[1] == b"1", words[2]
     if version not in ("2", "2.1", "2.2", "4.1"):
-        raise ValueError(f"'{path}' is version {version} of .msh; versions 2.2 and 4.1 are read: gmsh -format msh41")
+        raise ValueError(f"'{path}' is version {version} of .msh; versions 1, 2 and 4.1 are read: gmsh -format msh41")
     order = "<"
     if binary and head is not None:
         order = "<" if head.split(b"\n", 1)[1][:4] == b"\x01\x00\x00\x00" else ">"
@@ -287,7 +287,11 @@ def _sections_1(data: bytes, path: Path) -> _Mesh:
     _nodes_22(_Numbers(nodes, "NOD", path, False, "<", "<i8"), mesh)
     numbers = _Numbers(elements, "ELM", path, False, "<", "<i8")
     for _ in range(numbers.line()):
-        _number, kind, group, entity, n = map(int, numbers.take("int", 5))
+        number, kind, group, entity, n = map(int, numbers.take("int", 5))
+        if n != _width(kind, numbers):
+            raise ValueError(
+                f"'{path}': element {number} of type {kind} has {n} nodes, not {N_NODES[kind]}; export it again"
+            )
         row = numbers.take("int", n).reshape(1, -1)
         dimension = 2 if kind in GMSH else 3 if kind in GMSH_SOLIDS else 0
         if group and group not in mesh.groups.setdefault((dimension, entity), []):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -114,8 +115,12 @@ def placement_of(
         Where nothing, or more than one thing, says how large a pixel is.
     """
     given = reading.image
-    keys = {key: given.get(key) for key in ("width", "height", "pixel")}
-    said = {key: float(value) for key, value in keys.items() if isinstance(value, int | float)}
+    said = {}
+    for key in ("width", "height", "pixel"):
+        if (value := given.get(key)) is not None:
+            if not isinstance(value, Real):
+                raise ValueError(f"'{path}': {key} is {value!r}; give a length in m above 0")
+            said[key] = float(value)
     drawn = _of_world_file(image or path) or _of_tags(path, tags or {}, said)
     if said:
         return _of_keys(path, size, said, reading.unit, drawn)

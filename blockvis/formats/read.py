@@ -285,23 +285,10 @@ def read(
     -------
     solver.Assembly
     """
-    layout = read_layout(
-        path,
-        unit=unit,
-        chord_tolerance=chord_tolerance,
-        view=view,
-        ignore=ignore,
-        only=only,
-        window=window,
-        dimension=dimension,
-        thickness=thickness,
-        width=width,
-        height=height,
-        pixel=pixel,
-        background=background,
-        smallest=smallest,
-        outline_tolerance=outline_tolerance,
-    )
+    chosen: dict[str, Any] = {"chord_tolerance": chord_tolerance, "view": view, "only": only, "window": window}
+    chosen |= {"dimension": dimension, "thickness": thickness, "width": width, "height": height, "pixel": pixel}
+    chosen |= {"background": background, "smallest": smallest, "outline_tolerance": outline_tolerance}
+    layout = read_layout(path, unit=unit, ignore=ignore, **chosen)
     if chord_tolerance is not None and outline_tolerance is None:
         # Who says how fine arcs are wants their chords.
         outline_tolerance = 0.0
@@ -318,7 +305,6 @@ def read(
             outline_tolerance=outline_tolerance,
         )
     except DeepOverlap as error:
-        chosen = {"view": view, "only": only, "window": window, "dimension": dimension, "thickness": thickness}
         remedy = overlap_remedy(layout, ignore, **chosen)
         raise ValueError(f"'{path}': {error}{remedy and f'; {remedy}'}") from None
 
@@ -454,7 +440,7 @@ def _module_of(path: Path, verb: str) -> Any:
 def _format(path: Path, verb: str) -> Format:
     suffix = path.suffix.lower()
     known = FORMATS.get(suffix)
-    if known is None or not (known.reads if verb == "read" else known.writes):
+    if known is None or (verb == "write" and not known.writes):
         if verb == "read":
             raise ValueError(f"'{path}': {cannot_read(suffix)}")
         able = " ".join(sorted(key for key, value in FORMATS.items() if value.writes))

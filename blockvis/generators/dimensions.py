@@ -59,9 +59,15 @@ def whole(name: str, value: Any, least: int, most: int = MOST_BLOCKS) -> int:
     if number != int(number) or number < least:
         raise ValueError(f"{name} is {number:g}; give a whole number of at least {least}")
     if number > most:
-        where = "layout" if most == MOST_BLOCKS else "ring"
-        raise ValueError(f"{name} is {number:g}; a {where} has at most {most} blocks")
+        raise ValueError(f"{name} is {number:g}; give a whole number of at most {most}")
     return int(number)
+
+
+def true_or_false(name: str, value: Any) -> bool:
+    """Return the value if it is true or false: words count as true in Python, "no" too."""
+    if not isinstance(value, bool):
+        raise ValueError(f"{name} is {value!r}; give true or false")
+    return value
 
 
 def pair(name: str, value: Any, unit: str = "m") -> tuple[float, float]:

@@ -10,7 +10,7 @@ import solver
 from blockvis.layout.solids import Solid, between
 from solver import mechanics
 
-from .dimensions import above_zero, thickness_over_radius, whole
+from .dimensions import above_zero, thickness_over_radius, true_or_false, whole
 from .solids import assembled
 
 #: Most stones around a dome.
@@ -87,7 +87,7 @@ def dome(
         for k in range(rings)
         for j in range(n)
     ]
-    if not oculus:
+    if not true_or_false("oculus", oculus):
         stones.append(("cap", between(ring(inner, rings), ring(outer, rings))))
     down = np.array([0.0, 0.0, -2.0 * thickness])
     bearings = [joint(inner - thickness / 2.0, outer + thickness / 2.0, 0, j) for j in range(n)]

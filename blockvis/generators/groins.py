@@ -12,7 +12,7 @@ from blockvis.layout.solids import Solid, between, box, outward
 from solver import mechanics
 
 from .arches import segmental_joints
-from .dimensions import above_zero, whole
+from .dimensions import above_zero, true_or_false, whole
 from .solids import assembled
 
 #: An arm of a stone on a diagonal is at least this fraction of a stone long.
@@ -306,7 +306,7 @@ def _square(crown: np.ndarray) -> Solid:
 
 def _on_diagonal(name: str, section: np.ndarray, arm: float, quarter: int, bonded: bool) -> list[tuple[str, Solid]]:
     """Make the stone of a course on a diagonal, whole or cut along it."""
-    if bonded:
+    if true_or_false("bonded", bonded):
         return [(name, _turned(_corner(section, arm), quarter))]
     one = between(_mirrored(section, 1.0), np.insert(section, 1, arm, axis=1))
     swapped = one[0][:, [1, 0, 2]], one[1]

@@ -99,6 +99,11 @@ def checked_opening(
         raise ValueError(
             f"{where}: rise is {rise:g} m; that of a round arch is {width / 2.0:g} m: take a segmental arch"
         )
+    if head == "segmental arch" and rise > width / 2.0:
+        raise ValueError(
+            f"{where}: rise is {rise:g} m, more than half of its width of {width:g} m; give at most that, or take a "
+            "round arch"
+        )
     skew = finite(f"{where}: skew", values.get("skew", 20.0), "degrees")
     if not 0.0 < skew < 60.0:
         raise ValueError(f"{where}: skew is {skew:g} degrees; give an angle above 0 and below 60")

@@ -177,6 +177,11 @@ def facade(
     span = above_zero("window_bricks", window_bricks, "brick lengths")
     high, sill = whole("window_courses", window_courses, 1), whole("sill_courses", sill_courses, 0)
     rise = course * above_zero("rise_courses", rise_courses, "courses")
+    if rise > length * span / 2.0:
+        raise ValueError(
+            f"rise_courses is {rise_courses:g}, {rise:g} m over windows of {length * span:g} m; give at most "
+            f"{length * span / 2.0 / course:.4g}"
+        )
     pier = (n - windows * span) / (windows + 1)
     if pier < 1.0:
         raise ValueError(

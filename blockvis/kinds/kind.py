@@ -1,7 +1,6 @@
 """A kind of analysis: what it runs over, what it measures, its keys, its increments, and its words.
 
-A new kind is an object of :class:`AnalysisKind` in a file of its own, with a row in :mod:`blockvis.kinds.kinds`. What
-it does not say in its own words is said in those of its quantities.
+A new kind is an object of :class:`AnalysisKind` in a file of its own, with a row in :mod:`blockvis.kinds.kinds`.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import solver
 from blockvis.cases.contents import Case
 from blockvis.cases.key import Key, Section, read_keys
 from blockvis.cases.toml_table import Table
-from blockvis.results.about import loss_of, mechanism_text
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -219,45 +217,17 @@ class AnalysisKind(ABC):
         """Whether :meth:`lines` say what the message of the response says."""
         return response.collapse is not None
 
+    @abstractmethod
     def lines(self, response: solver.Response) -> list[str]:
         """Numbers for the command line."""
-        lines = []
-        if response.path:
-            for name, increment in (("first", response.path[0]), ("last", response.path[-1])):
-                lines.append(f"{f'{name} {self.measured.name}':<21}{_with_unit(increment.measured, response.measured)}")
-            last = _with_unit(response.path[-1].parameter, response.parameter)
-            lines.append(f"{f'last {self.parameter.name}':<21}{last}")
-        if response.collapse is not None:
-            low, high = response.collapse.bracket
-            place = f"{response.collapse.displacement:12.6g} {response.collapse.unit}"
-            lines.append(f"{'collapse at':<21}{place}   between {low:.6g} and {high:.6g}")
-            lines.append(f"mechanism: {mechanism_text(response)}")
-            loss = loss_of(response)
-            lines += [] if loss is None else [str(loss)]
-        return lines
 
+    @abstractmethod
     def title(self, response: solver.Response) -> str:
         """Title of the report."""
-        if response.collapse is None:
-            return f"{self.name.capitalize()}: {response.stop}"
-        where = f"{response.collapse.displacement:.5g} {response.collapse.unit}"
-        return f"Collapse at {response.parameter.name} {where}"
 
+    @abstractmethod
     def rows(self, response: solver.Response) -> list[tuple[str, str]]:
         """Numbers for the report, in words and with units."""
-        rows, path = [], response.path
-        if response.collapse is not None:
-            c = response.collapse
-            rows.append((f"collapse at {self.parameter.name}", f"{c.displacement:.6g} {c.unit}"))
-            rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
-        if path:
-            first, last = (_with_unit(i.measured, response.measured).strip() for i in (path[0], path[-1]))
-            rows.append((f"{self.measured.name}, first and last", f"{first}, {last}"))
-        return rows
-
-
-def _with_unit(value: float, quantity: mechanics.Quantity) -> str:
-    return f"{value:12.6g} {quantity.unit}".rstrip()
 
 
 def without_increments() -> mechanics.Increments:

@@ -244,6 +244,11 @@ def _outline_of(support: Mapping[str, Any], name: str) -> np.ndarray:
         raise ValueError(f"support '{name}': its outline must be corners [[x, y], ...] in m; {error}") from None
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
         raise ValueError(f"support '{name}' needs at least three corners [x, y]; its shape is {outline.shape}")
+    try:
+        # As a block by itself, before it is one of many whose message names no support.
+        solver.Assembly.from_outlines([outline], names=[name])
+    except ValueError as error:
+        raise ValueError(f"support '{name}': outline: {error}") from None
     return outline
 
 

@@ -42,17 +42,11 @@ class Facing:
     Attributes
     ----------
     solids : tuple of Solid
-    n_joints : int
-        Joints whose faces did not lie in one plane.
-    largest : float [m]
-        How far they were apart, or overlapped, at most.
     note : str
         What was done; "" where every joint was plane.
     """
 
     solids: tuple[Solid, ...]
-    n_joints: int = 0
-    largest: float = 0.0
     note: str = ""
 
 
@@ -140,7 +134,7 @@ def faced(
         note += (
             f"; {counted(len(kept), 'block stays', 'blocks stay')} as drawn, which overlap less so ('{names[kept[0]]}')"
         )
-    return Facing(moved, n, float(abs(apart[worst])), note)
+    return Facing(moved, note)
 
 
 def _unless_worse(
@@ -328,13 +322,12 @@ def _common_plane(rings: Sequence[np.ndarray], sides: np.ndarray, planes: np.nda
         normal = axes[2] * np.sign(axes[2] @ planes[0, :3]) * sides[0]
     normal = normal / np.linalg.norm(normal)
     middles = np.array([ring.mean(axis=0) for ring in rings])
-    share = np.full(2, 0.5) if len(rings) == 2 else areas / areas.sum()
     if len(rings) == 2:
         # Half-way between both planes in the middle of the smaller face.
         middle = middles[int(areas.argmin())]
         heights = (planes[:, 3] - planes[:, :3] @ middle) / (planes[:, :3] @ normal)
         return np.append(normal, middle @ normal + float(heights.mean()))
-    return np.append(normal, float(share @ (middles @ normal)))
+    return np.append(normal, float(areas / areas.sum() @ (middles @ normal)))
 
 
 def _moved(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from solver.mechanics import counted
 from .facing import Facing as FacedJoints
 from .facing import faced, facing_tolerance
 from .joints.close import Proposal, proposed
-from .joints.facing_edges import Facing
+from .joints.facing_edges import Facing, rounded_up
 from .layout import Layout
 from .refusal import carrying
 from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
@@ -256,7 +255,8 @@ def _in_space(layout: Layout, free: np.ndarray) -> dict[str, Any]:
         gaps = [(i, j, gap) for i, j, gap in gaps if not (layout.laid[i] and layout.laid[j])]
     except ValueError as error:
         refused = str(error)
-    thickness = _closing_thickness(gaps)
+    # Widest first.
+    thickness = rounded_up(1.01 * gaps[0][2]) if gaps else 0.0
     joint_rows = [("joints", facing.note or "faces in contact lie in one plane")]
     if gaps:
         worst = ", ".join(f"{layout.names[i]} | {layout.names[j]} {by:.3g} m" for i, j, by in gaps[:4])
@@ -294,15 +294,6 @@ def _solid_rows(layout: Layout, free: np.ndarray) -> tuple[Row, ...]:
             f"{sum(len(points) for points, _ in layout.solids)}, {sum(len(faces) for _, faces in layout.solids)}",
         ),
     )
-
-
-def _closing_thickness(open_joints: Sequence[tuple[int, int, float]]) -> float:
-    """Joint thickness that closes open joints [m], widest first, rounded up to two digits; 0 without any."""
-    if not open_joints:
-        return 0.0
-    widest = 1.01 * open_joints[0][2]
-    unit = 10.0 ** (math.floor(math.log10(widest)) - 1)
-    return float(f"{math.ceil(widest / unit) * unit:.2g}")
 
 
 def _open_joints(assembly: solver.Assembly, width: float) -> list[tuple[int, int, float]]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import fnmatch
 from collections.abc import Mapping, Sequence
 
 from blockvis.text import by_similarity
 from solver import mechanics
 
 from .layout import Layout
+from .left_out import matches
 
 
 def checked_role(role: str, whose: str) -> str:
@@ -42,7 +42,7 @@ def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True
             hits = [
                 i
                 for i in range(layout.n_blocks)
-                if any(values[i] and fnmatch.fnmatchcase(values[i], key) for values in labels.values())
+                if matches(filter(None, (values[i] for values in labels.values())), [key])
             ]
             if not hits and all_match:
                 raise ValueError(_unmatched(key, layout))

@@ -7,9 +7,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from solver import mechanics
-
-from .joints.trimming import with_corners_on_edges
+from .joints.trimming import overlapping, with_corners_on_edges
 from .linked import linked
 
 #: Outlines of more corners than this in the mean are finer than needed: every corner at a joint is a contact.
@@ -163,10 +161,9 @@ def _spoilt(found: list[np.ndarray], drawn: Sequence[np.ndarray], tolerance: flo
     bad = set(np.flatnonzero(~shapely.is_valid(shapes) | (shapely.area(shapes) < 0.8 * before)).tolist())
     if bad:
         return bad
-    offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in found])])
-    a, b, _ = mechanics.overlap_depths(np.concatenate(found), offsets, 1e-3 * tolerance)
-    offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in drawn])])
-    i, j, _ = mechanics.overlap_depths(np.concatenate(drawn), offsets, 1e-3 * tolerance)
-    already = set(zip(i.tolist(), j.tolist(), strict=True))
-    new = set(zip(a.tolist(), b.tolist(), strict=True)) - already
+    after, already = (
+        set(zip(*(pair.tolist() for pair in overlapping(rings, 1e-3 * tolerance)[:2]), strict=True))
+        for rings in (found, drawn)
+    )
+    new = after - already
     return {block for pair in new for block in pair}

@@ -219,6 +219,10 @@ def test_damaged_geopackages_are_refused(tmp_path):
             base.execute("UPDATE wall SET geom = ?", (blob,))
             base.commit()
         assert words in refusal(path)
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("UPDATE gpkg_geometry_columns SET column_name = 'shape'")
+        base.commit()
+    assert "cut.gpkg' is no readable GeoPackage" in refusal(path)
 
 
 def write_shapefile(path, rings, projection=None, kind=5, **attributes):

@@ -66,12 +66,15 @@ def test_a_script_with_a_fault_gives_the_reason(tmp_path):
         read(tmp_path / "a.geo")
 
 
-def step(tmp_path, size=1000, unit=".MILLI."):
-    """Three boxes in a STEP file that states a unit; the numbers stay those of the boxes."""
+def step(tmp_path, size=1000, unit=".MILLI.", draw=None):
+    """Three boxes, or what else is drawn, in a STEP file that states a unit; the numbers stay as they are."""
     gmsh.initialize(["gmsh", "-nopopup"], interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
-    for k in range(3):
-        gmsh.model.occ.addBox(size * k, 0, 0, size, 0.3 * size, 0.25 * size)
+    if draw:
+        draw(gmsh.model.occ)
+    else:
+        for k in range(3):
+            gmsh.model.occ.addBox(size * k, 0, 0, size, 0.3 * size, 0.25 * size)
     gmsh.model.occ.synchronize()
     path = tmp_path / "a.step"
     gmsh.write(str(path))
@@ -100,6 +103,30 @@ def test_the_unit_of_a_step_file_and_the_one_asked_for(tmp_path, stated, asked, 
     assert read(path, unit=asked, view="xy").areas == pytest.approx([0.3 * (size * metres) ** 2] * 3)
     assert read_layout(path, unit=asked, view="xy").thickness == pytest.approx([0.25 * size * metres] * 3)
     assert read_layout(path, unit=asked).names == ("volume 1", "volume 2", "volume 3")
+
+
+def test_what_is_left_out_of_a_step_file_is_in_its_unit(tmp_path):
+    def wall(occ):
+        occ.cut([(2, occ.addRectangle(0, 0, 0, 1, 0.5))], [(2, occ.addRectangle(0.4, 0.2, 0, 0.2, 0.1))])
+        occ.addRectangle(2, 0, 0, 1, 0.5)
+
+    layout = read_layout(step(tmp_path, unit="$", draw=wall))
+    (face,) = layout.left_out
+    assert np.ptp(face.points, axis=0) == pytest.approx([1.0, 0.5])
+    assert np.ptp(face.holes[0], axis=0) == pytest.approx([0.2, 0.1])
+    assert any("an outline of 0.5 m²" in note and "1 opening, 0.48 m²" in note for note in layout.notes)
+
+
+def test_a_closed_surface_without_a_volume_is_a_body(tmp_path):
+    """As surface modellers export it."""
+
+    def shell(occ):
+        box = occ.addBox(0, 0, 0, 1, 0.5, 0.3)
+        occ.synchronize()
+        occ.remove([(3, box)])
+
+    layout = read_layout(step(tmp_path, unit="$", draw=shell), dimension=3)
+    assert layout.volumes == pytest.approx([0.15])
 
 
 def test_a_step_file_in_mm_with_the_numbers_of_metres(tmp_path):

@@ -383,8 +383,24 @@ def test_annotations_that_cannot_be_read_say_why(tmp_path, capsys):
         "annotates 2 images (a.jpg, b.jpg); export one of them alone": two,
         "outlines no stone, it has 1 boxes without an outline": boxes,
         "does not say how many pixels its image has; give pixel": _via(),
+        "w.json' has annotations of COCO that cannot be read": _coco(
+            annotations=[{"image_id": 7, "category_id": 1, "segmentation": [[0, 0, 10, 0, 10, 10, 5]]}]
+        ),
     }
     for says, content in cases.items():
         (tmp_path / "w.json").write_text(json.dumps(content), encoding="utf-8")
         code, _, error = informed(capsys, tmp_path / "w.json", "--width", 3)
         assert (code, says in error) == (2, True), error
+
+
+def test_labels_that_cover_stones_are_proposed_to_be_left_out(tmp_path):
+    """The annotations are read again at the same scale."""
+    content = _labelme()
+    shadow = [[60, 30], [180, 30], [180, 90], [60, 90]]
+    content["shapes"].append({"label": "shadow", "points": shadow, "shape_type": "polygon"})
+    (tmp_path / "w.json").write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(ValueError, match=r'overlaps .*; --ignore "shadow" leaves out 1 of 4 blocks'):
+        read(tmp_path / "w.json", width=3.0)
+    assert read(tmp_path / "w.json", width=np.float32(3.0), ignore="shadow").areas.sum() == pytest.approx(2.0)
+    with pytest.raises(ValueError, match=r"w\.json': width is '3'; give a length in m above 0"):
+        read_layout(tmp_path / "w.json", width="3")

@@ -115,7 +115,7 @@ def test_characters_changed(seed):
         ('"collapse.mp4"', '"summary.json"', "ending in .mp4"),
         ('"collapse.mp4"', '".mp4/../../x.gif"', "without a folder"),
         ("voussoirs = 5", "voussoirs = 500000000", "voussoirs"),
-        ("voussoirs = 5", "voussoirs = 100000", "at most 2000 blocks"),
+        ("voussoirs = 5", "voussoirs = 100000", "at most 2000"),
         ("voussoirs = 5", "voussoirs = " + "[" * 100_000, "without end"),
         ("falling_frames = 40", "falling_frames = 99999999999", "falling_frames"),
         ("increment = 0.01", "increment = 1e-15", "increment"),
@@ -149,4 +149,4 @@ def test_layouts_that_would_fill_the_memory_are_refused(tmp_path, capsys):
             encoding="utf-8",
         )
         assert run_command(path, "-o", tmp_path / "out") == 2, name
-        assert "blocks" in capsys.readouterr().err
+        assert "at most" in capsys.readouterr().err

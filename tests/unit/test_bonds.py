@@ -133,6 +133,11 @@ def test_any_wall_is_filled_whatever_its_openings_are(wall, openings, bond, head
     checked(layout, outline.difference(shapely.union_all(holes)).area if holes else outline.area)
 
 
+def test_a_seed_that_is_too_large_is_refused_as_a_number():
+    with pytest.raises(ValueError, match=r"seed is 3e.09; give a whole number of at most 2147483648"):
+        generators.bond(shapely.box(0, 0, 2, 1), bond="rubble", stone=0.5, seed=3_000_000_000)
+
+
 def test_random_stones_come_back_with_their_seed():
     def stones(seed):
         return generators.bond(shapely.box(0, 0, 2, 1), bond="rubble", stone=0.5, seed=seed).points

@@ -15,6 +15,7 @@ from structures import box, brick, drawn, fans, layout_of
 
 import solver
 from blockvis import generators, inspect, read, read_layout, run_case, write_layout
+from blockvis.cli import main
 from blockvis.layout.assemble import assemble
 from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.facing import faced, facing_tolerance
@@ -674,3 +675,17 @@ def test_facing_never_makes_the_deepest_overlap_deeper(tolerance):
 def test_a_tolerance_does_not_face_less_than_none():
     solids = layout_of(generators.build("dome", SMALL["dome"])).solids
     assert facing_tolerance(solids, 0.0, 1e-9) == facing_tolerance(solids) < facing_tolerance(solids, 0.0, 1.0) == 1.0
+
+
+def test_convert_closes_joints_and_says_no_more_of_the_blocks_than_the_drawing(tmp_path):
+    """What a file does not say is the case's to say: role, thickness and density."""
+    rings = [brick(0, 0, 0.5, 0.3), brick(0.52, 0, 0.5, 0.3)]
+    write_layout(Layout(tuple(rings), ("a", "b"), ("stones",) * 2, roles=("moving", "")), tmp_path / "open.json")
+    for joint, width in (("auto", 0.51), ("0.05", 0.51), ("0.0", 0.5)):
+        files = (str(tmp_path / f"{name}.json") for name in ("open", joint))
+        assert main(["convert", *files, "--joint-thickness", joint]) == 0
+        layout = read_layout(tmp_path / f"{joint}.json")
+        assert np.ptp(layout.outlines[0], axis=0) == pytest.approx([width, 0.3])
+        assert (layout.groups, layout.roles) == (("stones",) * 2, ("moving", ""))
+        assert layout.thickness is None
+        assert layout.density is None

@@ -321,6 +321,7 @@ WALL = {"bricks": 12, "courses": 12}
         ("wall", {"settling": [4, 5]}, "settling is .4, 5. m, beside the wall"),
         ("wall", {"settling": 2}, "settling is 2; give two numbers"),
         ("wall", {"openings": {"x": 1}}, "give a list of tables"),
+        ("facade", {"window_bricks": 1, "rise_courses": 5}, "rise_courses is 5, 0.625 m over windows of 0.25 m"),
         ("facade", {"bricks": 16}, "bricks is 16, too few for 2 windows of 8 bricks .* give at least 19"),
     ],
 )
@@ -349,6 +350,7 @@ def test_every_length_of_every_layout_is_refused_by_its_name_unless_it_is_one(na
         ({"haed": "none"}, "opening 1 has no 'haed' .did you mean 'head'"),
         ({"head": "beam"}, "opening 1: head is 'beam'; choose from lintel"),
         ({"head": "round arch", "rise": 0.1}, "rise is 0.1 m; that of a round arch is 0.25 m"),
+        ({"head": "segmental arch", "rise": 0.3}, "opening 1: rise is 0.3 m, more than half of its width of 0.5 m"),
         ({"head": "flat arch", "skew": 80}, "opening 1: skew is 80 degrees; give an angle above 0 and below 60"),
         ({"width": "wide"}, "opening 1: width is 'wide'; give a finite number in m"),
         ({"x": 2.8}, "opening 1 ends at x = 3.3 m, outside the wall of 3 m"),

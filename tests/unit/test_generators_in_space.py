@@ -61,6 +61,7 @@ def test_the_dome_is_what_the_reference_values_are_for():
     ("parameters", "reason"),
     [
         ({"lunes": 2}, "lunes is 2; give a whole number of at least 3"),
+        ({"oculus": "no"}, "oculus is 'no'; give true or false"),
         ({"cap": 95.0}, "cap is 95 and springing 90 degrees"),
         ({"thickness_ratio": 0.0}, "thickness_ratio is 0"),
         ({"radius": -1.0}, "radius is -1 m; give a number above 0"),
@@ -102,6 +103,8 @@ def test_headers_tie_both_leaves():
         ("pavilion vault", {"voussoirs": 6}, "voussoirs is 6; a pavilion vault needs an odd number"),
         ("church bay", {"pier": 0.3}, "pier is 0.3 m; the vault's supports need"),
         ("T corner", {"bricks": 3}, "bricks is 3; give an even number"),
+        ("cross vault", {"bonded": "False"}, "bonded is 'False'; give true or false"),
+        ("pavilion vault", {"bonded": 1}, "bonded is 1; give true or false"),
         ("barrel vault", {"stones": 0}, "stones is 0; give a whole number of at least 1"),
         ("two-leaf wall", {"cavity": -0.1}, "cavity is -0.1"),
     ],

@@ -52,6 +52,20 @@ def test_a_point_of_what_acts_all_over_is_refused(tmp_path, capsys, acts):
     assert "case.toml: [loads] point is that of a force or moment; pressure and weight" in capsys.readouterr().err
 
 
+def test_more_positions_than_a_run_takes_are_refused(tmp_path, capsys):
+    """Their list alone would need more memory than there is."""
+    case = written(tmp_path, ARCH + "[[loads]]\nforce = [0, -1000]\npositions = [0, 1, 1e12]\n")
+    assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 2
+    assert re.search(r"case\.toml: \[loads\] positions is .* from 2 to 1000000 places", capsys.readouterr().err)
+
+
+def test_a_support_without_area_is_named_with_its_file(tmp_path, capsys):
+    under = '[[supports]]\nname = "ground"\noutline = [[5, 0], [6, 0], [7, 0]]\n'
+    assert main(["run", str(written(tmp_path, ARCH + under)), "-o", str(tmp_path / "out")]) == 2
+    says = r"case\.toml: \[\[supports\]\] support 'ground': outline: .* has an area of 0 m² .*: remove it or redraw it"
+    assert re.search(says, capsys.readouterr().err)
+
+
 @pytest.mark.parametrize("name", ["", 'name = "springer"\n', 'name = "voussoir 1"\n'])
 def test_a_support_that_is_called_as_something_else_is_refused(tmp_path, capsys, name):
     """By its name it has its stiffness, which another had."""

@@ -57,6 +57,7 @@ def test_a_misspelt_key_of_any_table_is_not_valid(path):
 def test_a_misspelt_parameter_of_a_layout_is_not_valid():
     assert CASE.is_valid(_with(geometry={"layout": "segmental arch", "parameters": {"rise": 1.0}}))
     assert not CASE.is_valid(_with(geometry={"layout": "segmental arch", "parameters": {"rize": 1.0}}))
+    assert not CASE.is_valid(_with(geometry={"layout": "dome", "parameters": {"oculus": "no"}}))
 
 
 @pytest.mark.parametrize(

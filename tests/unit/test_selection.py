@@ -1,12 +1,14 @@
 """What of a drawing is a block: what is left out by itself or on request, and how it is told."""
 
+import json
+
 import ezdxf
 import numpy as np
 import pytest
 import structures
 from structures import assembly_of, brick, case_from
 
-from blockvis import inspect, read, read_case, read_layout, write_layout
+from blockvis import inspect, read, read_case, read_layout, run_case, write_layout
 from blockvis.cli import main
 
 
@@ -205,3 +207,33 @@ def test_bodies_are_left_out_before_they_hide_the_others(tmp_path):
     assert any("left out: 1 outline, as asked for, 'second leaf'" in note for note in drawing.notes)
     with pytest.raises(ValueError, match="all that it draws is left out as asked"):
         read_layout(tmp_path / "a.glb", ignore="*")
+
+
+def test_names_with_brackets_name_their_blocks(tmp_path):
+    """Beside patterns, of which [1] would mean the figure alone."""
+    names = {"stone [1]": 0.0, "stone [2]": 2.0}
+    blocks = [{"name": name, "outline": brick(x, 0, 1, 1).tolist()} for name, x in names.items()]
+    blocks.append({"name": "ground", "outline": brick(-1, -1, 5, 1).tolist(), "role": "moving"})
+    (tmp_path / "stones.json").write_text(json.dumps({"blocks": blocks}), encoding="utf-8")
+    text = """
+[geometry]
+file = "stones.json"
+[[loads]]
+blocks = "stone [1]"
+force = [0, -10]
+[[backfill]]
+over = "stone [2]"
+surface = 2.0
+unit_weight = 1e4
+[[remove]]
+phase = 1
+blocks = "stone [1]"
+[[settlement]]
+direction = [0, -1]
+limit = 0.01
+increment = 0.01
+[output]
+animation = false
+"""
+    run = run_case(case_from(text, tmp_path), tmp_path / "results")
+    assert run.response.path[-1].removed.tolist() == [True, False, False]

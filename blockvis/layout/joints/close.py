@@ -127,8 +127,6 @@ class Closing:
         Stretches that no common line fits; one side was extended to the other and cut along it.
     largest_gap : float [m]
         Widest gap that was closed.
-    residual : float [m]
-        Widest remaining gap or overlap along them.
     method : str
         "faces" or "voronoi".
     """
@@ -137,7 +135,6 @@ class Closing:
     n_joints: int
     n_cut: int
     largest_gap: float
-    residual: float
     method: str = "faces"
 
 
@@ -239,7 +236,7 @@ def _to_nearest_stone(
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
     n_open = int((np.abs(found.gaps).max(axis=1) > CLOSED * scale).sum()) if len(found) else 0
     closed = share_out(outlines, thickness, anchored, mortar)
-    return Closing(tuple(closed), n_open, 0, float(found.gaps.max(initial=0.0)), 0.0, "voronoi")
+    return Closing(tuple(closed), n_open, 0, float(found.gaps.max(initial=0.0)), "voronoi")
 
 
 def _between_faces(
@@ -255,20 +252,17 @@ def _between_faces(
     closed = CLOSED * scale
     n_open = int((np.abs(found.gaps).max(axis=1) > closed).sum()) if len(found) else 0
     if n_open == 0:
-        return Closing(tuple(outlines), 0, 0, 0.0, 0.0)
+        return Closing(tuple(outlines), 0, 0, 0.0)
     lines, uncommon = common_lines(found, edges, anchored, closed)
     base = _without_repeats(moved_outlines(edges, lines, LONGEST_MITRE * max(thickness, overlap)), closed)
     final = extended_to_lines(base, edges, found, uncommon, lines, anchored, max(thickness, overlap))
     final = separated(_without_repeats(final, closed), anchored, max(thickness, overlap), 10.0 * closed)
     final = _without_repeats(final, closed)
-    remaining = facing_edges(final, thickness, max(overlap, closed), laid)
-    residual = float(np.abs(remaining.gaps).max()) if len(remaining) else 0.0
     return Closing(
         outlines=tuple(outlines[i] if anchored[i] else ring + origin for i, ring in enumerate(final)),
         n_joints=n_open,
         n_cut=len(uncommon),
         largest_gap=float(found.gaps.max()),
-        residual=residual,
     )
 
 

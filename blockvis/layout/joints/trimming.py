@@ -144,14 +144,14 @@ def separated(rings: list[np.ndarray], anchored: np.ndarray, thickness: float, c
     """
     import shapely
 
-    first, second, _ = _overlaps(rings, closed)
+    first, second, _ = overlapping(rings, closed)
     if len(first) == 0:
         return rings
     rings = merge_close_corners(
         rings, sorted({*map(int, first), *map(int, second)}), anchored, MERGED * thickness, closed / 10.0
     )
     result = list(rings)
-    for i, j, _ in zip(*_overlaps(rings, closed), strict=True):
+    for i, j, _ in zip(*overlapping(rings, closed), strict=True):
         shapes = {int(k): shapely.Polygon(result[k]).buffer(0) for k in (i, j)}
         small, large = sorted(shapes, key=lambda k: (bool(anchored[k]), shapes[k].area))
         if anchored[small]:
@@ -164,7 +164,8 @@ def separated(rings: list[np.ndarray], anchored: np.ndarray, thickness: float, c
     return result
 
 
-def _overlaps(rings: list[np.ndarray], closed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def overlapping(rings: Sequence[np.ndarray], closed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find pairs of outlines that overlap by more than ``closed`` [m], and how deep."""
     offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
     return mechanics.overlap_depths(np.concatenate(rings), offsets, closed)
 
