@@ -20,6 +20,7 @@ from blockvis.pictures import palette
 from blockvis.pictures.captions import failure_text, parameter_text
 from blockvis.pictures.crack_drawing import draw_cracks
 from blockvis.pictures.curves import draw_curve
+from blockvis.pictures.marks import evenly
 from blockvis.pictures.render import draw_mechanism, draw_still
 from blockvis.pictures.underlay import Underlay
 from blockvis.results.about import about
@@ -129,7 +130,7 @@ def _keys_in_use(case_text: str) -> str:
 def _states(response: solver.Response) -> tuple[Sequence[str], list[tuple[str, ...]], Sequence[float]]:
     """Give head, rows and widths [mm] of the table of the path, evenly thinned."""
     path, weight = response.path, response.total_weight
-    chosen = np.unique(np.linspace(0, len(path) - 1, min(len(path), MOST_STATES)).round().astype(int))
+    chosen = evenly(np.arange(len(path)), MOST_STATES)
     measured = response.measured
     head = [response.parameter.name, measured.name, "of the weight W" if measured.is_force else ""]
     rows: list[tuple[str, ...]] = []

@@ -52,22 +52,6 @@ def carried_faces(assembly: solver.Assembly, joints: InitialJoints, pose: solver
     return Faces(on_a, on_b, gaps, apart - gaps[:, None] * normal, normals)
 
 
-def faces_at(
-    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Carry the faces of joints in the plane to a pose.
-
-    Returns
-    -------
-    on_a, on_b : (n_joints, 2, 2) arrays [m]
-        Both ends of the common length, riding on block a and on block b.
-    normals : (n_joints, 2) array
-        Unit normal from block b into block a, turned with block b.
-    """
-    faces = carried_faces(assembly, joints, pose)
-    return faces.on_a.reshape(-1, 2, 2), faces.on_b.reshape(-1, 2, 2), faces.normals
-
-
 def end_openings(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> np.ndarray:
     """(n_joints, 2) array [m]: distance of the faces of joints in the plane at their ends, along the normal."""
     return carried_faces(assembly, joints, pose).gaps.reshape(-1, 2)
