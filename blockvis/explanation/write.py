@@ -177,7 +177,7 @@ def _vector(value: Sequence[float]) -> str:
 
 def _assumed(found: Explanation) -> list[str]:
     trust, runs = found.comparison.trust, found.runs
-    frictions = sorted({trial.friction for cause in found.causes for trial in cause.trials})
+    frictions = sorted({trial.variant.friction for cause in found.causes for trial in cause.trials})
     largest = float(found.causes[0].best.amounts[-1]) if found.causes else 0.0
     return [
         "Blocks are rigid, joints dry: cracks in stones, mortar that hardened later and loads that changed are not in "

@@ -75,14 +75,11 @@ class Record:
             if changed:
                 notes.append(f"the {what} file '{file}' has changed; the run goes on with what it read from it")
         now = versions()
-        newer = [f"{name} {self.versions.get(name)} → {now[name]}" for name in _DECIDING if self.differs(name, now)]
+        both = [(name, self.versions.get(name), now[name]) for name in _DECIDING]
+        newer = [f"{name} {before} → {after}" for name, before, after in both if before != after]
         if newer:
             notes.append(f"not what the run began with: {', '.join(newer)}; the last digits may differ")
         return notes
-
-    def differs(self, name: str, now: dict[str, str]) -> bool:
-        """Whether a package has another version than when the run began."""
-        return self.versions.get(name) != now[name]
 
 
 def read_record(folder: Path) -> Record:

@@ -165,8 +165,9 @@ def _draw_swing(axes: Axes, place: int, swing: Swing, centre: float, factor: flo
         # Of a parameter without effect the two values stand to both sides.
         outwards = side if np.isclose(factor * mean, centre, rtol=1e-9) else 1 if factor * mean > centre else -1
         edge = factor * (mean + outwards * (0.0 if np.isnan(error) else error))
+        words = textwrap.shorten(value, 16) if isinstance(value, str) else rounded_text(value)
         axes.annotate(
-            _short(value), (edge, place), xytext=(6 * outwards, 0), textcoords="offset points", va="center",
+            words, (edge, place), xytext=(6 * outwards, 0), textcoords="offset points", va="center",
             ha="left" if outwards > 0 else "right", fontsize=0.85 * TEXT,
         )  # fmt: skip
 
@@ -352,10 +353,6 @@ def _length(table: pd.DataFrame) -> tuple[float, str]:
     unit = units[0] if units else "m"
     largest = float(np.nanmax(np.append(outcome(table), 0.0)))
     return (1e3, "mm") if unit == "m" and largest < 1.0 else (1.0, unit)
-
-
-def _short(value: float | str) -> str:
-    return textwrap.shorten(value, 16) if isinstance(value, str) else rounded_text(value)
 
 
 def _mark(colour: str, mark: str, label: str, *, hollow: bool = False):  # type: ignore[no-untyped-def]
