@@ -9,6 +9,7 @@ import json
 import os
 import weakref
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -250,7 +251,7 @@ class ResultsFolder:
             cracks = cracks_of(self.assembly, last.pose, self._movements.joints, last.fallen)
         listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         if self.ties:
-            listed["ties"] = [course.values() for course in self._courses.courses]
+            listed["ties"] = [asdict(course) for course in self._courses.courses]
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_atomic(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
