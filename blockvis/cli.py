@@ -14,6 +14,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -538,7 +539,7 @@ def _explain(options: argparse.Namespace) -> int:
 
 
 def _sweep(options: argparse.Namespace) -> int:
-    from .studies.campaign import run_study
+    from .studies.campaign import study as carried_out
     from .studies.study_file import read_study
     from .studies.study_folder import finished_runs
     from .studies.summary import in_words, stored_summary
@@ -546,14 +547,13 @@ def _sweep(options: argparse.Namespace) -> int:
     study = read_study(options.study)
     folder = Path(options.output or f"{study.source.stem}-study")
     try:
-        run_study(
-            study,
+        carried_out(
+            replace(study, keep=(*study.keep, *_run_numbers(options.keep))),
             folder,
             scheduler=options.scheduler,
             workers=options.workers,
             force=options.force,
             retry_failed=options.retry_failed,
-            keep=_run_numbers(options.keep),
         )
     except KeyboardInterrupt:
         print(
@@ -598,8 +598,6 @@ def _new(options: argparse.Namespace) -> int:
 
 def _try_new(text: str, target: Path, *, drawing: bool) -> None:
     """Say whether what a new case describes stands, and draw it with its ground."""
-    from dataclasses import replace
-
     from .case_files.read import parse_case
     from .cases.build import case_assembly
     from .layout.inspect import inspected
@@ -846,8 +844,6 @@ def _write_report(response: solver.Response, folder: Path) -> Fall | None:
 
 
 def _info(options: argparse.Namespace) -> int:
-    from dataclasses import replace
-
     from .formats.read import inspect
     from .layout.assemble import supports_of
     from .layout.ground import ground_of
