@@ -8,7 +8,7 @@ import io
 import json
 import os
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
@@ -59,6 +59,7 @@ _PICTURES = (
     "paraview_colours.py",
     *(f"collapse{suffix}" for suffix in VIDEO_SUFFIXES),
 )
+RUN_FILES = ("increments", *_LISTS, *_STARTED, *_PICTURES)
 
 C = TypeVar("C")
 
@@ -70,16 +71,24 @@ class ResultsExist(ValueError):
 def refuse_results(path: str | Path, overwrite: bool = False) -> None:
     """Raise :class:`ResultsExist` if a folder holds results that may not be replaced."""
     path = Path(path)
-    if path.exists() and not path.is_dir():
-        raise ResultsExist(f"'{path}' is a file; choose a folder with -o")
-    names = ("increments", *_LISTS, *_STARTED, *_PICTURES)
-    if not overwrite and any((path / name).exists() for name in names):
-        unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
-        go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
-        found = next(name for name in names if (path / name).exists())
-        raise ResultsExist(
-            f"'{path}' holds results already ({found}); {go_on}choose another folder with -o or add --force"
-        )
+    unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
+    go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
+    refuse_files(path, RUN_FILES, "results", overwrite, f"{go_on}choose another folder with -o or add --force")
+
+
+def refuse_files(
+    folder: Path,
+    names: Iterable[str],
+    what: str,
+    overwrite: bool,
+    remedy: str = "choose another folder with -o or add --force",
+) -> None:
+    """Raise :class:`ResultsExist` if a folder holds one of these files, which may not be replaced."""
+    if folder.exists() and not folder.is_dir():
+        raise ResultsExist(f"'{folder}' is a file; choose a folder with -o")
+    there = next((name for name in names if (folder / name).exists()), None)
+    if there is not None and not overwrite:
+        raise ResultsExist(f"'{folder}' holds {what} already ({there}); {remedy}")
 
 
 class ResultsFolder:
