@@ -43,7 +43,8 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
     axes = figure.add_subplot()
     longest = max(comparison.sides, key=lambda side: side.end).response
     per_length, _ = parameter_unit(longest)
-    largest = max((side.response for side in comparison.sides), key=lambda r: float(np.nanmax(np.abs(r.values))))
+    responses = [side.response for side in comparison.sides]
+    largest = max(responses, key=lambda response: float(np.nan_to_num(np.abs(response.values)).max()))
     factor, _ = force_unit(largest)
     for side, colour, line in zip(comparison.sides, COLOURS, LINES, strict=True):
         response, ink = side.response, palette.hexadecimal(colour)
