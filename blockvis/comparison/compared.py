@@ -74,7 +74,7 @@ class Side:
         return force_text(value, measured.unit == "N·m") if measured.is_force else f"{value:.5g}"
 
     def state(self, at: float) -> solver.Increment:
-        """Give the state at a parameter over all phases [m or rad], the last beyond the end; the lowest of limit loads."""
+        """Give the state at a parameter over all phases [m or rad], the last beyond the end; the lowest limit load."""
         governing = self.response.governing
         if not self.response.parameter.is_path and governing is not None:
             return governing

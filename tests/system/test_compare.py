@@ -110,7 +110,7 @@ def test_what_cannot_be_compared_is_refused_in_one_line(arch_results, tmp_path, 
         (blockvis.write(turned, tmp_path / "turned"), "the parameter is settlement [m] in one and settlement [rad] in"),
         (
             blockvis.write(moved_and_turned(), tmp_path / "mixed"),
-            "'mixed' has settlements in m and in rad, which share",
+            "mixed' has settlements in m and in rad",
         ),
         (empty, "holds no results"),
     ):
