@@ -14,7 +14,7 @@ from structures import case_from, run_command
 import blockvis
 import solver
 from blockvis import write_report
-from blockvis.cli import _say_error, _write_report
+from blockvis.cli import _say_error, main
 from blockvis.report.page import add_error
 from blockvis.runs import step_check
 from blockvis.runs.once_more import takes_steps, traced
@@ -116,8 +116,14 @@ def test_a_report_keeps_its_step_error_when_it_is_drawn_again(tmp_path, capsys):
     add_error(report, line)
     assert report.read_text(encoding="utf-8").count(row_of(line)) == 1
     report.unlink()
-    _write_report(response, tmp_path / "out")
-    assert report.read_text(encoding="utf-8").count(row_of(line)) == 1
+    (tmp_path / "out" / "range.csv").write_text(
+        "phase,settlement,reaction_low,reaction_high,runs\n0,0.0,1e3,2e3,9\n0,0.01,1e3,2e3,9\n", encoding="utf-8"
+    )
+    assert main(["run", "--resume", str(tmp_path / "out"), "--no-film"]) == 0
+    drawn = report.read_text(encoding="utf-8")
+    assert drawn.count(row_of(line)) == 1
+    assert "band behind the curve" in drawn
+    assert '"band":[[0.0,' in drawn
 
 
 @pytest.mark.slow
