@@ -268,6 +268,13 @@ def _check(study: Study, where: str) -> None:
             f"vary the {base.analysis} in a loop, as blockvis run {base.source.name} --set "
             "material.friction_coefficient=0.5 -o out-0.5"
         )
+    units = [settlement.unit for settlement in base.settlements]
+    if len(set(units)) > 1:
+        tables = (", ".join(str(k) for k, found in enumerate(units, 1) if found == unit) for unit in ("m", "rad"))
+        raise ValueError(
+            f"{base.source}: a study counts settlements one after another, but [[settlement]] {next(tables)} is in m "
+            f"and {next(tables)} in rad; leave out those of one unit"
+        )
     if study.method == "grid":
         _check_grid(study, where)
     try:

@@ -202,6 +202,15 @@ BAD = [
 ]
 
 
+def test_settlements_in_m_and_in_rad_are_no_study(study_file, capsys):
+    turn = "[[settlement]]\nrotation_centre = [1.0, 0.0]\nincrement = 0.001\nlimit = 0.002\n"
+    (study_file.parent / "case.toml").write_text(CASE + turn, encoding="utf-8")
+    assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
+    message = capsys.readouterr().err
+    assert "but [[settlement]] 1 is in m and 2 in rad; leave out those of one unit" in message
+    assert "case.toml" in message
+
+
 @pytest.mark.parametrize(("old", "new", "words"), BAD, ids=[b[1][:24] for b in BAD])
 def test_bad_input_is_one_message_and_nothing_started(study_file, capsys, old, new, words):
     _with(study_file, old, new)
