@@ -259,6 +259,11 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
     apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), first), np.finfo(float).tiny)
     moved = np.linalg.norm(ours.positions[mine] - other.positions[theirs], axis=2)
     ends = [np.nan if path.collapse is None else path.collapse for path in (ours, other)]
+    stops = [ours.stop, other.stop]
+    if ours.collapse_phase != other.collapse_phase and not np.isnan(ends).any():
+        # Displacements of two phases are no measure of each other.
+        ends = [np.nan, np.nan]
+        stops = [f"{path.stop} in phase {path.collapse_phase + 1}" for path in (ours, other)]
     worst = mine[np.argmax(apart)] if apart.any() else None
     phase = 0 if worst is None else int(ours.phases[worst])
     return StepCheck(
@@ -268,7 +273,7 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
         unit=unit_in(response, phase),
         collapse=abs(ends[1] - ends[0]) / ends[0] if ends[0] > 0.0 else np.nan,
         position=float(moved.max(initial=0.0)),
-        stop=ours.stop,
-        stop_of_check=other.stop,
+        stop=stops[0],
+        stop_of_check=stops[1],
         phase=phase + 1 if len(response.settlements) > 1 else None,
     )

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from structures import case_from, run_command
+from structures import arch_response, case_from, run_command
 
 import blockvis
 import solver
@@ -205,6 +205,15 @@ def test_an_error_is_told_in_the_unit_of_the_settlement_where_it_is_and_with_its
     check = compared(replace(settled, settlements=(*settled.settlements, turning)), other)
     assert (check.unit, check.phase) == ("m", 1)
     assert " (at 0.1 m in phase 1), " in str(check)
+
+
+def test_collapses_of_two_settlements_are_no_measure_of_each_other():
+    response = arch_response()
+    check = compared(response, replace(traced(response), collapse=1e-6, collapse_phase=1))
+    assert np.isnan(check.collapse)
+    assert str(check).endswith(
+        "with a quarter of the step tolerance it ends as 'collapsed in phase 2', not 'collapsed in phase 1'"
+    )
 
 
 def test_where_the_reaction_is_next_to_nothing_it_is_compared_with_a_part_of_the_first(settled):
