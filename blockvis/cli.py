@@ -874,6 +874,7 @@ def _convert(options: argparse.Namespace) -> int:
 def _convert_results(options: argparse.Namespace, target: Path) -> int:
     """Write a results folder as one file: a series, an animation, or the blocks where they are at the end."""
     from .pictures.captions import loss_words
+    from .results.about import in_phase, unit_in
     from .results.fall_files import known_fall
     from .runs.reopen import open_results
 
@@ -906,7 +907,8 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     last = response.path[-1]
     layout = layout_of(response.assembly, pose=last.pose).chosen(np.flatnonzero(~last.fallen))
     write_layout(layout, target)
-    where = f"{response.parameter.name} {last.parameter:.6g} {response.parameter.unit}".rstrip()
+    unit, phase = unit_in(response, last.phase), in_phase(response, last.phase)
+    where = f"{response.parameter.name} {last.parameter:.6g} {unit}".rstrip() + phase
     left_out = f"; left out: {gone}" if gone else ""
     print(f"{counted(layout.n_blocks, 'block')} written to {target}, as they are at {where}{left_out}")
     return 0
