@@ -251,7 +251,7 @@ class ResultsFolder:
             write_end(self.path, response, self.vtu, self._movements.joints)
         self._write_table(durable=True)
         write_lists(self.path, self.increments, durable=True)
-        write_atomic(self.path / "joints.csv", self._movements.table())
+        write_atomic(self.path / "joints.csv", self._movements.table(response.settlements))
         for name, text in (tables or {}).items():
             write_atomic(self.path / name, text)
         cracks = []
