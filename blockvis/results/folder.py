@@ -25,7 +25,7 @@ from .fall_files import remove_fall
 from .increments import StoredIncrements, packed_increment
 from .joints import LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
-from .record import RECORD, Record, read_record, versions
+from .record import RECORD, Record, read_json, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
 from .ties import COLUMNS as TIE_COLUMNS
 from .ties import TIES, TieCourses, stored_ties, tie_rows, write_ties
@@ -397,7 +397,7 @@ def stored_case(folder: str | Path) -> str:
     for name in ("summary.json", RECORD):
         file = Path(folder) / name
         if file.is_file():
-            return str(json.loads(file.read_text(encoding="utf-8")).get("case", ""))
+            return str(read_json(file).get("case", ""))
     return ""
 
 
@@ -411,8 +411,7 @@ def add_to_summary(folder: Path, **found: Any) -> None:
         By the names of the keys.
     """
     file = folder / "summary.json"
-    summary = json.loads(file.read_text(encoding="utf-8"))
-    write_atomic(file, json.dumps({**summary, **found}, indent=2, ensure_ascii=False) + "\n")
+    write_atomic(file, json.dumps({**read_json(file), **found}, indent=2, ensure_ascii=False) + "\n")
 
 
 def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
@@ -436,7 +435,7 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
     nothing = f"the run in '{folder}' has found nothing yet; go on with it by blockvis run --resume {folder}"
     summary: dict[str, Any] = {}
     if (folder / "summary.json").is_file():
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = read_json(folder / "summary.json")
     response = solver.Response(
         assembly=assembly,
         settlements=(),

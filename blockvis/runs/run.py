@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 import warnings
 from collections.abc import Iterator, Sequence
@@ -20,7 +19,7 @@ from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kind import AnalysisRun
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import RESULTS, ResultsFolder, refuse_results
-from blockvis.results.record import Record, checksum_of, read_record, versions
+from blockvis.results.record import Record, checksum_of, read_json, read_record, versions
 from blockvis.results.viewer_files import restore_grids, write_end
 from blockvis.system.atomic_files import PARTIAL
 from solver import mechanics
@@ -204,7 +203,7 @@ def _finished(folder: Path) -> dict[str, Any] | None:
     """Read the summary of a run that came to its end; None where it was stopped."""
     if not (folder / "summary.json").is_file():
         return None
-    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary: dict[str, Any] = read_json(folder / "summary.json")
     return None if summary["status"] == solver.Status.INTERRUPTED else summary
 
 

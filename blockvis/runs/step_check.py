@@ -16,7 +16,7 @@ from blockvis.case_files.read import parse_case
 from blockvis.cases.contents import Case
 from blockvis.results.about import unit_in
 from blockvis.results.folder import STEP_CHECK, add_to_summary
-from blockvis.results.record import read_record
+from blockvis.results.record import read_json, read_record
 from blockvis.system.atomic_files import write_atomic
 
 from .once_more import LINEAR_PROGRAM, OnceMore, Traced, followed, takes_steps, traced
@@ -180,7 +180,7 @@ def stored_case(folder: Path) -> Case:
     """
     record = read_record(folder)
     if not record.case:
-        raise ValueError(f"'{folder}' was written from Python, without a case file; its steps cannot be checked")
+        raise ValueError(f"'{folder}' was written from Python, without a case file; it cannot be followed again")
     return parse_case(record.case, Path(record.case_file or folder / "case.toml"))
 
 
@@ -214,7 +214,7 @@ def stored_check(folder: Path) -> StepCheck | None:
     """Read what a run was compared with, if it was."""
     if not (folder / STEP_CHECK).is_file():
         return None
-    numbers = json.loads((folder / STEP_CHECK).read_text(encoding="utf-8"))
+    numbers = read_json(folder / STEP_CHECK)
     known = {field.name: numbers[field.name] for field in fields(StepCheck) if field.name in numbers}
     return StepCheck(**{**known, "collapse": np.nan if known["collapse"] is None else known["collapse"]})
 
