@@ -201,7 +201,9 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
         axes.set_xlabel(name, fontsize=TEXT)
         _plain_frame(axes)
     panels[0].set_ylabel(f"collapse displacement [{unit}]", fontsize=TEXT)
-    panels[0].set_ylim(-0.02 * float(np.nanmax(y)), 1.06 * float(np.nanmax(y)))
+    # Where nothing ever stands all are 0.
+    largest = float(np.nanmax(y)) or 1.0
+    panels[0].set_ylim(-0.02 * largest, 1.06 * largest)
     handles = [_mark(CLASSES[k], MARKS[k], label) for k, label in enumerate(labels)]
     rest = sum(classes.values()) - sum(classes[one] for one in shown)
     if rest:
