@@ -116,7 +116,7 @@ def placement_of(
     given = reading.image
     keys = {key: given.get(key) for key in ("width", "height", "pixel")}
     said = {key: float(value) for key, value in keys.items() if isinstance(value, int | float)}
-    drawn = _of_world_file(image or path) or _of_tags(path, tags or {}, said)
+    drawn = written_placement(image or path, tags or {}, said)
     if said:
         return _of_keys(path, size, said, reading.unit, drawn)
     if drawn is not None:
@@ -127,6 +127,11 @@ def placement_of(
         f"'{path}' has no scale; give the width{wide} in m, --width 1.2 or [geometry] width = 1.2, or height, or the "
         f"size of a pixel, pixel = 0.002; or a world file {(image or path).with_suffix(suffix).name} beside it"
     )
+
+
+def written_placement(path: Path, tags: Mapping[int, Any], said: Mapping[str, float]) -> Placement | None:
+    """Read where an image lies from the world file beside it or its tags; None where neither says it."""
+    return _of_world_file(path) or _of_tags(path, tags, said)
 
 
 def _of_keys(
