@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -81,13 +81,21 @@ def draw_still(
     Raises
     ------
     ValueError
-        For a view or a section of blocks in the plane, and a plane that misses the blocks.
+        For a number that no increment has, a view or a section of blocks in the plane, and a plane that misses the
+        blocks.
     """
     _check_response(response)
-    chosen = increment if isinstance(increment, solver.Increment) else response.increments[increment]
+    chosen = increment if isinstance(increment, solver.Increment) else numbered(response.increments, increment)
     look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
     drawer = Drawer(response, look, size, (chosen,), curve=curve, underlay=underlay, still=True)
     return _save(drawer.picture(chosen, widths=True), path)
+
+
+def numbered(increments: Sequence[solver.Increment], number: int) -> solver.Increment:
+    """Give the increment of a number, which counts from the end below 0; raises ``ValueError`` where there is none."""
+    if not -len(increments) <= number < len(increments):
+        raise ValueError(f"there is no increment {number}: choose one from 0 to {len(increments) - 1}, or -1, the last")
+    return increments[number]
 
 
 def seen_from(view: Any, section: Any) -> tuple[Sight | None, Cut | None]:

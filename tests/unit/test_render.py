@@ -84,6 +84,8 @@ def test_frames_differ_and_the_fall_is_marked(tmp_path):
     response = arch_response()
     first = pixels(draw_still(response, 0, tmp_path / "first.png", size=SMALL))
     last = pixels(draw_still(response, len(response.path) - 1, tmp_path / "last.png", size=SMALL))
+    with pytest.raises(ValueError, match="there is no increment 99: choose one from 0 to"):
+        draw_still(response, 99, tmp_path / "none.png")
     fallen = pixels(draw_still(response, np.int64(-1), tmp_path / "fallen.png", size=SMALL))
     assert first.shape == (360, 640, 3)
     assert (np.abs(first - last).max(axis=2) > 30).sum() > 1000
