@@ -512,7 +512,7 @@ def test_means_with_runs_that_stood_are_the_least_that_they_may_be(tmp_path):
 
 
 def test_where_nothing_ever_stands_displacements_are_drawn_without_words_of_matplotlib(tmp_path):
-    study = _study()
+    study = _study(runs=8)
     table = _table(study, np.zeros(8), ["no initial equilibrium"] * 8)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
