@@ -14,6 +14,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,7 +34,6 @@ from .text import nearest
 
 if TYPE_CHECKING:
     from .cases.contents import Case
-    from .dynamics.fall import Fall
     from .layout.inspect import Inspection
     from .runs.outputs import Output
     from .runs.run import Run
@@ -538,7 +538,7 @@ def _explain(options: argparse.Namespace) -> int:
 
 
 def _sweep(options: argparse.Namespace) -> int:
-    from .studies.campaign import run_study
+    from .studies.campaign import study as carried_out
     from .studies.study_file import read_study
     from .studies.study_folder import finished_runs
     from .studies.summary import in_words, stored_summary
@@ -546,14 +546,13 @@ def _sweep(options: argparse.Namespace) -> int:
     study = read_study(options.study)
     folder = Path(options.output or f"{study.source.stem}-study")
     try:
-        run_study(
-            study,
+        carried_out(
+            replace(study, keep=(*study.keep, *_run_numbers(options.keep))),
             folder,
             scheduler=options.scheduler,
             workers=options.workers,
             force=options.force,
             retry_failed=options.retry_failed,
-            keep=_run_numbers(options.keep),
         )
     except KeyboardInterrupt:
         print(
@@ -598,8 +597,6 @@ def _new(options: argparse.Namespace) -> int:
 
 def _try_new(text: str, target: Path, *, drawing: bool) -> None:
     """Say whether what a new case describes stands, and draw it with its ground."""
-    from dataclasses import replace
-
     from .case_files.read import parse_case
     from .cases.build import case_assembly
     from .layout.inspect import inspected
@@ -791,7 +788,9 @@ def _say_waiting(patience: float | None) -> None:
 
 def _say_range(options: argparse.Namespace, run: Run) -> None:
     """Find and say the range of a path where it is asked for and not known."""
+    from .results.fall_files import known_fall
     from .results.folder import RANGE
+    from .runs.outputs import draw_curves, write_report_of
     from .runs.path_range import find_range, wants_range
     from .runs.step_check import stored_case
 
@@ -816,38 +815,12 @@ def _say_range(options: argparse.Namespace, run: Run) -> None:
     except KeyboardInterrupt:
         print("blockvis: range not known: interrupted; everything else is written", file=sys.stderr)
         return
-    _draw_curve(run.response, run.folder, [n for n in ("curve.png", "curve.svg") if (run.folder / n).is_file()])
+    draw_curves(run.response, run.folder, [n for n in ("curve.png", "curve.svg") if (run.folder / n).is_file()])
     if (run.folder / "report.html").is_file():
-        _write_report(run.response, run.folder)
-
-
-def _draw_curve(response: solver.Response, folder: Path, names: Sequence[str]) -> None:
-    """Draw the curve of a results folder, with what is known of its range."""
-    from .pictures.curves import draw_curve
-    from .results.reaction_range import stored_range
-
-    for name in names:
-        draw_curve(response, folder / name, band=stored_range(folder))
-
-
-def _write_report(response: solver.Response, folder: Path) -> Fall | None:
-    """Write the report of a results folder, with what is known of its error and range; returns its fall."""
-    from .dynamics.fall import fall_of
-    from .report.page import write_report
-    from .results.fall_files import stored_fall
-    from .results.folder import stored_case
-    from .results.reaction_range import stored_range
-    from .runs.step_check import stored_check
-
-    fall = stored_fall(folder) or fall_of(response)
-    error, band = str(stored_check(folder) or ""), stored_range(folder)
-    write_report(response, folder / "report.html", stored_case(folder), fall=fall, error=error, band=band)
-    return fall
+        write_report_of(run.response, run.folder, known_fall(run.response))
 
 
 def _info(options: argparse.Namespace) -> int:
-    from dataclasses import replace
-
     from .formats.read import inspect
     from .layout.assemble import supports_of
     from .layout.ground import ground_of
@@ -904,6 +877,7 @@ def _convert(options: argparse.Namespace) -> int:
 def _convert_results(options: argparse.Namespace, target: Path) -> int:
     """Write a results folder as one file: a series, an animation, or the blocks where they are at the end."""
     from .pictures.captions import loss_words
+    from .results.about import in_phase, unit_in
     from .results.fall_files import known_fall
     from .runs.reopen import open_results
 
@@ -936,7 +910,8 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     last = response.path[-1]
     layout = layout_of(response.assembly, pose=last.pose).chosen(np.flatnonzero(~last.fallen))
     write_layout(layout, target)
-    where = f"{response.parameter.name} {last.parameter:.6g} {response.parameter.unit}".rstrip()
+    unit, phase = unit_in(response, last.phase), in_phase(response, last.phase)
+    where = f"{response.parameter.name} {last.parameter:.6g} {unit}".rstrip() + phase
     left_out = f"; left out: {gone}" if gone else ""
     print(f"{counted(layout.n_blocks, 'block')} written to {target}, as they are at {where}{left_out}")
     return 0
@@ -976,6 +951,8 @@ def _layout(options: argparse.Namespace) -> int:
 def _render(options: argparse.Namespace) -> int:
     from .pictures.crack_drawing import draw_cracks
     from .pictures.render import animate, draw_mechanism, draw_still
+    from .results.fall_files import known_fall
+    from .runs.outputs import draw_curves, write_report_of
     from .runs.progress import DrawingProgress
     from .runs.reopen import open_results
     from .runs.underlay import stored_underlay
@@ -989,11 +966,12 @@ def _render(options: argparse.Namespace) -> int:
         print(f"drawn in {folder}/: cracks.png")
         return 0
     underlay = stored_underlay(folder)
-    fall = _write_report(response, folder)
+    fall = known_fall(response)
+    write_report_of(response, folder, fall)
     drawn = ["report.html"]
     if response.path:
         curves = ["curve.png", "curve.svg"]
-        _draw_curve(response, folder, curves)
+        draw_curves(response, folder, curves)
         drawn += curves
     look = {
         "magnification": options.magnification,
@@ -1022,13 +1000,16 @@ def _render(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
+    from .results.fall_files import known_fall
+    from .runs.outputs import write_report_of
     from .runs.reopen import open_results
 
     folder = Path(options.results)
     if not options.pdf and (options.view or options.section):
         raise ValueError("--view and --section are of the report on paper, report.html turns; add --pdf")
     response = open_results(folder)
-    fall = _write_report(response, folder)
+    fall = known_fall(response)
+    write_report_of(response, folder, fall)
     written = ["report.html"]
     if options.pdf:
         from .report.pdf import write_pdf

@@ -99,6 +99,14 @@ def stacked(shift=(0.0, 0.0), turn: float = 0.0) -> tuple[solver.Assembly, solve
 
 
 @cache
+def moved_and_turned() -> solver.Response:
+    """An arch whose springer moves by a millimetre, in the first settlement, and turns by a milliradian."""
+    turns = solver.Settlement(rotation=1.0, rotation_centre=(1.0, 0.0), increment=1e-3, limit=1e-3)
+    moves = solver.Settlement((1, 0), increment=1e-3, limit=1e-3)
+    return solver.Structure(generators.arch(voussoirs=5), friction_coefficient=2.0).settle([moves, turns])
+
+
+@cache
 def arch_response() -> solver.Response:
     """A semicircular arch of 12 voussoirs whose right springer spreads until it collapses."""
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)

@@ -67,6 +67,11 @@ def case_file_text(path: Path) -> str:
             f"'{path}' is a layout, not a case file; a case file names it, what settles and by how much: "
             f'[geometry] file = "{path.name}" (see examples/); blockvis info shows what is in it'
         )
+    return utf8_text(path)
+
+
+def utf8_text(path: Path) -> str:
+    """Read a text file; raises ``ValueError`` where it is no text in UTF-8."""
     try:
         # Editors of Windows begin a file with a mark of its encoding.
         return path.read_text(encoding="utf-8-sig")
@@ -113,18 +118,18 @@ def parse_case(text: str, source: Path) -> Case:
     return case_of(parsed_toml(text, source), source, text)
 
 
-def parsed_toml(text: str, source: Path) -> dict[str, Any]:
-    """Parse the text of a case file; raises ``ValueError`` with the place where it is no TOML."""
+def parsed_toml(text: str, source: Path, kind: str = "case file", example: str = 'file = "arch.msh"') -> dict[str, Any]:
+    """Parse the text of a case or study file; raises ``ValueError`` with the place where it is no TOML."""
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise ValueError(f"{source}: nests lists or tables without end; a case file has a handful of them") from None
+        raise ValueError(f"{source}: nests lists or tables without end; a {kind} has a handful of them") from None
     except ValueError as error:
         comma = decimal_comma(text, str(error))
         if comma:
             raise ValueError(f"{source}: {comma}") from None
         hint = "; write paths with / or in single quotes" if "\\" in text else ""
-        raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"{hint}') from None
+        raise ValueError(f"{source}: {error}; a {kind} is TOML, for instance: {example}{hint}") from None
 
 
 def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:

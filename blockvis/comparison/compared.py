@@ -15,7 +15,7 @@ import numpy as np
 import solver
 from blockvis.case_files.case_keys import SECTIONS
 from blockvis.dynamics.fall import Fall
-from blockvis.pictures.captions import parameter_text
+from blockvis.pictures.captions import in_one_unit, parameter_text
 from blockvis.pictures.film import state_at
 from blockvis.report.page import summary_rows, tie_rows
 from blockvis.results.cracks import Crack, cracks_of
@@ -74,7 +74,10 @@ class Side:
         return force_text(value, measured.unit == "N·m") if measured.is_force else f"{value:.5g}"
 
     def state(self, at: float) -> solver.Increment:
-        """Give the state at a parameter over all phases [m or rad], the last beyond the end."""
+        """Give the state at a parameter over all phases [m or rad], the last beyond the end; the lowest limit load."""
+        governing = self.response.governing
+        if not self.response.parameter.is_path and governing is not None:
+            return governing
         return state_at(self.response, min(at, self.end))
 
 
@@ -113,7 +116,7 @@ class Comparison:
     @property
     def stations(self) -> np.ndarray:
         """(n,) array [m or rad]: parameters at which pictures stand side by side."""
-        if self.common_end <= 0.0:
+        if self.common_end <= 0.0 or not self.is_path:
             return np.zeros(1)
         return self.common_end * np.arange(1, STATIONS + 1) / STATIONS
 
@@ -198,7 +201,8 @@ def compared(one: str | Path, other: str | Path) -> Comparison:
         raise ValueError(f"'{one}' and '{other}' are the same folder; give the results of two runs")
     first, second = (_opened(folder, label) for folder, label in zip(folders, _labels(*folders), strict=True))
     for what in ("parameter", "measured"):
-        names = [getattr(side.response, what).name for side in (first, second)]
+        quantities = [getattr(side.response, what) for side in (first, second)]
+        names = [f"{q.name} [{q.unit}]" if q.unit else q.name for q in quantities]
         if names[0] != names[1]:
             raise ValueError(
                 f"'{one}' and '{other}' share no axis: the {what} is {names[0]} in one and {names[1]} in the other; "
@@ -208,9 +212,15 @@ def compared(one: str | Path, other: str | Path) -> Comparison:
 
 
 def _opened(folder: Path, label: str) -> Side:
-    response = open_results(folder)
-    if not response.path:
-        raise ValueError(f"'{folder}' has no equilibrium to compare: {response.message or response.stop}")
+    found = open_results(folder)
+    if not found.path:
+        raise ValueError(f"'{folder}' has no equilibrium to compare: {found.message or found.stop}")
+    response = in_one_unit(found, found.path[-1].phase)
+    if len(response.path) < len(found.path):
+        raise ValueError(
+            f"'{folder}' has settlements in m and in rad, which share no axis; compare runs of which all settlements "
+            "are movements along a direction, or all are rotations"
+        )
     text = stored_case(folder)
     return Side(label, folder, response, stored_fall(folder), dict(_flat(tomllib.loads(text))) if text else {})
 

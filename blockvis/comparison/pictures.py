@@ -30,6 +30,9 @@ TALL_PANEL, WIDE_PANEL = (800, 620), (1280, 480)
 #: Structures wider than this for their height stand below each other.
 WIDE = 1.8
 
+#: Frames per second, and seconds for the path to the last equilibrium of both.
+FPS, SECONDS = 25.0, 6.0
+
 #: Height of the strip with the name of the run [pixels].
 STRIP = 40
 
@@ -40,7 +43,8 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
     axes = figure.add_subplot()
     longest = max(comparison.sides, key=lambda side: side.end).response
     per_length, _ = parameter_unit(longest)
-    largest = max((side.response for side in comparison.sides), key=lambda r: float(np.nanmax(np.abs(r.values))))
+    responses = [side.response for side in comparison.sides]
+    largest = max(responses, key=lambda response: float(np.nan_to_num(np.abs(response.values)).max()))
     factor, _ = force_unit(largest)
     for side, colour, line in zip(comparison.sides, COLOURS, LINES, strict=True):
         response, ink = side.response, palette.hexadecimal(colour)
@@ -139,14 +143,7 @@ def draw_stations(comparison: Comparison, path: Path) -> Path:
     return path
 
 
-def film_in_step(
-    comparison: Comparison,
-    path: Path,
-    *,
-    fps: float = 25.0,
-    seconds: float = 6.0,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
+def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int, int], None] | None = None) -> Path:
     """Write a film of both at the same settlements; the one that collapses first falls while the other goes on.
 
     Parameters
@@ -155,32 +152,28 @@ def film_in_step(
         Of two paths.
     path : Path
         Ending in .mp4, .gif or .webp.
-    fps : float
-        Frames per second.
-    seconds : float [s]
-        For the path to the last equilibrium of both.
     progress : callable, optional
         Called with the frames drawn and their number.
     """
     pair = Pair(comparison, Look(colour_by="mechanism"), falls=True)
     end = max(side.end for side in comparison.sides)
-    longest = max(_seconds(side, end, seconds) for side in comparison.sides)
-    count = max(2, int(np.ceil((longest + PAUSE + END) * fps)))
+    longest = max(_seconds(side, end) for side in comparison.sides)
+    count = max(2, int(np.ceil((longest + PAUSE + END) * FPS)))
 
     def pictures() -> Iterator[Image.Image]:
         last: list[Image.Image | None] = [None, None]
         shown: list[object] = [None, None]
         for frame in range(count):
-            time = frame / fps
+            time = frame / FPS
             for k, (side, drawer) in enumerate(zip(comparison.sides, pair.drawers, strict=True)):
-                moment = _moment(side, time, end, seconds)
+                moment = _moment(side, time, end)
                 if moment != shown[k] or last[k] is None:
                     last[k], shown[k] = _drawn(side, drawer, moment), moment
             if progress is not None:
                 progress(frame + 1, count)
             yield pair.picture([image for image in last if image is not None])
 
-    return write_film(pictures(), path, size=pair.size, fps=fps)
+    return write_film(pictures(), path, size=pair.size, fps=FPS)
 
 
 def _aspect(side: Side) -> float:
@@ -188,21 +181,21 @@ def _aspect(side: Side) -> float:
     return float(width / height)
 
 
-def _arrival(side: Side, end: float, seconds: float) -> float:
+def _arrival(side: Side, end: float) -> float:
     """Seconds after which a run is at its last equilibrium."""
-    return seconds * side.end / end if end > 0.0 else 0.0
+    return SECONDS * side.end / end if end > 0.0 else 0.0
 
 
-def _seconds(side: Side, end: float, seconds: float) -> float:
+def _seconds(side: Side, end: float) -> float:
     falls = 0.0 if side.fall is None else PAUSE + float(side.fall.times[-1])
-    return max(_arrival(side, end, seconds) + falls, seconds)
+    return max(_arrival(side, end) + falls, SECONDS)
 
 
-def _moment(side: Side, time: float, end: float, seconds: float) -> tuple[str, float]:
+def _moment(side: Side, time: float, end: float) -> tuple[str, float]:
     """Give what a run shows at a time of the film: a place on its path, or a moment of its fall."""
-    arrival = _arrival(side, end, seconds)
+    arrival = _arrival(side, end)
     if time < arrival:
-        return "path", end * time / seconds
+        return "path", end * time / SECONDS
     if side.fall is None or time < arrival + PAUSE:
         return "path", side.end
     return "fall", min(time - arrival - PAUSE, float(side.fall.times[-1]))

@@ -10,7 +10,7 @@ from pathlib import Path
 from string import Template
 
 from blockvis.results.about import about
-from blockvis.results.folder import VIDEO_SUFFIXES, ResultsExist, refuse_results
+from blockvis.results.folder import RUN_FILES, VIDEO_SUFFIXES, refuse_files
 from blockvis.system.atomic_files import make_folder, write_atomic
 from blockvis.text import width_text
 
@@ -62,7 +62,9 @@ def compare(
             f"'{film}' is no film that blockvis writes; end its name in {', '.join(VIDEO_SUFFIXES)}, "
             "or in / for a folder of pictures"
         )
-    _refuse(folder, (PAGE, CURVES, STATIONS, *([film] if film else [])), overwrite)
+    # A comparison is no run, whose results --force may replace.
+    refuse_files(folder, RUN_FILES, "results", False, "choose another folder with -o")
+    refuse_files(folder, (PAGE, CURVES, STATIONS, *([film] if film else [])), "a comparison", overwrite)
     found = compared(one, other)
     make_folder(folder)
     curves = draw_curves(found, folder / CURVES)
@@ -117,13 +119,3 @@ def _rows(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = ["".join(f"<th>{html.escape(head)}</th>" for head in heads)]
     lines += ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in rows]
     return "".join(f"<tr>{line}</tr>" for line in lines)
-
-
-def _refuse(folder: Path, names: Sequence[str], overwrite: bool) -> None:
-    """Raise :class:`ResultsExist` if a folder holds a comparison that may not be replaced, or the results of a run."""
-    refuse_results(folder)
-    there = [name for name in names if (folder / name).exists()]
-    if there and not overwrite:
-        raise ResultsExist(
-            f"'{folder}' holds a comparison already ({there[0]}); choose another folder with -o or add --force"
-        )

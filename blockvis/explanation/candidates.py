@@ -112,6 +112,8 @@ class Ground:
         Every support fixed; cut where troughs are looked at.
     pieces : mapping of str to tuple of str
         What became of each support of the drawing.
+    troughs : bool
+        Whether troughs are looked at.
     notes : tuple of str
         What was cut.
     """

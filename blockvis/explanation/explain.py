@@ -17,6 +17,7 @@ from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cases.contents import Case
 from blockvis.kinds.kind import needs_no_crushing
 from blockvis.kinds.kinds import KINDS
+from blockvis.results.folder import refuse_files
 from blockvis.runs.plan import refuse_ties
 from blockvis.runs.progress import RunsProgress
 from solver import mechanics
@@ -40,7 +41,7 @@ from .observations import Observations, read_observations
 from .ranking import Cause, next_measurement, ranked, unexplained
 from .result import Explanation
 from .words import in_words
-from .write import refuse_explanation, write_explanation
+from .write import FILES, write_explanation
 
 #: Range of the coefficient of friction, as fractions of that of the case, where the case gives none.
 FRICTIONS = (0.8, 1.25)
@@ -100,7 +101,7 @@ def explain(
     same input gives the same answer.
     """
     if folder is not None:
-        refuse_explanation(folder, overwrite)
+        refuse_files(Path(folder), FILES, "an explanation", overwrite)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         if not isinstance(case, Case):
@@ -146,7 +147,7 @@ def explain(
     )
     found = replace(found, words=in_words(found))
     if folder is not None:
-        write_explanation(found, folder, overwrite=overwrite)
+        write_explanation(found, Path(folder))
     return found
 
 

@@ -255,11 +255,6 @@ class Trial:
     pairs: np.ndarray
     gaps: np.ndarray
 
-    @property
-    def friction(self) -> float:
-        """Coefficient of friction of [material]."""
-        return self.variant.friction
-
     @cached_property
     def log_evidence(self) -> float:
         """Logarithm of the likelihood, averaged over the amounts."""

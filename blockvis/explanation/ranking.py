@@ -182,7 +182,7 @@ def _frictions(own: Sequence[Trial], share: np.ndarray) -> tuple[float, float]:
     """Range of the coefficients of friction that are not ten times less likely than the best."""
     by: dict[float, float] = {}
     for trial, s in zip(own, share, strict=True):
-        by[trial.friction] = max(by.get(trial.friction, 0.0), float(s))
+        by[trial.variant.friction] = max(by.get(trial.variant.friction, 0.0), float(s))
     likely = [friction for friction, s in by.items() if s * TOLD_APART >= max(by.values())]
     return min(likely), max(likely)
 

@@ -164,7 +164,7 @@ def values_of(found: Explanation) -> dict[str, Any]:
             "model_uncertainty": settings.model_uncertainty,
             "place_uncertainty": found.comparison.trust.place,
             "outliers": settings.outliers,
-            "frictions": sorted({trial.friction for cause in found.causes for trial in cause.trials}),
+            "frictions": sorted({trial.variant.friction for cause in found.causes for trial in cause.trials}),
         },
         "runs": len(found.runs),
         "notes": list(found.notes),

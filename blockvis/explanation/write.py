@@ -12,7 +12,6 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
-from blockvis.results.folder import ResultsExist
 from blockvis.system.atomic_files import make_folder, write_atomic
 from solver.mechanics import counted
 
@@ -42,35 +41,18 @@ FILES = ("explain.html", "explain.json", "explain.png")
 MOST_CAUSES, MOST_OBSERVATIONS = 12, 200
 
 
-def refuse_explanation(folder: str | Path, overwrite: bool) -> None:
-    """Raise :class:`ResultsExist` if a folder holds an explanation that may not be replaced."""
-    folder = Path(folder)
-    if folder.exists() and not folder.is_dir():
-        raise ResultsExist(f"'{folder}' is a file; choose a folder with -o")
-    there = [name for name in FILES if (folder / name).exists()]
-    if there and not overwrite:
-        raise ResultsExist(
-            f"'{folder}' holds an explanation already ({there[0]}); choose another folder with -o or add --force"
-        )
-
-
-def write_explanation(found: Explanation, folder: str | Path, *, overwrite: bool = False) -> Path:
+def write_explanation(found: Explanation, folder: Path) -> None:
     """Write the page, its numbers and its picture.
 
     Parameters
     ----------
     found : Explanation
-    folder : str or Path
-    overwrite : bool
-        Whether an explanation that is there already may be replaced.
+    folder : Path
     """
-    refuse_explanation(folder, overwrite)
-    folder = Path(folder)
     make_folder(folder)
     write_atomic(folder / "explain.json", json.dumps(values_of(found), indent=2, ensure_ascii=False) + "\n")
     picture = draw_explanation(found, folder / "explain.png")
     write_atomic(folder / "explain.html", explanation_html(found, picture.read_bytes()))
-    return folder
 
 
 def explanation_html(found: Explanation, picture: bytes) -> str:
@@ -177,7 +159,7 @@ def _vector(value: Sequence[float]) -> str:
 
 def _assumed(found: Explanation) -> list[str]:
     trust, runs = found.comparison.trust, found.runs
-    frictions = sorted({trial.friction for cause in found.causes for trial in cause.trials})
+    frictions = sorted({trial.variant.friction for cause in found.causes for trial in cause.trials})
     largest = float(found.causes[0].best.amounts[-1]) if found.causes else 0.0
     return [
         "Blocks are rigid, joints dry: cracks in stones, mortar that hardened later and loads that changed are not in "

@@ -121,7 +121,7 @@ def placement_of(
             if not isinstance(value, Real):
                 raise ValueError(f"'{path}': {key} is {value!r}; give a length in m above 0")
             said[key] = float(value)
-    drawn = _of_world_file(image or path) or _of_tags(path, tags or {}, said)
+    drawn = written_placement(image or path, tags or {}, said)
     if said:
         return _of_keys(path, size, said, reading.unit, drawn)
     if drawn is not None:
@@ -132,6 +132,11 @@ def placement_of(
         f"'{path}' has no scale; give the width{wide} in m, --width 1.2 or [geometry] width = 1.2, or height, or the "
         f"size of a pixel, pixel = 0.002; or a world file {(image or path).with_suffix(suffix).name} beside it"
     )
+
+
+def written_placement(path: Path, tags: Mapping[int, Any], said: Mapping[str, float]) -> Placement | None:
+    """Read where an image lies from the world file beside it or its tags; None where neither says it."""
+    return _of_world_file(path) or _of_tags(path, tags, said)
 
 
 def _of_keys(

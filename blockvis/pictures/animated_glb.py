@@ -103,7 +103,8 @@ def _played(
 
     What has gone by the last equilibrium does not come back for what follows.
     """
-    path, along = response.path, response.parameters
+    # Positions of a load may be negative, times may not.
+    path, along = response.path, response.parameters - response.parameters[:1]
     initial = solver.Pose.initial(response.assembly)
     poses = [increment.pose for increment in path] or [initial]
     stands = [~increment.fallen for increment in path] or [np.ones(response.assembly.n_blocks, dtype=bool)]

@@ -23,7 +23,7 @@ from . import palette
 from .captions import loss_words, phase_words, state_text
 from .flat_scene import FlatScene
 from .frame import Key, Sheet, framed, write_labels
-from .render import STILL_SIZE, seen_from
+from .render import STILL_SIZE, numbered, seen_from
 
 #: Thickness of a crack that only slides and of the widest one, in heights of the picture; the latter in block sizes at
 #: most, or the steps of a fine bond would run into each other.
@@ -63,9 +63,7 @@ def draw_cracks(
     """
     assembly = response.assembly
     increments = response.path or response.increments
-    if not -len(increments) <= number < len(increments):
-        raise ValueError(f"there is no increment {number}: choose one from 0 to {len(increments) - 1}, or -1, the last")
-    increment = increments[number]
+    increment = numbered(increments, number)
     joints = initial_joints(assembly)
     cracks = cracks_of(assembly, increment.pose, joints, increment.fallen)
     widest = width_text(cracks[0].width) if cracks else ""

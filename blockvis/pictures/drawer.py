@@ -14,7 +14,7 @@ import solver
 from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.layout.sights import Cut, Sight
 from blockvis.results.cracks import cracks_of, main_cracks
-from blockvis.results.joints import end_openings, faces_at, initial_joints
+from blockvis.results.joints import carried_faces, end_openings, initial_joints
 from blockvis.text import force_text, rounded_length, width_text
 from solver import mechanics
 
@@ -26,6 +26,7 @@ from .frame import ColourBar, Frame, Key, Sheet, framed, write_labels
 from .live_load import LiveLoads
 from .marks import (
     SMALLEST_RESULTANT,
+    evenly,
     joint_forces,
     length_per_force,
     marks_of,
@@ -209,7 +210,8 @@ class Drawer:
             # What lies between the plane and the eye is left out.
             self._plane = self._plane * [[1.0], [-1.0]]
         self.ties = DrawnTies(response, self._plane)
-        self._seen = _Series(sampled=sampled([k for k, i in enumerate(increments) if matters(i, response)]))
+        numbers = np.array([k for k, i in enumerate(increments) if matters(i, response)], dtype=int)
+        self._seen = _Series(sampled=frozenset(evenly(numbers, FORCES_OF).tolist()))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
@@ -221,7 +223,7 @@ class Drawer:
             # Figures and axes of matplotlib are loaded where a curve is drawn only.
             from .curves import CurvePanel
 
-            self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text)
+            self.panel = CurvePanel(response, (beside, self.sheet.inside_size[1]), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         self._arrow = ARROW_IN_SPACE * float(frame.size.max())
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
@@ -625,10 +627,10 @@ class Drawer:
         points, words, colours = self.ties.labels(increment, shown)
         if widths:
             cracks = main_cracks(cracks_of(self.assembly, increment.pose, self.joints, increment.fallen))
-            on_a, on_b, _ = faces_at(self.assembly, self.joints, shown)
+            faces = carried_faces(self.assembly, self.joints, shown)
             widest = [int(crack.joints[0]) for crack in cracks]
             ends = end_openings(self.assembly, self.joints, increment.pose)[widest].argmax(axis=1)
-            points = np.concatenate([points, (on_a + on_b)[widest, ends] / 2.0])
+            points = np.concatenate([points, (faces.on_a + faces.on_b).reshape(-1, 2, 2)[widest, ends] / 2.0])
             words += [width_text(crack.width) for crack in cracks]
             colours += [palette.OPEN] * len(cracks)
         if words:
@@ -750,18 +752,7 @@ def alike(frames: list[Frame]) -> list[Frame]:
     return [Frame(middle - half, middle + half) for middle in middles]
 
 
-def sampled(numbers: list[int]) -> frozenset[int]:
-    """Up to ``FORCES_OF`` of the numbers, evenly chosen."""
-    chosen = np.linspace(0, len(numbers) - 1, min(len(numbers), FORCES_OF)).round().astype(int)
-    return frozenset(numbers[k] for k in chosen)
-
-
 def largest_displacement(assembly: solver.Assembly, increment: solver.Increment) -> float:
     """Largest displacement [m] of a corner of a free block since the layout."""
     moved = mechanics.moved_vertices(assembly, increment.pose) - assembly.vertices
     return float(np.linalg.norm(moved, axis=1)[assembly.free[assembly.block_of_vertex]].max(initial=0.0))
-
-
-def size_of(box: tuple[int, int, int, int]) -> tuple[int, int]:
-    """Width and height of a box of left, top, right and bottom."""
-    return box[2] - box[0], box[3] - box[1]

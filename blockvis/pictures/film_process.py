@@ -12,6 +12,7 @@ from typing import Any
 import solver
 from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.results.increments import StoredIncrements
+from blockvis.results.reaction_range import stored_range
 from blockvis.results.viewer_files import ViewerFiles, ViewerFormat
 from blockvis.system.atomic_files import partial_of, remove
 from blockvis.system.worker import Say, Worker, WorkerEnded, serve
@@ -237,7 +238,7 @@ def _draw(
         fall = fall_of(response, lambda seconds: say("falling", seconds))
         say("fall", fall)
     if response.path:
-        draw_curve(response, path.with_name("curve.png"))
+        draw_curve(response, path.with_name("curve.png"), band=stored_range(path.parent))
     look: dict[str, Any] = {"underlay": underlay, "poster": path.with_name("poster.png"), **seen_from}
     animate(response, path, fall=fall, progress=lambda done, total: say("drawing", (done, total)), **look)
     say("drawn", None)

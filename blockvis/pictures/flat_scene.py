@@ -19,6 +19,7 @@ from .backfill import FillBodies
 from .frame import Frame
 from .hatching import hatch_lines
 from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes, part_outlines
+from .scene import Scene
 from .swing import MOST_PARTS, Swing
 from .ties import Strands
 from .underlay import COVER, CarriedPhotograph, Underlay
@@ -44,7 +45,7 @@ Colour = tuple[int, int, int]
 MOST_OUTLINES = 6
 
 
-class FlatScene:
+class FlatScene(Scene):
     """Blocks of the plane and their marks, drawn frame after frame; see :class:`blockvis.pictures.scene.Scene`.
 
     Parameters
@@ -89,11 +90,6 @@ class FlatScene:
         self._hatch()
         self.pose(solver.Pose.initial(assembly))
 
-    @property
-    def layers(self) -> tuple[str, ...]:
-        """Names of the layers drawn so far."""
-        return tuple(self._layers)
-
     def holds(self, *layers: str) -> bool:
         """Whether anything is drawn in one of the layers, parts of them (after a "/") included."""
         return any(len(layer.corners) for name, layer in self._layers.items() if name.split("/")[0] in layers)
@@ -120,10 +116,6 @@ class FlatScene:
             moved = mechanics.carried(points, blocks, solver.Pose.initial(self.assembly), shown)
             moved[self._gone[blocks]] = self.frame.low - self.frame.size
             self._layers["hatch"].move(moved)
-
-    def hide(self, gone: np.ndarray) -> None:
-        """Leave blocks, (n_blocks,) bool array, out from the next pose on."""
-        self._gone = gone
 
     def backfill(self, bodies: FillBodies) -> None:
         """Fill and hatch what lies between extrados and surface, behind the blocks."""
@@ -239,7 +231,7 @@ class FlatScene:
 
     def clear(self, *layers: str) -> None:
         """Remove layers, parts of them (after a "/") included."""
-        for name in self.layers:
+        for name in tuple(self._layers):
             if name.split("/")[0] in layers:
                 del self._layers[name]
 
@@ -307,11 +299,6 @@ class FlatScene:
             _Layer((int(r), int(g), int(b)), corners[owner == k], codes[owner == k], cover=cover)
             for k, (r, g, b) in enumerate(colours)
         ]
-
-    @property
-    def _thin(self) -> float:
-        """Pixels; one where the picture is 1080 high."""
-        return self.size[1] / 1080.0
 
     def _outline_width(self) -> float:
         """Pixels; thinner where the blocks are small, so that a façade does not turn dark."""

@@ -82,7 +82,8 @@ def draw_still(
     Raises
     ------
     ValueError
-        For a view or a section of blocks in the plane, and a plane that misses the blocks.
+        For a number that no increment has, a view or a section of blocks in the plane, and a plane that misses the
+        blocks.
     """
     _check_response(response)
     chosen = increment if isinstance(increment, solver.Increment) else numbered(response.increments, increment)

@@ -40,12 +40,19 @@ class Scene(Protocol):
     size: tuple[int, int]
     frame: Frame
     pixel: float
+    _gone: np.ndarray
+
+    @property
+    def _thin(self) -> float:
+        """Pixels; one where the picture is 1080 high."""
+        return self.size[1] / 1080.0
 
     def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
         """Put the blocks where they are drawn, in new colours (n_blocks, 3) uint8 where these are given."""
 
     def hide(self, gone: np.ndarray) -> None:
         """Leave blocks, (n_blocks,) bool array, out from the next pose on."""
+        self._gone = gone
 
     def backfill(self, bodies: FillBodies) -> None:
         """Draw loose fill over the blocks."""
@@ -67,6 +74,7 @@ class Scene(Protocol):
 
     def bearings(self, ends: np.ndarray) -> None:
         """Draw where supports carry the structure, lines (n, 2, d) [m]; in space the blocks show it."""
+        return
 
     def arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
         """Draw arrows from tails (n, d) [m] to tips (n, d) [m]: "arrow" of supports or "live" of loads."""

@@ -24,6 +24,7 @@ from . import palette
 from .backfill import FillBodies
 from .frame import Frame, framed, room_in
 from .marks import Marks, arrow_shapes
+from .scene import Scene
 from .solid_view import ABOVE, AROUND, View, showing_faces
 from .surface import IN_PLANE, section_of, sharp_edges, triangles_of
 from .swing import MOST_PARTS, Swing
@@ -74,7 +75,7 @@ class _Arrows:
     within: float | None = None
 
 
-class SolidScene:
+class SolidScene(Scene):
     """Blocks in space and their marks, drawn frame after frame; see :class:`blockvis.pictures.scene.Scene`.
 
     Parameters
@@ -196,10 +197,6 @@ class SolidScene:
             shades = (CUT_SHADE * self._fill[owners]).astype(np.uint8)
             colours = np.repeat(shades, [len(face) for face in faces], axis=0)
             self.polygons("section", faces, colours, forward=1.0)
-
-    def hide(self, gone: np.ndarray) -> None:
-        """Leave blocks, (n_blocks,) bool array, out from the next pose on."""
-        self._gone = gone
 
     def backfill(self, bodies: FillBodies) -> None:
         """Draw the edges of the bodies of fill."""
@@ -339,9 +336,6 @@ class SolidScene:
             hidden = dashed(strand.ends, DASH * max(self._thin, 0.6) * self.pixel)
             self.lines(f"hidden {strand.layer}", hidden, strand.colour, 0.35 * width, forward=IN_FRONT_OF_ALL)
 
-    def bearings(self, ends: np.ndarray) -> None:
-        """Draw nothing: the blocks show it."""
-
     def arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
         """Draw arrows from tails (n, 3) [m] to tips (n, 3) [m] over all: none is hidden behind its own support."""
         if self._cut is not None:
@@ -369,11 +363,6 @@ class SolidScene:
             self._overlays.pop(name, None)
             if name in self._layers:
                 self._plotter.remove_actor(self._layers.pop(name), reset_camera=False, render=False)
-
-    @property
-    def layers(self) -> tuple[str, ...]:
-        """Names of the layers."""
-        return tuple(self._layers)
 
     def holds(self, *layers: str) -> bool:
         """Whether anything is drawn in one of the layers."""
@@ -430,11 +419,6 @@ class SolidScene:
     def close(self) -> None:
         """Give the memory of the graphics card back."""
         self._plotter.close()
-
-    @property
-    def _thin(self) -> float:
-        """Pixels; one where the picture is 1080 high."""
-        return self.size[1] / 1080.0
 
     def _look_at(self) -> None:
         axes, camera = self.view.axes, self._plotter.camera

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 import solver
-from blockvis.dynamics.fall import fall_of
 from blockvis.pictures import palette
 from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.render import draw_mechanism
+from blockvis.results.fall_files import known_fall
 from blockvis.text import force_text
 from solver import mechanics
 
@@ -45,7 +45,7 @@ class Player:
 
     def _repr_html_(self) -> str:
         # A frame of its own keeps the page's names and styles apart from the notebook's.
-        page = html.escape(report_html(self.response, fall=fall_of(self.response)), quote=True)
+        page = html.escape(report_html(self.response, fall=known_fall(self.response)), quote=True)
         style = f"width:100%;height:{self.height}px;border:0"
         return f'<iframe srcdoc="{page}" style="{style}" sandbox="allow-scripts allow-downloads"></iframe>'
 

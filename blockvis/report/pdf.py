@@ -17,9 +17,10 @@ from fpdf.enums import TableBordersLayout
 import solver
 from blockvis.dynamics.fall import Fall
 from blockvis.pictures import palette
-from blockvis.pictures.captions import failure_text, parameter_text
+from blockvis.pictures.captions import failure_text, in_one_unit, parameter_text
 from blockvis.pictures.crack_drawing import draw_cracks
 from blockvis.pictures.curves import draw_curve
+from blockvis.pictures.marks import evenly
 from blockvis.pictures.render import draw_mechanism, draw_still
 from blockvis.pictures.underlay import Underlay
 from blockvis.results.about import about
@@ -129,16 +130,16 @@ def _keys_in_use(case_text: str) -> str:
 def _states(response: solver.Response) -> tuple[Sequence[str], list[tuple[str, ...]], Sequence[float]]:
     """Give head, rows and widths [mm] of the table of the path, evenly thinned."""
     path, weight = response.path, response.total_weight
-    chosen = np.unique(np.linspace(0, len(path) - 1, min(len(path), MOST_STATES)).round().astype(int))
-    measured = response.measured
-    head = [response.parameter.name, measured.name, "of the weight W" if measured.is_force else ""]
+    chosen = evenly(np.arange(len(path)), MOST_STATES)
+    head = [response.parameter.name, response.measured.name, "of the weight W" if response.measured.is_force else ""]
     rows: list[tuple[str, ...]] = []
     for k in chosen.tolist():
         increment = path[k]
-        moment = measured.unit == "N·m"
+        here = in_one_unit(response, increment.phase)
+        measured, moment = here.measured, here.measured.unit == "N·m"
         value = force_text(increment.measured, moment) if measured.is_force else f"{increment.measured:.5g}"
         share = f"{increment.measured / weight:.4f}" if measured.is_force and not moment else ""
-        place = parameter_text(increment.parameter, response)
+        place = parameter_text(increment.parameter, here)
         several = len(response.settlements) > 1
         rows.append((f"{place}, phase {increment.phase + 1}" if several else place, value, share))
     return head, rows, (58.0, 58.0, 58.0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import time
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from blockvis.text import force_text
 from solver import mechanics
 
 from .increments import folder_of
-from .record import Record, read_record, versions
+from .record import Record, read_json, read_record, versions
 
 #: A mechanism that takes less than this share of the weight with it is the loss of a few blocks: the structure stands.
 LOCAL = 0.05
@@ -48,7 +47,7 @@ def about(response: solver.Response) -> About:
         with contextlib.suppress(ValueError):
             record = read_record(folder)
         with contextlib.suppress(OSError, ValueError, KeyError):
-            finished = str(json.loads((folder / "summary.json").read_text(encoding="utf-8"))["finished"])
+            finished = str(read_json(folder / "summary.json")["finished"])
     stamp = finished or time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     file = Path(record.case_file)
     return About(

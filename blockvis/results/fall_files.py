@@ -49,19 +49,19 @@ def write_fall(
 
     make_folder(folder / "fall")
     falls, times = falling_in(response), fall.times.tolist()
-    grids = {FALL_LIST: ("blocks", lambda time: fall_grid(response, fall, time, vtu.shape, falls))}
-    if response.ties:
-        grids[TIE_LIST] = ("ties", lambda time: tie_fall_grid(response, fall, time, vtu.shape))
-    for listed, (kind, grid_at) in grids.items():
+    for listed, kind in ((FALL_LIST, "blocks"), *(((TIE_LIST, "ties"),) if response.ties else ())):
         files = [f"fall/{kind}_{k:05d}.vtu" for k in range(len(times))]
         for time, file in zip(times, files, strict=True):
-            write_vtu(grid_at(time), folder / file, strings=vtu.strings, durable=False)
+            grid = fall_grid(response, fall, time, vtu.shape, falls if kind == "blocks" else None)
+            write_vtu(grid, folder / file, strings=vtu.strings, durable=False)
         write_pvd(folder / listed, list(zip(times, files, strict=True)), last=False)
     write_atomic(folder / FALL_POSES, compressed(flat(fall)))
 
 
-def fall_grid(response: solver.Response, fall: Fall, time: float, shape: str, falls: np.ndarray) -> vtkUnstructuredGrid:
-    """Make a grid of the blocks at a time [s] of a fall.
+def fall_grid(
+    response: solver.Response, fall: Fall, time: float, shape: str, falls: np.ndarray | None
+) -> vtkUnstructuredGrid:
+    """Make a grid of the blocks, of which the collapse takes ``falls`` (n_blocks,), or of the ties at a time [s].
 
     Parameters
     ----------
@@ -69,28 +69,17 @@ def fall_grid(response: solver.Response, fall: Fall, time: float, shape: str, fa
     fall : Fall
     time : float [s]
     shape : {"moved", "undeformed"}
-    falls : (n_blocks,) bool array
-        Blocks that the collapse takes.
+    falls : (n_blocks,) bool array, optional
+        None for the ties.
     """
-    from .datasets import block_grid
-
-    grid = block_grid(response.assembly, falling_increment(response, fall, time), shape=shape, falls=falls)
-    return _timed(grid, time)
-
-
-def tie_fall_grid(response: solver.Response, fall: Fall, time: float, shape: str) -> vtkUnstructuredGrid:
-    """Make a grid of the ties at a time [s] of a fall."""
+    from .datasets import add_arrays, block_grid
     from .tie_grid import tie_grid
 
-    return _timed(
-        tie_grid(response.ties, response.assembly, falling_increment(response, fall, time), shape=shape), time
-    )
-
-
-def _timed(grid: vtkUnstructuredGrid, time: float) -> vtkUnstructuredGrid:
-    """Give a grid the time [s] for what the static path counts by."""
-    from .datasets import add_arrays
-
+    state = falling_increment(response, fall, time)
+    if falls is None:
+        grid = tie_grid(response.ties, response.assembly, state, shape=shape)
+    else:
+        grid = block_grid(response.assembly, state, shape=shape, falls=falls)
     # There is no equilibrium here: numbers of the static path would mislead.
     for name in ("settlement", "load_multiplier", "reaction"):
         grid.GetFieldData().RemoveArray(name)

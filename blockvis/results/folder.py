@@ -8,7 +8,8 @@ import io
 import json
 import os
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,7 +26,7 @@ from .increments import StoredIncrements, packed_increment
 from .joints import LargestMovements
 from .mechanism_arrays import at_last_equilibrium
 from .npz import checked_arrays, compressed, flat, packed, unpacked
-from .record import RECORD, Record, read_record, versions
+from .record import RECORD, Record, read_json, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
 from .ties import COLUMNS as TIE_COLUMNS
 from .ties import TIES, TieCourses, stored_ties, tie_rows, write_ties
@@ -59,8 +60,13 @@ _PICTURES = (
     "paraview_colours.py",
     *(f"collapse{suffix}" for suffix in VIDEO_SUFFIXES),
 )
+RUN_FILES = ("increments", *_LISTS, *_STARTED, *_PICTURES)
 
 C = TypeVar("C")
+
+
+#: What to do where files of another run stand.
+CHOOSE = "choose another folder with -o or add --force (in Python overwrite=True)"
 
 
 class ResultsExist(ValueError):
@@ -70,17 +76,24 @@ class ResultsExist(ValueError):
 def refuse_results(path: str | Path, overwrite: bool = False) -> None:
     """Raise :class:`ResultsExist` if a folder holds results that may not be replaced."""
     path = Path(path)
-    if path.exists() and not path.is_dir():
-        raise ResultsExist(f"'{path}' is a file; choose a folder with -o")
-    names = ("increments", *_LISTS, *_STARTED, *_PICTURES)
-    if not overwrite and any((path / name).exists() for name in names):
-        unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
-        go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
-        found = next(name for name in names if (path / name).exists())
-        raise ResultsExist(
-            f"'{path}' holds results already ({found}); {go_on}choose another folder with -o or add --force "
-            "(in Python overwrite=True)"
-        )
+    unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
+    go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
+    refuse_files(path, RUN_FILES, "results", overwrite, go_on + CHOOSE)
+
+
+def refuse_files(
+    folder: Path,
+    names: Iterable[str],
+    what: str,
+    overwrite: bool,
+    remedy: str = CHOOSE,
+) -> None:
+    """Raise :class:`ResultsExist` if a folder holds one of these files, which may not be replaced."""
+    if folder.exists() and not folder.is_dir():
+        raise ResultsExist(f"'{folder}' is a file; choose a folder with -o")
+    there = next((name for name in names if (folder / name).exists()), None)
+    if there is not None and not overwrite:
+        raise ResultsExist(f"'{folder}' holds {what} already ({there}); {remedy}")
 
 
 class ResultsFolder:
@@ -248,7 +261,7 @@ class ResultsFolder:
             self._write_row(len(response.path) - 1, at_last_equilibrium(response))
         self._write_table(durable=True)
         write_lists(self.path, self.increments, durable=True)
-        write_atomic(self.path / "joints.csv", self._movements.table())
+        write_atomic(self.path / "joints.csv", self._movements.table(response.settlements))
         for name, text in (tables or {}).items():
             write_atomic(self.path / name, text)
         cracks = []
@@ -257,7 +270,7 @@ class ResultsFolder:
             cracks = cracks_of(self.assembly, last.pose, self._movements.joints, last.fallen)
         listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         if self.ties:
-            listed["ties"] = [course.values() for course in self._courses.courses]
+            listed["ties"] = [asdict(course) for course in self._courses.courses]
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_atomic(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
@@ -398,7 +411,7 @@ def stored_case(folder: str | Path) -> str:
     for name in ("summary.json", RECORD):
         file = Path(folder) / name
         if file.is_file():
-            return str(json.loads(file.read_text(encoding="utf-8")).get("case", ""))
+            return str(read_json(file).get("case", ""))
     return ""
 
 
@@ -412,8 +425,7 @@ def add_to_summary(folder: Path, **found: Any) -> None:
         By the names of the keys.
     """
     file = folder / "summary.json"
-    summary = json.loads(file.read_text(encoding="utf-8"))
-    write_atomic(file, json.dumps({**summary, **found}, indent=2, ensure_ascii=False) + "\n")
+    write_atomic(file, json.dumps({**read_json(file), **found}, indent=2, ensure_ascii=False) + "\n")
 
 
 def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
@@ -436,7 +448,7 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
     nothing = f"the run in '{folder}' has found nothing yet; go on with it by blockvis run --resume {folder}"
     summary: dict[str, Any] = {}
     if (folder / "summary.json").is_file():
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = read_json(folder / "summary.json")
     # A copy that broke off has fewer files than the run wrote, whose path would seem to end there.
     count = max(len(files), summary.get("n_increments", 0) + summary.get("n_falling_frames", 0))
     increments = [files.opened(k) for k in range(count)]

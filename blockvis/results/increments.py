@@ -6,7 +6,6 @@ from the increment's file and forgotten again, so that memory does not grow with
 
 from __future__ import annotations
 
-import math
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -59,7 +58,7 @@ class StateInFile:
             If the file is missing, damaged or no longer that of the increment; names it.
         """
         found = self.files.read(self.number)
-        if not all(_same(*pair) for pair in zip(_numbers(found), self.numbers, strict=True)):
+        if not np.array_equal(_numbers(found), self.numbers, equal_nan=True):
             file = self.files.file(self.number)
             raise ValueError(f"'{file}' is not what it was when it was opened; open the results again")
         return found.state
@@ -180,12 +179,12 @@ def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
 
 
 def numbered(increments: Sequence[solver.Increment], k: int) -> solver.Increment:
-    """Choose an increment by its number; below 0 from the end."""
+    """Choose an increment by its number, below 0 from the end; raises ``ValueError`` where there is none."""
     n = len(increments)
     if not isinstance(k, (int, np.integer)):
         raise TypeError(f"k is {k!r}; it is the number of an increment, 0 to {n - 1}, or -1 for the last")
     if not -n <= k < n:
-        raise IndexError(f"there is no increment {k}; the response has {n}, 0 to {n - 1}, or -1 for the last")
+        raise ValueError(f"there is no increment {k}; the response has {n}, 0 to {n - 1}, or -1 for the last")
     return increments[k]
 
 
@@ -196,11 +195,7 @@ def _tie_arrays(ties: mechanics.TieForces) -> dict[str, np.ndarray]:
 
 def _numbers(increment: solver.Increment) -> tuple[float, ...]:
     values = (getattr(increment, field.name) for field in fields(increment))
-    return tuple(value for value in values if isinstance(value, int | float) and not isinstance(value, str))
-
-
-def _same(one: float, other: float) -> bool:
-    return one == other or (math.isnan(one) and math.isnan(other))
+    return tuple(value for value in values if isinstance(value, int | float))
 
 
 def _bytes_of(increment: solver.Increment) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,22 +51,6 @@ def carried_faces(assembly: solver.Assembly, joints: InitialJoints, pose: solver
     apart, normal = on_a - on_b, normals[rings.ring]
     gaps = (apart * normal).sum(axis=1)
     return Faces(on_a, on_b, gaps, apart - gaps[:, None] * normal, normals)
-
-
-def faces_at(
-    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Carry the faces of joints in the plane to a pose.
-
-    Returns
-    -------
-    on_a, on_b : (n_joints, 2, 2) arrays [m]
-        Both ends of the common length, riding on block a and on block b.
-    normals : (n_joints, 2) array
-        Unit normal from block b into block a, turned with block b.
-    """
-    faces = carried_faces(assembly, joints, pose)
-    return faces.on_a.reshape(-1, 2, 2), faces.on_b.reshape(-1, 2, 2), faces.normals
 
 
 def end_openings(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> np.ndarray:
@@ -248,18 +233,21 @@ class LargestMovements:
     def __init__(self, assembly: solver.Assembly, parameter: mechanics.Quantity) -> None:
         self.assembly, self.parameter, self.joints = assembly, parameter, initial_joints(assembly)
         self._largest = np.zeros((len(self.joints), 2))
-        self._at = np.zeros_like(self._largest)
+        self._at, self._phases = np.zeros_like(self._largest), np.zeros_like(self._largest)
 
     def add(self, increment: solver.Increment) -> None:
         """Take an increment in equilibrium into account."""
         moved = np.abs(opening_and_slip(self.assembly, self.joints, increment.pose))
         larger = moved > self._largest
         self._largest[larger] = moved[larger]
-        self._at[larger] = increment.parameter
+        self._at[larger], self._phases[larger] = increment.parameter, increment.phase
 
-    def table(self) -> str:
+    def table(self, settlements: Sequence[solver.Settlement]) -> str:
         """Write joints.csv: a row for each pair of blocks that touch in the layout, the widest opening first."""
-        joints, names, unit = self.joints, self.assembly.names, f" [{self.parameter.unit}]"
+        joints, names = self.joints, self.assembly.names
+        # Several settlements have phases to tell, and no unit in common where some move and some turn.
+        phases = len(settlements) > 1
+        unit = f" [{self.parameter.unit}]" if len({settlement.unit for settlement in settlements}) < 2 else ""
         sizes, middles, d = joints.sizes, joints.rings.middles(), self.assembly.dimension
         low, high = np.minimum(joints.block_a, joints.block_b), np.maximum(joints.block_a, joints.block_b)
         pairs, which = np.unique(np.stack([low, high], axis=1), axis=0, return_inverse=True)
@@ -269,15 +257,17 @@ class LargestMovements:
             here = np.flatnonzero(which.ravel() == k)
             place = sizes[here] @ middles[here] / sizes[here].sum()
             widest = here[self._largest[here].argmax(axis=0)]
-            largest, at = (values[widest, [0, 1]] for values in (self._largest, self._at))
+            largest, at, phase = (values[widest, [0, 1]] for values in (self._largest, self._at, self._phases))
             seen = largest > CLOSED * self.assembly.block_size
-            largest, at = np.where(seen, largest, 0.0), np.where(seen, at, 0.0)
-            rows.append((f"{names[a]} | {names[b]}", *place, sizes[here].sum(), largest[0], at[0], largest[1], at[1]))
+            largest, at, phase = (np.where(seen, found, 0.0) for found in (largest, at, phase))
+            measured = (largest[0], at[0], largest[1], at[1], *(phase if phases else ()))
+            rows.append((f"{names[a]} | {names[b]}", *place, sizes[here].sum(), *measured))
         rows.sort(key=lambda row: (-row[d + 2], -row[d + 4]))
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         opening, slip = (f"{self.parameter.name} at largest {what}{unit}" for what in ("opening", "slip"))
         head = ("joint", *(f"{axis} [m]" for axis in "xyz"[:d]), "length [m]" if d == 2 else "area [m²]")
-        table.writerow((*head, "largest opening [m]", opening, "largest slip [m]", slip))
+        within = ("phase at largest opening", "phase at largest slip") if phases else ()
+        table.writerow((*head, "largest opening [m]", opening, "largest slip [m]", slip, *within))
         table.writerows((name, *(f"{number + 0.0:.6g}" for number in numbers)) for name, *numbers in rows)
         return text.getvalue()

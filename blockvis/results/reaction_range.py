@@ -12,6 +12,7 @@ import numpy as np
 import solver
 
 from .folder import RANGE
+from .record import damaged
 
 #: Columns of range.csv.
 COLUMNS = ("phase", "settlement", "reaction_low", "reaction_high", "runs")
@@ -70,5 +71,8 @@ def stored_range(folder: Path) -> ReactionRange | None:
         return None
     with (folder / RANGE).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    phases, settlements, low, high, runs = (np.array([float(row[name]) for row in rows]) for name in COLUMNS)
+    try:
+        phases, settlements, low, high, runs = (np.array([float(row[name]) for row in rows]) for name in COLUMNS)
+    except (KeyError, ValueError, TypeError) as error:
+        raise damaged(folder / RANGE, f"no numbers in its columns {', '.join(COLUMNS)}: {error}") from None
     return ReactionRange(phases.astype(int), settlements, low, high, runs.astype(int))

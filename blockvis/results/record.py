@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 #: Name of the file in the results folder.
 RECORD = "run.json"
@@ -75,14 +76,11 @@ class Record:
             if changed:
                 notes.append(f"the {what} file '{file}' has changed; the run goes on with what it read from it")
         now = versions()
-        newer = [f"{name} {self.versions.get(name)} → {now[name]}" for name in _DECIDING if self.differs(name, now)]
+        both = [(name, self.versions.get(name), now[name]) for name in _DECIDING]
+        newer = [f"{name} {before} → {after}" for name, before, after in both if before != after]
         if newer:
             notes.append(f"not what the run began with: {', '.join(newer)}; the last digits may differ")
         return notes
-
-    def differs(self, name: str, now: dict[str, str]) -> bool:
-        """Whether a package has another version than when the run began."""
-        return self.versions.get(name) != now[name]
 
 
 def read_record(folder: Path) -> Record:
@@ -100,9 +98,22 @@ def read_record(folder: Path) -> Record:
             f"{folder} --force"
         )
     try:
-        return Record(**json.loads(path.read_text(encoding="utf-8")))
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"'{path}' is not what a run wrote ({error}); run the case again with --force") from None
+        return Record(**read_json(path))
+    except TypeError as error:
+        raise damaged(path, error) from None
+
+
+def read_json(path: Path) -> Any:
+    """Read a file of JSON that a run has written; raises ``ValueError`` with its name where it is damaged."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise damaged(path, error) from None
+
+
+def damaged(path: Path, why: object) -> ValueError:
+    """Say that a file of a results folder cannot be read, and why."""
+    return ValueError(f"'{path}' is not what a run wrote ({why}); run the case again with --force")
 
 
 def versions() -> dict[str, str]:

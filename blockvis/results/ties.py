@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -111,54 +111,38 @@ def tie_rows(ties: Sequence[solver.Tie], number: int, increment: solver.Incremen
 
 @dataclass(frozen=True)
 class TieCourse:
-    """What a tie does along a path.
+    """What a tie does along a path, as summary.json has it.
 
     Attributes
     ----------
     name, kind : str
-    force : float [N]
-        The largest, tension positive.
-    at : float [m or rad]
+    largest_force : float [N]
+        Tension positive.
+    largest_force_at : float [m or rad]
         Settlement there.
     phase : int
         Of it, from 1.
     yields_at, breaks_at : float or None [m or rad]
         First settlement at which it does.
-    yields_in, breaks_in : int or None
+    yields_in_phase, breaks_in_phase : int or None
         Phase of it, from 1.
-    last : float [N]
-        Force at the last equilibrium.
-    state : str
+    last_force : float [N]
+        At the last equilibrium.
+    last_state : str
         There.
     """
 
     name: str
     kind: str
-    force: float
-    at: float
+    largest_force: float
+    largest_force_at: float
     phase: int
-    yields_at: float | None
-    breaks_at: float | None
-    yields_in: int | None
-    breaks_in: int | None
-    last: float
-    state: str
-
-    def values(self) -> dict[str, Any]:
-        """Give what summary.json says of it."""
-        return {
-            "name": self.name,
-            "kind": self.kind,
-            "largest_force": self.force,
-            "largest_force_at": self.at,
-            "phase": self.phase,
-            "yields_at": self.yields_at,
-            "breaks_at": self.breaks_at,
-            "yields_in_phase": self.yields_in,
-            "breaks_in_phase": self.breaks_in,
-            "last_force": self.last,
-            "last_state": self.state,
-        }
+    yields_at: float | None = None
+    breaks_at: float | None = None
+    yields_in_phase: int | None = None
+    breaks_in_phase: int | None = None
+    last_force: float = 0.0
+    last_state: str = STATE_WORDS[mechanics.ABSENT]
 
 
 class TieCourses:
@@ -175,10 +159,7 @@ class TieCourses:
         found, at, phase = increment.ties, float(increment.parameter), increment.phase + 1
         largest = float(np.abs(increment.forces).max(initial=0.0))
         if not self._found:
-            self._found = [
-                TieCourse(t.name, t.kind, 0.0, at, phase, None, None, None, None, 0.0, STATE_WORDS[mechanics.ABSENT])
-                for t in self.ties
-            ]
+            self._found = [TieCourse(tie.name, tie.kind, 0.0, at, phase) for tie in self.ties]
         for k, (before, force, state) in enumerate(zip(self._found, found.forces, found.states, strict=True)):
             tie = self.ties[k]
             if state == mechanics.BROKEN and before.breaks_at is None:
@@ -187,24 +168,19 @@ class TieCourses:
             elif abs(force) < NEGLIGIBLE * largest:
                 force = 0.0
             # A tie that yields has carried the same, up to rounding, since it began to.
-            larger = abs(force) - abs(before.force) > NEGLIGIBLE * largest
+            larger = abs(force) - abs(before.largest_force) > NEGLIGIBLE * largest
             # One that never carries is told where it begins to be there.
-            here = larger or (before.state == STATE_WORDS[mechanics.ABSENT] and state != mechanics.ABSENT)
-            yields = before.yields_at is None and state == mechanics.YIELDING
-            breaks = before.breaks_at is None and state == mechanics.BROKEN
-            self._found[k] = TieCourse(
-                before.name,
-                before.kind,
-                float(force) if larger else before.force,
-                at if here else before.at,
-                phase if here else before.phase,
-                at if yields else before.yields_at,
-                at if breaks else before.breaks_at,
-                phase if yields else before.yields_in,
-                phase if breaks else before.breaks_in,
-                0.0 if state == mechanics.BROKEN else float(force),
-                STATE_WORDS[state],
-            )
+            here = larger or (before.last_state == STATE_WORDS[mechanics.ABSENT] and state != mechanics.ABSENT)
+            found_here: dict[str, Any] = {}
+            if larger:
+                found_here["largest_force"] = float(force)
+            if here:
+                found_here |= {"largest_force_at": at, "phase": phase}
+            for word, when in (("yields", mechanics.YIELDING), ("breaks", mechanics.BROKEN)):
+                if state == when and getattr(before, f"{word}_at") is None:
+                    found_here |= {f"{word}_at": at, f"{word}_in_phase": phase}
+            last = 0.0 if state == mechanics.BROKEN else float(force)
+            self._found[k] = replace(before, **found_here, last_force=last, last_state=STATE_WORDS[state])
 
     @property
     def courses(self) -> tuple[TieCourse, ...]:
@@ -269,21 +245,21 @@ def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, s
     def place(at: float, phase: int) -> str:
         return f"{at:.4g} {unit_in(response, phase - 1)}{in_phase(response, phase - 1)}"
 
-    sense = "tension" if course.force > 0.0 else "compression"
+    sense = "tension" if course.largest_force > 0.0 else "compression"
     # It breaks between two increments.
-    at = "by" if (course.at, course.phase) == (course.breaks_at, course.breaks_in) else "at"
-    where = f"{sense} {at} {place(course.at, course.phase)}"
-    largest = f"{force_text(abs(course.force))} {where}" if course.force else "no force"
-    fates = (("yields", course.yields_at, course.yields_in), ("breaks", course.breaks_at, course.breaks_in))
+    at = "by" if (course.largest_force_at, course.phase) == (course.breaks_at, course.breaks_in_phase) else "at"
+    where = f"{sense} {at} {place(course.largest_force_at, course.phase)}"
+    largest = f"{force_text(abs(course.largest_force))} {where}" if course.largest_force else "no force"
+    fates = (("yields", course.yields_at, course.yields_in_phase), ("breaks", course.breaks_at, course.breaks_in_phase))
     told = ((word, place(at, phase)) for word, at, phase in fates if at is not None and phase is not None)
     fate = [f"{word} at {where} or before" for word, where in told]
     # What yields and breaks was told.
-    said = {"yielding": course.yields_at, "broken": course.breaks_at}.get(course.state)
+    said = {"yielding": course.yields_at, "broken": course.breaks_at}.get(course.last_state)
     if said is None:
         fate.append(
-            f"{course.state} at the end, {force_text(abs(course.last))}"
-            if course.last
-            else f"{course.state} at the end"
+            f"{course.last_state} at the end, {force_text(abs(course.last_force))}"
+            if course.last_force
+            else f"{course.last_state} at the end"
         )
     return (
         f"{course.name} ({course.kind})" if course.kind not in course.name.split() else course.name,

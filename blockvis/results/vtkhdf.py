@@ -27,7 +27,7 @@ from .viewer_files import GRIDS, TIE_GRID, output_times
 COMPRESSION = 4
 
 
-def write_vtkhdf(response: solver.Response, path: Path, *, shape: str = "moved") -> Path:
+def write_vtkhdf(response: solver.Response, path: Path) -> Path:
     """Write the path of a response as one file: blocks, contact points, joints and ties, time is the parameter.
 
     Parameters
@@ -35,8 +35,6 @@ def write_vtkhdf(response: solver.Response, path: Path, *, shape: str = "moved")
     response : solver.Response
     path : Path
         Ending in .vtkhdf.
-    shape : {"moved", "undeformed"}
-        As of :func:`blockvis.results.datasets.block_dataset`.
 
     Raises
     ------
@@ -51,7 +49,7 @@ def write_vtkhdf(response: solver.Response, path: Path, *, shape: str = "moved")
     """
     if not response.path:
         raise ValueError(f"there is no path to write to '{path}': {response.message or response.stop}")
-    source = _Series(response, shape)
+    source = _Series(response)
     writer = vtkHDFWriter()
     writer.SetInputConnection(source.GetOutputPort())
     writer.SetWriteAllTimeSteps(True)
@@ -71,12 +69,11 @@ class _Series(VTKPythonAlgorithmBase):
     Parameters
     ----------
     response : solver.Response
-    shape : {"moved", "undeformed"}
     """
 
-    def __init__(self, response: solver.Response, shape: str) -> None:
+    def __init__(self, response: solver.Response) -> None:
         super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkMultiBlockDataSet")
-        self._response, self._shape, self._joints = response, shape, initial_joints(response.assembly)
+        self._response, self._joints = response, initial_joints(response.assembly)
         self._times, self._ties = output_times(response.path), known_ties(response)
 
     def RequestInformation(self, _request: Any, _inputs: Any, outputs: Any) -> int:
@@ -98,15 +95,15 @@ class _Series(VTKPythonAlgorithmBase):
         return 1
 
     def _grids(self, number: int) -> Sequence[vtkUnstructuredGrid]:
-        response, shape, falls = self._response, self._shape, None
+        response, falls = self._response, None
         increment, assembly = response.path[number], response.assembly
         if number == len(response.path) - 1 and response.collapse is not None:
             increment, falls = at_last_equilibrium(response), falling_in(response)
         return (
-            block_grid(assembly, increment, shape=shape, falls=falls),
-            contact_grid(assembly, increment, shape=shape),
-            joint_grid(assembly, increment, shape=shape, joints=self._joints),
-            *((tie_grid(self._ties, assembly, increment, shape=shape),) if self._ties else ()),
+            block_grid(assembly, increment, falls=falls),
+            contact_grid(assembly, increment),
+            joint_grid(assembly, increment, joints=self._joints),
+            *((tie_grid(self._ties, assembly, increment),) if self._ties else ()),
         )
 
 

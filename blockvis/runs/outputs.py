@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,11 +14,13 @@ from blockvis.cases.contents import Case
 from blockvis.dynamics.fall import FALLEN, Fall, fall_of, may_fall
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.fall_files import stored_fall, write_fall
-from blockvis.results.folder import ResultsFolder
+from blockvis.results.folder import ResultsFolder, stored_case
+from blockvis.results.reaction_range import stored_range
 from blockvis.results.viewer_files import ViewerFormat
 from solver import mechanics
 
 from .progress import DrawingProgress
+from .step_check import stored_check
 
 if TYPE_CHECKING:
     from blockvis.pictures.film_process import FilmProcess
@@ -107,11 +109,13 @@ class Drawing(Output):
             results.viewer = self._process
 
     def is_written(self, case: Case, folder: Path) -> bool:
-        """Whether the last of what is drawn is there."""
+        """Whether all that is drawn is there."""
+        if not self._pictures:
+            return True
         animation = self._animation(case)
-        names = ["report.html", "mechanism.png", *([animation] if animation else [])] if self._pictures else []
+        names = ["report.html", "mechanism.png", "curve.png", *([animation, "poster.png"] if animation else [])]
         # A limit load is of the layout, in which nothing is open.
-        if self._pictures and KINDS[case.analysis].course(case).parameter.is_path:
+        if KINDS[case.analysis].course(case).parameter.is_path:
             names.append("cracks.png")
         return all((folder / name).exists() for name in names)
 
@@ -162,17 +166,13 @@ class Drawing(Output):
         if not self._pictures:
             return ()
         with clock.counting("report"):
-            from blockvis.report.page import write_report
-
-            write_report(response, folder / "report.html", case.text, fall=fall)
+            write_report_of(response, folder, fall)
         problem = ""
         if apart is not None:
             problem = _awaited(apart, progress, clock)
         if response.path and (apart is None or problem):
             with clock.counting("curve"):
-                from blockvis.pictures.curves import draw_curve
-
-                draw_curve(response, folder / "curve.png")
+                draw_curves(response, folder, ["curve.png"])
         if animation is not None and apart is None:
             with clock.counting("film"):
                 from blockvis.pictures.render import animate
@@ -183,6 +183,22 @@ class Drawing(Output):
                 finally:
                     progress.done()
         return (problem,) if problem else ()
+
+
+def draw_curves(response: solver.Response, folder: Path, names: Sequence[str]) -> None:
+    """Draw the curve of a results folder, with what is known of its range."""
+    from blockvis.pictures.curves import draw_curve
+
+    for name in names:
+        draw_curve(response, folder / name, band=stored_range(folder))
+
+
+def write_report_of(response: solver.Response, folder: Path, fall: Fall | None) -> None:
+    """Write the report of a results folder, with what is known of its error and range."""
+    from blockvis.report.page import write_report
+
+    error, band = str(stored_check(folder) or ""), stored_range(folder)
+    write_report(response, folder / "report.html", stored_case(folder), fall=fall, error=error, band=band)
 
 
 def viewer_format(case: Case) -> ViewerFormat:

@@ -67,15 +67,12 @@ class PathRange:
     ----------
     runs : list of (Variation, Traced or None)
         None for one that came to nothing.
-    unit : str
-        Of the settlement at collapse.
-    moment : bool
-        Whether the reaction is a moment.
+    units : sequence of str
+        Of each settlement: "m" or "rad", whose reaction is a moment.
     """
 
     runs: list[tuple[Variation, Traced | None]]
-    unit: str
-    moment: bool
+    units: Sequence[str]
 
     @property
     def followed(self) -> list[Traced]:
@@ -83,12 +80,9 @@ class PathRange:
         return [run for _, run in self.runs if run is not None]
 
     @property
-    def collapse(self) -> tuple[float, float | None] | None:
-        """Least and largest displacement at collapse [m or rad]; without the largest where a run stands to its end."""
-        falls = sorted((run.collapse_phase, run.collapse) for run in self.followed if run.collapse is not None)
-        if not falls:
-            return None
-        return falls[0][1], falls[-1][1] if len(falls) == len(self.followed) else None
+    def falls(self) -> list[tuple[int, float]]:
+        """Phases, from 0, and displacements within them [m or rad] of the runs that collapse, the first first."""
+        return sorted((run.collapse_phase, run.collapse) for run in self.followed if run.collapse is not None)
 
     def reaction(self) -> ReactionRange:
         """Range of the reaction at all settlements that one of the runs tells, over the runs that get there."""
@@ -107,29 +101,38 @@ class PathRange:
         """Give what summary.json says of it."""
         runs = [
             {**asdict(variation), "collapse": None if run is None else run.collapse}
+            | {"collapse_phase": None if run is None or run.collapse is None else run.collapse_phase + 1}
             | {"status": None if run is None else run.stop}
             for variation, run in self.runs
         ]
-        return {"collapse": None if self.collapse is None else list(self.collapse), "runs": runs}
+        falls = [displacement for _, displacement in self.falls]
+        ends = [falls[0], falls[-1] if len(falls) == len(self.followed) else None] if falls else None
+        return {"collapse": ends, "runs": runs}
 
     def __str__(self) -> str:
         """Say it in a line."""
-        followed, lost = self.followed, len(self.runs) - len(self.followed)
-        standing = sum(run.collapse is None for run in followed)
-        if self.collapse is None:
+        followed, lost, falls = self.followed, len(self.runs) - len(self.followed), self.falls
+        standing = len(followed) - len(falls)
+        if not falls:
             last = self.reaction()
-            forces = " to ".join(force_text(float(value), self.moment) for value in (last.low[-1], last.high[-1]))
-            where = f"{last.settlements[-1]:.4g} {self.unit}"
+            phase = int(last.phases[-1])
+            moment = self.units[phase] == "rad"
+            forces = " to ".join(force_text(float(value), moment) for value in (last.low[-1], last.high[-1]))
+            where = self._place(phase, float(last.settlements[-1]))
             said = f"range of reaction {forces} at {where}, no collapse in {counted(len(followed), 'run')}"
-        elif self.collapse[1] is None:
-            said = (
-                f"range of collapse from {self.collapse[0]:.4g} {self.unit} on, {standing} of {len(followed)} runs "
-                "without a collapse"
-            )
+        elif standing:
+            without = f"{standing} of {len(followed)} runs without a collapse"
+            said = f"range of collapse from {self._place(*falls[0])} on, {without}"
         else:
-            said = f"range of collapse {self.collapse[0]:.4g} to {self.collapse[1]:.4g} {self.unit}"
+            alike = falls[0][0] == falls[-1][0]
+            first = f"{falls[0][1]:.4g}" if alike else self._place(*falls[0])
+            said = f"range of collapse {first} to {self._place(*falls[-1])}"
         nothing = f"; {counted(lost, 'run')} came to nothing" if lost else ""
         return f"{said} ({WORDS}{nothing})"
+
+    def _place(self, phase: int, settlement: float) -> str:
+        within = f" in phase {phase + 1}" if len(self.units) > 1 else ""
+        return f"{settlement:.4g} {self.units[phase]}{within}"
 
 
 def wants_range(case: Case) -> bool:
@@ -165,8 +168,7 @@ def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda 
     waiting(len(VARIATIONS), at_once)
     others = _all_followed([variation.of(case) for variation in VARIATIONS], folder, at_once)
     runs = list(zip((Variation(), *VARIATIONS), (traced(response), *others), strict=True))
-    unit = response.settlements[response.path[-1].phase].unit
-    found = PathRange(runs, unit, moment=unit == "rad")
+    found = PathRange(runs, [settlement.unit for settlement in response.settlements])
     write_atomic(folder / RANGE, found.reaction().table())
     add_to_summary(folder, range=found.numbers())
     return found

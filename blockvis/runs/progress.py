@@ -245,29 +245,22 @@ class StudyProgress:
     """
 
     def __init__(self, total: int, before: int = 0, *, shown: bool | None = None, stream: TextIO | None = None) -> None:
-        self.total, self.before, self.count, self.failed = total, before, 0, 0
-        self.stream = sys.stderr if stream is None else stream
-        watched = self.stream.isatty() or "ipykernel" in sys.modules
-        self.shown = watched if shown is None else shown and watched
-        self.started = time.perf_counter()
-        self.last = -1.0
+        self.total, self.before, self.count, self.failed, self._line = total, before, 0, 0, _Line(stream)
+        self._line.watched |= "ipykernel" in sys.modules
+        self.shown = self._line.watched and shown is not False
 
     def finished(self, *, failed: bool = False) -> None:
         """Count a run."""
         self.count += 1
         self.failed += failed
-        now, done = time.perf_counter(), self.before + self.count
-        if not self.shown or (now - self.last < REDRAW and done < self.total):
-            return
-        self.last = now
-        rest = (self.total - done) * (now - self.started) / self.count
-        without = f", {self.failed} without result" if self.failed else ""
-        bar = "#" * (24 * done // max(self.total, 1))
-        self.stream.write(f"\r\x1b[K[{bar:<24}] run {done} of {self.total}{without}, about {rest:.0f} s left")
-        self.stream.flush()
+        done = self.before + self.count
+        if self.shown and (self._line.due or done == self.total):
+            rest = (self.total - done) * (time.perf_counter() - self._line.started) / self.count
+            without = f", {self.failed} without result" if self.failed else ""
+            text = f"run {done} of {self.total}{without}, about {rest:.0f} s left"
+            self._line.write(text, done / max(self.total, 1))
 
     def done(self) -> None:
         """Clear the bar."""
         if self.shown:
-            self.stream.write("\r\x1b[K")
-            self.stream.flush()
+            self._line.clear()

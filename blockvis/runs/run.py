@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import time
 import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -19,12 +19,11 @@ from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kind import AnalysisRun
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import RESULTS, ResultsFolder, refuse_results
-from blockvis.results.record import Record, checksum_of, read_record, versions
+from blockvis.results.record import Record, checksum_of, read_json, read_record, versions
 from blockvis.results.viewer_files import restore_grids, write_end
 from blockvis.system.atomic_files import PARTIAL
 from solver import mechanics
 
-from .budget import Budget, IncrementTooLong
 from .outputs import Clock, Drawing, Output, viewer_format
 from .plan import planned
 from .progress import Progress
@@ -70,6 +69,10 @@ class Run:
     missing: tuple[str, ...] = field(default=())
     had_finished: bool = False
     stages: dict[str, float] = field(default_factory=dict)
+
+
+class IncrementTooLong(Exception):
+    """An increment has taken longer than it may; the message says what it was doing."""
 
 
 class DrawingInterrupted(KeyboardInterrupt):
@@ -144,8 +147,6 @@ def run_case(
 def resume_run(
     folder: str | Path,
     *,
-    film: bool = True,
-    pictures: bool = True,
     outputs: Sequence[Output] | None = None,
     increment_seconds: float | None = None,
 ) -> Run:
@@ -155,7 +156,7 @@ def resume_run(
     ----------
     folder : str or Path
         That a run has written, whatever ended it.
-    film, pictures, outputs
+    outputs : sequence of Output, optional
         As in :func:`run_case`.
     increment_seconds : float, optional [s]
         What an increment may take; by default what it takes, whatever the case says.
@@ -176,7 +177,7 @@ def resume_run(
     if not record.case:
         raise ValueError(f"'{folder}' was written from Python, without a case file; run it again from there")
     case = parse_case(record.case, Path(record.case_file or folder / "case.toml"))
-    outputs = (Drawing(film=film, pictures=pictures),) if outputs is None else outputs
+    outputs = (Drawing(),) if outputs is None else outputs
     finished = _finished(folder)
     if finished is not None:
         response = open_results(folder)
@@ -202,7 +203,7 @@ def _finished(folder: Path) -> dict[str, Any] | None:
     """Read the summary of a run that came to its end; None where it was stopped."""
     if not (folder / "summary.json").is_file():
         return None
-    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary: dict[str, Any] = read_json(folder / "summary.json")
     return None if summary["status"] == solver.Status.INTERRUPTED else summary
 
 
@@ -262,8 +263,14 @@ def _follow(
     """Follow the increments to their end or to Ctrl-C, write each, and draw what came out."""
     folder = results.path
     progress = Progress(run.course, assembly=results.assembly, count=len(results.increments))
-    budget = Budget(increment_seconds, progress.doing)
-    run.given.listeners.extend([progress.step, budget.step])
+    began = time.perf_counter()
+
+    def in_time(state: mechanics.PathState) -> None:
+        if increment_seconds is not None and time.perf_counter() - began > increment_seconds:
+            what = f"an increment took more than {increment_seconds:g} s (increment_seconds)"
+            raise IncrementTooLong(f"{what}: {progress.doing(state)}")
+
+    run.given.listeners.extend([progress.step, in_time])
     ending = mechanics.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
     progress.watch()
     try:
@@ -275,7 +282,7 @@ def _follow(
             for note in increment.notes:
                 warnings.warn(f"{phase}{note}", stacklevel=2)
             progress.increment(increment)
-            budget.next()
+            began = time.perf_counter()
         ending = run.steps.ending
     except KeyboardInterrupt:
         run.steps.close()

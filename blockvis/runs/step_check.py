@@ -16,7 +16,7 @@ from blockvis.case_files.read import parse_case
 from blockvis.cases.contents import Case
 from blockvis.results.about import unit_in
 from blockvis.results.folder import STEP_CHECK, add_to_summary
-from blockvis.results.record import read_record
+from blockvis.results.record import read_json, read_record
 from blockvis.system.atomic_files import write_atomic
 from solver import mechanics
 
@@ -181,7 +181,7 @@ def stored_case(folder: Path) -> Case:
     """
     record = read_record(folder)
     if not record.case:
-        raise ValueError(f"'{folder}' was written from Python, without a case file; its steps cannot be checked")
+        raise ValueError(f"'{folder}' was written from Python, without a case file; it cannot be followed again")
     return parse_case(record.case, Path(record.case_file or folder / "case.toml"))
 
 
@@ -215,7 +215,7 @@ def stored_check(folder: Path) -> StepCheck | None:
     """Read what a run was compared with, if it was."""
     if not (folder / STEP_CHECK).is_file():
         return None
-    numbers = json.loads((folder / STEP_CHECK).read_text(encoding="utf-8"))
+    numbers = read_json(folder / STEP_CHECK)
     known = {field.name: numbers[field.name] for field in fields(StepCheck) if field.name in numbers}
     return StepCheck(**{**known, "collapse": np.nan if known["collapse"] is None else known["collapse"]})
 
@@ -260,6 +260,11 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
     apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), first), np.finfo(float).tiny)
     moved = np.linalg.norm(ours.positions[mine] - other.positions[theirs], axis=2)
     ends = [np.nan if path.collapse is None else path.collapse for path in (ours, other)]
+    stops = [ours.stop, other.stop]
+    if ours.collapse_phase != other.collapse_phase and not np.isnan(ends).any():
+        # Displacements of two phases are no measure of each other.
+        ends = [np.nan, np.nan]
+        stops = [f"{path.stop} in phase {path.collapse_phase + 1}" for path in (ours, other)]
     worst = mine[np.argmax(apart)] if apart.any() else None
     phase = 0 if worst is None else int(ours.phases[worst])
     return StepCheck(
@@ -269,7 +274,7 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
         unit=unit_in(response, phase),
         collapse=abs(ends[1] - ends[0]) / ends[0] if ends[0] > 0.0 else np.nan,
         position=float(moved.max(initial=0.0)),
-        stop=ours.stop,
-        stop_of_check=other.stop,
+        stop=stops[0],
+        stop_of_check=stops[1],
         phase=phase + 1 if len(response.settlements) > 1 else None,
     )

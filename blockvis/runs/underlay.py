@@ -12,7 +12,7 @@ from blockvis.case_files.read import parse_case
 from blockvis.cases.contents import Case
 from blockvis.formats import FORMATS
 from blockvis.formats.annotations import annotated_placement, program_of
-from blockvis.formats.image_scale import Placement, placement_of
+from blockvis.formats.image_scale import Placement, placement_of, written_placement
 from blockvis.formats.images import opened
 from blockvis.formats.reading import Reading
 from blockvis.layout.units import metres_per
@@ -41,10 +41,7 @@ def underlay_of(case: Case) -> Underlay | None:
     drawn = _drawing(case)
     own: Placement | None = None
     if drawn is None or drawn[0].source.startswith(("world", "tags")):
-        try:
-            own = placement_of(file, image.size, Reading(unit=case.unit), tags=tags)
-        except ValueError:
-            own = None
+        own = written_placement(file, tags, {})
     if own is not None:
         return Underlay(_pixels(image), own.matrix * _metres(own, case))
     if drawn is None or drawn[1] is None:

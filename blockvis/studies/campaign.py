@@ -88,44 +88,13 @@ def study(
     -----
     In a script, call it under ``if __name__ == "__main__":``, because each worker of this machine imports the script.
     """
-    return run_study(
-        source,
-        folder,
-        scheduler=scheduler,
-        workers=workers,
-        force=force,
-        retry_failed=retry_failed,
-        progress=progress,
-    ).write_table()
-
-
-def run_study(
-    source: str | Path | Mapping[str, Any] | Study,
-    folder: str | Path | None = None,
-    *,
-    scheduler: str | None = None,
-    workers: int | None = None,
-    force: bool = False,
-    retry_failed: bool = False,
-    progress: bool = True,
-    keep: Sequence[int] = (),
-) -> StudyFolder:
-    """Carry out a study as :func:`study`, and return its folder.
-
-    Parameters
-    ----------
-    source, folder, scheduler, workers, force, retry_failed, progress
-        As of :func:`study`.
-    keep : sequence of int
-        Runs whose results folder is written, besides those that the study names.
-    """
     if "__mp_main__" in sys.modules and multiprocessing.parent_process() is not None:
         raise SystemExit('blockvis: in a script, call blockvis.study under: if __name__ == "__main__":')
     require("studies", "studies")
     plan = source if isinstance(source, Study) else read_study(source)
     if workers is not None and workers < 1:
         raise ValueError(f"workers is {workers}; give at least 1")
-    for run in keep:
+    for run in plan.keep:
         if not 0 <= run < plan.n_runs:
             raise ValueError(f"run {run} is to be kept, but runs are numbered from 0 to {plan.n_runs - 1}")
     folder = Path(f"{plan.source.stem}-study") if folder is None else Path(folder)
@@ -143,19 +112,19 @@ def run_study(
         with existing_cluster(scheduler, "" if file is None else str(file)) as client:
             records = StudyFolder(folder, plan, force=force)
             carry_out(records, records.missing(retry_failed=retry_failed), client, progress)
-    _finish(records, sorted({*plan.keep, *keep}))
-    return records
+    return _finish(records)
 
 
-def _finish(records: StudyFolder, keep: Sequence[int]) -> None:
+def _finish(records: StudyFolder) -> pd.DataFrame:
     from .pictures import draw_study
     from .summary import summary_of
 
     table = records.write_table()
     records.write_summary(summary_of(records.study, table))
     draw_study(records, table)
-    for run in keep:
+    for run in sorted({*records.study.keep}):
         _keep(records, run)
+    return table
 
 
 def _keep(records: StudyFolder, run: int) -> None:

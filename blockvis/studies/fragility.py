@@ -37,7 +37,7 @@ class Fragility:
     furthest : float [m or rad]
         The curve is known up to the largest settlement of any run.
     n_runs, n_collapsed, n_stood : int
-        All runs, those that collapsed, and those that did not collapse within their limit.
+        Runs with a result, those that collapsed, and those that did not collapse within their limit.
     """
 
     settlement: np.ndarray

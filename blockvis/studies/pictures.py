@@ -165,8 +165,9 @@ def _draw_swing(axes: Axes, place: int, swing: Swing, centre: float, factor: flo
         # Of a parameter without effect the two values stand to both sides.
         outwards = side if np.isclose(factor * mean, centre, rtol=1e-9) else 1 if factor * mean > centre else -1
         edge = factor * (mean + outwards * (0.0 if np.isnan(error) else error))
+        words = textwrap.shorten(value, 16) if isinstance(value, str) else rounded_text(value)
         axes.annotate(
-            _short(value), (edge, place), xytext=(6 * outwards, 0), textcoords="offset points", va="center",
+            words, (edge, place), xytext=(6 * outwards, 0), textcoords="offset points", va="center",
             ha="left" if outwards > 0 else "right", fontsize=0.85 * TEXT,
         )  # fmt: skip
 
@@ -200,7 +201,9 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
         axes.set_xlabel(name, fontsize=TEXT)
         _plain_frame(axes)
     panels[0].set_ylabel(f"collapse displacement [{unit}]", fontsize=TEXT)
-    panels[0].set_ylim(-0.02 * float(np.nanmax(y)), 1.06 * float(np.nanmax(y)))
+    # Where nothing ever stands all are 0.
+    largest = float(np.nanmax(y)) or 1.0
+    panels[0].set_ylim(-0.02 * largest, 1.06 * largest)
     handles = [_mark(CLASSES[k], MARKS[k], label) for k, label in enumerate(labels)]
     rest = sum(classes.values()) - sum(classes[one] for one in shown)
     if rest:
@@ -352,10 +355,6 @@ def _length(table: pd.DataFrame) -> tuple[float, str]:
     unit = units[0] if units else "m"
     largest = float(np.nanmax(np.append(outcome(table), 0.0)))
     return (1e3, "mm") if unit == "m" and largest < 1.0 else (1.0, unit)
-
-
-def _short(value: float | str) -> str:
-    return textwrap.shorten(value, 16) if isinstance(value, str) else rounded_text(value)
 
 
 def _mark(colour: str, mark: str, label: str, *, hollow: bool = False):  # type: ignore[no-untyped-def]

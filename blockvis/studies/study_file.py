@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.case_files.read import case_of, read_case
+from blockvis.case_files.read import case_of, parsed_toml, read_case, utf8_text
 from blockvis.cases.build import case_assembly
 from blockvis.cases.distributions import Distribution, distribution_of
 from blockvis.cases.imperfections import read_imperfection
@@ -214,15 +214,7 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
     path = Path(source)
     if not path.is_file():
         raise ValueError(f"there is no study file '{path}'")
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise ValueError(
-            f"{path}: is not a text file in UTF-8 ({error.reason} at byte {error.start}); save it in UTF-8"
-        ) from None
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path}: {error}; a study file is TOML") from None
-    return _study(values, path)
+    return _study(parsed_toml(utf8_text(path), path, "study file", 'case = "arch.toml"'), path)
 
 
 def _study(given: Mapping[str, Any], source: Path) -> Study:
@@ -267,6 +259,13 @@ def _check(study: Study, where: str) -> None:
             f"{base.source}: a study follows settlements, but [analysis] kind is '{base.analysis}'; leave it out, or "
             f"vary the {base.analysis} in a loop, as blockvis run {base.source.name} --set "
             "material.friction_coefficient=0.5 -o out-0.5"
+        )
+    units = [settlement.unit for settlement in base.settlements]
+    if len(set(units)) > 1:
+        tables = (", ".join(str(k) for k, found in enumerate(units, 1) if found == unit) for unit in ("m", "rad"))
+        raise ValueError(
+            f"{base.source}: a study counts settlements one after another, but [[settlement]] {next(tables)} is in m "
+            f"and {next(tables)} in rad; leave out those of one unit"
         )
     if study.method == "grid":
         _check_grid(study, where)

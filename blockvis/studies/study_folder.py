@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import shutil
@@ -141,7 +142,7 @@ class StudyFolder:
         first = self._first[file]
         if first is None or row["run"] < first:
             self._first[file] = row["run"]
-            with np.load(_buffer(shape)) as stored:
+            with np.load(io.BytesIO(shape)) as stored:
                 arrays = {name: stored[name] for name in stored.files}
             write_atomic(file, compressed({**arrays, "run": np.array(row["run"])}))
 
@@ -226,12 +227,6 @@ def _first_run(file: Path) -> int | None:
         return None
     with np.load(file) as stored:
         return int(stored["run"])
-
-
-def _buffer(data: bytes) -> Any:
-    from io import BytesIO
-
-    return BytesIO(data)
 
 
 def _json(value: Any) -> bytes:

@@ -46,23 +46,12 @@ def require(extra: str, needed_by: str) -> None:
     MissingExtra
         If a package is not installed.
     """
-    missing = [PACKAGES.get(name, name) for name in missing_packages(extra)]
+    missing = [PACKAGES.get(name, name) for name in EXTRAS[extra] if not is_installed(name)]
     if missing:
         raise MissingExtra(
             f"{needed_by} need {', '.join(missing)}, which this environment lacks; "
             f"install with: {install_command(extra)}"
         )
-
-
-def missing_packages(extra: str) -> list[str]:
-    """List the packages of an extra that are not installed, without importing any.
-
-    Parameters
-    ----------
-    extra : str
-        A key of :data:`EXTRAS`.
-    """
-    return [name for name in EXTRAS[extra] if not is_installed(name)]
 
 
 def is_installed(name: str) -> bool:

@@ -201,6 +201,9 @@ def test_a_photograph_that_nothing_places_goes_under_no_drawing(tmp_path, capsys
     case.write_text(text, encoding="utf-8")
     assert main(["run", str(case)]) == 2
     assert "nothing says where 'photo.jpg' lies; put a world file beside it" in capsys.readouterr().err
+    (tmp_path / "photo.jgw").write_text("0.01 abc", encoding="utf-8")
+    assert main(["run", str(case)]) == 2
+    assert "photo.jgw' is no world file; it has six numbers, one a line" in capsys.readouterr().err
 
 
 def test_tags_of_a_geotiff_say_where_the_pixels_are(tmp_path, capsys):

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from structures import arch_response, pixels
+from PIL import Image
+from structures import arch_response, case_from, moved_and_turned, pixels
 
 import blockvis
 import solver
@@ -101,9 +102,16 @@ def test_what_cannot_be_compared_is_refused_in_one_line(arch_results, tmp_path, 
     standing = blockvis.write(limit.response, tmp_path / "limit")
     empty = tmp_path / "empty"
     empty.mkdir()
+    turn = solver.Settlement(rotation=1.0, rotation_centre=(1, 0), increment=1e-3, limit=1e-3)
+    turned = solver.Structure(generators.arch(voussoirs=5), friction_coefficient=2.0).settle(turn)
     for other, words in (
         (arch_results, "are the same folder; give the results of two runs"),
         (standing, "share no axis"),
+        (blockvis.write(turned, tmp_path / "turned"), "the parameter is settlement [m] in one and settlement [rad] in"),
+        (
+            blockvis.write(moved_and_turned(), tmp_path / "mixed"),
+            "mixed' has settlements in m and in rad",
+        ),
         (empty, "holds no results"),
     ):
         assert main(["compare", str(arch_results), str(other), "-o", str(tmp_path / "both")]) == 2
@@ -111,5 +119,41 @@ def test_what_cannot_be_compared_is_refused_in_one_line(arch_results, tmp_path, 
         assert words in message
         assert message.count("\n") == 1
     assert not (tmp_path / "both").exists()
-    assert main(["compare", str(arch_results), str(standing), "-o", str(arch_results)]) == 2
-    assert "holds results already" in capsys.readouterr().err
+    assert main(["compare", str(arch_results), str(standing), "-o", str(arch_results), "--force"]) == 2
+    assert capsys.readouterr().err.endswith("holds results already (increments); choose another folder with -o\n")
+
+
+LIMIT_LOADS = """
+[geometry]
+layout = "arch"
+[geometry.parameters]
+voussoirs = 6
+[material]
+friction_coefficient = 0.8
+[analysis]
+kind = "limit load"
+[[loads]]
+kind = "live"
+"""
+
+
+def test_loads_that_move_are_compared_where_they_are_lowest(tmp_path, monkeypatch):
+    """Between two positions, on the line between their limit loads, nothing is a limit state."""
+    folders, seen, lowest = [], [], []
+    for places in ([-0.9, 0.9, 4], [-0.9, -0.1, 3]):
+        folders.append(tmp_path / f"{places[-1]}")
+        case = case_from(f"{LIMIT_LOADS}force = [0, -1000]\npositions = {places}\n", tmp_path)
+        lowest.append(blockvis.run_case(case, folders[-1], outputs=()).response.governing.parameter)
+    blank = Image.new("RGB", (800, 620))
+    picture = "blockvis.pictures.drawer.Drawer.picture"
+    monkeypatch.setattr(picture, lambda _, increment, **look: seen.append(increment.parameter) or blank)
+    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both")]) == 0
+    assert seen == lowest
+
+
+def test_unbounded_limit_loads_are_compared_without_words_of_numpy(tmp_path, capsys):
+    case = case_from(f"{LIMIT_LOADS}weight_fraction = [0, -1]\n", tmp_path)
+    folders = [blockvis.run_case(case, tmp_path / name, outputs=()).folder for name in ("one", "two")]
+    capsys.readouterr()
+    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both")]) == 0
+    assert capsys.readouterr().err == ""

@@ -115,7 +115,7 @@ def test_film_and_pictures_may_be_left_out(case, tmp_path):
     film = {path.name for path in blockvis.run_case(case, tmp_path / "film", pictures=False).folder.iterdir()}
     assert not film & {"report.html", "curve.png", "mechanism.png", "collapse.mp4"}
     assert {"summary.json", "blocks.pvd", "fall.pvd"} <= film
-    run = RUN.resume_run(tmp_path / "film", film=False)
+    run = RUN.resume_run(tmp_path / "film", outputs=(RUN.Drawing(film=False),))
     there = {path.name for path in run.folder.iterdir()}
     assert {"report.html", "curve.png", "mechanism.png", "cracks.png"} <= there
     assert "collapse.mp4" not in there

@@ -88,20 +88,30 @@ def test_a_variation_changes_friction_everywhere_and_the_controls():
 
 def test_the_range_says_how_many_collapse():
     plain, other = (Variation(), path(0.3, 0.35)), Variation(friction_factor=0.95)
-    both = PathRange([plain, (other, path(0.2, 0.25, 1.1))], "m", moment=False)
+    both = PathRange([plain, (other, path(0.2, 0.25, 1.1))], ["m"])
     assert str(both) == f"range of collapse 0.25 to 0.35 m {ALL}"
-    one = PathRange([plain, (other, path(0.5))], "m", moment=False)
+    one = PathRange([plain, (other, path(0.5))], ["m"])
     assert str(one) == f"range of collapse from 0.35 m on, 1 of 2 runs without a collapse {ALL}"
     assert one.numbers()["collapse"] == [0.35, None]
-    none = PathRange([(Variation(), path(0.5)), (other, path(0.5, factor=1.1)), (other, None)], "m", moment=False)
+    none = PathRange([(Variation(), path(0.5)), (other, path(0.5, factor=1.1)), (other, None)], ["m"])
     assert str(none).startswith("range of reaction 10.5 N to 11.55 N at 0.5 m, no collapse in 2 runs (friction")
     assert str(none).endswith("× 2; 1 run came to nothing)")
     assert none.numbers()["collapse"] is None
 
 
+def test_collapses_of_two_settlements_are_told_with_theirs():
+    """What falls as the second begins has a displacement below that of what falls at the end of the first."""
+    late = replace(path(0.1, 4e-6), collapse_phase=1)
+    found = PathRange([(Variation(), late), (Variation(0.95), path(0.1, 0.141))], ["m", "rad"])
+    assert str(found) == f"range of collapse 0.141 m in phase 1 to 4e-06 rad in phase 2 {ALL}"
+    assert [run["collapse_phase"] for run in found.numbers()["runs"]] == [2, 1]
+    early = replace(found, runs=[found.runs[1], (Variation(), path(0.5))])
+    assert str(early).startswith("range of collapse from 0.141 m in phase 1 on, 1 of 2 runs without")
+
+
 def test_the_reaction_ranges_over_the_runs_that_get_there():
     runs = [(Variation(), path(0.3, 0.35)), (Variation(0.95), path(0.2, 0.25, 1.1, unit=0.05))]
-    reaction = PathRange(runs, "m", moment=False).reaction()
+    reaction = PathRange(runs, ["m"]).reaction()
     assert reaction.settlements == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2, 0.3])
     assert reaction.low == pytest.approx(10.0 + reaction.settlements)
     assert reaction.high == pytest.approx((10.0 + reaction.settlements) * [1.1, 1.1, 1.1, 1.1, 1.1, 1.0])
@@ -112,7 +122,7 @@ def test_the_band_of_a_later_phase_lies_behind_those_before():
     arch = blockvis.generators.arch(voussoirs=6, thickness_ratio=0.2)
     phases = [solver.Settlement(direction=d, increment=0.05, limit=0.05) for d in ((1, 0), (0, -1))]
     response = solver.settle(arch, phases, friction_coefficient=2.0)
-    low = PathRange([(Variation(), traced(response))], "m", moment=False).reaction()
+    low = PathRange([(Variation(), traced(response))], ["m"]).reaction()
     band = ReactionRange(low.phases, low.settlements, low.low, 2.0 * low.high, low.runs)
     total, _, _ = band.along(response)
     assert total[-1] == pytest.approx(0.1)
@@ -180,6 +190,6 @@ def test_the_option_is_refused_where_there_is_no_settlement(tmp_path, capsys):
 
 
 def test_runs_that_came_to_nothing_are_left_out():
-    found = PathRange([(Variation(), path(0.3, 0.35)), (replace(VARIATIONS[0]), None)], "m", moment=False)
-    assert found.collapse == (0.35, 0.35)
+    found = PathRange([(Variation(), path(0.3, 0.35)), (replace(VARIATIONS[0]), None)], ["m"])
+    assert found.numbers()["collapse"] == [0.35, 0.35]
     assert found.numbers()["runs"][1]["status"] is None

@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from structures import vault_response
+from structures import moved_and_turned, vault_response
 
 import blockvis
 from blockvis.cli import main
@@ -74,3 +74,16 @@ def test_keys_that_are_not_in_use_are_not_on_paper(arch_results, monkeypatch):
     summary.write_text(json.dumps(json.loads(summary.read_text(encoding="utf-8")) | {"case": case}), encoding="utf-8")
     assert main(["report", str(arch_results), "--pdf"]) == 0
     assert listed == ['[geometry]\nfile = "arch#1.msh"\n\n[settlement]\ndirection = [1, 0]\nlimit = 0.5  # m']
+
+
+@pytest.mark.slow
+def test_states_of_a_rotation_are_told_in_rad_with_their_moment(tmp_path, monkeypatch):
+    tables = {}
+    monkeypatch.setattr("blockvis.report.pdf._Paper.tabulate", lambda _, title, *table: tables.update({title: table}))
+    response = moved_and_turned()
+    assert main(["report", str(blockvis.write(response, tmp_path / "out")), "--pdf"]) == 0
+    last = response.path[-1].measured
+    rows = tables["States"][1]
+    assert rows[1][0] == "1.00 mm, phase 1"
+    assert rows[1][1].endswith(" kN")
+    assert rows[-1] == ("0.0010 rad, phase 2", f"{last:.4g} N·m", "")

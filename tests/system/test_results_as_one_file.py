@@ -1,11 +1,12 @@
 """A results folder as one file: a series for ParaView, an animation for a browser, and the deformed layout."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import pyvista as pv
-from structures import arch_response, box, dropped_brick, rectangle, vault_response
+from structures import arch_response, box, case_from, dropped_brick, moved_and_turned, rectangle, vault_response
 from vtkmodules.vtkIOGeometry import vtkGLTFReader
 
 import blockvis
@@ -141,6 +142,23 @@ def test_blocks_taken_away_are_left_out_of_layouts_and_vanish_from_animations(in
     assert "vanishing on the way: 1 block taken away" in said
     assert played(film, 2.9)[1][1, 1] == pytest.approx(0.9, abs=0.02)
     assert played(film, 3.1)[1][1, 1] == pytest.approx(0.5, abs=0.02)
+
+
+def test_the_deformed_layout_is_told_in_the_unit_of_its_settlement(tmp_path, capsys):
+    converted(blockvis.write(moved_and_turned(), tmp_path / "out"), tmp_path / "deformed.json")
+    assert capsys.readouterr().out.endswith(", as they are at settlement 0.001 rad in phase 2\n")
+
+
+def test_an_animation_of_a_load_that_moves_begins_at_0_seconds(tmp_path):
+    text = '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 6 }\n[material]\nfriction_coefficient = 0.8\n'
+    text += (
+        '[analysis]\nkind = "limit load"\n[[loads]]\nkind = "live"\nforce = [0, -1000]\npositions = [-0.9, 0.9, 3]\n'
+    )
+    folder = blockvis.run_case(case_from(text, tmp_path), tmp_path / "out", outputs=()).folder
+    data = converted(folder, tmp_path / "load.glb").read_bytes()
+    tree = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    times = [tree["accessors"][sampler["input"]] for sampler in tree["animations"][0]["samplers"]]
+    assert {tuple(one["min"]) for one in times} == {(0.0,)}
 
 
 @pytest.mark.slow

@@ -9,12 +9,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from structures import case_from, run_command
+from structures import arch_response, case_from, run_command
 
 import blockvis
 import solver
 from blockvis import write_report
-from blockvis.cli import _say_error, _write_report
+from blockvis.cli import _say_error, main
 from blockvis.report.page import add_error
 from blockvis.runs import step_check
 from blockvis.runs.once_more import takes_steps, traced
@@ -116,8 +116,14 @@ def test_a_report_keeps_its_step_error_when_it_is_drawn_again(tmp_path, capsys):
     add_error(report, line)
     assert report.read_text(encoding="utf-8").count(row_of(line)) == 1
     report.unlink()
-    _write_report(response, tmp_path / "out")
-    assert report.read_text(encoding="utf-8").count(row_of(line)) == 1
+    (tmp_path / "out" / "range.csv").write_text(
+        "phase,settlement,reaction_low,reaction_high,runs\n0,0.0,1e3,2e3,9\n0,0.01,1e3,2e3,9\n", encoding="utf-8"
+    )
+    assert main(["run", "--resume", str(tmp_path / "out"), "--no-film"]) == 0
+    drawn = report.read_text(encoding="utf-8")
+    assert drawn.count(row_of(line)) == 1
+    assert "band behind the curve" in drawn
+    assert '"band":[[0.0,' in drawn
 
 
 @pytest.mark.slow
@@ -202,6 +208,15 @@ def test_an_error_is_told_in_the_unit_of_the_settlement_where_it_is_and_with_its
     check = compared(replace(settled, settlements=(*settled.settlements, turning)), other)
     assert (check.unit, check.phase) == ("m", 1)
     assert " (at 0.1 m in phase 1), " in str(check)
+
+
+def test_collapses_of_two_settlements_are_no_measure_of_each_other():
+    response = arch_response()
+    check = compared(response, replace(traced(response), collapse=1e-6, collapse_phase=1))
+    assert np.isnan(check.collapse)
+    assert str(check).endswith(
+        "with a quarter of the step tolerance it ends as 'collapsed in phase 2', not 'collapsed in phase 1'"
+    )
 
 
 def test_where_the_reaction_is_next_to_nothing_it_is_compared_with_a_part_of_the_first(settled):

@@ -48,7 +48,7 @@ def test_any_increment_is_drawn_on_demand(tmp_path):
     assert last.read_bytes() == draw_cracks(response, -1, tmp_path / "same.png", size=SIZE).read_bytes()
     with pytest.raises(ValueError, match="these lie in the plane: leave both out"):
         draw_cracks(response, 0, tmp_path / "none.png", view="front")
-    with pytest.raises(ValueError, match=f"no increment 999: choose one from 0 to {len(response.path) - 1}"):
+    with pytest.raises(ValueError, match=f"no increment 999; the response has {len(response.path)}, 0 to"):
         draw_cracks(response, 999, tmp_path / "none.png")
 
 
@@ -97,7 +97,8 @@ def test_labels_stand_at_the_widest_point_of_a_joint(monkeypatch):
     drawer.picture(last, widths=True)
     found = main_cracks(cracks_of(response.assembly, last.pose))
     joints = drawer.joints
-    on_a, on_b, _ = drawing.faces_at(response.assembly, joints, last.pose)
+    faces = drawing.carried_faces(response.assembly, joints, last.pose)
+    on_a, on_b = faces.on_a.reshape(-1, 2, 2), faces.on_b.reshape(-1, 2, 2)
     for crack, place in zip(found, seen, strict=True):
         gap = np.linalg.norm((on_a - on_b)[crack.joints[0]], axis=1)
         widest = (on_a + on_b)[crack.joints[0], gap.argmax()] / 2.0

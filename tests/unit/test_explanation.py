@@ -340,7 +340,8 @@ def trial(cause, evidence, *, shared=None, prior=1.0, detail="", refines=""):
     candidate = SimpleNamespace(cause=cause, prior=prior, detail=detail, refines=refines)
     log = np.full(10, evidence, dtype=float)
     return SimpleNamespace(
-        candidate=candidate, shared=shared or candidate, friction=0.6, unit="m", amounts=np.geomspace(1e-3, 1e-2, 10),
+        candidate=candidate, shared=shared or candidate, variant=SimpleNamespace(friction=0.6), unit="m",
+        amounts=np.geomspace(1e-3, 1e-2, 10),
         log_likelihood=log, log_mass=log, log_evidence=evidence, best=0,
     )  # fmt: skip
 

@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 import pyvista as pv
-from structures import BENT, arch_response, parted, posed, stacked, wall
+from structures import BENT, arch_response, moved_and_turned, parted, posed, stacked, wall
 
 import blockvis
 import solver
@@ -156,6 +156,16 @@ def test_joints_csv_names_the_widest_crack_first(tmp_path):
     openings = [float(row["largest opening [m]"]) for row in rows]
     assert openings == sorted(openings, reverse=True)
     assert openings[3] == 0.0, "what a step leaves is no opening"
+
+
+def test_joints_csv_tells_the_phase_of_places_in_m_and_in_rad(tmp_path):
+    response = moved_and_turned()
+    out = blockvis.write(response, tmp_path / "out")
+    rows = list(csv.DictReader((out / "joints.csv").read_text(encoding="utf-8").splitlines()))
+    widest = max(range(len(response.path)), key=lambda k: response.joints(k)["opening"].max())
+    found = [float(rows[0][f"{what} at largest opening"]) for what in ("settlement", "phase")]
+    assert found == [response.path[widest].parameter, response.path[widest].phase]
+    assert {row["phase at largest opening"] for row in rows} == {"0", "1"}
 
 
 def test_a_joint_that_slips_far_stands_behind_those_that_are_open(tmp_path):

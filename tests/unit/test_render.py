@@ -84,6 +84,8 @@ def test_frames_differ_and_the_fall_is_marked(tmp_path):
     response = arch_response()
     first = pixels(draw_still(response, 0, tmp_path / "first.png", size=SMALL))
     last = pixels(draw_still(response, len(response.path) - 1, tmp_path / "last.png", size=SMALL))
+    with pytest.raises(ValueError, match="there is no increment 99; the response has"):
+        draw_still(response, 99, tmp_path / "none.png")
     fallen = pixels(draw_still(response, np.int64(-1), tmp_path / "fallen.png", size=SMALL))
     assert first.shape == (360, 640, 3)
     assert (np.abs(first - last).max(axis=2) > 30).sum() > 1000
@@ -191,7 +193,7 @@ def test_wrong_options_are_named(tmp_path):
         draw_still(arch_response(), 0, tmp_path / "a.png", magnification=-1.0)
     with pytest.raises(ValueError, match="size is 0 × 10 pixels, which leave the blocks none"):
         draw_still(arch_response(), 0, tmp_path / "a.png", size=(0, 10))
-    with pytest.raises(IndexError, match=r"there is no increment 99; the response has \d+, 0 to"):
+    with pytest.raises(ValueError, match=r"there is no increment 99; the response has \d+, 0 to"):
         draw_still(arch_response(), 99, tmp_path / "a.png")
     with pytest.raises(ValueError, match="fps is 0; it must be a positive number"):
         animate(arch_response(), tmp_path / "a.mp4", fps=0, size=SMALL)

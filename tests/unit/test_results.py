@@ -11,6 +11,7 @@ from structures import equal_certificates
 import blockvis
 import solver
 from blockvis import generators
+from blockvis.cli import main
 from solver import mechanics
 
 
@@ -134,3 +135,14 @@ def test_numbers_of_numpy_are_written(tmp_path):
     control = solver.ControlDisplacement("block", increment=np.float32(0.25), limit=np.int64(1))
     pushed = solver.pushover(assembly, control, loads=live, friction_coefficient=0.3)
     assert blockvis.open_results(blockvis.write(pushed, tmp_path / "pushed")).control == control
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("summary.json", '{"status": '), ("step_check.json", "{"), ("range.csv", "a,b\n1,2\n")]
+)
+def test_files_of_a_folder_that_are_damaged_are_named_with_the_remedy(name, text, arch_results, capsys):
+    (arch_results / name).write_text(text, encoding="utf-8")
+    assert main(["report", str(arch_results)]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith(f"blockvis: '{arch_results / name}' is not what a run wrote (")
+    assert message.endswith("); run the case again with --force\n")

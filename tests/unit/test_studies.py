@@ -2,6 +2,7 @@
 
 import json
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -199,7 +200,19 @@ BAD = [
     ('method = "latin hypercube"\nruns = 8', 'method = "grid"', ("a grid needs points",)),
     ("seed = 3", "seed = 3\nkeep = [9]", ("keep names run 9", "0 to 7")),
     ("[study]", "[studie]", ("did you mean 'study'",)),
+    ("runs = 8", "runs = 8,5", ("has a decimal comma", "runs = 8.5")),
+    ('"case.toml"', '"cases\\m.toml"', ("write paths with / or in single quotes", "a study file is TOML")),
+    ("seed = 3", f"seed = {'[' * 3000}", ("nests lists or tables without end",)),
 ]
+
+
+def test_settlements_in_m_and_in_rad_are_no_study(study_file, capsys):
+    turn = "[[settlement]]\nrotation_centre = [1.0, 0.0]\nincrement = 0.001\nlimit = 0.002\n"
+    (study_file.parent / "case.toml").write_text(CASE + turn, encoding="utf-8")
+    assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
+    message = capsys.readouterr().err
+    assert "but [[settlement]] 1 is in m and 2 in rad; leave out those of one unit" in message
+    assert "case.toml" in message
 
 
 @pytest.mark.parametrize(("old", "new", "words"), BAD, ids=[b[1][:24] for b in BAD])
@@ -496,6 +509,14 @@ def test_means_with_runs_that_stood_are_the_least_that_they_may_be(tmp_path):
     assert re.search(r"^a: 0\.\d+ m on average at 0\.\d+, at least 0\.\d+ m at ", said, re.M)
     drawn = pictures.draw_sensitivity(study, table, tmp_path / "sensitivity.svg").read_text(encoding="utf-8")
     assert f"at least: {mechanics.counted(int(stood.sum()), 'run')} stood" in drawn
+
+
+def test_where_nothing_ever_stands_displacements_are_drawn_without_words_of_matplotlib(tmp_path):
+    study = _study(runs=8)
+    table = _table(study, np.zeros(8), ["no initial equilibrium"] * 8)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert pictures.draw_scatter(study, table, tmp_path / "scatter.svg").is_file()
 
 
 def test_a_limit_load_is_no_case_of_a_study_and_the_way_is_told(study_file, capsys):
