@@ -63,7 +63,7 @@ def stored_ties(folder: Path, increments: Sequence[solver.Increment] = ()) -> tu
             ties = unpacked(file.read_bytes(), _Members)[0].ties
     except ValueError as error:
         raise ValueError(f"'{file}' cannot be read ({error}); run the case again") from None
-    told = len(increments[0].ties.forces) if increments else 0
+    told = len(increments[-1].ties.forces) if increments else 0
     if told not in (0, len(ties)):
         what = "is missing" if not file.is_file() else f"has {len(ties)}"
         carried = mechanics.counted(told, "tie")

@@ -151,7 +151,7 @@ def test_a_dome_stands_on_a_ring_of_which_half_sinks():
 
 def test_numbers_for_the_plane_are_refused_in_space():
     plug = leaning_plug(3)
-    with pytest.raises(ValueError, match=r"in space: give .* as \[x, y, z\]"):
+    with pytest.raises(ValueError, match=r"in space: give \[x, y, z\]"):
         solver.settle(plug, solver.Settlement(direction=(1, 0)))
     with pytest.raises(ValueError, match="in the plane"):
         solver.settle(arch(), solver.Settlement(direction=(1, 0, 0)))
