@@ -43,6 +43,9 @@ FORCE = 1e-3
 #: the last one leaves blocks in each other, the step is halved.
 EXACT, LINEARISATIONS = 1e-4, 6
 
+#: Change of the acceleration of a block from step to step, in its weight, up to which nothing has struck it.
+SMOOTH = 0.3
+
 #: Part of that error that the length of a tie may have: nothing pushes it out later, and stiff ones store energy by it.
 EXACT_TIES = 1e-2
 
@@ -125,7 +128,8 @@ class Engine:
         self.contacts: mechanics.Contacts | None = None
         self.forces = self.trial = np.zeros((0, self.d))
         self.corners = mechanics.moved_vertices(assembly, pose)
-        self.flies = np.zeros(assembly.n_blocks, dtype=bool)
+        self.acceleration = np.zeros_like(self.velocity)
+        self.is_smooth = np.zeros(assembly.n_blocks, dtype=bool)
         #: Length of the last step. The first are short, so that they follow the push: implicit steps fall too far.
         self.step_length = 0.05 * LONGEST_STEP
         self.steps = self.programs = 0
@@ -215,9 +219,9 @@ class Engine:
         self.contacts, self.forces, self.trial = contacts, forces, trial
         self.velocity = np.where(self.free[:, None], velocity + (motion - flight) / h, 0.0)
         self.pose, self.corners = pose, corners
-        self.flies = self.free.copy()
-        carries = forces[:, 0] > FORCE
-        self.flies[contacts.block_a[carries]] = self.flies[contacts.block_b[carries]] = False
+        before_it, self.acceleration = self.acceleration, (motion - flight) / h**2
+        jump = (self.weights * (self.acceleration - before_it) ** 2).sum(axis=1)
+        self.is_smooth = self.free & (jump <= SMOOTH**2 * (self.loads**2 / self.weights).sum(axis=1))
         self._yield()
         self._lose(energies)
         self.steps += 1
@@ -231,8 +235,6 @@ class Engine:
     def _flight(self, h: float) -> tuple[np.ndarray, np.ndarray]:
         """Movement and velocity after a step without loads and contact, (n_blocks, n_dof) arrays."""
         motion, velocity = h * self.velocity, self.velocity.copy()
-        # Implicit steps fall too far by h² g / 2, which is taken back where nothing touches.
-        motion[:, : self.d] -= np.where(self.flies[:, None], 0.5 * h * h * self.loads / self.weights, 0.0)[:, : self.d]
         spinning = np.flatnonzero((self.velocity[:, self.d :] != 0.0).any(axis=1))
         if self.d == 3 and len(spinning):
             axes = axes_at(self.pose, self.drawn_axes)[spinning]
@@ -241,7 +243,8 @@ class Engine:
             motion[spinning, 3:] = np.einsum("nij,nj->ni", axes, turn)
             # The axes have turned, too.
             velocity[spinning, 3:] = mechanics.turned(np.einsum("nij,nj->ni", axes, after), motion[spinning, 3:])
-        return motion, velocity
+        # Implicit steps move as if the acceleration at their end were that of all of them.
+        return motion - 0.5 * h * h * np.where(self.is_smooth[:, None], self.acceleration, 0.0), velocity
 
     def _near(self, h: float) -> mechanics.Contacts:
         """Contact points that may close within a step."""
