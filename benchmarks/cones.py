@@ -64,12 +64,12 @@ def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
     sinks[assembly.moving, 2] = -1.0
     stated: list[ConicProgram] = []
 
-    def kept(program: ConicProgram, *_: object) -> Solution:
+    def kept(program: ConicProgram, route: str) -> Solution:
         stated.append(program)
         raise StopIteration
 
     friction, limits = np.full(len(contacts), FRICTION), ForceLimits.dry(len(contacts))
-    with patch.object(solve, "solve_cones", kept), suppress(StopIteration):
+    with patch.object(solve, "run_clarabel", kept), suppress(StopIteration):
         StaticProgram(model, Pose.initial(assembly), contacts, friction, sinks, COMPUTED_GAP, limits).bounds()
     return stated[0], len(contacts)
 
@@ -84,7 +84,7 @@ def main() -> None:
         assembly = wall(blocks)
         program, points = program_of(assembly)
         started = time.process_time()
-        found = solve.solve_cones(program)
+        found, _ = solve.run_clarabel(program, "clarabel")
         seconds = time.process_time() - started
         print(
             f"{int(assembly.free.sum()):7} {points:7} {seconds:8.2f} {found.iterations:10} "

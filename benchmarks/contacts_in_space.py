@@ -63,7 +63,7 @@ def main() -> None:
         vertices = assembly.vertices
         contacts = mechanics.find_contacts(assembly, vertices, REACH)
         find = seconds(lambda: mechanics.find_contacts(assembly, vertices, REACH))  # noqa: B023
-        measure = seconds(lambda: mechanics.measure_contacts(assembly, vertices, contacts))  # noqa: B023
+        measure = seconds(lambda: assembly.shapes.measure(vertices, contacts))  # noqa: B023
         print(f"{assembly.n_blocks:8d} {len(contacts):8d} {built:8.3f} {find:8.3f} {measure:8.3f}")
 
 

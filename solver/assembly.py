@@ -346,20 +346,6 @@ def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Con
     return assembly.shapes.find(vertices, reach, assembly.free)
 
 
-def measure_contacts(assembly: Assembly, vertices: np.ndarray, contacts: Contacts) -> Contacts:
-    """Measure the same contact points with the corners elsewhere.
-
-    Parameters
-    ----------
-    assembly : Assembly
-    vertices : (n_vertices, d) array [m]
-        Current corners of all blocks.
-    contacts : Contacts
-        Whose features are measured.
-    """
-    return assembly.shapes.measure(vertices, contacts)
-
-
 def _labels(
     n: int,
     what: str,

@@ -13,7 +13,7 @@ from solver.results.increment import Increment
 
 
 class Increments(Iterator[Increment]):
-    """The increments of an analysis, found one by one as they are asked for, and then how it ended.
+    """The increments of an analysis, found one by one with the seconds that each took, and then how it ended.
 
     Parameters
     ----------
@@ -37,16 +37,19 @@ class Increments(Iterator[Increment]):
         if self._first is not None:
             first, self._first = self._first, None
             return first
+        started = time.perf_counter()
         try:
-            increment = self._found()
+            # Of several threads all but one wait by counting, on a core that another process could have.
+            with ExitStack() as limits:
+                with suppress(NotLimited):
+                    limits.enter_context(one_thread())
+                found = next(self._steps)
         except StopIteration as stop:
             # What it stops with again after its end is nothing.
             self._ending = self._ending or stop.value
             raise StopIteration(self._ending) from None
+        increment = replace(found, seconds=time.perf_counter() - started)
         return increment if self._changed is None else self._changed(increment)
-
-    def _found(self) -> Increment:
-        return next(self._steps)
 
     @property
     def ending(self) -> Ending:
@@ -84,19 +87,3 @@ class Increments(Iterator[Increment]):
             if on_increment is not None:
                 on_increment(increments[-1])
         return tuple(increments)
-
-
-class TimedIncrements(Increments):
-    """The same with the seconds each took, not counting what whoever listens takes in between.
-
-    The linear algebra keeps to one thread while they are worked out, where it can be limited: of several, all but one
-    wait by counting, on a core that another process could have.
-    """
-
-    def _found(self) -> Increment:
-        started = time.perf_counter()
-        with ExitStack() as limits:
-            with suppress(NotLimited):
-                limits.enter_context(one_thread())
-            increment = next(self._steps)
-        return replace(increment, seconds=time.perf_counter() - started)

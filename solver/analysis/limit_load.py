@@ -20,7 +20,6 @@ from solver.loads import Loads, checked_loads
 from solver.path.stepping import Stepper
 from solver.program.strength import Admissible, point_strength
 from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces, face_wrench_matrix, point_forces
-from solver.program.without_dilatancy import solve_without_dilatancy
 from solver.programs.problem import Unbounded
 from solver.programs.solve import solve_between
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
@@ -63,6 +62,9 @@ FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE, NO_NEARER = 1e-6, 1e-8, 5
 #: The second in space, where solutions are interior ones and a smaller cost is lost in their rounding; it is seen in
 #: the motion, which a last program without it gives.
 CHANGE_COST, CHANGE_COST_IN_SPACE = 1e-8, 1e-5
+
+#: Non-associative flow: cost of unbalanced force, in multipliers, above that of any mechanism.
+UNBALANCED_COST = 1e3
 
 
 def find_limit_load(
@@ -374,13 +376,48 @@ class _Problem:
         return self.result(nearest, status, "non-associative", programs)
 
     def _sliding(self, normal: np.ndarray, unbalanced: np.ndarray, change_cost: np.ndarray) -> _State:
-        """One program of the sequence."""
-        bound, loads = self.cohesion + self.friction * normal, (self.dead, self.live, unbalanced)
-        forces, multiplier, left, solution = solve_without_dilatancy(
-            self.matrix, *loads, bound, self.crushing, self.price, normal, change_cost
+        """One program of the sequence: maximise α with |T| ≤ B; of equal α the normal forces nearest to N⁰, ``normal``.
+
+        Columns: the shear forces, N, p, m, α and unbalanced forces, with N - N⁰ = p - m, and a row N for each point
+        that may crush. In the plane T = (u - v) / 2 of columns u + v = 2 B; in space the disc |T| ≤ B is the cone
+        |T| ≤ B s with s = 1.
+        """
+        n, rows, size, plane = len(normal), len(self.dead), self.size, self.size == 2
+        bound, brittle = self.cohesion + self.friction * normal, np.flatnonzero(np.isfinite(self.crushing))
+        identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
+        if plane:
+            half = sp.diags_array(np.full(n, 0.5))
+            shears = sp.hstack([half, -half])
+            to_shear = self.matrix[:, 1::2] @ shears
+            level, level_is, slopes, slack = sp.hstack([eye, eye]), 2.0 * bound, np.zeros(0), unbalanced
+        else:
+            disc = np.ones((n, size)) * bound[:, None]
+            disc[:, 0] = 0.0
+            shears = sp.diags_array(disc.ravel())
+            to_shear = self.matrix @ shears
+            level = sp.csr_array((np.ones(n), (np.arange(n), size * np.arange(n))), shape=(n, size * n))
+            level_is, slopes, slack = np.ones(n), np.ones(n), np.zeros(rows)
+        first = shears.shape[1]
+        blocks = [
+            [to_shear, self.matrix[:, 0::size], None, None, sp.csr_array(self.live[:, None]), identity, -identity],
+            [level, None, None, None, None, None, None],
+            [None, eye, -eye, eye, None, None, None],
+            [None, sp.csr_array(eye)[brittle], None, None, None, None, None],
+        ]
+        of_forces = [np.zeros(first), self.price, change_cost, change_cost]
+        solution = solve_between(
+            np.concatenate([*of_forces, [-1.0], np.full(2 * rows, UNBALANCED_COST)]),
+            sp.csc_array(sp.block_array(blocks, format="csc")),
+            np.concatenate([-self.dead - slack, level_is, normal, np.zeros(len(brittle))]),
+            np.concatenate([-self.dead + slack, level_is, normal, self.crushing[brittle]]),
+            slopes,
+            size,
         )
-        velocity, falls = -solution.row_dual[: len(self.dead)], left > FALLING_FRACTION * self.total
-        return _State(forces, multiplier, velocity, unbalanced, solution.gap, falls, bound)
+        shear, x = (shears @ solution.x[:first]).reshape(n, -1), solution.x[first:]
+        forces = np.column_stack([x[:n], shear[:, int(not plane) :]])
+        multiplier, left = float(x[3 * n]), x[3 * n + 1 :][: 2 * rows].max(initial=0.0)
+        falls = bool(left > FALLING_FRACTION * self.total)
+        return _State(forces, multiplier, -solution.row_dual[:rows], unbalanced, solution.gap, falls, bound)
 
     def result(self, state: _State, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
         """The state in metres and newtons, its bounds and its certificate recomputed from it."""

@@ -22,7 +22,7 @@ from solver.results.increment import Bonds, Increment, Status
 from solver.ties import Tie, TieForces, check_ties
 from solver.words import counted
 
-from .increments import Increments, TimedIncrements
+from .increments import Increments
 from .limit_load import checked_live, remaining
 from .settlement import model_of
 
@@ -96,7 +96,7 @@ def pushover_increments(
     model = model_of(near, loads, interfaces, controls, loads.live, ties)
     path = Path(model, ControlledLoad(near, control, start), 0, controls, on_step)
     steps = _increments(path, start, ties_at, bonds_at, fallen, resume)
-    return TimedIncrements(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
+    return Increments(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
 
 
 def _increments(

@@ -25,7 +25,7 @@ from solver.results.increment import Increment, Status
 from solver.ties import Tie, check_ties
 from solver.words import counted
 
-from .increments import Increments, TimedIncrements
+from .increments import Increments
 
 
 def settlement_increments(
@@ -76,7 +76,7 @@ def settlement_increments(
         steps = linear_program_increments(near, local, interfaces, loads, resume)
     else:
         steps = _increments(near, local, interfaces, loads, controls, resume, near_ties, changes, on_step)
-    return TimedIncrements(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
+    return Increments(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
 
 
 def _refuse_by_program(

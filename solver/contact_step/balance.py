@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .cones import ITERATIONS, Scaling, longest_step, product, quotient
-from .factors import Singular
-from .problem import NotSolved
+from .factors import NotSolved
 from .stiffness import ContactRows
 
 #: Force out of balance, and mean product of forces and multipliers, in block weights, at which it has converged.
@@ -102,7 +101,7 @@ class _Iterate:
 
         Raises
         ------
-        Singular, LinAlgError
+        NotSolved, LinAlgError
             Where rounding is all that is left.
         """
         self.scaling = Scaling(self.u, self.z)
@@ -239,7 +238,7 @@ def nearest_equilibrium(
             break
         try:
             point.factorise()
-        except (Singular, np.linalg.LinAlgError):
+        except (NotSolved, np.linalg.LinAlgError):
             break
         scaled_point = point.scaling.scaled_point
         present = product(scaled_point, scaled_point)

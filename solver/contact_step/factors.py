@@ -21,8 +21,8 @@ WIDE = 300
 ALONE = 1e-14
 
 
-class Singular(ArithmeticError):
-    """The matrix is not positive definite, by rounding."""
+class NotSolved(Exception):
+    """The minimum of a step's program was not found, or its matrix is not positive definite, by rounding."""
 
 
 def factorisation(pairs: np.ndarray, places: np.ndarray | None, n_blocks: int, dof: int) -> Band | Fronts:
@@ -61,14 +61,14 @@ class Band:
 
         Raises
         ------
-        Singular
+        NotSolved
         """
         size, width = self.shape
         band = np.bincount(self.entry, matrices.ravel()[self.kept], size * width).reshape(self.shape).T
         band[0] += diagonal[self.order] + ALONE * band[0].max()
         factor, bad = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
         if bad:
-            raise Singular(f"pivot {bad} of {size} is not positive")
+            raise NotSolved(f"pivot {bad} of {size} is not positive")
 
         def solve(right: np.ndarray) -> np.ndarray:
             solution, _ = lapack.dpbtrs(factor, right[self.order], lower=1)
@@ -169,7 +169,7 @@ class Fronts:
             if len(own):
                 own, bad = lapack.dpotrf(own, lower=1, clean=0, overwrite_a=1)
                 if bad:
-                    raise Singular(f"pivot {front.own.start + bad} of {len(self.order)} is not positive")
+                    raise NotSolved(f"pivot {front.own.start + bad} of {len(self.order)} is not positive")
             if across.size:
                 across = blas.dtrsm(1.0, own, across, side=1, lower=1, trans_a=1, overwrite_b=1)
                 left = blas.dsyrk(-1.0, across, lower=1, beta=1.0, c=left, overwrite_c=1)

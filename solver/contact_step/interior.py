@@ -13,7 +13,7 @@ that of springs at the contact points: symmetric and positive definite.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,9 +26,8 @@ from .problem import ContactProblem, NotSolved, StepSolution
 CONVERGED, FITS, BALANCED, ACCEPTED = 1e-12, 1e-8, 1e-9, 1e-6
 
 
-@dataclass(frozen=True)
-class _Change:
-    """A change of the iterate; (d, k) arrays of the k contact points with friction."""
+class _Point(NamedTuple):
+    """Movement, forces N, u = (B, T), openings y, yielding w and slides z, or a change of them."""
 
     motion: np.ndarray
     multiplier: float
@@ -37,6 +36,9 @@ class _Change:
     yielding: np.ndarray
     shear: np.ndarray
     slide: np.ndarray
+
+    def moved(self, change: _Point, part: float) -> _Point:
+        return _Point(*(value + part * by for value, by in zip(self, change, strict=True)))  # type: ignore[operator,arg-type]
 
 
 def _frames(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -50,46 +52,44 @@ class _Iterate:
     """Forces N, u = (B, T), openings y, yielding w and slides z of a problem's contact points, inside their bounds."""
 
     def __init__(self, problem: ContactProblem, multiplier: float) -> None:
-        self.problem, self.multiplier = problem, multiplier
-        self.motion = np.zeros_like(problem.load)
+        self.problem = problem
         self.rough = np.flatnonzero(problem.bound > 1e-8)
         self.limited = np.flatnonzero(np.isfinite(problem.most))
-        self.relative = problem.rows.relative(self.motion)
         # In smaller steps the compliance of the joints decides.
         self.size = max(problem.size, 1e-5)
         mean = 0.03 * self.size
         before, bound = problem.forces[:, 0], problem.bound[self.rough]
         # The start lies well inside the cones.
         normal = np.maximum(before, 0.3)
-        self.opening = np.maximum(problem.gap + self.relative[:, 0], mean / normal)
-        self.normal = np.where(before > 0.0, normal, np.minimum(normal, mean / self.opening))
-        self.normal = np.minimum(self.normal, 0.5 * problem.most)
-        self.yielding = mean / self.reserve
+        opening = np.maximum(problem.gap, mean / normal)
+        normal = np.where(before > 0.0, normal, np.minimum(normal, mean / opening))
+        normal = np.minimum(normal, 0.5 * problem.most)
+        yielding = mean / (problem.most[self.limited] - normal[self.limited])
         shear, slip = problem.forces[self.rough, 1:].T, problem.slip[self.rough].T
         length = np.sqrt((shear**2).sum(axis=0))
-        self.shear = np.concatenate([bound[None], shear * np.minimum(1.0, 0.9 * bound / np.maximum(length, 1e-300))])
-        self.slide = np.concatenate([(np.sqrt((slip**2).sum(axis=0)) + 2.0 * mean / bound)[None], slip])
+        shear = np.concatenate([bound[None], shear * np.minimum(1.0, 0.9 * bound / np.maximum(length, 1e-300))])
+        slide = np.concatenate([(np.sqrt((slip**2).sum(axis=0)) + 2.0 * mean / bound)[None], slip])
         self.factorisations = 0
         self.count = len(problem.gap) + len(self.limited) + 2 * len(self.rough)
-        self._measure()
+        self.take(_Point(np.zeros_like(problem.load), multiplier, normal, opening, yielding, shear, slide))
 
-    @property
-    def reserve(self) -> np.ndarray:
+    def reserve(self, point: _Point) -> np.ndarray:
         """(k,) array: what is missing from limited normal forces to their limit."""
-        return np.asarray(self.problem.most[self.limited] - self.normal[self.limited])
+        return np.asarray(self.problem.most[self.limited] - point.normal[self.limited])
 
-    def _measure(self) -> None:
-        """Compute the residuals of the equations and the mean product."""
-        p, rough = self.problem, self.rough
-        self.unbalanced = p.unbalanced(self.motion, self.forces(self.normal, self.shear), self.multiplier)
+    def take(self, at: _Point) -> None:
+        """Go to a point: the residuals of the equations and the mean product there."""
+        self.at, p, rough = at, self.problem, self.rough
+        relative = p.rows.relative(at.motion)
+        self.unbalanced = p.unbalanced(at.motion, self.forces(at.normal, at.shear), at.multiplier)
         self.imbalance = float(np.abs(self.unbalanced).max())
-        self.control_error = 0.0 if p.control is None else p.control_target - float(p.control @ self.motion)
-        shortening = p.compliance[:, 0] * (self.normal - p.forces[:, 0])
-        self.gap_error = self.opening - (p.gap + self.relative[:, 0] + shortening)
-        self.gap_error[self.limited] -= self.yielding
-        slip = (p.slip[rough] + self.relative[rough, 1:] - p.compliance[rough, 1:] * p.forces[rough, 1:]).T
-        self.slip_error = self.slide[1:] - slip - p.compliance[rough, 1] * self.shear[1:]
-        self.mean = self._mean(self.normal, self.opening, self.yielding, self.shear, self.slide)
+        self.control_error = 0.0 if p.control is None else p.control_target - float(p.control @ at.motion)
+        shortening = p.compliance[:, 0] * (at.normal - p.forces[:, 0])
+        self.gap_error = at.opening - (p.gap + relative[:, 0] + shortening)
+        self.gap_error[self.limited] -= at.yielding
+        slip = (p.slip[rough] + relative[rough, 1:] - p.compliance[rough, 1:] * p.forces[rough, 1:]).T
+        self.slip_error = at.slide[1:] - slip - p.compliance[rough, 1] * at.shear[1:]
+        self.mean = self.mean_of(at)
         geometry_error = max(float(np.abs(self.gap_error).max()), float(np.abs(self.slip_error).max(initial=0.0)))
         self.residual = max(geometry_error, abs(self.control_error))
 
@@ -100,20 +100,19 @@ class _Iterate:
         forces[self.rough, 1:] = shear[1:].T
         return forces
 
-    def _mean(
-        self, normal: np.ndarray, opening: np.ndarray, yielding: np.ndarray, shear: np.ndarray, slide: np.ndarray
-    ) -> float:
-        reserve = self.problem.most[self.limited] - normal[self.limited]
-        return float((normal * opening).sum() + (reserve * yielding).sum() + (shear * slide).sum()) / self.count
+    def mean_of(self, point: _Point) -> float:
+        """Mean product at a point."""
+        products = (point.normal * point.opening).sum() + (self.reserve(point) * point.yielding).sum()
+        return float(products + (point.shear * point.slide).sum()) / self.count
 
     def factorise(self) -> None:
         """Factorise Newton's equations at this iterate."""
-        p, d = self.problem, len(self.shear)
+        p, d = self.problem, len(self.at.shear)
         self.factorisations += 1
-        self.scaling = Scaling(self.shear, self.slide)
-        yielding = np.zeros_like(self.normal)
-        yielding[self.limited] = self.yielding / self.reserve
-        self.normal_stiffness = 1.0 / (p.compliance[:, 0] + self.opening / self.normal + yielding)
+        self.scaling = Scaling(self.at.shear, self.at.slide)
+        yielding = np.zeros_like(self.at.normal)
+        yielding[self.limited] = self.at.yielding / self.reserve(self.at)
+        self.normal_stiffness = 1.0 / (p.compliance[:, 0] + self.at.opening / self.at.normal + yielding)
         # (isotropic I + 2 η² w wᵀ)⁻¹ along w and across it: what rounds across is large along it.
         self.frames, self.length = _frames(self.scaling.w[1:])
         self.shear_stiffness = 1.0 / (p.compliance[self.rough, 1:].T + self.scaling.square)
@@ -126,11 +125,11 @@ class _Iterate:
 
     def direction(
         self, opening_products: np.ndarray, yielding_products: np.ndarray, slide_products: np.ndarray
-    ) -> _Change:
+    ) -> _Point:
         """Newton's direction with what the products, those of slides in the scaling, are to change by."""
         p, scaling, limited = self.problem, self.scaling, self.limited
-        normal_target = opening_products / self.normal + self.gap_error
-        normal_target[limited] -= yielding_products / self.reserve
+        normal_target = opening_products / self.at.normal + self.gap_error
+        normal_target[limited] -= yielding_products / self.reserve(self.at)
         target = scaling.scaled(quotient(slide_products, scaling.scaled_point))
         slip_target = np.einsum("ijn,jn->in", self.frames, target[1:] + self.slip_error)
 
@@ -144,7 +143,7 @@ class _Iterate:
             motion = motion + multiplier * self.by_live
         relative = p.rows.relative(motion)
         normal = self.normal_stiffness * (normal_target - relative[:, 0])
-        yielding = (yielding_products + self.yielding * normal[limited]) / self.reserve
+        yielding = (yielding_products + self.at.yielding * normal[limited]) / self.reserve(self.at)
         opening = relative[:, 0] + p.compliance[:, 0] * normal - self.gap_error
         opening[limited] += yielding
         slip = relative[self.rough, 1:].T
@@ -152,35 +151,17 @@ class _Iterate:
         shear = shear_of(along)
         first = target[0] - 2.0 * scaling.square * scaling.w[0] * self.length * along[0]
         slide = np.concatenate([first[None], slip + p.compliance[self.rough, 1] * shear[1:] - self.slip_error])
-        return _Change(motion, multiplier, normal, opening, yielding, shear, slide)
+        return _Point(motion, multiplier, normal, opening, yielding, shear, slide)
 
-    def longest(self, change: _Change) -> float:
+    def longest(self, change: _Point) -> float:
         """Largest part of a change, at most 1, that keeps everything inside."""
-        steepest = max(1.0, float((-change.normal / self.normal).max()), float((-change.opening / self.opening).max()))
-        if len(self.limited):
-            steepest = max(steepest, float((change.normal[self.limited] / self.reserve).max()))
-            steepest = max(steepest, float((-change.yielding / self.yielding).max()))
-        return min(1.0 / steepest, longest_step(self.shear, change.shear), longest_step(self.slide, change.slide))
-
-    def mean_after(self, change: _Change, part: float) -> float:
-        """Mean product after a part of a change."""
-        return self._mean(
-            self.normal + part * change.normal,
-            self.opening + part * change.opening,
-            self.yielding + part * change.yielding,
-            self.shear + part * change.shear,
-            self.slide + part * change.slide,
+        steepest = max(
+            1.0, float((-change.normal / self.at.normal).max()), float((-change.opening / self.at.opening).max())
         )
-
-    def take(self, change: _Change, part: float) -> None:
-        """Add a part of a change."""
-        self.motion = self.motion + part * change.motion
-        self.multiplier += part * change.multiplier
-        self.relative = self.problem.rows.relative(self.motion)
-        self.normal, self.opening = self.normal + part * change.normal, self.opening + part * change.opening
-        self.yielding = self.yielding + part * change.yielding
-        self.shear, self.slide = self.shear + part * change.shear, self.slide + part * change.slide
-        self._measure()
+        if len(self.limited):
+            steepest = max(steepest, float((change.normal[self.limited] / self.reserve(self.at)).max()))
+            steepest = max(steepest, float((-change.yielding / self.at.yielding).max()))
+        return min(1.0 / steepest, longest_step(self.at.shear, change.shear), longest_step(self.at.slide, change.slide))
 
 
 @np.errstate(all="ignore")  # A step that overflows is seen by its result.
@@ -189,20 +170,20 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
 
     Raises
     ------
-    NotSolved, Singular
+    NotSolved
     """
     point = _Iterate(problem, multiplier)
     for _ in range(ITERATIONS):
-        size = max(point.size, float(np.abs(point.motion).max()))
+        size = max(point.size, float(np.abs(point.at.motion).max()))
         if point.mean <= CONVERGED and point.imbalance < BALANCED and point.residual <= FITS * size:
             break
         point.factorise()
         scaled_point = point.scaling.scaled_point
-        normal_products, slide_products = point.normal * point.opening, product(scaled_point, scaled_point)
-        yielding_products = point.reserve * point.yielding
+        normal_products, slide_products = point.at.normal * point.at.opening, product(scaled_point, scaled_point)
+        yielding_products = point.reserve(point.at) * point.at.yielding
         change = point.direction(-normal_products, -yielding_products, -slide_products)
         part = point.longest(change)
-        centring = min(max((point.mean_after(change, part) / point.mean) ** 3, 1e-4), 0.5)
+        centring = min(max((point.mean_of(point.at.moved(change, part)) / point.mean) ** 3, 1e-4), 0.5)
         # Corrections of second order are bounded by the mean product.
         limit = 30.0 * point.mean
         second = np.clip(change.normal * change.opening, -limit, limit)
@@ -216,11 +197,13 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
         part = 0.99 * point.longest(change)
         if not (part > 1e-9 and np.isfinite(change.motion).all()):
             break
-        point.take(change, part)
+        point.take(point.at.moved(change, part))
     if point.mean > ACCEPTED * size or point.imbalance > ACCEPTED or point.residual > ACCEPTED * size:
         raise NotSolved(
             f"mean product {point.mean / size:.1e} of the movement, {point.imbalance:.1e} out of balance after "
             f"{point.factorisations} iterations"
         )
-    forces = point.forces(point.normal, point.shear)
-    return StepSolution(point.motion, forces, problem.trial(point.motion), point.multiplier, point.factorisations)
+    forces = point.forces(point.at.normal, point.at.shear)
+    return StepSolution(
+        point.at.motion, forces, problem.trial(point.at.motion), point.at.multiplier, point.factorisations
+    )

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .factors import Singular, Solve
+from .factors import Solve
 from .interior import BALANCED, interior_point
-from .problem import ContactProblem, NotSolved, StepSolution
+from .problem import ContactProblem, StepSolution
 
 #: Factorisations of Newton's method, and force out of balance, in block weights, were the blocks to go on as before or
 #: after the first one, beyond which it would take more: the interior method, which takes 8 to 14 wherever it starts,
@@ -37,12 +37,9 @@ def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplie
     if len(problem.gap) == 0:
         motion = problem.load / problem.viscosity - problem.motion_so_far
         return StepSolution(motion, problem.forces, problem.forces, multiplier, 0)
-    try:
-        solution, iterations = newton(problem, trial, multiplier)
-        if solution is None:
-            solution = interior_point(problem, multiplier)
-    except Singular as error:
-        raise NotSolved(str(error)) from None
+    solution, iterations = newton(problem, trial, multiplier)
+    if solution is None:
+        solution = interior_point(problem, multiplier)
     return replace(solution, factorisations=iterations + solution.factorisations)
 
 

@@ -21,11 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .factors import NotSolved as NotSolved
 from .stiffness import ContactRows
-
-
-class NotSolved(Exception):
-    """The minimum of a step's program was not found."""
 
 
 @dataclass(frozen=True)

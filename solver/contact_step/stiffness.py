@@ -82,7 +82,7 @@ class ContactRows:
 
         Raises
         ------
-        Singular
+        NotSolved
         """
         weighted = np.matmul(stiffness, self.blocks)
         sums, pairs = _over_pairs(self.key)

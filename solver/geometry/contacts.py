@@ -13,6 +13,10 @@ from .broad_phase import expand_ranges
 #: Faces that cover each other on a strip may touch if its gap is at most this part of its width; others slide past.
 STEEPEST_LANDING = 0.25
 
+#: Distance, in block sizes, up to which a point takes over from one that has vanished, as much as a normal turned by 1;
+#: and difference of distances up to which points are equally near.
+FAR_SUCCESSOR, SAME_PLACE = 1e-2, 1e-6
+
 #: Cosine from which on two normals are the same.
 SAME_NORMAL = 1.0 - 1e-6
 
@@ -118,7 +122,7 @@ def are_known(contacts: Contacts, known: Contacts, same_normal: bool = True) -> 
 
 
 def successors(
-    before: Contacts, vanished: np.ndarray, contacts: Contacts, near: float, length: float
+    before: Contacts, vanished: np.ndarray, contacts: Contacts, size: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the contact points that stand where others of the same two blocks have vanished, with the nearest normals.
 
@@ -128,8 +132,8 @@ def successors(
     ----------
     vanished : (k,) int array
         Numbers of those that are not among the contact points any more.
-    near, length : float [m]
-        Difference up to which points are equally near; largest distance, as much as a normal that is turned by 1.
+    size : float [m]
+        Of the blocks.
 
     Returns
     -------
@@ -145,7 +149,8 @@ def successors(
     sense = np.where(before.block_a[earlier] == contacts.block_a[successor], 1.0, -1.0)[:, None]
     apart = np.linalg.norm(before.points[earlier] - contacts.points[successor], axis=1)
     turned = np.linalg.norm(sense * before.frames[earlier, 0] - contacts.frames[successor, 0], axis=1)
+    length = FAR_SUCCESSOR * size
     measure, least = apart + length * turned, np.full(len(vanished), np.inf)
     np.minimum.at(least, row[apart < length], measure[apart < length])
-    chosen = (measure <= least[row] + near) & (apart < length)
+    chosen = (measure <= least[row] + SAME_PLACE * size) & (apart < length)
     return row[chosen], successor[chosen]

@@ -168,8 +168,9 @@ class EquilibriumChecks:
     def bounds(self, place: Place, gap: float = COMPUTED_GAP) -> EquilibriumBounds:
         """Bounds of the reaction or multiplier in equilibrium at a place."""
         rate = None if self.model.live is not None else self.driver.rate(place.s)
-        bounds = self._program(place, gap, rate).bounds()
-        self.stepper.programs += bounds.programs
+        program = self._program(place, gap, rate)
+        bounds = program.bounds()
+        self.stepper.programs += program.programs
         return bounds
 
     def _program(self, place: Place, gap: float, rate: np.ndarray | None = None) -> StaticProgram:

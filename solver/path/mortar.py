@@ -17,9 +17,6 @@ from .state import Place
 #: Opening and slip, in block sizes, over which a brittle point loses its strength: small, but no rounding.
 BRITTLE = 1e-6
 
-#: Distance, in block sizes, up to which a point takes over the bond of one that has vanished.
-NEAR = 1e-2
-
 
 @dataclass(frozen=True)
 class JointPoints:
@@ -158,8 +155,7 @@ class Mortar:
         vanished = np.flatnonzero(same & ~kept)
         if not len(vanished):
             return place
-        length = self.model.length
-        row, successor = successors(before, vanished, contacts, 1e-6 * length, NEAR * length)
+        row, successor = successors(before, vanished, contacts, self.model.length)
         # Equally near ones share it, and several that pass to one add up.
         part, old = 1.0 / np.bincount(row)[row], number[vanished[row]]
         stays = np.setdiff1d(np.arange(len(bonds)), old)

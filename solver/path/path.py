@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import replace
-from enum import Enum
 
 import numpy as np
 
@@ -62,15 +61,6 @@ FALLEN = 0.1
 
 #: Part of the first multiplier under which one may vanish within a bracket.
 VANISHING = 0.05
-
-
-class Outcome(Enum):
-    """How an advance towards a parameter ended."""
-
-    REACHED = "reached"
-    NO_EQUILIBRIUM = "no equilibrium"
-    LOCKED = "locked"
-    FAILED = "failed"
 
 
 class Path:
@@ -220,13 +210,13 @@ class Path:
             # What blocks that drop come to may be at a stop that has not been reported.
             state, outcome = self.advance(self.state, self.driver.next_stop(self.reported))
             self.state = state
-            if outcome is Outcome.REACHED:
+            if outcome is Status.LIMIT_REACHED:
                 yield from self._report_reached(state)
                 continue
-            if outcome is Outcome.LOCKED:
+            if outcome is Status.LOCKED:
                 # Forces grew from the last report on, and friction bounds with them.
                 return Ending(Status.LOCKED, self.reports.locked(self.wedged))
-            if outcome is Outcome.FAILED:
+            if outcome is Status.SOLVER_FAILED:
                 yield from self._report_last(state)
                 return Ending(Status.SOLVER_FAILED, self.reports.no_step(self.failure))
             beyond = self._place_beyond(state)
@@ -326,7 +316,7 @@ class Path:
 
     # Advancing ---------------------------------------------------------------------------------------------------
 
-    def advance(self, state: PathState, target: float) -> tuple[PathState, Outcome]:
+    def advance(self, state: PathState, target: float) -> tuple[PathState, Status]:
         """Advance to a parameter in steps whose length follows from their error.
 
         Where a place has no equilibrium, shorter steps of reduced viscosity, from the last place that has one, enclose
@@ -334,19 +324,19 @@ class Path:
         """
         for _ in range(MOST_STEPS):
             if state.place.s >= target * (1.0 - 1e-12):
-                return state, Outcome.REACHED
+                return state, Status.LIMIT_REACHED
             width = state.upper_bound - state.place.s
             if state.refined and width <= self.driver.tolerance * (1.0 + 1e-9):
-                return state, Outcome.NO_EQUILIBRIUM
+                return state, Status.FALLING
             state, outcome = self._step(state, target)
             if self.on_step is not None:
                 self.on_step(state)
             if outcome is not None:
                 return state, outcome
         self.failure = f"at {state.place.s:.6g} {self.driver.unit}: {MOST_STEPS} were tried"
-        return state, Outcome.FAILED
+        return state, Status.SOLVER_FAILED
 
-    def _step(self, state: PathState, target: float) -> tuple[PathState, Outcome | None]:
+    def _step(self, state: PathState, target: float) -> tuple[PathState, Status | None]:
         """Try one step towards a parameter; with an outcome where it was the last one to try."""
         place, unit = state.place, self.stepper.unit
         enclosing = np.isfinite(state.upper_bound)
@@ -362,7 +352,7 @@ class Path:
             return replace(state, step=length / 3.0), None
         if self._may_be_wedged(new, error) and self._supports_locked(place):
             self.wedged = new
-            return state, Outcome.LOCKED
+            return state, Status.LOCKED
         works = self._works(place, new, motion)
         # Beside the work of the supports or the live load, unless that is next to nothing, or so beside the others.
         driven = max(abs(works[1] + works[2]), self.tolerance * sum(map(abs, works)), CARRIES * length / unit)
@@ -386,15 +376,15 @@ class Path:
             state = replace(state, upper_bound=np.inf, refined=False, refine_until=until)
         return state, None
 
-    def _shorten(self, state: PathState, length: float, failure: str) -> tuple[PathState, Outcome | None]:
+    def _shorten(self, state: PathState, length: float, failure: str) -> tuple[PathState, Status | None]:
         """Shorten a step that was not solved, or end where it is the shortest."""
         if length / 3.0 >= SHORTEST_STEP * self.stepper.unit:
             return replace(state, step=length / 3.0), None
         if self._supports_locked(state.place):
             self.wedged = state.place
-            return state, Outcome.LOCKED
+            return state, Status.LOCKED
         self.failure = f"at {state.place.s:.6g} {self.driver.unit}: {failure}"
-        return state, Outcome.FAILED
+        return state, Status.SOLVER_FAILED
 
     def _may_be_wedged(self, new: Place, error: StepError) -> bool:
         """Whether blocks may be wedged: they penetrate, or their forces exceed all loads."""

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.assembly import find_contacts, measure_contacts
+from solver.assembly import find_contacts
 from solver.contact_step.minimise import minimise
 from solver.contact_step.problem import ContactProblem, NotSolved
 from solver.contact_step.stiffness import ContactRows
@@ -201,8 +201,8 @@ class Stepper:
         """Return the same contact points at another pose, with ties of these lengths."""
         vertices, members = moved_vertices(self.model.assembly, pose), is_member(contacts)
         if not members.any():
-            return measure_contacts(self.model.assembly, vertices, contacts)
-        of_blocks = measure_contacts(self.model.assembly, vertices, contacts[~members])
+            return self.model.assembly.shapes.measure(vertices, contacts)
+        of_blocks = self.model.assembly.shapes.measure(vertices, contacts[~members])
         return joined_contacts([of_blocks, self.members.measured(contacts[members], pose, tie_lengths)])
 
     def contacts(self, pose: Pose) -> Contacts:
@@ -286,8 +286,7 @@ class Stepper:
         vanished = np.flatnonzero(~kept & carried)
         is_new = ~same
         if len(vanished):
-            length = self.model.length
-            row, successor = successors(before, vanished, contacts, 1e-6 * length, 1e-2 * length)
+            row, successor = successors(before, vanished, contacts, self.model.length)
             # Equally near ones share them, so that their order does not matter.
             part, vanished = 1.0 / np.bincount(row)[row], vanished[row]
             sense = np.where(before.block_a[vanished] == contacts.block_a[successor], 1.0, -1.0)
@@ -562,7 +561,7 @@ class Stepper:
         if self.model.interfaces.elastic:
             # In an elastic joint corners come closer as its force grows.
             deep &= self.mortar.points(before, end).give[:, 0] == 0.0
-        found = measure_contacts(self.model.assembly, moved_vertices(self.model.assembly, before.pose), end[deep])
+        found = self.model.assembly.shapes.measure(moved_vertices(self.model.assembly, before.pose), end[deep])
         if is_stepped[deep].any() or (found.gaps < deepest).any():
             raise Penetration(movement_size)
         if not len(found):

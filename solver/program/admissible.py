@@ -42,7 +42,6 @@ class EquilibriumBounds:
     low: float
     high: float
     gap: float
-    programs: int
     forces: np.ndarray
     other_forces: np.ndarray | None = None
 
@@ -161,7 +160,7 @@ class StaticProgram:
         balanced, unbalanced = self.most_balanced()
         if unbalanced > FALLING_FRACTION:
             value = self.value(balanced)
-            return EquilibriumBounds(unbalanced, value, value, balanced.gap, self.programs, self.forces(balanced))
+            return EquilibriumBounds(unbalanced, value, value, balanced.gap, self.forces(balanced))
         values, found = {}, []
         for sign in (1.0, -1.0) if self.live_size == 0.0 else (-1.0, 1.0):
             values[sign] = np.nan
@@ -177,7 +176,7 @@ class StaticProgram:
         # Where blocks are wedged neither bound is finite.
         forces = [self.forces(solution) for solution in found or [balanced]]
         gap = max(solution.gap for solution in (balanced, *found))
-        return EquilibriumBounds(unbalanced, values[1.0], values[-1.0], gap, self.programs, *forces)
+        return EquilibriumBounds(unbalanced, values[1.0], values[-1.0], gap, *forces)
 
     def bound(self, sign: float, balanced: Solution) -> Solution | None:
         """Least or, by sign, largest value in equilibrium; None without a bound.

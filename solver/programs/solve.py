@@ -59,23 +59,6 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, v
     return _first_accepted(runs, f"linear program with {rows} rows and {columns} columns")
 
 
-def solve_cones(program: ConicProgram, routes: Sequence[str] = CONIC_ROUTES) -> Solution:
-    """Solve a conic program by Clarabel, trying one route after another until a solution passes its check.
-
-    Parameters
-    ----------
-    routes : sequence of str
-        In the order in which they are tried.
-
-    Raises
-    ------
-    Unbounded, SolveError
-        As of :func:`solve_lp`.
-    """
-    what = f"conic program with {program.matrix.shape[0]} rows and {len(program.friction)} cones"
-    return _first_accepted({route: partial(run_clarabel, program, route) for route in routes}, what)
-
-
 def _first_accepted(runs: Mapping[str, Callable[[], tuple[Solution | None, str]]], what: str) -> Solution:
     outcomes, best = [], None
     for route, run in runs.items():
@@ -110,7 +93,7 @@ def solve_between(
     size : int
         As of :class:`ConicProgram`.
     routes : sequence of str
-        As of :func:`solve_cones`.
+        ``CONIC_ROUTES``, in the order in which they are tried.
 
     Returns
     -------
@@ -121,7 +104,7 @@ def solve_between(
     Raises
     ------
     Unbounded, SolveError
-        As of :func:`solve_lp` and :func:`solve_cones`.
+        As of :func:`solve_lp`.
     """
     if len(friction) == 0:
         # A vertex is one mechanism; an interior point, a mean of several, lets fixed-point iterations drift.
@@ -131,13 +114,12 @@ def solve_between(
     rows = sp.vstack([rows_of[equal], rows_of[below], rows_of[above]])
     slack = np.concatenate([np.full(len(below), -1.0), np.ones(len(above))])
     slack_columns = sp.vstack([sp.csr_array((int(equal.sum()), len(slack))), sp.diags_array(slack)])
-    return solve_cones(
-        ConicProgram(
-            cost=np.concatenate([cost, np.zeros(len(slack))]),
-            matrix=sp.csc_array(sp.hstack([rows, slack_columns], format="csc")),
-            right=np.concatenate([lower[equal], lower[below], upper[above]]),
-            friction=friction,
-            size=size,
-        ),
-        routes,
+    program = ConicProgram(
+        cost=np.concatenate([cost, np.zeros(len(slack))]),
+        matrix=sp.csc_array(sp.hstack([rows, slack_columns], format="csc")),
+        right=np.concatenate([lower[equal], lower[below], upper[above]]),
+        friction=friction,
+        size=size,
     )
+    what = f"conic program with {len(program.right)} rows and {len(friction)} cones"
+    return _first_accepted({route: partial(run_clarabel, program, route) for route in routes}, what)

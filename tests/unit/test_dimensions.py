@@ -226,7 +226,7 @@ def test_gaps_and_slips_follow_the_motion_of_the_blocks(scene):
     pose = solver.Pose.initial(assembly)
     for size in (1e-4, 1e-5):
         motion = RANDOM.normal(size=(2, 6)) * size
-        there = mechanics.measure_contacts(assembly, mechanics.moved_vertices(assembly, moved(pose, motion)), contacts)
+        there = assembly.shapes.measure(mechanics.moved_vertices(assembly, moved(pose, motion)), contacts)
         expected = relative_velocities(contacts, pose, motion)
         np.testing.assert_allclose(there.gaps - contacts.gaps, expected[:, 0], atol=60 * size**2)
         np.testing.assert_allclose(there.slip - contacts.slip, expected[:, 1:], atol=60 * size**2)

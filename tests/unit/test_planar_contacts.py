@@ -224,7 +224,7 @@ def test_gaps_follow_the_moved_block():
     random = np.random.default_rng(3)
     q = 1e-6 * random.normal(size=(assembly.n_blocks, 3))
     pose = solver.Pose(assembly.centroids + q[:, :2], q[:, 2:])
-    after = mechanics.measure_contacts(assembly, mechanics.moved_vertices(assembly, pose), before)
+    after = assembly.shapes.measure(mechanics.moved_vertices(assembly, pose), before)
     # Work of a unit force at each contact point.
     units = np.eye(2 * len(before)).reshape(-1, len(before), 2)
     start = solver.Pose.initial(assembly)

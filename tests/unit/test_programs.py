@@ -23,7 +23,7 @@ from solver.programs import band, problem, solve
 from solver.programs.band import run_band
 from solver.programs.highs import ROUTES, run_highs
 from solver.programs.problem import ConicProgram, LinearProgram, Unbounded
-from solver.programs.solve import BAND, LADDER, SIMPLEX_ROWS, solve_between, solve_cones, solve_lp
+from solver.programs.solve import BAND, LADDER, SIMPLEX_ROWS, solve_between, solve_lp
 from solver.programs.threads import one_thread
 
 
@@ -240,11 +240,16 @@ def pyramids(given, rays):
     return LinearProgram(columns.T @ given.cost, sp.csc_array(given.matrix @ columns), given.right, given.right)
 
 
+def solved_by_cones(given):
+    """Its solution by the route of programs whose rows are equations."""
+    return solve_between(given.cost, given.matrix, given.right, given.right, given.friction, given.size)
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6))
 def test_pyramids_come_down_to_the_round_cones(seed, cones):
     given = program(seed, cones)
-    found = solve_cones(given).objective
+    found = solved_by_cones(given).objective
     few, many = (solve_lp(pyramids(given, rays)).objective for rays in (8, 512))
     assert found - 1e-6 * (1 + abs(found)) <= many <= few + 1e-6 * (1 + abs(few))
     # What they leave falls with the square of their rays, for a program that is not steep.
@@ -254,14 +259,14 @@ def test_pyramids_come_down_to_the_round_cones(seed, cones):
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6), st.sampled_from([2, 3, 4]))
 def test_programs_with_a_solution_pass_the_check(seed, cones, size):
-    assert solve_cones(program(seed, cones, size)).accepted
+    assert solved_by_cones(program(seed, cones, size)).accepted
 
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6), st.floats(1e-4, 1.0), st.sampled_from(["forces", "motion", "both"]))
 def test_the_check_refuses_what_is_off(seed, size, which):
     given = program(seed)
-    right = solve_cones(given)
+    right = solved_by_cones(given)
     random = np.random.default_rng(seed)
     x, y = right.x, right.row_dual
     if which != "motion":
@@ -276,7 +281,7 @@ def test_the_check_refuses_what_is_off(seed, size, which):
 def test_the_check_does_not_know_units_of_force(seed, unit):
     """Forces and loads in other units: violations and gap stay relative."""
     given = program(seed)
-    right = solve_cones(given)
+    right = solved_by_cones(given)
     other = replace(given, right=unit * given.right).checked(unit * right.x, right.row_dual, "scaled", 0)
     assert other.objective == pytest.approx(unit * right.objective)
     assert other.accepted
@@ -288,13 +293,13 @@ def test_a_cone_is_round():
     for t in np.stack([np.cos(angle), np.sin(angle)], axis=1):
         matrix = sp.csc_array(np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))
         given = ConicProgram(np.array([1.0, 0.0, 0.0]), matrix, t, np.array([0.5]))
-        np.testing.assert_allclose(solve_cones(given).x, [2.0, *t], atol=2e-6)
+        np.testing.assert_allclose(solved_by_cones(given).x, [2.0, *t], atol=2e-6)
 
 
 def test_no_friction_no_shear_force():
     matrix = sp.csc_array(np.hstack([np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.eye(2), -np.eye(2)]))
     given = ConicProgram(np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]), matrix, np.array([1.0, 0.3]), np.zeros(1))
-    found = solve_cones(given)
+    found = solved_by_cones(given)
     assert found.objective == pytest.approx(0.3, abs=1e-7)
     np.testing.assert_allclose(found.x[:3], [1.0, 0.0, 0.0], atol=1e-6)
 
@@ -305,7 +310,7 @@ def test_an_unlimited_objective_is_proved_by_a_ray():
     cost = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     given = ConicProgram(cost, matrix, np.zeros(1), np.array([0.5, 0.5]))
     with pytest.raises(Unbounded) as found:
-        solve_cones(given)
+        solved_by_cones(given)
     assert np.abs(matrix @ found.value.x).max() < 1e-8
     assert cost @ found.value.x < 0.0
     # Neither a ray that does not balance, nor one outside of the cones, nor one that costs.
@@ -319,7 +324,7 @@ def test_a_failure_says_what_it_ended_with():
     with pytest.raises(
         solver.SolveError, match=re.escape("no solution of the conic program with 1 rows and 1 cones")
     ) as error:
-        solve_cones(given)
+        solved_by_cones(given)
     assert "clarabel: no x balances the rows" in str(error.value)
 
 

@@ -39,7 +39,7 @@ WHITE_BOX = {
     "unit/test_labels.py": 12,
     "unit/test_marks.py": 12,
     "unit/test_observations.py": 1,
-    "unit/test_programs.py": 17,
+    "unit/test_programs.py": 16,
     "unit/test_refusal_pictures.py": 8,
     "unit/test_render.py": 12,
     "unit/test_studies.py": 18,
