@@ -526,4 +526,5 @@ def checked_live(assembly: Assembly, loads: Loads) -> Loads:
     live = np.where(assembly.free[:, None], loads.live, 0.0)
     if not live.any():
         raise ValueError("no live load acts on any free block; give an acceleration, or Loads whose 'live' is not zero")
-    return replace(loads, live=live)
+    arms = None if loads.live_arms is None else np.where(assembly.free[:, None, None], loads.live_arms, 0.0)
+    return replace(loads, live=live, live_arms=arms)

@@ -130,7 +130,7 @@ class EquilibriumChecks:
             else:
                 measured = float(np.clip(self.reaction(place, contacts, forces), low, max(low, high)))
                 return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
-        determined = high - low <= 1e-6 * max(abs(low), abs(high))
+        determined = bounds.high - bounds.low <= 1e-6 * max(abs(low), abs(high))
         try:
             if self.model.live is None:
                 forces = self.nearest(place, gap, None if determined else measured)

@@ -82,13 +82,17 @@ def test_the_capacity_of_a_pose_is_that_of_the_blocks_that_are_left() -> None:
     structure = solver.Structure(assembly, friction_coefficient=0.6, ties=[prop])
     last = structure.settle(DOWN, changes=[taken_away(structure, 0, "buttress")]).path[-1]
     assert last.fallen.tolist() == [False, False, True, False, False]
-    pushed = structure.with_live(solver.point_load(assembly, 1, (1e4, 0.0)))
+    # What acts at a point of a block that is gone acts no more, however it has turned.
+    ends = solver.PointForces([1, 2], [[1e4, 0.0], [1e4, 0.0]], [[2.5, 1.5], [5.0, 3.0]])
+    pushed = structure.with_live(ends)
     left, alone = {"pose": last.pose, "fallen": last.fallen}, assembly.masses[1] * solver.GRAVITY * 0.5 / (1e4 * 1.5)
     limit = pushed.limit_load(**left)
     assert limit.multiplier == pytest.approx(alone, rel=1e-9)
     assert limit.increment.fallen.tolist() == last.fallen.tolist()
     assert pushed.limit_load(pose=last.pose).multiplier > 2.0 * alone
     control = solver.ControlDisplacement("tower", increment=0.01, limit=0.01)
+    turned = last.pose.rotations + np.array([[0.0], [0.0], [1.0], [0.0], [0.0]])
+    left["pose"] = solver.Pose(last.pose.positions, turned)
     response = pushed.pushover(control, **left, ties_at=last.ties)
     assert response.path[0].load_multiplier == pytest.approx(alone, rel=1e-6)
     assert all(increment.fallen[2] for increment in response.path)

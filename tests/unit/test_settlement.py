@@ -530,3 +530,14 @@ def test_blocks_that_do_not_stand_as_drawn_are_told(gap, told):
     response = solver.settle(assembly, solver.Settlement(direction=(0, -1), increment=0.01, limit=0.01))
     assert len(response.notes) == told
     assert all("'block' moved by up to 0.005 m at once" in note and "as drawn" in note for note in response.notes)
+
+
+def test_forces_have_the_reaction_they_are_told_with_where_friction_bounds_it_to_neither_side():
+    """Three blocks that two walls hold between them, one of which sinks."""
+    outlines = [rectangle(k, 0.0, k + 1.0, 1.0) for k in range(5)]
+    roles = ["fixed", "free", "free", "free", "moving"]
+    structure = solver.Structure(solver.Assembly.from_outlines(outlines, roles=roles), friction_coefficient=0.8)
+    response = structure.settle(solver.Settlement((0.0, -1.0), increment=0.002, limit=0.004))
+    for increment in response.path:
+        assert (increment.least, increment.largest) == (-np.inf, np.inf)
+        assert -increment.support_forces[4, 1] == pytest.approx(increment.reaction, rel=1e-9)
