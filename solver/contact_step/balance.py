@@ -22,8 +22,9 @@ from .stiffness import ContactRows
 #: Force out of balance, and mean product of forces and multipliers, in block weights, at which it has converged.
 BALANCED, CONVERGED = 1e-11, 1e-12
 
-#: Force out of balance, in block weights, that is accepted of an iterate that no further one improves.
-ACCEPTED = 1e-9
+#: Force out of balance, in block weights, that is accepted of an iterate that no further one improves: the programs of
+#: bounds leave as much, and where one multiplier is in equilibrium the force that makes it the largest.
+ACCEPTED = 5e-7
 
 #: Sum of forces, as a multiple of the load, that no equilibrium of masonry needs.
 LARGEST_FORCES = 1e6

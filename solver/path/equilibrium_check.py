@@ -114,7 +114,9 @@ class EquilibriumChecks:
         """
         contacts, friction = self._contacts_at(place)
         bounds = self.bounds(place, gap)
-        target = place.multiplier if self.model.live is not None else reaction
+        # A pushover starts from its limit load.
+        is_limit = place.s == 0.0 and np.isfinite(bounds.high)
+        target = reaction if self.model.live is None else bounds.high if is_limit else place.multiplier
         if not bounds.in_equilibrium:
             # The forces of the program that comes nearest to equilibrium.
             nearest = bounds.high if self.model.live is not None else self.reaction(place, contacts, bounds.forces)

@@ -524,12 +524,10 @@ class Path:
         return self.checks.reaction(place, place.contacts, place.forces)
 
     def _check(self, place: Place, reaction: float | None = None) -> EquilibriumCheck:
-        """Equilibrium and bounds at a place; at the start of a pushover those of the limit load."""
+        """Equilibrium and bounds at a place."""
         check = self.checks.check(place, self._reaction(place) if reaction is None else reaction)
         if not check.bounds.in_equilibrium:
             check = self.checks.check(place, check.measured, CLOSING_GAP)
-        if self.model.live is not None and place.s == 0.0 and np.isfinite(check.bounds.high):
-            check = replace(check, forces=check.bounds.forces, measured=check.bounds.high)
         return check
 
     def _next_motion(self, place: Place) -> np.ndarray:

@@ -16,6 +16,7 @@ import solver
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cli import main
+from blockvis.generators import arch
 from blockvis.pictures import palette
 from blockvis.runs.plan import planned
 
@@ -383,3 +384,15 @@ def test_what_a_prop_presses_from_the_ground_alone_is_wedged():
     response = solver.Structure(assembly, friction_coefficient=0.6, ties=[prop]).settle(rising)
     assert response.stop is solver.Status.LOCKED
     assert response.message.endswith("1 block is wedged (block 'propped')")
+
+
+def test_forces_within_joints_are_shared_alike_beside_a_tie_that_yields():
+    """An arch whose springer moves out: both points of a joint that does not slide have about the same shear."""
+    tie = solver.Tie("tie", (0, 11), ((-0.6, 0.2), (0.6, 0.2)), stiffness=1e6, strength=2e3)
+    structure = solver.Structure(arch(), friction_coefficient=0.7, ties=[tie])
+    last = structure.settle(solver.Settlement((1.0, 0.0), increment=0.02, limit=0.06)).path[-1]
+    assert last.ties.forces == pytest.approx([2e3])
+    pairs, joint = last.contacts.joints()
+    of_springer = last.forces[joint == np.flatnonzero((pairs == [0, 12]).all(axis=1))[0]]
+    assert len(of_springer) == 2
+    assert np.ptp(of_springer[:, 1]) < 1e-3 * of_springer[:, 0].sum()
