@@ -216,11 +216,12 @@ def supports_of(supports: Sequence[Mapping[str, Any]], dimension: int) -> Layout
         strange = sorted(set(support) - known)
         if strange:
             where, hint = "in space" if in_space else "in the plane", nearest(strange[0], sorted(known))
-            other = "the plane" if in_space else "space"
-            drawn = f", or give [geometry] dimension = {5 - dimension} if the blocks are in {other}"
+            other = ", or give [geometry] dimension = " + (
+                "2 if the blocks are in the plane" if in_space else "3 if the blocks are in space"
+            )
             raise ValueError(
                 f"support '{name}' has the key '{strange[0]}', which no support {where} has{hint}; leave it out"
-                f"{drawn * (strange[0] in ('levels', 'thickness'))}"
+                f"{other if strange[0] in ('levels', 'thickness') else ''}"
             )
         outline = _outline_of(support, name)
         blocks.append(prism(outline, *_levels_of(support, name)) if in_space else outline)

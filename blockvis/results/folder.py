@@ -81,13 +81,7 @@ def refuse_results(path: str | Path, overwrite: bool = False) -> None:
     refuse_files(path, RUN_FILES, "results", overwrite, go_on + CHOOSE)
 
 
-def refuse_files(
-    folder: Path,
-    names: Iterable[str],
-    what: str,
-    overwrite: bool,
-    remedy: str = CHOOSE,
-) -> None:
+def refuse_files(folder: Path, names: Iterable[str], what: str, overwrite: bool, remedy: str = CHOOSE) -> None:
     """Raise :class:`ResultsExist` if a folder holds one of these files, which may not be replaced."""
     if folder.exists() and not folder.is_dir():
         raise ResultsExist(f"'{folder}' is a file; choose a folder with -o")
