@@ -241,7 +241,9 @@ class Stepper:
         gaps, limits = self.joint_limits(place, contacts)
         of_members = self.members.force_limits(contacts, gap)
         least = np.where(is_member(contacts), of_members.least, limits.least)
-        return replace(contacts, gaps=gaps), replace(limits, least=least, most=of_members.most)
+        # An open joint with a rest of its strength holds, and does not push.
+        pulls = (limits.least < 0.0) & (gaps > gap * self.model.length)
+        return replace(contacts, gaps=gaps), replace(limits, least=least, most=np.where(pulls, 0.0, of_members.most))
 
     def joint_limits(
         self, place: Place, contacts: Contacts, forces: np.ndarray | None = None
