@@ -30,10 +30,15 @@ NOTABLE = 0.05
 
 
 def drops_at_start(response: solver.Response) -> bool:
-    """Whether the reaction has left that at rest by the first increment: it does so at once, not along a line."""
+    """Whether the reaction has left that at rest by the first increment: it does so at once, not along a line.
+
+    So does the multiplier, whose first one is that of rigid joints, where these or the ground give.
+    """
     path = response.path
-    if len(path) < 2 or not response.measured.is_force or not response.parameter.is_path:
+    if len(path) < 2 or not response.parameter.is_path:
         return False
+    if not response.measured.is_force:
+        return response.interfaces.elastic and path[0].parameter == 0.0
     # Increments by linear program have no reaction at rest, and no upper bound.
     if path[0].parameter != 0.0 or np.isnan(path[0].largest):
         return False

@@ -301,7 +301,8 @@ def _draw_line(
         # On the side that the curve leaves free.
         above = values[0] > values[1]
         axes.annotate(
-            "at rest", (total[0], values[0]), xytext=(-4, 6 if above else -6), textcoords="offset points",
+            "at rest" if response.measured.is_force else "rigid",
+            (total[0], values[0]), xytext=(-4, 6 if above else -6), textcoords="offset points",
             va="bottom" if above else "top", fontsize=0.9 * text, zorder=4,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )  # fmt: skip

@@ -316,6 +316,18 @@ def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     assert "control displacement [m]" in page
 
 
+def test_the_largest_multiplier_where_joints_give_is_one_that_is_carried(tmp_path, capsys):
+    """Springs k A / 2 at the ends of the base: α W h / 2 = (k A b² / 4 - W h / 2) θ until an end lifts at 0.098."""
+    text = PUSHED.replace("friction_coefficient = 0.7", "friction_coefficient = 0.7\nnormal_stiffness = 2e6")
+    _, summary = ran(text.replace("increment = 0.03", "increment = 0.03\nlimit = 0.15"), tmp_path)
+    weight = 0.2 * 2000.0 * 9.81
+    by_hand = (2e6 * 0.2 * 0.2**2 / 4.0 / (weight * 0.5) - 1.0) * 0.09
+    assert summary["limit_load_multiplier"] == pytest.approx(0.2, abs=1e-6)
+    assert summary["largest_load_multiplier"] == pytest.approx(by_hand, rel=0.01)
+    assert summary["largest_load_multiplier_at"] == pytest.approx(0.09)
+    assert re.search(r"first multiplier .* at 0 m, .*, were joints and ground rigid\n", capsys.readouterr().out)
+
+
 @pytest.mark.thorough
 @pytest.mark.path
 def test_pushover_that_snaps_says_at_which_multiplier(tmp_path, capsys):
