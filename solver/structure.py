@@ -75,7 +75,7 @@ class Structure(Shown):
             raise TypeError(
                 f"interfaces are {interfaces!r}; give solver.Interfaces, or friction_coefficient by its name"
             )
-        interfaces.check(assembly)
+        interfaces.check(checked(assembly, Assembly, "assembly"))
         object.__setattr__(self, "assembly", assembly)
         object.__setattr__(self, "interfaces", interfaces)
         object.__setattr__(self, "loads", checked_loads(assembly, loads))

@@ -184,6 +184,7 @@ def test_friction_given_in_degrees_warns():
         (lambda: solver.settle(ASSEMBLY, (1, 0), friction_coefficient=None), "friction_coefficient is None"),
         (lambda: solver.Settlement((1, 0), blocks="pier"), "blocks is the text 'pier'; give a sequence of names"),
         (lambda: solver.Structure(ASSEMBLY, 0.5), r"interfaces are 0\.5; .* or friction_coefficient by its name"),
+        (lambda: solver.Structure("a.json", friction_coefficient=1), r"assembly is 'a\.json'; give solver\.Assembly"),
         (lambda: solver.Structure(ASSEMBLY, friction_coefficient=""), "friction_coefficient is the text ''"),
         (lambda: solver.Structure(ASSEMBLY, friction_coefficient=[]), r"friction_coefficient is \[\]; give a number"),
         (lambda: solver.Interfaces(0.5), r"default law of interfaces is 0\.5; give solver\.InterfaceLaw"),
