@@ -8,6 +8,7 @@ import numpy as np
 
 from .assembly import Assembly
 from .loads import PointForces, chosen_blocks
+from .words import numbers_of
 
 
 def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) -> np.ndarray:
@@ -39,7 +40,7 @@ def edge_force(assembly: Assembly, block: int, edge: int, pressure: float) -> Po
     start, stop = ring[edge], ring[(edge + 1) % len(ring)]
     along = stop - start
     inward = np.array([-along[1], along[0]])
-    force = pressure * float(assembly.thickness[block]) * inward
+    force = numbers_of(pressure, "pressure") * float(assembly.thickness[block]) * inward
     return PointForces.at(block, force, (start + stop) / 2.0)
 
 
@@ -80,7 +81,7 @@ def surface_forces(
 
     As :func:`surface_pressure`; each acts where it meets its block, and goes with it.
     """
-    push = np.asarray(direction, dtype=float)
+    push = numbers_of(direction, "pressure direction")
     if push.shape != (2,) or not 0.0 < (size := float(np.hypot(*push))) < np.inf:
         raise ValueError(f"pressure direction is {push.tolist()}; give the direction in which it pushes, two numbers")
     push = push / size

@@ -123,6 +123,8 @@ def _reading(
 ) -> Reading:
     if unit is not None:
         metres_per(unit)
+    if chord_tolerance is not None and not 0.0 < chord_tolerance < np.inf:
+        raise ValueError(f"chord_tolerance is {chord_tolerance:g} m; it must be a length above 0")
     ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
     return Reading(unit, chord_tolerance, checked_view(view), ignore, only, checked_dimension(dimension), {**image})
 

@@ -255,6 +255,9 @@ def _check_response(response: solver.Response) -> None:
 
 
 def _save(picture: Image.Image, path: str | os.PathLike[str]) -> Path:
+    path = Path(path)
+    if Image.registered_extensions().get(path.suffix.lower()) not in Image.SAVE:
+        raise ValueError(f"'{path}' is no picture that blockvis draws; end its name in .png, or as Pillow writes")
     with atomic_file(path) as partial:
         picture.save(partial)
-    return Path(path)
+    return path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import importlib
 import io
 import json
@@ -22,6 +23,7 @@ from solver import mechanics
 
 from .cracks import MOST_LISTED, cracks_of
 from .fall_files import remove_fall
+from .given import GIVEN, write_given
 from .increments import StoredIncrements, packed_increment
 from .joints import LargestMovements
 from .mechanism_arrays import at_last_equilibrium
@@ -54,7 +56,7 @@ _LISTS = (
     *("ties.csv", "ties.pvd"),
     *LIMIT_TABLES,
 )
-_STARTED = (RECORD, CHECKPOINT, "assembly.npz", TIES)
+_STARTED = (RECORD, CHECKPOINT, "assembly.npz", TIES, GIVEN)
 _PICTURES = (
     *("report.html", "report.pdf", "curve.png", "curve.svg", "mechanism.png", "cracks.png", "last.png", "poster.png"),
     "paraview_colours.py",
@@ -75,6 +77,8 @@ class ResultsExist(ValueError):
 
 def refuse_results(path: str | Path, overwrite: bool = False) -> None:
     """Raise :class:`ResultsExist` if a folder holds results that may not be replaced."""
+    if path == "":
+        raise ValueError("the folder is '': -o is empty; name the folder of the results")
     path = Path(path)
     unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
     go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
@@ -141,7 +145,7 @@ class ResultsFolder:
         self.path, self.assembly, self.record = Path(path), assembly, record or Record(versions=versions())
         self.increments: list[solver.Increment] = []
         self._files = StoredIncrements(self.path)
-        refuse_results(self.path, overwrite)
+        refuse_results(path, overwrite)
         make_folder(self.path / "increments")
         self._release = _locked(self, self.path)
         # Lists of files go first, so that none ever names a file that is gone.
@@ -216,6 +220,7 @@ class ResultsFolder:
         Afterwards the folder keeps the numbers of the increment, not its arrays; see
         :mod:`blockvis.results.increments`.
         """
+        self._refuse_gone()
         number = len(self.increments)
         write_atomic(self._files.file(number), packed_increment(increment))
         self.increments.append(self._files.without_arrays(number, increment))
@@ -245,6 +250,8 @@ class ResultsFolder:
         tables : mapping from file name to text, optional
             Tables of the kind of analysis.
         """
+        self._refuse_gone()
+        self.tell(response)
         if not self.viewer.finish():
             restore_grids(self.path, self.assembly, self.increments, self.vtu)
         if response.path and response.collapse is not None:
@@ -269,6 +276,11 @@ class ResultsFolder:
         write_atomic(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
         return summary
+
+    def tell(self, response: solver.Response) -> None:
+        """Write the laws and loads of a response where no case file tells them."""
+        if not self.record.case:
+            write_given(self.path, response)
 
     def own_viewer(self) -> ViewerWriter:
         """Make what writes the files for viewers in this process."""
@@ -300,6 +312,11 @@ class ResultsFolder:
         write_atomic(self.path / "response.csv", self._rows.getvalue(), last=False, durable=durable)
         if self.ties:
             write_atomic(self.path / "ties.csv", self._tie_rows.getvalue(), last=False, durable=durable)
+
+    def _refuse_gone(self) -> None:
+        """Raise ``OSError`` where the folder was moved during the run: made again, it would hold half of the run."""
+        if not self.path.is_dir():
+            raise FileNotFoundError(errno.ENOENT, "it was moved or removed during the run", str(self.path))
 
     def flush(self) -> None:
         """Flush the VTU files to the disk: each increment waits for its state only, of which they are made."""

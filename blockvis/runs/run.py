@@ -120,7 +120,7 @@ def run_case(
     if not isinstance(case, Case):
         case = read_case(case)
     refuse_increment_seconds(case, increment_seconds)
-    folder = Path(f"{case.source.stem}{RESULTS}") if folder is None else Path(folder)
+    folder = f"{case.source.stem}{RESULTS}" if folder is None else folder
     refuse_results(folder, overwrite)
     outputs = (Drawing(film=film, pictures=pictures),) if outputs is None else outputs
     with _begun(case, outputs):
@@ -138,6 +138,7 @@ def run_case(
                 vtu=viewer_format(case),
                 ties=run.given.ties,
             )
+            results.tell(run.response((), mechanics.Ending(solver.Status.INTERRUPTED)))
         except OSError as error:
             raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
         limit = case.increment_seconds if increment_seconds is None else increment_seconds
@@ -305,6 +306,11 @@ def _follow(
 
 def _write_error(folder: Path, error: OSError) -> OSError:
     """Remove half-written files when the disk is full or gone in the middle of a run; returns the error to raise."""
+    if not folder.is_dir():
+        return OSError(
+            f"'{folder}' was moved or removed during the run; go on with it where it is now by blockvis run --resume "
+            "FOLDER, or run the case again"
+        )
     for half in folder.rglob(PARTIAL):
         half.unlink(missing_ok=True)
     return OSError(

@@ -41,7 +41,7 @@ from solver.ties import (
     tie_lengths,
 )
 from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
-from solver.words import counted
+from solver.words import checked, counted, plain
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25
@@ -140,10 +140,10 @@ def find_limit_load(
     loads = checked_live(left, loads)
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
-    pose = Pose.initial(assembly) if pose is None else pose
+    pose = Pose.initial(assembly) if pose is None else checked(pose, Pose, "pose")
     loads = replace(loads, dead=loads.dead_at(assembly, pose), live=loads.live_at(pose))
     for name, value in (("displacement", displacement), ("closed_gap", closed_gap)):
-        if not (np.isfinite(value) and value >= 0.0):
+        if not 0.0 <= plain(value, "float", name) < np.inf:
             raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
     gone = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else np.asarray(fallen)
     states = np.full(len(ties), ELASTIC) if ties_at is None else ties_at.states

@@ -209,7 +209,9 @@ class Stepper:
         """Return the contact points of blocks at a pose; those of the last pose are kept."""
         if self._last is None or self._last[0] is not pose:
             model = self.model
-            found = find_contacts(model.assembly, moved_vertices(model.assembly, pose), model.reach)
+            # Contact points with a larger gap are not looked at.
+            reach = model.length / 4.0
+            found = find_contacts(model.assembly, moved_vertices(model.assembly, pose), reach)
             if model.fallen is not None:
                 found = found[~(model.fallen[found.block_a] | model.fallen[found.block_b])]
             self._last = pose, found

@@ -104,6 +104,7 @@ FILL = {"over": '"voussoir *"', "surface": "2.0", "unit_weight": "18000.0"}
         ({"over": "[]"}, r"\[backfill\] over is empty"),
         ({"over": '"left springer"'}, "'left springer' are supports only; fill loads free blocks"),
         ({"surface": "1.0"}, r"surface is 1 m, below the extrados of block 'voussoir 2', which reaches 1.20"),
+        ({"surface": "inf"}, r"surface is inf.*a finite number"),
         ({"unit_weight": "-18000.0"}, r"\[backfill\] unit_weight is -18000"),
         ({"pressure_coefficient": "-0.1"}, r"\[backfill\] pressure_coefficient is -0.1"),
     ],

@@ -148,5 +148,7 @@ def test_the_fall_begins_at_the_last_equilibrium_and_is_found_by_its_seconds():
     assert later.field_data["time"][0] == 0.5
     assert later.points[:, 1].max() < start.points[:, 1].max() - 0.1
     assert response.fall(99.0).field_data["time"][0] < 99.0
+    with pytest.raises(ValueError, match="time is nan; give the seconds since the last equilibrium"):
+        response.fall(np.nan)
     with pytest.raises(ValueError, match="nothing falls"):
         replace(response, collapse=None).fall(0.5)

@@ -183,6 +183,8 @@ def test_films_that_cannot_be(tmp_path):
         animate(arch_response(), tmp_path / "odd.mp4", size=(641, 360))
     with pytest.raises(ValueError, match=r"film\.avi.*\.mp4, \.gif, \.webp"):
         animate(arch_response(), tmp_path / "film.avi", size=SMALL)
+    with pytest.raises(ValueError, match=r"pic' is no picture that blockvis draws; end its name in \.png"):
+        draw_still(arch_response(), 0, tmp_path / "pic", size=SMALL)
     assert not list(tmp_path.iterdir())
 
 
