@@ -194,7 +194,7 @@ def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.
         On ``blocks[:, 0]``.
     blocks : (n, 2) int array
     """
-    contacts, carrying = increment.contacts, increment.forces.any(axis=1)
+    contacts, carrying = increment.contacts, np.flatnonzero(increment.forces.any(axis=1))
     sense = np.where(contacts.block_a > contacts.block_b, -1.0, 1.0)
     force = np.einsum("ki,kij->kj", increment.forces, contacts.frames) * sense[:, None]
     pairs, which = contacts[carrying].joints()
@@ -214,7 +214,7 @@ def joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np
     """Find points (n, d) [m], forces (n, d) [N] and blocks (n, 2) of the resultants, or by "points" of all contacts."""
     if kind == "thrust":
         return resultants(increment)
-    contacts, carrying = increment.contacts, increment.forces.any(axis=1)
+    contacts, carrying = increment.contacts, np.flatnonzero(increment.forces.any(axis=1))
     force = np.einsum("ki,kij->kj", increment.forces, contacts.frames)
     blocks = np.stack([contacts.block_a, contacts.block_b], axis=1)
     return contacts.points[carrying], force[carrying], blocks[carrying]

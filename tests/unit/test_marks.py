@@ -195,7 +195,10 @@ def test_resultants_of_mortar_that_is_bent_and_pulled_balance_the_stones():
     increment, assembly = response.path[-1], response.assembly
     points, forces, blocks = marks.resultants(increment)
     weight = assembly.masses * solver.GRAVITY
-    told = {tuple(assembly.names[k] for k in pair): (point, force) for pair, point, force in zip(blocks, points, forces)}
+    told = {
+        tuple(assembly.names[k] for k in pair): (point, force)
+        for pair, point, force in zip(blocks, points, forces, strict=True)
+    }
     place, force = told["corbel", "hanger"]
     np.testing.assert_allclose(force, [0.0, -weight[3]], atol=1e-6 * weight[3])
     np.testing.assert_allclose(place, [0.25, 0.0], atol=1e-9)
