@@ -183,6 +183,15 @@ to = { block = "right pier 4", point = [1.4, 1.4] }
 stiffness = 2e6
 strength = 2500.0
 prestress = 500.0
+[[backfill]]
+over = "voussoir*"
+surface = 3.2
+unit_weight = 16000.0
+pressure_coefficient = 0.35
+[[loads]]
+blocks = "left pier 4"
+force = [0.0, -2000.0]
+point = [-1.6, 1.6]
 [[loads]]
 kind = "live"
 force = [500.0, -1000.0]
