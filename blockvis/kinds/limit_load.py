@@ -352,7 +352,7 @@ def _before(response: solver.Response) -> float | None:
 
 
 def _notes_on_places(response: solver.Response) -> list[str]:
-    """Say at which of several positions of a load no limit load is known, and where joints that stay open change it."""
+    """Say at which of several positions of a load no limit load is known, and where joints that stay open lower it."""
     states = response.limit_states
     if response.parameter.is_path or len(states) < 2:
         return []
@@ -364,7 +364,7 @@ def _notes_on_places(response: solver.Response) -> list[str]:
     )
     told = (f"{least:.6g} instead of {most:.6g} at x = {x:.6g} m" for least, most, x in other[:MOST_LISTED])
     listed = "; ".join(told) + "; ..." * (len(other) > MOST_LISTED)
-    note = f"where open joints stay open α is another at {len(other)} of {len(states)} positions: {listed}"
+    note = f"where open joints stay open α is less at {len(other)} of {len(states)} positions: {listed}"
     return [*filter(None, (_unconverged(places, len(states)), note if other else ""))]
 
 
@@ -557,16 +557,7 @@ def _staying_open(
 
 
 def _closing_note(run: AnalysisRun, at: solver.Increment, first: bool) -> list[str]:
-    """Say within which displacement open joints may close, at the first state, and what is carried where they do not.
-
-    Parameters
-    ----------
-    run : AnalysisRun
-    at : solver.Increment
-        Of the settlement.
-    first : bool
-        Whether it is the first state.
-    """
+    """Say within which displacement open joints may close, at the first state, and what is carried where they do not."""
     words, limit = _closing_words(run), run.limits[-1]
     least = _staying_open(run, run.given.loads, at.pose, at.ties, at.bonds)
     if least is not None and _differs(limit, least):

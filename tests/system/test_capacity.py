@@ -222,7 +222,7 @@ def test_a_load_that_moves_is_told_with_joints_that_stay_open(tied):
     (k,) = (k for k, row in enumerate(rows) if float(row["load_multiplier"]) > 1.01 * without[k])
     least, most, x = without[k], float(rows[k]["load_multiplier"]), float(rows[k]["position"])
     note = f"at 1 of 6 positions: {least:.6g} instead of {most:.6g} at x = {x:.6g} m"
-    assert f"note: where open joints stay open α is another {note}\n" in _in_words(tied.response, tied.folder)
+    assert f"note: where open joints stay open α is less {note}\n" in _in_words(tied.response, tied.folder)
     again = blockvis.open_results(tied.folder)
     assert [limit.staying_open for limit in again.limits] == [limit.staying_open for limit in tied.response.limits]
     assert "staying_open" not in table(apart.folder / "envelope.csv")[0]
