@@ -322,10 +322,7 @@ def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[solv
 
 def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> solver.Tie:
     where = f"{entry.where} '{entry.name}'"
-    points = tuple(
-        _place(end.point, assembly, f"{where} {key}", bool(entry.layer))
-        for key, end in zip(("from", "to"), entry.ends, strict=True)
-    )
+    points = tuple(_place(end.point, assembly) for end in entry.ends)
     length = float(np.linalg.norm(np.subtract(points[1], points[0])))
     if not length > 0.0:
         raise ValueError(
@@ -352,14 +349,9 @@ def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> solver.Tie:
     )
 
 
-def _place(point: tuple[float, ...], assembly: solver.Assembly, where: str, drawn: bool) -> tuple[float, ...]:
+def _place(point: tuple[float, ...], assembly: solver.Assembly) -> tuple[float, ...]:
     """Give a point as many coordinates as the blocks have: a drawing in the plane stands upright in space."""
-    if drawn and len(point) < assembly.dimension:
-        return (point[0], 0.0, point[1])
-    if len(point) != assembly.dimension:
-        wanted = "space; give three numbers [x, y, z]" if assembly.dimension == 3 else "the plane; give [x, y]"
-        raise ValueError(f"{where} has {len(point)} numbers, {_written(point)}, but the blocks are in {wanted}")
-    return point
+    return point if len(point) == assembly.dimension else (point[0], 0.0, point[1])
 
 
 def _holding(

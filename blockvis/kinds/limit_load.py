@@ -557,7 +557,7 @@ def _staying_open(
 
 
 def _closing_note(run: AnalysisRun, at: solver.Increment, first: bool) -> list[str]:
-    """Say within which displacement open joints may close, at the first state, and what is carried where they do not."""
+    """Say within which displacement open joints may close, at the first state, and α where they do not."""
     words, limit = _closing_words(run), run.limits[-1]
     least = _staying_open(run, run.given.loads, at.pose, at.ties, at.bonds)
     if least is not None and _differs(limit, least):

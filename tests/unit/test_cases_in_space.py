@@ -98,7 +98,7 @@ def test_what_does_not_fit_is_named(text, reason, tmp_path):
 def test_ends_of_ties_have_three_numbers(key, end, tmp_path):
     ends = {"from": "[0, 0, 5]", "to": "{ fixed = [2.0, 0.0, 0.3] }"} | {key: end}
     tie = '[[ties]]\nname = "iron"\nstiffness = 1e7\n' + "".join(f"{which} = {at}\n" for which, at in ends.items())
-    with pytest.raises(ValueError, match=rf"case\.toml: \[ties\] 'iron' {key} has 2 numbers, .* give three numbers"):
+    with pytest.raises(ValueError, match=rf"case\.toml: \[ties 'iron'\] {key} has 2 numbers, .* give three numbers"):
         blockvis.run_case(case(DOME + DOWN + tie, tmp_path), tmp_path / "out", outputs=())
 
 
