@@ -21,6 +21,8 @@ def check_coordinates(case: Case, assembly: solver.Assembly) -> None:
     d = assembly.dimension
     control = case.settings if isinstance(case.settings, solver.ControlDisplacement) else None
     given = [("control", key, getattr(control, key, None)) for key in ("direction", "point")]
+    for tie in case.ties:
+        given += [(f"ties '{tie.name}'", key, end.point) for key, end in zip(("from", "to"), tie.ends, strict=False)]
     for table, key, numbers in (*_of_settlements(case, d), *_of_loads(case, d), *given):
         if numbers is not None and len(numbers) != d:
             wanted = "three numbers [x, y, z]" if d == 3 else "two numbers [x, y]"

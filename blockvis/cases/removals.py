@@ -73,10 +73,16 @@ def removed_ties(removal: Removal, ties: Sequence[solver.Tie]) -> tuple[str, ...
     Raises
     ------
     ValueError
-        For a name that no tie has.
+        For a name that no tie has, and a tie that is installed later.
     """
-    names = [tie.name for tie in ties]
-    return tuple(_matching(removal.ties, names, f"{removal.where} ties", "tie"))
+    chosen = _matching(removal.ties, [tie.name for tie in ties], f"{removal.where} ties", "tie")
+    late = next((tie for tie in ties if tie.name in chosen and tie.phase >= removal.phase), None)
+    if late is not None:
+        raise ValueError(
+            f"{removal.where} ties: '{late.name}' is installed before settlement {late.phase}, and taken away before "
+            f"settlement {removal.phase}; give phase = {late.phase + 1} or later, or leave it out"
+        )
+    return tuple(chosen)
 
 
 def _matching(patterns: Sequence[str], names: Sequence[str], where: str, what: str) -> list[str]:

@@ -322,7 +322,7 @@ def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[solv
 
 def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> solver.Tie:
     where = f"{entry.where} '{entry.name}'"
-    points = tuple(_place(end.point, assembly, where) for end in entry.ends)
+    points = tuple(_place(end.point, assembly) for end in entry.ends)
     length = float(np.linalg.norm(np.subtract(points[1], points[0])))
     if not length > 0.0:
         raise ValueError(
@@ -349,13 +349,9 @@ def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> solver.Tie:
     )
 
 
-def _place(point: tuple[float, ...], assembly: solver.Assembly, where: str) -> tuple[float, ...]:
+def _place(point: tuple[float, ...], assembly: solver.Assembly) -> tuple[float, ...]:
     """Give a point as many coordinates as the blocks have: a drawing in the plane stands upright in space."""
-    if len(point) == assembly.dimension:
-        return point
-    if len(point) == 2:
-        return (point[0], 0.0, point[1])
-    raise ValueError(f"{where}: {_written(point)} has three coordinates, and the blocks lie in the plane; give [x, y]")
+    return point if len(point) == assembly.dimension else (point[0], 0.0, point[1])
 
 
 def _holding(

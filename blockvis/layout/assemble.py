@@ -258,6 +258,8 @@ def _levels_of(support: Mapping[str, Any], name: str) -> tuple[float, float]:
         bottom, top = map(float, support["levels"])
     except (KeyError, TypeError, ValueError):
         bottom = top = np.nan
+    if bottom >= top:
+        raise ValueError(f"support '{name}': levels is [{bottom:g}, {top:g}]; give the lower first, in m")
     if not bottom < top:
         raise ValueError(
             f"support '{name}' stands in space: give levels = [bottom, top] in m beside its outline in plan [x, y]"

@@ -132,8 +132,8 @@ class _Series:
         Displacement of any free block.
     widest : float [m]
         Opening of any crack in equilibrium.
-    cracks, sliding, hinges, lost : bool
-        Whether there are any anywhere; of blocks that are lost.
+    cracks, sliding, hinges, lost, pulls : bool
+        Whether there are any anywhere; of blocks that are lost, of joints that pull.
     largest_force : float [N]
     forces : list of arrays [N]
         Sizes, of the increments sampled.
@@ -146,6 +146,7 @@ class _Series:
     sliding: bool = False
     hinges: bool = False
     lost: bool = False
+    pulls: bool = False
     largest_force: float = 0.0
     forces: list[np.ndarray] = field(default_factory=list)
 
@@ -347,7 +348,9 @@ class Drawer:
                 seen.hinges |= len(found.hinges) > 0
             if look.forces != "none" and matters(increment, self.response):
                 sizes = np.linalg.norm(joint_forces(increment, look.forces)[1], axis=1)
-                seen.largest_force = max(seen.largest_force, float(sizes.max(initial=0.0)))
+                largest = float(sizes.max(initial=0.0))
+                seen.largest_force = max(seen.largest_force, largest)
+                seen.pulls |= bool((increment.forces[:, 0] < -SMALLEST_RESULTANT * largest).any())
                 if number in seen.sampled:
                     seen.forces.append(sizes)
             yield magnified(self.assembly, increment.pose, look.magnification)
@@ -537,7 +540,8 @@ class Drawer:
             return [Key("", "forces not shown", palette.FAINT)]
         if self.force_scale == 0.0:
             return []
-        text = "compression" if self.look.forces == "thrust" else "contact force"
+        joint = "force of a joint" if self._seen.pulls else "compression"
+        text = joint if self.look.forces == "thrust" else "contact force"
         if not self._flat:
             # Lengths in space are foreshortened: no bar is their scale.
             return [Key("line", f"{text} up to {force_text(self._seen.largest_force)}", palette.FORCE)]

@@ -27,6 +27,10 @@ SHORTEST = 0.3
 #: Resultants below this fraction of the largest are not drawn.
 SMALLEST_RESULTANT = 2e-3
 
+#: Where normal forces of a joint leave less than this part of what presses and pulls there, as of mortar that is bent
+#: or sheared, the resultant runs along the joint and crosses it far off: it is drawn at the middle.
+ALONG = 0.1
+
 #: Blocks of one part are grown by this fraction of the block size, merged and shrunk back: between faces that touch,
 #: the last digit leaves slivers otherwise.
 SLIVER = 1e-3
@@ -180,34 +184,37 @@ def cracks_between(
 
 
 def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Resultant of the contact forces of each pair of blocks.
+    """Resultant of the contact forces of each pair of blocks, pressed or pulled.
 
     Returns
     -------
     points : (n, d) array [m]
-        Where the resultant crosses the joint, at the increment's pose.
+        Where the resultant crosses the joint, at the increment's pose; by mortar it may be beside it.
     forces : (n, d) array [N]
         On ``blocks[:, 0]``.
     blocks : (n, 2) int array
     """
-    contacts, carrying = increment.contacts, increment.forces[:, 0] > 0.0
+    contacts, carrying = increment.contacts, np.flatnonzero(increment.forces.any(axis=1))
     sense = np.where(contacts.block_a > contacts.block_b, -1.0, 1.0)
     force = np.einsum("ki,kij->kj", increment.forces, contacts.frames) * sense[:, None]
     pairs, which = contacts[carrying].joints()
-    forces, points = np.zeros((2, len(pairs), contacts.points.shape[1]))
-    normal = increment.forces[carrying, 0]
+    forces, points, middles = np.zeros((3, len(pairs), contacts.points.shape[1]))
+    normal, places = increment.forces[carrying, 0], contacts.points[carrying]
     np.add.at(forces, which, force[carrying])
-    np.add.at(points, which, normal[:, None] * contacts.points[carrying])
-    weight = np.bincount(which, weights=normal, minlength=len(pairs))
-    return points / weight[:, None], forces, pairs
+    np.add.at(points, which, normal[:, None] * places)
+    np.add.at(middles, which, places)
+    middles /= np.bincount(which, minlength=len(pairs))[:, None]
+    weight, every = (np.bincount(which, weights=of, minlength=len(pairs)) for of in (normal, np.abs(normal)))
+    crosses = np.abs(weight) > ALONG * every
+    middles[crosses] = points[crosses] / weight[crosses, None]
+    return middles, forces, pairs
 
 
 def joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find points (n, d) [m], forces (n, d) [N] and blocks (n, 2) of the resultants, or by "points" of all contacts."""
     if kind == "thrust":
         return resultants(increment)
-    contacts = increment.contacts
-    carrying = increment.forces[:, 0] > 0.0
+    contacts, carrying = increment.contacts, np.flatnonzero(increment.forces.any(axis=1))
     force = np.einsum("ki,kij->kj", increment.forces, contacts.frames)
     blocks = np.stack([contacts.block_a, contacts.block_b], axis=1)
     return contacts.points[carrying], force[carrying], blocks[carrying]

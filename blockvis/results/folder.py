@@ -31,7 +31,7 @@ from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_json, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
 from .ties import COLUMNS as TIE_COLUMNS
-from .ties import TIES, TieCourses, stored_ties, tie_rows, write_ties
+from .ties import TIES, TieCourses, stored_ties, tie_courses, tie_rows, write_ties
 from .viewer_files import MOVED, ViewerFiles, ViewerFormat, ViewerWriter, restore_grids, write_end, write_lists
 
 #: Where a run can go on from, beside the increments it belongs to.
@@ -271,7 +271,8 @@ class ResultsFolder:
             cracks = cracks_of(self.assembly, last.pose, self._movements.joints, last.fallen)
         listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         if self.ties:
-            listed["ties"] = [asdict(course) for course in self._courses.courses]
+            courses = self._courses.courses if response.parameter.is_path else tie_courses(response)
+            listed["ties"] = [asdict(course) for course in courses]
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_atomic(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
@@ -292,7 +293,7 @@ class ResultsFolder:
         self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
         self._tie_rows = io.StringIO()
         self._tie_table = csv.writer(self._tie_rows, lineterminator="\n")
-        self._tie_table.writerow(TIE_COLUMNS)
+        self._tie_table.writerow((*TIE_COLUMNS, *own_columns(self.parameter)))
         self._courses = TieCourses(self.ties)
         self._movements = LargestMovements(self.assembly, self.parameter)
 
@@ -302,7 +303,7 @@ class ResultsFolder:
             self._write_row(number, increment)
             self._movements.add(increment)
             if self.ties:
-                self._tie_table.writerows(tie_rows(self.ties, number, increment))
+                self._tie_table.writerows(tie_rows(self.ties, number, increment, self.parameter))
                 self._courses.add(increment)
 
     def _write_row(self, number: int, increment: solver.Increment) -> None:

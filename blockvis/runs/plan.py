@@ -67,7 +67,10 @@ def planned(
         )
     given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly), changes, members)
     if case.settlements:
-        mechanics.check_settlement(assembly, case.settlements, case.controls, changes, members)
+        try:
+            mechanics.check_settlement(assembly, case.settlements, case.controls, changes, members)
+        except ValueError as error:
+            raise ValueError(f"{case.source}: {error}") from None
     return kind.start(given, resume, found)
 
 

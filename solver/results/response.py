@@ -363,6 +363,8 @@ class LimitLoad(HasState, Shown):
         memory, or in a file; None where it is kept with the increment that reports the limit load.
     analysed : (Assembly, Interfaces, Loads, ties), optional
         Whose limit load it is.
+    staying_open : float, optional
+        Multiplier where joints that are open may not close for the live load; None where it has not been asked for.
     """
 
     multiplier: float
@@ -375,6 +377,7 @@ class LimitLoad(HasState, Shown):
     held: State | StoredState | None = field(default=None, repr=False, compare=False)
     torsion: str = "points"
     analysed: Analysed | None = field(default=None, repr=False, compare=False)
+    staying_open: float | None = None
 
     @property
     def mechanism(self) -> np.ndarray:

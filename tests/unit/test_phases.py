@@ -221,7 +221,15 @@ def test_a_path_goes_on_across_a_removal_bit_for_bit() -> None:
         (REMOVED.replace("brick", "brik"), r"\[remove\] blocks: no block is named 'brik 3-3'"),
         ("[[remove]]\nphase = 2\n", r"\[remove\] blocks is missing"),
         ('[[remove]]\nphase = 2\nties = "tie"\n', r"\[remove\] ties: no tie is named 'tie'; the case has no ties"),
-        (REMOVED.replace("brick 3-3", "ground*"), "phase 2 moves only supports that have been taken away"),
+        (
+            REMOVED.replace("brick 3-3", "ground*"),
+            r"case\.toml: settlement phase 2 moves only supports that have been taken away",
+        ),
+        (
+            '[[ties]]\nname = "iron"\nfrom = [0.1, 0.1]\nto = [0.6, 0.2]\nstiffness = 1e5\nphase = 2\n'
+            '[[remove]]\nphase = 2\nties = "iron"\n',
+            r"case\.toml: \[remove\] ties: 'iron' is installed before settlement 2, .*; give phase = 3 or later",
+        ),
         ("[[loads]]\nforce = [0, -1]\nphase = 3\n", r"\[loads 1\] phase is 3; the case has 2 \[\[settlement\]\]"),
         ('[[loads]]\nkind = "live"\nforce = [0, -1]\nphase = 2\n', "a live load acts after all settlements"),
         (
@@ -310,6 +318,17 @@ def test_a_tie_that_is_taken_away_is_named_in_the_summary(tmp_path: Path, capsys
     steps = SPREADING.replace("increment = 0.05\nlimit = 0.1", "increment = 0.002\nlimit = 0.002")
     _, summary = run_told(tmp_path, ARCH + 2 * steps + iron + '[[remove]]\nphase = 2\nties = "iron"\n', capsys)
     assert summary["removed"] == [{"phase": 2, "blocks": [], "ties": ["iron"], "weight": 0.0}]
+
+
+def test_a_block_named_twice_is_taken_away_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    column = (
+        '[geometry]\nlayout = "column"\nparameters = { blocks = 4, width = 0.6, block_height = 0.5, depth = 0.5 }\n'
+    )
+    away = '[[remove]]\nphase = 3\nblocks = ["block 4", "block 3"]\n[[remove]]\nphase = 2\nblocks = "block 4"\n'
+    _, summary = run_told(tmp_path, column + 3 * SETTLEMENT + away, capsys)
+    told = [(entry["phase"], entry["blocks"], entry["weight"]) for entry in summary["removed"]]
+    assert told == [(2, ["block 4"], pytest.approx(2943.0)), (3, ["block 3"], pytest.approx(2943.0))]
+    assert "block 'block 3' taken away before settlement 3, 2943 N" in summary["notes"][-1]
 
 
 @pytest.mark.parametrize("ranged", ["", "[analysis]\nrange = true\n"])
