@@ -69,7 +69,12 @@ def note_outside(assembly: solver.Assembly, point: Sequence[float], block: int, 
 
 
 def block_at(
-    assembly: solver.Assembly, point: Sequence[float], chosen: np.ndarray, towards: Sequence[float], where: str
+    assembly: solver.Assembly,
+    point: Sequence[float],
+    chosen: np.ndarray,
+    towards: Sequence[float],
+    where: str,
+    gone: np.ndarray,
 ) -> int:
     """Find the block that holds a point.
 
@@ -85,11 +90,13 @@ def block_at(
         Of a force at the point.
     where : str
         File, table and key, for the message.
+    gone : (n_blocks,) bool array
+        Blocks that have been taken away before, which hold nothing.
 
     Raises
     ------
     ValueError
-        If none of them holds the point; names the nearest and how far it is.
+        If none of them that is left holds the point; names the nearest and how far it is.
     """
     apart = distances_to(assembly, point)
     holding = chosen[apart[chosen] <= ON_EDGE * assembly.block_size]
@@ -105,6 +112,12 @@ def block_at(
             f"{where} {place} m lies in none of the blocks meant; the nearest is '{assembly.names[nearest]}', "
             f"{apart[nearest]:.3g} m away{inside}"
         )
+    if gone[holding].all():
+        raise ValueError(
+            f"{where} {place} m lies in '{assembly.names[holding[0]]}', which [[remove]] has taken away by then; give "
+            "a point of a block that is left"
+        )
+    holding = holding[~gone[holding]]
     if len(holding) == 1:
         return int(holding[0])
     size = float(np.linalg.norm(towards))

@@ -30,7 +30,7 @@ from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
 from .profiles import cut_ground, pieces_named, with_profiles
-from .removals import removed_blocks, removed_ties
+from .removals import gone_in, removed_blocks, removed_ties
 from .role_places import with_roles_by_place
 from .ties import check_layers, drawn_ties, ties_of, without_tie_lines
 
@@ -307,7 +307,7 @@ def case_interfaces(case: Case) -> solver.Interfaces:
 
 def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
     """Sum self-weight and the loads of a case that do not move [N, N·m], and lay its fill over the blocks."""
-    loads = loads_of(case.loads, assembly, case.source)
+    loads = loads_of(case.loads, assembly, case.source, gone_in(case.removals, assembly, 1))
     return replace(loads, fills=backfills(case.backfills, assembly))
 
 
@@ -324,7 +324,7 @@ def case_changes(case: Case, assembly: solver.Assembly, ties: Sequence[solver.Ti
         for one in case.removals
     ]
     for phase in sorted({load.phase for load in case.loads} - {1}):
-        added = loads_of(case.loads, assembly, case.source, phase)
+        added = loads_of(case.loads, assembly, case.source, gone_in(case.removals, assembly, phase), phase)
         changes.append(solver.PhaseChange(phase - 1, dead=added.dead, dead_arms=added.dead_arms))
     return tuple(changes)
 
@@ -335,7 +335,9 @@ def case_ties(case: Case, assembly: solver.Assembly) -> tuple[solver.Tie, ...]:
     if case.tie_layers:
         check_layers(case.ties, case.tie_layers, case.source)
         lines = without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[1]
-    return ties_of(drawn_ties(case.ties, lines), assembly)
+    ties = drawn_ties(case.ties, lines)
+    gone = {phase: gone_in(case.removals, assembly, phase) for phase in {tie.phase for tie in ties}}
+    return ties_of(ties, assembly, gone)
 
 
 def case_settlements(case: Case, assembly: solver.Assembly) -> tuple[solver.Settlement, ...]:

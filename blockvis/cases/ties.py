@@ -303,7 +303,9 @@ def drawn_ties(entries: Sequence[TieCase], lines: Sequence[LeftOut]) -> list[Tie
     return found
 
 
-def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[solver.Tie, ...]:
+def ties_of(
+    entries: Sequence[TieCase], assembly: solver.Assembly, gone: Mapping[int, np.ndarray]
+) -> tuple[solver.Tie, ...]:
     """Find the blocks that hold the ends of ties.
 
     Parameters
@@ -311,26 +313,29 @@ def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[solv
     entries : sequence of TieCase
         As of :func:`drawn_ties`.
     assembly : solver.Assembly
+    gone : mapping of int to (n_blocks,) bool array
+        By phase: blocks that have been taken away before ties are installed.
 
     Raises
     ------
     ValueError
-        For an end in no block, both in one, a tie without length; names the tie and the remedy.
+        For an end in no block that is left, both in one, a tie without length; names the tie and the remedy.
     """
-    return tuple(_in_blocks(entry, assembly) for entry in entries)
+    return tuple(_in_blocks(entry, assembly, gone[entry.phase]) for entry in entries)
 
 
-def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> solver.Tie:
+def _in_blocks(entry: TieCase, assembly: solver.Assembly, gone: np.ndarray) -> solver.Tie:
     where = f"{entry.where} '{entry.name}'"
     points = tuple(_place(end.point, assembly, where) for end in entry.ends)
-    length = float(np.linalg.norm(np.subtract(points[1], points[0])))
+    along = np.subtract(points[0], points[1])
+    length = float(np.linalg.norm(along))
     if not length > 0.0:
         raise ValueError(
             f"{where}: a {entry.kind} has no length: both ends are at {_written(points[0])}; give two places"
         )
     blocks = tuple(
-        _holding(end, points[k], np.subtract(points[k], points[1 - k]), assembly, f"{where} {('from', 'to')[k]}", entry)
-        for k, end in enumerate(entry.ends)
+        _holding(end, points[k], away, assembly, gone, f"{where} {('from', 'to')[k]}", entry)
+        for k, (end, away) in enumerate(zip(entry.ends, (along, -along), strict=True))
     )
     if blocks[0] == blocks[1]:
         held = "the ground" if blocks[0] is None else f"the block '{assembly.names[blocks[0]]}'"
@@ -359,7 +364,13 @@ def _place(point: tuple[float, ...], assembly: solver.Assembly, where: str) -> t
 
 
 def _holding(
-    end: TieEnd, point: tuple[float, ...], away: np.ndarray, assembly: solver.Assembly, where: str, entry: TieCase
+    end: TieEnd,
+    point: tuple[float, ...],
+    away: np.ndarray,
+    assembly: solver.Assembly,
+    gone: np.ndarray,
+    where: str,
+    entry: TieCase,
 ) -> int | None:
     """Find the block that holds an end; None for the ground."""
     if end.fixed:
@@ -371,6 +382,11 @@ def _holding(
                 f"{where}: no block is called '{end.block}'{near}; the layout has {', '.join(assembly.names[:12])}"
             )
         block = assembly.index(end.block)
+        if gone[block]:
+            raise ValueError(
+                f"{where}: [[remove]] has taken '{end.block}' away before settlement {entry.phase}, before which the "
+                f"{entry.kind} is installed; name a block that is left"
+            )
         note_outside(assembly, point, block, where, "which holds this end")
         return block
     every = np.arange(assembly.n_blocks)
@@ -391,7 +407,7 @@ def _holding(
             f"{_in_metres(point, assembly)}; {remedy}"
         )
     # Where several blocks meet, it is the one behind the anchor.
-    return block_at(assembly, point, every, away.tolist(), where)
+    return block_at(assembly, point, every, away.tolist(), where, gone)
 
 
 def _in_metres(point: tuple[float, ...], assembly: solver.Assembly) -> str:
