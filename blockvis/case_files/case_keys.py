@@ -347,8 +347,8 @@ SUPPORTS = Section(
             [[-0.5, -0.3], [4.0, -0.3], [4.0, 0.0], [-0.5, 0.0]], "m", required=True),
         Key("levels", _LEVELS, "In space, z of its bottom and top", [-0.3, 0.0], "m", otherwise="required in space"),
         Key("material", TEXT, "Material, for [[interfaces]]", "rock", otherwise="none"),
-        Key("stiffness", POSITIVE, "Subgrade modulus of the ground, which gives under the blocks on it and does not "
-            "pull; a settlement is that of the ground below", 5e7, "Pa/m", otherwise="rigid"),
+        Key("stiffness", POSITIVE, "Subgrade modulus of the ground, which along a path gives under the blocks on it "
+            "and does not pull; a settlement is that of the ground below", 5e7, "Pa/m", otherwise="rigid"),
     ),
     several=True,
 )  # fmt: skip
