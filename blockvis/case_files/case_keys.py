@@ -13,7 +13,7 @@ import numpy as np
 import solver
 from blockvis.cases.backfill import BACKFILL
 from blockvis.cases.bonds import BOND
-from blockvis.cases.build import DENSITY, THICKNESS
+from blockvis.cases.build import THICKNESS
 from blockvis.cases.explain_settings import EXPLAIN
 from blockvis.cases.imperfections import IMPERFECTIONS
 from blockvis.cases.key import (
@@ -41,6 +41,7 @@ from blockvis.cases.ties import TIES
 from blockvis.cases.toml_table import Table, shortened
 from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
+from blockvis.layout.inspect import DENSITY
 from blockvis.layout.joints.close import WAYS
 from blockvis.layout.sights import SIGHTS, read_cut, read_sight
 from blockvis.layout.units import UNITS

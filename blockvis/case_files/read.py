@@ -41,10 +41,6 @@ def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
     changes : sequence of str
         Changes for this time, as ``"material.friction_coefficient=0.5"``; see :func:`changed_text`.
 
-    Returns
-    -------
-    Case
-
     Raises
     ------
     ValueError

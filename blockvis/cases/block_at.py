@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import ArrayLike
 
 import solver
+from blockvis.text import place_text
 
 #: A point on a block's edge or face lies in it, up to this, in block sizes.
 ON_EDGE = 1e-6
@@ -60,10 +61,9 @@ def note_outside(assembly: solver.Assembly, point: Sequence[float], block: int, 
     corners = assembly.vertices[assembly.block_of_vertex == block]
     apart = float(np.linalg.norm(point - np.clip(point, corners.min(axis=0), corners.max(axis=0))))
     if apart > assembly.block_size:
-        place = ", ".join(f"{x:g}" for x in point)
         warnings.warn(
-            f"{where} ({place}) lies {apart:.3g} m outside block '{assembly.names[block]}', {role} all the same: "
-            "is it in m?",
+            f"{where} {place_text(point, 6)} lies {apart:.3g} m outside block '{assembly.names[block]}', {role} all "
+            "the same: is it in m?",
             stacklevel=3,
         )
 
@@ -100,7 +100,7 @@ def block_at(
     """
     apart = distances_to(assembly, point)
     holding = chosen[apart[chosen] <= ON_EDGE * assembly.block_size]
-    place = f"({', '.join(f'{x:g}' for x in point)})"
+    place = place_text(point, 6)
     if len(holding) == 0:
         nearest = int(chosen[apart[chosen].argmin()])
         other = int(apart.argmin())

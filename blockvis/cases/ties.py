@@ -11,7 +11,7 @@ import numpy as np
 import solver
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, in_words, matches
-from blockvis.text import nearest
+from blockvis.text import nearest, place_text
 from solver import mechanics
 
 from .block_at import ON_EDGE, block_at, distances_to, note_outside
@@ -331,7 +331,7 @@ def _in_blocks(entry: TieCase, assembly: solver.Assembly, gone: np.ndarray) -> s
     length = float(np.linalg.norm(along))
     if not length > 0.0:
         raise ValueError(
-            f"{where}: a {entry.kind} has no length: both ends are at {_written(points[0])}; give two places"
+            f"{where}: a {entry.kind} has no length: both ends are at {place_text(points[0], 6)}; give two places"
         )
     blocks = tuple(
         _holding(end, points[k], away, assembly, gone, f"{where} {('from', 'to')[k]}", entry)
@@ -360,7 +360,8 @@ def _place(point: tuple[float, ...], assembly: solver.Assembly, where: str) -> t
         return point
     if len(point) == 2:
         return (point[0], 0.0, point[1])
-    raise ValueError(f"{where}: {_written(point)} has three coordinates, and the blocks lie in the plane; give [x, y]")
+    place = place_text(point, 6)
+    raise ValueError(f"{where}: {place} has three coordinates, and the blocks lie in the plane; give [x, y]")
 
 
 def _holding(
@@ -403,7 +404,7 @@ def _holding(
                 f"{where.rpartition(' ')[2]} = {fixed} and {other}; the line itself goes to another layer"
             )
         raise ValueError(
-            f"{where} {_written(point)} m lies in no block; the nearest is '{near}', {apart.min():.3g} m away"
+            f"{where} {place_text(point, 6)} m lies in no block; the nearest is '{near}', {apart.min():.3g} m away"
             f"{_in_metres(point, assembly)}; {remedy}"
         )
     # Where several blocks meet, it is the one behind the anchor.
@@ -415,9 +416,5 @@ def _in_metres(point: tuple[float, ...], assembly: solver.Assembly) -> str:
     for unit, factor in UNITS.items():
         scaled = tuple(factor * x for x in point)
         if distances_to(assembly, scaled).min() <= ON_EDGE * assembly.block_size:
-            return f" (if it is in {unit}, write {_written(scaled)}: coordinates of a case are in m)"
+            return f" (if it is in {unit}, write {place_text(scaled, 6)}: coordinates of a case are in m)"
     return ""
-
-
-def _written(point: Sequence[float]) -> str:
-    return f"({', '.join(f'{x:g}' for x in point)})"

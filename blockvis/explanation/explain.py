@@ -85,10 +85,6 @@ def explain(
     progress : bool
         Whether a bar, and lines where stderr is no terminal, count the runs and name their causes.
 
-    Returns
-    -------
-    Explanation
-
     Raises
     ------
     ValueError

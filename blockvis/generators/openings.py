@@ -80,10 +80,6 @@ def checked_opening(
         From 1, for messages.
     brick_length, brick_height, wall_height : float [m]
 
-    Returns
-    -------
-    Opening
-
     Raises
     ------
     ValueError

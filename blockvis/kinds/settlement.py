@@ -75,11 +75,6 @@ class SettlementKind(AnalysisKind):
                 stacklevel=5,
             )
         needs_no_crushing(case)
-        if case.controls.local_loss and case.controls.increments == LINEAR_PROGRAM:
-            raise ValueError(
-                f'{case.source}: [settlement] local_loss belongs to increments = "{COULOMB}"; linear programs end with '
-                "the first blocks that fall: leave it out"
-            )
         if case.settings and case.controls.increments == LINEAR_PROGRAM:
             raise ValueError(
                 f'{case.source}: [analysis] range = true belongs to increments = "{COULOMB}"; a linear program knows '

@@ -120,10 +120,6 @@ def write_report(
         What of and how large, "error of the steps: reaction ± 0.2 %"; :func:`add_error` may say it later.
     band : ReactionRange, optional
         Of the reaction, drawn behind the curve.
-
-    Returns
-    -------
-    pathlib.Path
     """
     return write_atomic(path, report_html(response, case_text, title=title, fall=fall, error=error, band=band))
 

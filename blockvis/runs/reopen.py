@@ -17,10 +17,6 @@ from blockvis.results.folder import stored_case, stored_response
 def open_results(folder: str | Path) -> solver.Response:
     """Reopen a results folder as the response it was written from, without solving.
 
-    Parameters
-    ----------
-    folder : str or Path
-
     Returns
     -------
     solver.Response

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from structures import case_from
 
 import solver
 from blockvis import generators
@@ -112,11 +111,3 @@ def test_friction_that_has_yet_to_follow_holds_nothing_up(monkeypatch):
         controls=solver.Controls(falling_frames=0),
     )
     assert response.stop is solver.Status.LIMIT_REACHED
-
-
-def test_linear_programs_let_nothing_go():
-    case = '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nlocal_loss = 0.3\n'
-    with pytest.raises(
-        ValueError, match=r'\[settlement\] local_loss belongs to increments = "coulomb"; linear programs'
-    ):
-        case_from(case + '[analysis]\nincrements = "linear program"\n')
