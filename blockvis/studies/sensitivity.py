@@ -155,8 +155,9 @@ def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, flo
     elif study.method == "grid":
         found = {p.name: _of_groups(u[:, k], y[known]) for k, p in enumerate(study.parameters) if p.n_levels > 1}
     else:
-        found = _of_sample(study.parameters, u, y[known], study.seed)
-    # Where a single run differs, resamples without it have no variance.
+        # Where a single run differs, resamples without it have no variance.
+        with np.errstate(invalid="ignore"):
+            found = _of_sample(study.parameters, u, y[known], study.seed)
     return {name: pair for name, pair in found.items() if np.isfinite(pair).all()}
 
 
