@@ -849,8 +849,6 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _convert(options: argparse.Namespace) -> int:
-    from dataclasses import replace
-
     from .formats.read import read_layout, write_layout
     from .layout.assemble import assemble, without_twins
     from .layout.layout import layout_of

@@ -41,10 +41,6 @@ def read_case(path: str | Path, changes: str | Sequence[str] = ()) -> Case:
     changes : str or sequence of str
         Changes for this time, as ``"material.friction_coefficient=0.5"``; see :func:`changed_text`.
 
-    Returns
-    -------
-    Case
-
     Raises
     ------
     ValueError

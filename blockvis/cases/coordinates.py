@@ -76,6 +76,8 @@ def _refuse_plane_keys(case: Case) -> None:
     for key, is_given in (
         ("closing", case.closing != "auto"),
         ("outline_tolerance", case.outline_tolerance is not None),
+        # Of a drawing that dimension = 3 sets up it is the depth.
+        ("thickness", case.thickness is not None and case.dimension != 3),
     ):
         if is_given:
             raise ValueError(f"{case.source}: [geometry] {key} belongs to outlines in the plane; leave it out in space")

@@ -67,6 +67,12 @@ def removed_blocks(removal: Removal, assembly: solver.Assembly) -> np.ndarray:
     return np.isin(assembly.names, _matching(removal.blocks, assembly.names, f"{removal.where} blocks", "block"))
 
 
+def gone_in(removals: Sequence[Removal], assembly: solver.Assembly, phase: int) -> np.ndarray:
+    """(n_blocks,) bool array: blocks that have been taken away before a settlement, counted from 1, or earlier."""
+    gone = [removed_blocks(one, assembly) for one in removals if one.phase <= phase]
+    return np.any([np.zeros(assembly.n_blocks, dtype=bool), *gone], axis=0)
+
+
 def removed_ties(removal: Removal, ties: Sequence[solver.Tie]) -> tuple[str, ...]:
     """Names of the ties that a table takes away.
 

@@ -85,10 +85,6 @@ def explain(
     progress : bool
         Whether a bar, and lines where stderr is no terminal, count the runs and name their causes.
 
-    Returns
-    -------
-    Explanation
-
     Raises
     ------
     ValueError
@@ -112,6 +108,12 @@ def explain(
                 f"{case.removals[0].where} takes away what blockvis explain would follow: it knows the structure as "
                 "drawn; leave it out, and such blocks out of the drawing"
             )
+        for number, load in enumerate(case.loads, start=1):
+            if load.phase > 1:
+                raise ValueError(
+                    f"{case.source}: [loads {number}] phase is {load.phase}, and blockvis explain has no settlement "
+                    "before which the load begins to act; leave phase out if it acts from the start, or the load"
+                )
         refuse_ties(case)
         drawn = case_assembly(case)
         _refuse_grounded(case_ties(case, drawn), case)

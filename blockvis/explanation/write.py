@@ -13,12 +13,12 @@ from string import Template
 from typing import TYPE_CHECKING
 
 from blockvis.system.atomic_files import make_folder, write_atomic
+from blockvis.text import place_text
 from solver.mechanics import counted
 
 from .forward import LEANING
 from .likelihood import ELSEWHERE, INDEPENDENT
 from .picture import draw_explanation
-from .places import place_text
 from .words import (
     amount_text,
     cause_text,
@@ -42,13 +42,7 @@ MOST_CAUSES, MOST_OBSERVATIONS = 12, 200
 
 
 def write_explanation(found: Explanation, folder: Path) -> None:
-    """Write the page, its numbers and its picture.
-
-    Parameters
-    ----------
-    found : Explanation
-    folder : Path
-    """
+    """Write the page, its numbers and its picture."""
     make_folder(folder)
     write_atomic(folder / "explain.json", json.dumps(values_of(found), indent=2, ensure_ascii=False) + "\n")
     picture = draw_explanation(found, folder / "explain.png")

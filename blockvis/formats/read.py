@@ -282,10 +282,6 @@ def read(
         As of :func:`read_layout`.
     width, height, pixel, background, smallest
         Of an image; as of :class:`blockvis.formats.image_scale.ImageKeys`.
-
-    Returns
-    -------
-    solver.Assembly
     """
     chosen: dict[str, Any] = {"chord_tolerance": chord_tolerance, "view": view, "only": only, "window": window}
     chosen |= {"dimension": dimension, "thickness": thickness, "width": width, "height": height, "pixel": pixel}
@@ -321,10 +317,6 @@ def from_compas(model: Any, **options: Any) -> solver.Assembly:
         ``roles`` says otherwise.
     **options
         As of :func:`read`.
-
-    Returns
-    -------
-    solver.Assembly
 
     Raises
     ------

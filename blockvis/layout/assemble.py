@@ -15,7 +15,7 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from .facing import faced, facing_tolerance
-from .inspect import inspected
+from .inspect import DENSITY, inspected
 from .layout import Layout
 from .notes import changes_analysis
 from .repair import duplicates, overlaps, refuse_overlaps, repaired
@@ -36,7 +36,7 @@ def assemble(
     *,
     roles: Mapping[str, str] | None = None,
     supports: Sequence[Mapping[str, Any]] = (),
-    density: float = 2000.0,
+    density: float = DENSITY,
     thickness: float = 1.0,
     joint_thickness: float | str = 0.0,
     overlap_tolerance: float | None = None,

@@ -78,10 +78,6 @@ def draw_curve(
         Width and height; a PNG has 200 pixels per inch.
     band : ReactionRange, optional
         Of the reaction, drawn behind it.
-
-    Returns
-    -------
-    pathlib.Path
     """
     path, name = Path(path), about(response).name
     if in_one_unit(response) is not response:

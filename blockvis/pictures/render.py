@@ -75,10 +75,6 @@ def draw_still(
     section : str or mapping, optional
         A plane that cuts blocks in space open: "x", "y = 1.2" [m], or ``{"point": (x, y, z), "normal": (x, y, z)}``.
 
-    Returns
-    -------
-    pathlib.Path
-
     Raises
     ------
     ValueError
@@ -141,10 +137,6 @@ def draw_mechanism(
         As of :func:`draw_still`.
     section : str or mapping, optional
         As of :func:`draw_still`.
-
-    Returns
-    -------
-    pathlib.Path
     """
     response = response.response if isinstance(response, solver.LimitLoad) else response
     _check_response(response)
@@ -206,10 +198,6 @@ def animate(
         As of :func:`draw_still`; a film has one view.
     poster : path, optional
         Of a picture that stands for the film where it does not play: the frame in which the fall is fastest.
-
-    Returns
-    -------
-    pathlib.Path
     """
     _check_response(response)
     look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))

@@ -120,10 +120,6 @@ def write_report(
         What of and how large, "error of the steps: reaction ± 0.2 %"; :func:`add_error` may say it later.
     band : ReactionRange, optional
         Of the reaction, drawn behind the curve.
-
-    Returns
-    -------
-    pathlib.Path
     """
     return write_atomic(path, report_html(response, case_text, title=title, fall=fall, error=error, band=band))
 
@@ -335,7 +331,8 @@ def _fill(
 ) -> dict[str, Any] | None:
     """Give the pieces of blocks under fill, which carry it as they move, with the law of its load; None without fill.
 
-    A piece has its block, its ends and the surface [m], thickness times unit weight [N/m²], the pressure coefficient.
+    A piece has its block, its ends, the surface and the base [m], thickness times unit weight [N/m²], the pressure
+    coefficient.
     """
     fills = response.loads.fills
     if not fills:
@@ -346,8 +343,8 @@ def _fill(
         ends = np.round(fill.pieces - origin, 5)
         weights = fill.unit_weight * fill.thickness
         for block, (first, last), weight in zip(fill.block.tolist(), ends.tolist(), weights.tolist(), strict=True):
-            surface = round(float(fill.surface - origin[1]), 5)
-            pieces.append([block, *first, *last, surface, weight, fill.pressure_coefficient])
+            surface, base = (round(float(level - origin[1]), 5) for level in (fill.surface, max(fill.base, -1e9)))
+            pieces.append([block, *first, *last, surface, base, weight, fill.pressure_coefficient])
     largest = max(float(np.abs(fill.load(response.assembly, shown[0].pose)[:, :2]).max()) for fill in fills)
     return {
         "pieces": pieces,

@@ -259,7 +259,11 @@ class ResultsFolder:
             write_end(self.path, response, self.vtu, self._movements.joints)
             self._rows.seek(self._last_row)
             self._rows.truncate()
-            self._write_row(len(response.path) - 1, at_last_equilibrium(response))
+            last = at_last_equilibrium(response)
+            self._write_row(len(response.path) - 1, last)
+            if len(response.path) == len(self.increments):
+                # There is no frame of the fall that has the mechanism.
+                write_atomic(self._files.file(len(response.path) - 1), packed_increment(last))
         self._write_table(durable=True)
         write_lists(self.path, self.increments, durable=True)
         write_atomic(self.path / "joints.csv", self._movements.table(response.settlements))
@@ -267,8 +271,8 @@ class ResultsFolder:
             write_atomic(self.path / name, text)
         cracks = []
         if response.path:
-            last = response.path[-1]
-            cracks = cracks_of(self.assembly, last.pose, self._movements.joints, last.fallen)
+            end = response.path[-1]
+            cracks = cracks_of(self.assembly, end.pose, self._movements.joints, end.fallen)
         listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         if self.ties:
             courses = self._courses.courses if response.parameter.is_path else tie_courses(response)
@@ -485,8 +489,9 @@ def _collapse_of(
         return None
     mechanism = np.zeros((assembly.n_blocks, 3 * assembly.dimension - 3))
     falling = [i for i in increments if i.status == solver.Status.FALLING]
-    if falling:
-        motion = falling[0].velocity
+    moving = [*falling, *increments[-1:]]
+    if moving:
+        motion = moving[0].velocity
         mechanism = motion / max(mechanics.motion_size(motion, assembly.block_size).max(), 1e-300)
     return solver.Collapse(
         displacement=summary["collapse_displacement"],

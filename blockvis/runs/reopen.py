@@ -18,10 +18,6 @@ from blockvis.results.given import with_given
 def open_results(folder: str | Path) -> solver.Response:
     """Reopen a results folder as the response it was written from, without solving.
 
-    Parameters
-    ----------
-    folder : str or Path
-
     Returns
     -------
     solver.Response

@@ -28,6 +28,7 @@ from .outputs import Clock, Drawing, Output, viewer_format
 from .plan import planned
 from .progress import Progress
 from .reopen import open_results
+from .step_check import stored_case
 from .write import finish
 
 
@@ -174,10 +175,7 @@ def resume_run(
     changed are named in a warning, and not read again. Of a run that has finished, what is not drawn yet is drawn.
     """
     folder = Path(folder)
-    record = read_record(folder)
-    if not record.case:
-        raise ValueError(f"'{folder}' was written from Python, without a case file; run it again from there")
-    case = parse_case(record.case, Path(record.case_file or folder / "case.toml"))
+    case, record = stored_case(folder), read_record(folder)
     outputs = (Drawing(),) if outputs is None else outputs
     finished = _finished(folder)
     if finished is not None:

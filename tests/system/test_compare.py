@@ -15,6 +15,7 @@ from blockvis import generators
 from blockvis.cli import main
 
 CASE = Path(__file__).parents[2] / "examples" / "semicircular_arch.toml"
+SCATTER = 'kind = "density", distribution = "lognormal", deviation = 0.01'
 
 
 @pytest.fixture
@@ -70,7 +71,8 @@ def test_what_the_cases_differ_in_is_told(tmp_path):
     for friction, density in (("1.5", "1850.5"), ("2.0", "2000.0")):
         folders.append(tmp_path / friction)
         changes = [f"material.friction_coefficient={friction}", "settlement.limit=0.02", "output.animation=false"]
-        changes.append(f"material.density={density}")
+        # Of numbers as of dates the seventh digit tells.
+        changes += [f"material.density={density}", f"imperfections=[{{{SCATTER}, seed={20260100 + int(friction[0])}}}]"]
         blockvis.run_case(blockvis.read_case(CASE, changes=changes), folders[-1], outputs=())
     assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
     page = (tmp_path / "both" / "compare.html").read_text(encoding="utf-8")
@@ -78,6 +80,7 @@ def test_what_the_cases_differ_in_is_told(tmp_path):
         "": ["1.5", "2.0"],
         "material.friction_coefficient": ["1.5", "2"],
         "material.density": ["1850.5 kg/m³", "2000 kg/m³"],
+        "imperfections 1.seed": ["20260101", "20260102"],
     }
 
 

@@ -73,6 +73,7 @@ def test_rotations_and_loads_have_three_numbers(tmp_path):
         (DOME + DOWN + "[[loads]]\npressure = 3.0", r"pressure belongs to blocks in the plane; in space give forces"),
         (DOME.replace("\n", "\ndimension = 2\n", 1) + DOWN, r"dimension is 2, but the layout 'dome' is in space"),
         (DOME.replace("\n", "\ndimension = 4\n", 1) + DOWN, r'dimension is 4; give 2, 3 or "auto"'),
+        (DOME.replace("\n", "\nthickness = 0.7\n", 1) + DOWN, r"thickness belongs to outlines in the plane"),
         (DOME.replace("\n", '\nclosing = "faces"\n', 1) + DOWN, r"closing belongs to outlines in the plane"),
         (DOME + DOWN + '[[imperfections]]\nkind = "vertices"\ndistribution = "normal"\nmean = 0\ndeviation = 0.01\n',
          r"kind 'vertices' belongs to blocks in the plane"),

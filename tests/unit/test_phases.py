@@ -251,6 +251,56 @@ def test_a_change_that_cannot_be_is_refused_in_one_line(more: str, words: str) -
     assert "\n" not in str(error.value)
 
 
+COLUMNS = f"""
+[geometry]
+file = "columns.json"
+{SETTLEMENT}
+{SETTLEMENT}
+[[remove]]
+phase = 2
+blocks = "left"
+"""
+
+
+def columns(folder: Path, more: str) -> solver.Response:
+    """Two columns on a ground that sinks, of which the left one is taken away before the second settlement."""
+    outlines = {"left": rectangle(0.5, 0.0, 1.0, 1.0), "right": rectangle(2.0, 0.0, 2.5, 1.0)}
+    blocks: list[dict[str, Any]] = [{"name": name, "outline": ring.tolist()} for name, ring in outlines.items()]
+    blocks.append({"name": "ground", "role": "moving", "outline": rectangle(0.0, -0.5, 4.0, 0.0).tolist()})
+    (folder / "columns.json").write_text(json.dumps({"blocks": blocks}), encoding="utf-8")
+    return blockvis.run_case(case_from(COLUMNS + more, folder), folder / "out", outputs=()).response
+
+
+@pytest.mark.parametrize("blocks", ["", 'blocks = "right"'])
+def test_what_has_been_taken_away_shields_nothing_from_a_later_pressure(tmp_path: Path, blocks: str) -> None:
+    # 100 kN push on a column of 9.8 kN.
+    found = columns(tmp_path, f"[[loads]]\npressure = 1e5\ndirection = [1, 0]\nphase = 2\n{blocks}\n")
+    assert found.stop is solver.Status.COLLAPSED
+    assert [increment.phase for increment in found.path] == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ('[[loads]]\nblocks = "left"\nforce = [5e4, 0]\nphase = 2\n', "loads 1] blocks 'left' matches only what [[re"),
+        ("[[loads]]\npoint = [0.7, 0.5]\nforce = [5e4, 0]\nphase = 2\n", "(0.7, 0.5) m lies in 'left', which [[remo"),
+        (
+            '[[ties]]\nname = "t"\nstiffness = 1e7\nkind = "bar"\nphase = 2\nfrom = [1, 0.7]\nto = [2, 0.7]\n',
+            "[ties] 't' from (1, 0.7) m lies in 'left', which [[remove]] has taken away",
+        ),
+        (
+            '[[ties]]\nname = "t"\nstiffness = 1e7\nphase = 2\nto = [2, 0.7]\n'
+            'from = { block = "left", point = [1, 0.7] }\n',
+            "[ties] 't' from: [[remove]] has taken 'left' away before settlement 2",
+        ),
+    ],
+)
+def test_what_would_act_on_blocks_that_have_been_taken_away_is_refused(tmp_path: Path, more: str, words: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(words)) as error:
+        columns(tmp_path, more)
+    assert "\n" not in str(error.value)
+
+
 PILE = """
 [geometry]
 file = "pile.json"

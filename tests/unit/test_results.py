@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import equal_certificates
+from structures import equal_certificates, report_of
 
 import blockvis
 import solver
@@ -43,6 +43,16 @@ def test_reopens_as_the_same_response(response, folder):
         assert np.array_equal(one.states, other.states)
         assert equal_certificates(one.certificate, other.certificate)
     np.testing.assert_allclose(again.collapse.mechanism, response.collapse.mechanism, rtol=1e-12)
+
+
+def test_a_collapse_without_frames_of_its_fall_comes_back_with_its_mechanism(response, tmp_path):
+    bare = replace(response, increments=response.path)
+    again = blockvis.open_results(blockvis.write(bare, tmp_path / "out"))
+    assert len(again.increments) == len(response.path)
+    np.testing.assert_allclose(again.collapse.mechanism, response.collapse.mechanism, rtol=1e-12)
+    assert np.array_equal(again.path[-1].pose.positions, response.path[-1].pose.positions)
+    for words in ("<td>mechanism</td>", "<td>falls</td>"):
+        assert words in report_of(again)
 
 
 def test_csv_counts_every_contact_once(response, folder):
