@@ -36,6 +36,8 @@ class Line:
         Whether it is a polyline, and so part of an outline; a single line may also be a dimension or an axis.
     looks : tuple of str
         Kind of entity and colour.
+    off : float
+        Largest distance of its chords from the curve for which they stand.
     """
 
     points: np.ndarray
@@ -43,6 +45,7 @@ class Line:
     handle: str
     must_close: bool
     looks: tuple[str, ...] = ()
+    off: float = 0.0
 
 
 @dataclass
@@ -68,7 +71,7 @@ class Faces:
     notes: list[str] = field(default_factory=list)
 
 
-def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -> Faces:
+def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: Sequence[float]) -> Faces:
     """Find the faces between lines, and the pieces into which they cut outlines.
 
     Parameters
@@ -76,6 +79,8 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -
     lines : sequence of Line
     outlines : sequence of (n, 2) arrays
         Closed outlines of the same drawing.
+    offs : sequence of float
+        Largest distance of the chords of each outline from the curve for which they stand.
 
     Notes
     -----
@@ -91,27 +96,23 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -
         return found
     every = cKDTree(np.concatenate([*flat, *outlines]))
     size = float(np.ptp(every.data, axis=0).max())
-    usable = [float(np.ptp(ring, axis=0).max()) > GRID * size for ring in outlines]
-    borders = [shapely.LinearRing(ring) for ring, good in zip(outlines, usable, strict=True) if good]
-    flat = _joined(flat, borders, size, found)
-    segments = shapely.set_precision([shapely.LineString(points) for points in flat], GRID * size)
-    cutting = _cut_outlines(
-        [ring if good else None for ring, good in zip(outlines, usable, strict=True)], segments, every, size, found
-    )
+    usable = [i for i, ring in enumerate(outlines) if float(np.ptp(ring, axis=0).max()) > GRID * size]
+    flat += [np.concatenate([outlines[i], outlines[i][:1]]) for i in usable]
+    flat = _joined(flat, len(lines), [*(line.off for line in lines), *(offs[i] for i in usable)], size, found)
+    segments = shapely.set_precision([shapely.LineString(points) for points in flat[: len(lines)]], GRID * size)
+    cutting = _cut_outlines(dict(zip(usable, flat[len(lines) :], strict=True)), segments, every, size, found)
     rest = [k for k in range(len(lines)) if k not in cutting]
     _add_faces([lines[k] for k in rest], [segments[k] for k in rest], outlines, every, size, found)
     return found
 
 
-def _cut_outlines(
-    outlines: Sequence[np.ndarray | None], segments: Any, every: Any, size: float, found: Faces
-) -> set[int]:
-    """Cut outlines, but None, along the lines within them; numbers of the lines that cut one."""
+def _cut_outlines(outlines: dict[int, np.ndarray], segments: Any, every: Any, size: float, found: Faces) -> set[int]:
+    """Cut outlines, by their numbers, along the lines within them; numbers of the lines that cut one."""
     import shapely
 
     cutting: set[int] = set()
     tree = shapely.STRtree(segments)
-    for i, ring in enumerate(outlines):
+    for i, ring in outlines.items():
         area = shapely.Polygon(ring)
         if area.is_empty or not area.is_valid:
             continue
@@ -184,16 +185,17 @@ def nothing_closed(faces: Faces) -> str:
     return words
 
 
-def _joined(flat: list[np.ndarray], borders: list[Any], size: float, found: Faces) -> list[np.ndarray]:
-    """Move ends of lines that miss another line or outline by little onto it."""
+def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: float, found: Faces) -> list[np.ndarray]:
+    """Let the ends of the first n lines meet what they miss by little, and be corners of every line that they meet."""
     import shapely
 
-    flat = [points.copy() for points in flat]
-    others = [*(shapely.LineString(points) for points in flat), *borders]
+    # An end on a curve hangs between it and its chord: the curve gets a corner there.
+    curves = {j: off + MEETS * size for j, off in enumerate(offs) if off > 0.0}
+    flat = _with_corners(flat, n, curves, MEETS * size)
+    others = [shapely.LineString(points) for points in flat]
     tree = shapely.STRtree(others)
-    ends = [(k, e) for k in range(len(flat)) for e in (0, -1)]
-    places = shapely.points(np.array([flat[k][e] for k, e in ends]))
-    which, other = tree.query(places, "dwithin", GRID * size)
+    ends = [(k, e) for k in range(n) for e in (0, -1)]
+    which, other = tree.query(shapely.points(np.array([flat[k][e] for k, e in ends])), "intersects")
     own = np.array([k for k, _ in ends])
     meeting = set(which[other != own[which]].tolist())
     moved = []
@@ -204,15 +206,34 @@ def _joined(flat: list[np.ndarray], borders: list[Any], size: float, found: Face
         reach = min(MEETS * size, SHORTENED * float(shapely.length(others[k])))
         near = [int(j) for j in tree.query(shapely.Point(end), "dwithin", MEETS * size) if j != k]
         # A line that has moved is taken where it is now.
-        there = [shapely.LineString(flat[j]) if j < len(flat) else others[j] for j in near]
-        best, distance = _nearest(there, end, reach)
+        best, distance = _nearest([shapely.LineString(flat[j]) for j in near], end, reach)
         if distance < reach and distance > 0.0:
             flat[k][e] = best
             moved.append(distance)
-    if moved:
-        said = f"joined: {len(moved)} ends of lines that missed another by up to {max(moved):.3g} units"
+    far = [distance for distance in moved if distance > GRID * size]
+    if far:
+        said = f"joined: {len(far)} ends of lines that missed another by up to {max(far):.3g} units"
         found.notes.append(Note(CHANGED, said))
-    return flat
+    # On the grid an end and a slanted line that it meets would be rounded apart.
+    return _with_corners(flat, n, dict.fromkeys(range(len(flat)), GRID * size), 0.0)
+
+
+def _with_corners(lines: Sequence[np.ndarray], n: int, reach: dict[int, float], apart: float) -> list[np.ndarray]:
+    """Make the ends of the first n lines corners of the others that they reach, but for those near a corner."""
+    import shapely
+
+    lines = [points.copy() for points in lines]
+    ends = np.array([lines[k][e] for k in range(n) for e in (0, -1)])
+    near = np.array([shapely.LineString(lines[j]) for j in reach], dtype=object)
+    which, number = shapely.STRtree(shapely.points(ends)).query(near, "dwithin", [*reach.values()])
+    for j, i in zip(np.array([*reach], dtype=int)[which].tolist(), number.tolist(), strict=True):
+        if i // 2 == j or np.hypot(*(lines[j] - ends[i]).T).min() <= apart:
+            continue
+        along = np.cumsum(np.hypot(*np.diff(lines[j], axis=0).T))
+        place = shapely.LineString(lines[j]).project(shapely.Point(ends[i]))
+        if 0.0 < place < along[-1]:
+            lines[j] = np.insert(lines[j], 1 + np.searchsorted(along, place), ends[i], axis=0)
+    return lines
 
 
 def _nearest(lines: Sequence[Any], end: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
