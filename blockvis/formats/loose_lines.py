@@ -112,12 +112,22 @@ def _cut_outlines(outlines: dict[int, np.ndarray], segments: Any, every: Any, si
 
     cutting: set[int] = set()
     tree = shapely.STRtree(segments)
-    for i, ring in outlines.items():
-        area = shapely.Polygon(ring)
+    areas = shapely.STRtree([shapely.Polygon(ring) for ring in outlines.values()])
+    openings = 0
+    for i, area in zip(outlines, areas.geometries, strict=True):
         if area.is_empty or not area.is_valid:
             continue
         inside = tree.query(area.buffer(2 * MEETS * size), "contains").tolist()
-        pieces = _cut(area, [segments[k] for k in inside], GRID * size) if inside else []
+        if not inside:
+            continue
+        cuts = [segments[k] for k in inside]
+        # Lines may end on an outline within this one, as between two circles.
+        within = areas.geometries[areas.query(area, "contains_properly")]
+        border, line = tree.query(shapely.get_exterior_ring(within), "dwithin", GRID * size)
+        reached = within[np.unique(border[np.isin(line, inside)])].tolist()
+        pieces = _cut(area, cuts, reached, GRID * size) if reached else []
+        openings += len(reached) if pieces else 0
+        pieces = pieces or _cut(area, cuts, [], GRID * size)
         if pieces:
             found.pieces[i] = [_sharpened(piece, every, GRID * size) for piece in pieces]
             cutting |= set(inside)
@@ -125,6 +135,8 @@ def _cut_outlines(outlines: dict[int, np.ndarray], segments: Any, every: Any, si
         n = sum(map(len, found.pieces.values()))
         around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
         said = f"cut: {counted(len(cutting), 'line')} within {around} into {counted(n, 'block')}"
+        if openings:
+            said += f" around {counted(openings, 'outline')}, a block too: ignore it by its name if it is an opening"
         found.notes.append(Note(CHANGED, f"{said}; leave their layer out (ignore) if they are no joints"))
     return cutting
 
@@ -255,14 +267,15 @@ def _nearest(lines: Sequence[Any], end: np.ndarray, reach: float) -> tuple[np.nd
     return best, distance
 
 
-def _cut(area: Any, segments: list[Any], grid: float) -> list[np.ndarray]:
-    """Pieces of an outline along its border, two or more; empty where the lines do not cut it."""
+def _cut(area: Any, segments: list[Any], inner: list[Any], grid: float) -> list[np.ndarray]:
+    """Pieces of an outline around inner ones along its border, two or more; empty where the lines do not cut it."""
     import shapely
 
     border = shapely.set_precision(area.exterior, grid)
-    noded = shapely.union_all([border, *segments], grid_size=grid)
+    noded = shapely.union_all([border, *segments, *(one.exterior for one in inner)], grid_size=grid)
     faces = list(shapely.polygonize([*shapely.get_parts(noded)]).geoms)
     faces = [face for face in faces if area.buffer(2 * grid).contains(face)]
+    faces = [face for face in faces if not any(one.contains(face.representative_point()) for one in inner)]
     at_border = [face for face in faces if face.exterior.intersection(border.buffer(2 * grid)).length > 10 * grid]
     if len(at_border) < 2 or any(len(face.interiors) for face in faces):
         return []

@@ -146,6 +146,23 @@ def test_joints_that_end_on_an_arc_cut_it(tmp_path, draw, over, ring):
         assert drawing.left_out == ()
 
 
+def test_lines_between_two_circles_cut_the_ring(tmp_path):
+    def draw(space):
+        for radius in (1000, 1200):
+            space.add_circle((0, 0), radius)
+        for sign in (1, -1):
+            for a, b in arch(9, 0.0, False)[:-1]:
+                space.add_line((sign * a[0], sign * a[1]), (sign * b[0], sign * b[1]))
+
+    path = dxf(tmp_path, draw)
+    drawing = read_layout(path)
+    assert drawing.n_blocks == 19
+    assert any("18 blocks around 1 outline, a block too: ignore it by its name" in note for note in drawing.notes)
+    areas = [shapely.Polygon(ring).area for ring in drawing.outlines]
+    disc = drawing.names[areas.index(max(areas))]
+    assert read_layout(path, ignore=[disc]).n_blocks == 18
+
+
 def test_joints_that_end_on_slanted_beds_cut_them(tmp_path):
     # Exact ends and beds, which a grid rounds apart.
     def at(x, y):
