@@ -354,7 +354,7 @@ def _selected(found: Bodies, path: Path | str, reading: Reading) -> _Selection:
     size = float(spread_of(every, f"'{path}'").max())
     if not 0.0 < size < LARGEST_SIZE:
         raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
-    return _Selection(bodies, [_with_role(found.rows[k]) for k in kept], size, dropped)
+    return _Selection(bodies, [with_role(found.rows[k]) for k in kept], size, dropped)
 
 
 def _mortar(found: Bodies, labels: Sequence[Sequence[str]], only: Sequence[str]) -> list[int]:
@@ -375,7 +375,7 @@ def _mortar(found: Bodies, labels: Sequence[Sequence[str]], only: Sequence[str])
     return around
 
 
-def _with_role(row: dict[str, Any]) -> dict[str, Any]:
+def with_role(row: dict[str, Any]) -> dict[str, Any]:
     """Take the role of a body from the beginning of its group or name: modellers number objects, "fixed.001"."""
     if row.get("role"):
         return row

@@ -19,7 +19,7 @@ from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 from solver import mechanics
 from solver.mechanics import counted
 
-from .bodies import Bodies, Body
+from .bodies import Bodies, Body, with_role
 from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
 
 #: Names of the cell array that numbers the blocks, in order of preference.
@@ -90,7 +90,7 @@ def layout_of_cells(
     first = np.unique(owner, return_index=True)[1]
     notes = tuple(text for text in (how, note) if text)
     layout = Layout(blocks=tuple(outlines), names=tuple(names), unit="", notes=notes)
-    layout = with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
+    layout = with_rows(layout, [with_role(row_of(data, int(cell), names[k])) for k, cell in enumerate(first)])
     return layout.leaving_out(unusable)
 
 
@@ -234,7 +234,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
     )
     groups = [{"group": label} if label else {} for part, label in parts for _ in range(part.n_blocks)]
     rows = [row for part in named for row in rows_of(part)]
-    return with_rows(layout, [group | row for group, row in zip(groups, rows, strict=True)])
+    return with_rows(layout, [with_role(group | row) for group, row in zip(groups, rows, strict=True)])
 
 
 def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path | str) -> Layout | Bodies:

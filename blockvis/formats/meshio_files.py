@@ -53,10 +53,10 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
             f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again, with straight cells "
             "(order 1), or as .msh or .vtu"
         ) from None
-    if path.suffix.lower() == ".f3grid":
+    if suffix == ".f3grid":
         mesh.cell_sets = _groups(mesh)
     points = np.asarray(mesh.points, dtype=float)
-    sets = sets or _sets_of_mesh(mesh)
+    sets = sets or _sets_of_mesh(mesh) or (_element_blocks(mesh) if suffix in (".e", ".ex2", ".exo") else {})
     solid = [(k, shape) for k, block in enumerate(mesh.cells) if (shape := _shape(block.type))]
     if solid:
         # Surface cells beside cells with a volume are their skin.
@@ -167,12 +167,24 @@ def _check_text(path: Path) -> None:
 
 
 def _sets_of_mesh(mesh: Any) -> dict[str, np.ndarray]:
-    """Numbers of the cells of each named set, counted through all blocks of cells."""
+    """Numbers of the cells of each named set, and group of MED, counted through all blocks of cells."""
     sets, starts = {}, _starts(mesh.cells)
     for name, parts in mesh.cell_sets.items():
         members = [starts[k] + np.asarray(part, dtype=np.int64) for k, part in enumerate(parts) if part is not None]
         sets[str(name)] = np.concatenate([np.zeros(0, dtype=np.int64), *members])
+    families = getattr(mesh, "cell_tags", None) or {}
+    if families and "cell_tags" in mesh.cell_data:
+        own = np.concatenate(mesh.cell_data["cell_tags"])
+        for name in dict.fromkeys(name for names in families.values() for name in names):
+            sets[str(name)] = np.flatnonzero(np.isin(own, [tag for tag, names in families.items() if name in names]))
     return sets
+
+
+def _element_blocks(mesh: Any) -> dict[str, np.ndarray]:
+    """Numbers of the cells of each element block of Exodus; none where these tell kinds of cells apart, not stones."""
+    kinds, starts = [block.type for block in mesh.cells], _starts(mesh.cells)
+    several = len(set(kinds)) < len(kinds)
+    return {f"block {k + 1}": np.arange(starts[k], starts[k + 1]) for k in range(len(kinds)) if several}
 
 
 def _arrays_of_sets(sets: Mapping[str, np.ndarray], total: int) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
