@@ -14,7 +14,7 @@ import numpy as np
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
-from blockvis.layout.notes import UPRIGHT, kind_of
+from blockvis.layout.notes import LEFT_OUT, UPRIGHT, Note, kind_of
 from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 from solver import mechanics
 from solver.mechanics import counted
@@ -150,6 +150,15 @@ def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, An
         if key in data and len(data[key]) > cell and np.ndim(data[key][cell]) == 0:
             row[key] = float(data[key][cell])
     return row
+
+
+def flat_beside(bodies: Sequence[np.ndarray], flat: Sequence[np.ndarray]) -> tuple[str, ...]:
+    """Count in a note the flat cells that are no skin of those with a volume; given are the points of each cell."""
+    if not len(flat):
+        return ()
+    lost = ~np.isin(np.concatenate(flat), np.concatenate([np.ravel(one) for one in bodies]))
+    n = int(np.logical_or.reduceat(lost, np.cumsum([0, *map(len, flat)])[:-1]).sum())
+    return (Note(LEFT_OUT, f"left out: {counted(n, 'flat cell')} beside bodies"),) if n else ()
 
 
 def merged(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path | str) -> Layout | Bodies:

@@ -399,10 +399,10 @@ def _order(points: np.ndarray, view: str | None, path: Path) -> tuple[list[int],
             f"'{path}' lies in {flat[0]}: seen as {view} it has no area; give view = \"{flat[0]}\", or none"
         )
     chosen = view or (flat[0] if flat else "xy")
-    if chosen != "xy":
-        return list(VIEWS[chosen]), [upright_note(chosen)]
-    seen = [] if flat else [Note(CHANGED, "elevations were ignored: the drawing was read as seen from above")]
-    return [0, 1], list(seen)
+    notes = [] if chosen == "xy" else [upright_note(chosen)]
+    seen = "from above" if chosen == "xy" else f"along {'xyz'[axis_across(chosen)]}"
+    notes += [] if flat else [Note(CHANGED, f"elevations were ignored: the drawing was read as seen {seen}")]
+    return list(VIEWS[chosen]), list(notes)
 
 
 def _check_degrees(

@@ -16,7 +16,7 @@ from blockvis.layout.layout import Layout
 from solver.mechanics import counted
 
 from .bodies import Bodies
-from .cells import block_array, layout_of_cells, row_of
+from .cells import block_array, flat_beside, layout_of_cells, row_of
 from .node_order import MESHIO, ring_of_nodes
 from .reading import Reading
 from .volumes import MESHIO_SOLIDS, Faces, bodies_of_cells
@@ -59,11 +59,12 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     sets = sets or _sets_of_mesh(mesh) or (_element_blocks(mesh) if suffix in (".e", ".ex2", ".exo") else {})
     solid = [(k, shape) for k, block in enumerate(mesh.cells) if (shape := _shape(block.type))]
     if solid:
-        # Surface cells beside cells with a volume are their skin.
         chosen = [(k, len(mesh.cells[k].data)) for k, _ in solid]
         cells = [(shape, np.asarray(mesh.cells[k].data, dtype=np.int64)) for k, shape in solid]
         data, notes = _cell_data(mesh, chosen, sets)
         bodies = _bodies(points, cells, data)
+        flat = [cell for block in mesh.cells if block.type in MESHIO for cell in block.data]
+        notes += flat_beside([nodes for _, nodes in cells], flat)
         return replace(bodies, notes=bodies.notes + notes)
     rings: list[np.ndarray] = []
     chosen = []
