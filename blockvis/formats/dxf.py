@@ -107,9 +107,10 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     from ezdxf import recover
 
     try:
-        with path.open("rb") as file:
-            is_binary = file.read(len(BINARY)) == BINARY
-        if is_binary:
+        content = path.read_bytes()
+        if b"SECTION" not in content:
+            raise ValueError(f"it begins with {content[:16]!r}")
+        if content.startswith(BINARY):
             # recover reads text only.
             document = ezdxf.readfile(path)
             audit = document.audit()

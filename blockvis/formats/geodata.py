@@ -227,7 +227,9 @@ def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Fe
     if start is None or blob[3] & 32:
         raise ValueError(f"{called} is of an extended kind, which is not read; export it again")
     try:
-        return Feature(shapely.from_wkb(blob[8 + start :]), row, layer)
+        # What is not finite is refused by its place.
+        with np.errstate(invalid="ignore"):
+            return Feature(shapely.from_wkb(blob[8 + start :]), row, layer)
     except NotImplementedError:
         remedy = f"ogr2ogr -nlt CONVERT_TO_LINEAR {path.stem}_straight.gpkg {path.name}"
         raise ValueError(f"{called} has arcs or is in space, which is not read; straighten it: {remedy}") from None
