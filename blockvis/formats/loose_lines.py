@@ -218,9 +218,11 @@ def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: flo
         reach = min(MEETS * size, SHORTENED * float(shapely.length(others[k])))
         near = [int(j) for j in tree.query(shapely.Point(end), "dwithin", MEETS * size) if j != k]
         # A line that has moved is taken where it is now.
-        best, distance = _nearest([shapely.LineString(flat[j]) for j in near], end, reach)
+        best, distance, j = _nearest({j: shapely.LineString(flat[j]) for j in near}, end, reach)
         if distance < reach and distance > 0.0:
             flat[k][e] = best
+            # An end of that line may move, too.
+            flat[j] = _with_corner(flat[j], best, 0.0)
             moved.append(distance)
     far = [distance for distance in moved if distance > GRID * size]
     if far:
@@ -239,21 +241,29 @@ def _with_corners(lines: Sequence[np.ndarray], n: int, reach: dict[int, float], 
     near = np.array([shapely.LineString(lines[j]) for j in reach], dtype=object)
     which, number = shapely.STRtree(shapely.points(ends)).query(near, "dwithin", [*reach.values()])
     for j, i in zip(np.array([*reach], dtype=int)[which].tolist(), number.tolist(), strict=True):
-        if i // 2 == j or np.hypot(*(lines[j] - ends[i]).T).min() <= apart:
-            continue
-        along = np.cumsum(np.hypot(*np.diff(lines[j], axis=0).T))
-        place = shapely.LineString(lines[j]).project(shapely.Point(ends[i]))
-        if 0.0 < place < along[-1]:
-            lines[j] = np.insert(lines[j], 1 + np.searchsorted(along, place), ends[i], axis=0)
+        if i // 2 != j:
+            lines[j] = _with_corner(lines[j], ends[i], apart)
     return lines
 
 
-def _nearest(lines: Sequence[Any], end: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
-    """Find the place on lines to which an end belongs, and its distance; corners and ends of a line come first."""
+def _with_corner(points: np.ndarray, end: np.ndarray, apart: float) -> np.ndarray:
+    """Make an end a corner of a line between its own ends, but for one near a corner."""
     import shapely
 
-    best, distance = end, reach
-    for line in lines:
+    if np.hypot(*(points - end).T).min() <= apart:
+        return points
+    along = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
+    place = shapely.LineString(points).project(shapely.Point(end))
+    within = 0.0 < place < along[-1]
+    return np.insert(points, 1 + np.searchsorted(along, place), end, axis=0) if within else points
+
+
+def _nearest(lines: dict[int, Any], end: np.ndarray, reach: float) -> tuple[np.ndarray, float, int]:
+    """Find the place on lines to which an end belongs, its distance and the line; corners of a line come first."""
+    import shapely
+
+    best, distance, found = end, reach, -1
+    for j, line in lines.items():
         corners = np.array(line.coords)
         apart = np.hypot(*(corners - end).T)
         point = line.interpolate(line.project(shapely.Point(end)))
@@ -262,9 +272,9 @@ def _nearest(lines: Sequence[Any], end: np.ndarray, reach: float) -> tuple[np.nd
             ((point.x, point.y), point.distance(shapely.Point(end))),
         ):
             if d <= distance:
-                best, distance = np.array(candidate), float(d)
+                best, distance, found = np.array(candidate), float(d), j
                 break
-    return best, distance
+    return best, distance, found
 
 
 def _cut(area: Any, segments: list[Any], inner: list[Any], grid: float) -> list[np.ndarray]:
