@@ -13,6 +13,7 @@ from blockvis.pictures import palette
 from blockvis.pictures.captions import drops_at_start, force_unit, parameter_label, parameter_unit, value_label
 from blockvis.pictures.curves import TEXT
 from blockvis.pictures.drawer import Drawer, Look
+from blockvis.pictures.figures import plain_text
 from blockvis.pictures.film import END, PAUSE
 from blockvis.pictures.frame import fitting_font, framed
 from blockvis.pictures.swing import shown_increments
@@ -37,6 +38,7 @@ FPS, SECONDS = 25.0, 6.0
 STRIP = 40
 
 
+@plain_text
 def draw_curves(comparison: Comparison, path: Path) -> Path:
     """Draw both curves in one plot, with where each collapses."""
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
@@ -53,7 +55,7 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
         # The drop from rest is no part of the path, as in the curve of one run.
         first = 1 if drops_at_start(response) else 0
         axes.plot(x[: 2 * first], y[: 2 * first], ":", color=ink, linewidth=1.5)
-        axes.plot(x[first:], y[first:], line, marker=marker, color=ink, linewidth=2.0, label=side.label)
+        axes.plot(x[first:], y[first:], line, marker=marker, color=ink, linewidth=2.0, label=f" {side.label}")
         if response.collapse is not None:
             axes.plot(x[-1:], y[-1:], "X", color=ink, markersize=9)
             axes.axvline(x[-1], color=ink, linewidth=1.0, linestyle=":")

@@ -72,6 +72,19 @@ def test_the_collapse_has_the_count_of_its_mechanism_and_the_case_its_name(tmp_p
     assert "garden" in said(run.response, tmp_path / "named.svg")
 
 
+def test_a_name_is_text_whatever_it_holds(tmp_path):
+    """No formula between two "$", and in the legend also where it begins with "_"."""
+    (tmp_path / "$\\foo$ 5.toml").write_text(
+        '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.001\nlimit = 0.001\n'
+        '[[ties]]\nname = "_1 $x_1$"\nfrom = [-1.0, 0.2]\nto = [1.0, 0.2]\nstiffness = 1e5\n',
+        encoding="utf-8",
+    )
+    run = blockvis.run_case(tmp_path / "$\\foo$ 5.toml", tmp_path / "out", outputs=())
+    told = said(run.response, tmp_path / "named.svg")
+    assert "$\\foo$ 5" in told
+    assert " _1 $x_1$" in told
+
+
 def test_a_collapse_is_counted_once(tmp_path):
     """Not as a change to no hinges as well, where the supports alone move at the last equilibrium."""
     response = arch_response()
