@@ -11,7 +11,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from structures import BENT, alike, arch_response, parted, pixels, wall
+from structures import BENT, alike, arch_response, box, parted, pixels, rectangle, wall
 
 import solver
 from blockvis import animate, draw_mechanism, draw_still
@@ -51,6 +51,39 @@ def test_what_is_where(tmp_path):
         )
     assert alike(colour_at(np.array([0.0, 0.3])), palette.PAPER)
     assert alike(colour_at(last.pose.positions[assembly.moving][0]), palette.SETTLEMENT)
+
+
+@pytest.mark.parametrize("foot", [0.0, -0.2], ids=["below its load", "at its centroid"])
+def test_a_support_that_turns_has_an_arrow_at_both_ends(foot, tmp_path):
+    """One arrow would show ground that tilts as pushed aside."""
+    stones = [rectangle(-0.3, 0.4 * k, 0.3, 0.4 * k + 0.4) for k in range(8)]
+    column = solver.Assembly.from_outlines([rectangle(-0.6, -0.4, 0.6, 0), *stones], roles=["moving", *["free"] * 8])
+    tilts = solver.Settlement(rotation=1.0, rotation_centre=(0.0, foot), increment=0.01, limit=0.01)
+    response = solver.Structure(column, friction_coefficient=0.7).settle(tilts)
+    picture = pixels(draw_still(response, 0, tmp_path / "tilt.png", size=SMALL, forces="none"))
+    columns = alike(picture, palette.SETTLEMENT, 30).any(axis=0)
+    middle = SMALL[0] // 2
+    assert not columns[middle]
+    assert columns[:middle].sum() == pytest.approx(columns[middle:].sum(), abs=2)
+    assert columns[middle:].sum() > 3
+
+
+@pytest.mark.parametrize("space", [False, True], ids=["of shallow ground", "magnified in space"])
+def test_arrows_of_supports_are_drawn_whole(space, tmp_path):
+    if space:
+        solids = [box((-1, -1, -0.4), (1, 1, 0)), box((-0.6, -0.6, 0), (0.6, 0.6, 1))]
+        column = solver.Assembly.from_solids(solids, roles=["moving", "free"])
+    else:
+        stones = [rectangle(-0.3, 0.4 * k, 0.3, 0.4 * k + 0.4) for k in range(30)]
+        column = solver.Assembly.from_outlines(
+            [rectangle(-0.6, -0.1, 0.6, 0), *stones], roles=["moving", *["free"] * 30]
+        )
+    motion = solver.Settlement((1, 0, 0) if space else (0, -1), increment=0.04, limit=0.04)
+    response = solver.Structure(column, friction_coefficient=0.7).settle(motion)
+    options = {"size": (500, 500), "magnification": 20.0, "view": "top"} if space else {"size": (1920, 1080)}
+    picture = pixels(draw_still(response, -1, tmp_path / "still.png", forces="none", **options))
+    lengths = np.ptp(np.argwhere(alike(picture, palette.SETTLEMENT)), axis=0)
+    assert lengths.max() >= (35 if space else 95), lengths
 
 
 def test_bent_blocks_are_filled_without_triangle_lines():
