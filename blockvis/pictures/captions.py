@@ -269,7 +269,8 @@ def _state(response: solver.Response, increment: solver.Increment) -> str:
         return "no equilibrium: the mechanism followed step by step"
     if response.limits:
         lowest = len(response.path) > 1 and not response.parameter.is_path and _decides(response, increment)
-        words = f"limit state, {response.limits[0].flow} friction"
+        state = "limit state" if np.isfinite(increment.measured) else "equilibrium under the dead load"
+        words = f"{state}, {response.limits[0].flow} friction"
         return words + (f"   ·   the lowest of {len(response.path)} positions" if lowest else "")
     last = response.path[-1]
     if (increment.phase, increment.parameter) == (last.phase, last.parameter):
