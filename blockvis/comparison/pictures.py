@@ -10,7 +10,14 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
 from blockvis.pictures import palette
-from blockvis.pictures.captions import drops_at_start, force_unit, parameter_label, parameter_unit, value_label
+from blockvis.pictures.captions import (
+    drops_at_start,
+    force_unit,
+    parameter_label,
+    parameter_unit,
+    state_text,
+    value_label,
+)
 from blockvis.pictures.curves import TEXT
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.figures import plain_text
@@ -43,7 +50,7 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
     """Draw both curves in one plot, with where each collapses."""
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     axes = figure.add_subplot()
-    longest = max(comparison.sides, key=lambda side: side.end).response
+    longest = comparison.longest
     per_length, _ = parameter_unit(longest)
     responses = [side.response for side in comparison.sides]
     largest = max(responses, key=lambda response: float(np.nan_to_num(np.abs(response.values)).max()))
@@ -83,7 +90,7 @@ class Pair:
     """
 
     def __init__(self, comparison: Comparison, look: Look, *, falls: bool = False) -> None:
-        self.sides = comparison.sides
+        self.sides, self._longest = comparison.sides, comparison.longest
         self._below = all(_aspect(side) > WIDE for side in self.sides)
         self._panel = WIDE_PANEL if self._below else TALL_PANEL
         self.drawers = [
@@ -116,6 +123,12 @@ class Pair:
             page.paste(image, (left, top + STRIP))
         return page
 
+    def path_picture(self, k: int, parameter: float, *, widths: bool = False) -> Image.Image:
+        """Draw one of both at a parameter over all phases [m or rad], which has the same unit in both."""
+        state = self.sides[k].state(parameter)
+        title = state_text(state, self.sides[k].response, self._longest)
+        return self.drawers[k].picture(state, title=title, widths=widths)
+
     def at(self, parameter: float, *, widths: bool = False) -> Image.Image:
         """Draw both at a parameter over all phases [m or rad].
 
@@ -125,12 +138,7 @@ class Pair:
         widths : bool
             Write the widths of the main cracks.
         """
-        return self.picture(
-            [
-                drawer.picture(side.state(parameter), widths=widths)
-                for side, drawer in zip(self.sides, self.drawers, strict=True)
-            ]
-        )
+        return self.picture([self.path_picture(k, parameter, widths=widths) for k in (0, 1)])
 
 
 def draw_stations(comparison: Comparison, path: Path) -> Path:
@@ -167,10 +175,11 @@ def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int,
         shown: list[object] = [None, None]
         for frame in range(count):
             time = frame / FPS
-            for k, (side, drawer) in enumerate(zip(comparison.sides, pair.drawers, strict=True)):
-                moment = _moment(side, time, end)
+            for k, side in enumerate(comparison.sides):
+                what, at = moment = _moment(side, time, end)
                 if moment != shown[k] or last[k] is None:
-                    last[k], shown[k] = _drawn(side, drawer, moment), moment
+                    last[k] = pair.drawers[k].falling_picture(at) if what == "fall" else pair.path_picture(k, at)
+                    shown[k] = moment
             if progress is not None:
                 progress(frame + 1, count)
             yield pair.picture([image for image in last if image is not None])
@@ -201,10 +210,3 @@ def _moment(side: Side, time: float, end: float) -> tuple[str, float]:
     if side.fall is None or time < arrival + PAUSE:
         return "path", side.end
     return "fall", min(time - arrival - PAUSE, float(side.fall.times[-1]))
-
-
-def _drawn(side: Side, drawer: Drawer, moment: tuple[str, float]) -> Image.Image:
-    what, at = moment
-    if what == "fall":
-        return drawer.falling_picture(at)
-    return drawer.picture(side.state(at))

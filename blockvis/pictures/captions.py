@@ -168,10 +168,10 @@ def matters(increment: solver.Increment, response: solver.Response) -> bool:
     return increment.measured <= MOST_OVER_LOWEST * lowest.measured
 
 
-def state_text(increment: solver.Increment, response: solver.Response) -> str:
-    """Write the first line of a caption: the parameter and what is measured there."""
+def state_text(increment: solver.Increment, response: solver.Response, beside: solver.Response | None = None) -> str:
+    """Write the first line of a caption: the parameter, in the unit of a response beside it, and what is measured."""
     response = in_one_unit(response, increment.phase)
-    place = parameter_text(increment.parameter, response)
+    place = parameter_text(increment.parameter, beside or response)
     if response.parameter.is_path:
         text = f"{response.parameter.name.capitalize()} {place}"
     else:
