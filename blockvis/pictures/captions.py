@@ -240,8 +240,8 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
         Of the displacements.
     """
     parts = [_state(response, increment), *phase_words(response, increment)]
-    # A mechanism that swings out of a limit state has no scale.
-    if not (response.swings and increment.status == solver.Status.FALLING):
+    # A mechanism that swings out of a limit state, or where nothing stood, has no scale.
+    if increment.status != solver.Status.FALLING or (response.path and not response.swings):
         parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")
     parts.append(f"W = {force_text(response.total_weight)}")
     return state_text(increment, response), "   ·   ".join([*parts, *loss_words(increment)])
@@ -266,6 +266,8 @@ def _state(response: solver.Response, increment: solver.Increment) -> str:
     if increment.status == solver.Status.FALLING:
         if response.swings:
             return "pseudo-motion: the mechanism at the limit load, followed to first order and out of scale"
+        if not response.path:
+            return "no equilibrium: pseudo-motion of the mechanism, out of scale"
         return "no equilibrium: the mechanism followed step by step"
     if response.limits:
         lowest = len(response.path) > 1 and not response.parameter.is_path and _decides(response, increment)

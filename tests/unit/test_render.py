@@ -183,6 +183,8 @@ def test_mechanism_of_a_structure_that_never_stood(tmp_path):
     assert response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM
     picture = pixels(draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL))
     assert alike(picture, palette.SETTLEMENT).sum() > 50
+    with Image.open(animate(response, tmp_path / "film.gif", size=(320, 180), fps=10)) as film:
+        assert film.n_frames >= 8, "the mechanism swings out"
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "gif", "webp"])
