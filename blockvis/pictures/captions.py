@@ -240,8 +240,7 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
         Of the displacements.
     """
     parts = [_state(response, increment), *phase_words(response, increment)]
-    # A mechanism that swings out of a limit state, or where nothing stood, has no scale.
-    if increment.status != solver.Status.FALLING or (response.path and not response.swings):
+    if not _swings_out(response, increment):
         parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")
     parts.append(f"W = {force_text(response.total_weight)}")
     return state_text(increment, response), "   ·   ".join([*parts, *loss_words(increment)])
@@ -262,12 +261,18 @@ def phase_words(response: solver.Response, increment: solver.Increment) -> list[
     return [f"phase {increment.phase + 1} of {len(response.settlements)}"] if several else []
 
 
+def _swings_out(response: solver.Response, increment: solver.Increment) -> bool:
+    """Whether a frame is one of a mechanism without scale: of a limit load, or made for want of frames of the fall."""
+    made = all(increment is not one for one in response.increments)
+    return increment.status == solver.Status.FALLING and (made or response.swings)
+
+
 def _state(response: solver.Response, increment: solver.Increment) -> str:
     if increment.status == solver.Status.FALLING:
         if response.swings:
             return "pseudo-motion: the mechanism at the limit load, followed to first order and out of scale"
-        if not response.path:
-            return "no equilibrium: pseudo-motion of the mechanism, out of scale"
+        if _swings_out(response, increment):
+            return "no equilibrium: the mechanism, followed to first order and out of scale"
         return "no equilibrium: the mechanism followed step by step"
     if response.limits:
         lowest = len(response.path) > 1 and not response.parameter.is_path and _decides(response, increment)

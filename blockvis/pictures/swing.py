@@ -88,9 +88,8 @@ def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:
     swing = swing_of(response)
     if not swing.moves:
         return response.increments
-    reaches = (SWING_REACH * (k / SWING_FRAMES) ** 2 for k in range(1, SWING_FRAMES + 1))
-    start = path or response.increments[:1]
-    return (*start, *(swung_increment(swing.increment, reach * swing.motion) for reach in reaches))
+    reaches = (SWING_REACH * (k / SWING_FRAMES) ** 2 for k in range(1 if path else 0, SWING_FRAMES + 1))
+    return (*path, *(swung_increment(swing.increment, reach * swing.motion) for reach in reaches))
 
 
 def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing) -> np.ndarray:
