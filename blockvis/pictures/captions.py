@@ -80,13 +80,18 @@ def in_one_unit(response: solver.Response, phase: int | None = None) -> solver.R
 def parameter_unit(response: solver.Response) -> tuple[float, str]:
     """Factor and unit in which the parameter reads well."""
     parameter = response.parameter
-    largest = max((abs(i.parameter) for i in response.increments), default=0.0)
-    millimetres = parameter.unit == "m" and 0.0 < largest < 0.1 and parameter.is_path
+    millimetres = parameter.unit == "m" and 0.0 < _largest_parameter(response) < 0.1 and parameter.is_path
     return (1e3, "mm") if millimetres else (1.0, parameter.unit)
+
+
+def _largest_parameter(response: solver.Response) -> float:
+    return max((abs(i.parameter) for i in response.increments), default=0.0)
 
 
 def parameter_text(value: float, response: solver.Response) -> str:
     """Write a parameter with its unit, in mm where the whole response stays below a decimetre.
+
+    All of a response have as many decimals, of which the largest has three digits at least.
 
     Parameters
     ----------
@@ -94,7 +99,8 @@ def parameter_text(value: float, response: solver.Response) -> str:
     response : solver.Response
     """
     factor, unit = parameter_unit(response)
-    return f"{value * factor:.2f} {unit}" if unit == "mm" else f"{value * factor:.4f} {unit}"
+    power = int(np.floor(np.log10(factor * _largest_parameter(response) or 1.0)))
+    return f"{value * factor:.{max(2 if unit == 'mm' else 4, 2 - power)}f} {unit}"
 
 
 def parameter_label(response: solver.Response) -> str:

@@ -141,6 +141,14 @@ def test_small_settlements_are_written_in_millimetres(tmp_path):
     assert "solver failed at 5.00 mm: the curve is not complete" in said(response, tmp_path / "curve.svg")
 
 
+@pytest.mark.parametrize(("largest", "told"), [(2.5e-7, "0.000250 mm"), (2.28753e-4, "0.229 mm"), (0.0123, "12.30 mm")])
+def test_settlements_have_digits_however_small_they_are(largest, told, tmp_path):
+    response = arch_response()
+    small = tuple(replace(i, parameter=largest * k) for k, i in enumerate(response.path[:2]))
+    failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=small)
+    assert f"solver failed at {told}: the curve is not complete" in said(failed, tmp_path / "curve.svg")
+
+
 @pytest.mark.slow
 def test_phases_in_other_units_share_no_axis(tmp_path):
     """A block on a support that sinks, then tilts until the block falls over its edge."""
