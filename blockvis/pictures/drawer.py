@@ -215,7 +215,7 @@ class Drawer:
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
-        bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
+        bar = ColourBar(self.largest, fall is not None) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
         self.sheet = Sheet(size, bar, beside)
         self.panel: CurvePanel | None = None

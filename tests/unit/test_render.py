@@ -216,6 +216,19 @@ def test_films_have_their_frames(tmp_path, suffix, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
+def test_the_scale_of_displacements_tells_that_a_fall_goes_further(tmp_path, monkeypatch):
+    """The last tick has a sign beside its number."""
+    inked = []
+    for falls in (True, False):
+        if not falls:
+            monkeypatch.setattr("blockvis.pictures.render.fall_of", lambda response: None)
+        options = {"size": SMALL, "fps": 2, "seconds": 1.0, "colour_by": "displacement"}
+        frames = animate(arch_response(), tmp_path / f"{falls}", **options)
+        scale = pixels(min(frames.iterdir()))[60:, int(0.93 * SMALL[0]) :]
+        inked.append((scale < 128).all(axis=2).sum())
+    assert inked[0] > inked[1] + 5
+
+
 @pytest.mark.slow
 def test_films_that_cannot_be(tmp_path):
     with pytest.raises(ValueError, match=r"641 × 360.*even"):
