@@ -497,12 +497,11 @@ def _ticks(low: float, high: float, n: int) -> list[float]:
 def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tuple[str, str]]:
     """Sum up a response in words and numbers with their units."""
     assembly, path = response.assembly, response.path
-    status = str(response.stop)
-    if response.swings:
-        # That a limit load is found is no collapse that has happened.
-        limit = governing_limit(response)
-        found = limit is None or limit.status is solver.LimitStatus.FOUND
-        status = "limit load found" if found else str(limit.status)
+    limit = governing_limit(response) if response.swings else None
+    # That a limit load is found is no collapse that has happened.
+    status = str(response.stop if limit is None else limit.status)
+    if limit is not None and limit.status is solver.LimitStatus.FOUND:
+        status = "limit load found"
     rows = [("analysis", response.analysis), ("status", status), *KINDS[response.analysis].rows(response)]
     apart = len(response.increments) - len(path)
     loss = loss_of(response)
