@@ -120,6 +120,11 @@ class Comparison:
             return np.zeros(1)
         return self.common_end * np.arange(1, STATIONS + 1) / STATIONS
 
+    @property
+    def longest(self) -> solver.Response:
+        """The response that goes further: its parameter's unit is that of both."""
+        return max(self.sides, key=lambda side: side.end).response
+
     def place_text(self, at: float) -> str:
         """Write a parameter with its name and unit.
 
@@ -127,7 +132,7 @@ class Comparison:
         ----------
         at : float [m or rad]
         """
-        response = max(self.sides, key=lambda side: side.end).response
+        response = self.longest
         several = any(increment.phase for side in self.sides for increment in side.response.path)
         return f"{response.parameter.name} {parameter_text(at, response)}{', all phases added' if several else ''}"
 

@@ -17,7 +17,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
-from blockvis.results.about import collapse_phase, in_phase, unit_in
+from blockvis.results.about import collapse_phase, governing_limit, in_phase, unit_in
 from blockvis.results.swinging import swing_factors, swung_increment
 from blockvis.results.tables import finite
 from blockvis.text import force_text
@@ -322,7 +322,7 @@ class LimitLoadKind(AnalysisKind):
             rows.append(("settlement alone: collapse at", place))
         if state is None or not np.isfinite(state.load_multiplier):
             return rows
-        limit = next((limit for limit, found in response.limit_states if found is state), None)
+        limit = governing_limit(response)
         rows.append(("load multiplier α", f"{state.load_multiplier:.6g}"))
         if limit is not None:
             rows.append(("static, kinematic value", f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))

@@ -216,7 +216,7 @@ class Drawer:
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
-        bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
+        bar = ColourBar(self.largest, fall is not None) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
         self.sheet = Sheet(size, bar, beside)
         self.panel: CurvePanel | None = None
@@ -226,10 +226,11 @@ class Drawer:
 
             self.panel = CurvePanel(response, (beside, self.sheet.inside_size[1]), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
-        self._arrow = ARROW_IN_SPACE * float(frame.size.max())
+        whole = frame.fitted(*self.sheet.inside_size) if self._flat else frame
+        self._arrow = (ARROW if self._flat else ARROW_IN_SPACE) * float(whole.size.max())
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
         heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
-        ends = np.concatenate([self.live.tails, heads, *self._arrow_tips(extra), tied])
+        ends = np.concatenate([self.live.tails, heads, *self._arrow_ends(frame, extra), tied])
         if self._plane is not None:
             ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
         frame = self._with_floor(frame.holding(self._projected(ends)))
@@ -239,8 +240,6 @@ class Drawer:
             palette.block_colours(assembly.materials, assembly.free) if plain else palette.role_colours(assembly)
         )
         self.scene = self._scene(frame)
-        if self._flat:
-            self._arrow = ARROW * float(self.scene.frame.size.max())
         self._loses = bool(response.losses)
         self.force_scale, self.force_shown = self._force_scale()
         self.tints: np.ndarray | None = None
@@ -322,12 +321,12 @@ class Drawer:
         """(n, d) array [m]: places in the picture, or in each of several, of points (n, d) [m]."""
         return points if not self._views else np.asarray(points @ self._axes.T)
 
-    def _arrow_tips(self, extra: tuple[solver.Pose, ...]) -> Iterator[np.ndarray]:
-        """Yield where the arrows at supports in space end: at first and last, and at the extra poses."""
-        if not self._flat:
-            first, last = (self.increments[k] for k in (0, -1))
-            for increment, pose in ((first, first.pose), (last, last.pose), *((last, pose) for pose in extra)):
-                yield self._settlement_arrows(increment, pose)[1]
+    def _arrow_ends(self, frame: Frame, extra: tuple[solver.Pose, ...]) -> Iterator[np.ndarray]:
+        """Yield where the arrows at supports begin and end: at first and last as shown, and at the extra poses."""
+        first, last = (self.increments[k] for k in (0, -1))
+        shown = [(one, magnified(self.assembly, one.pose, self.look.magnification)) for one in (first, last)]
+        for increment, pose in (*shown, *((last, pose) for pose in extra)):
+            yield from self._settlement_arrows(increment, pose, frame if self._flat else None)
 
     def _surveyed(self) -> Iterator[solver.Pose]:
         """Yield the poses as shown, and note what must be the same in all pictures.

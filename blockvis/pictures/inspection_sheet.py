@@ -15,6 +15,7 @@ from blockvis.text import rounded_length
 from solver import mechanics
 
 from . import palette
+from .figures import plain_text
 from .frame import room_in
 
 if TYPE_CHECKING:
@@ -131,6 +132,7 @@ class _Canvas:
         return np.asarray(points @ self.axis.T)
 
 
+@plain_text
 def draw_contents(contents: Contents, path: str | Path) -> Path:
     """Draw what a drawing holds on a sheet with title, findings and legend.
 

@@ -218,7 +218,8 @@ def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
     n = int(parts.max(initial=-1)) + 1
     bodies = f"{mechanics.counted(n, 'moving part')}{', darker where faster' if n > MOST_PARTS else ''}"
     if response.collapse is None and response.limits:
-        return f"mechanism at the limit load   ·   {response.limits[-1].flow} friction   ·   {bodies}"
+        friction = f"{response.limits[-1].flow} friction"
+        return f"mechanism at the limit load   ·   {friction}   ·   {bodies}" if n else f"no mechanism   ·   {friction}"
     if response.collapse is None:
         if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM:
             when = f"before any {response.parameter.name}" if response.measured.is_force else "under the dead load"

@@ -41,7 +41,7 @@ from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.marks import STEEPEST, WIDEST
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.pictures.ties import DrawnTies
-from blockvis.results.about import about, certified, counts_text, loss_of
+from blockvis.results.about import about, certified, counts_text, governing_limit, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
@@ -494,8 +494,11 @@ def _ticks(low: float, high: float, n: int) -> list[float]:
 def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tuple[str, str]]:
     """Sum up a response in words and numbers with their units."""
     assembly, path = response.assembly, response.path
+    limit = governing_limit(response) if response.swings else None
     # That a limit load is found is no collapse that has happened.
-    status = "limit load found" if response.swings and response.limits else str(response.stop)
+    status = str(response.stop if limit is None else limit.status)
+    if limit is not None and limit.status is solver.LimitStatus.FOUND:
+        status = "limit load found"
     rows = [("analysis", response.analysis), ("status", status), *KINDS[response.analysis].rows(response)]
     apart = len(response.increments) - len(path)
     loss = loss_of(response)

@@ -476,6 +476,7 @@ def test_a_load_without_limit_is_unbounded(tmp_path, capsys):
     assert summary["initial_reaction"] is summary["reaction_at_rest"] is summary["last_reaction"] is None
     opened = blockvis.open_results(folder)
     assert opened.limits[0].multiplier == opened.path[0].reaction == np.inf
+    assert "<td>status</td><td>unbounded</td>" in blockvis.write_report(opened, folder / "page.html").read_text("utf-8")
     assert next(csv.DictReader((folder / "response.csv").open()))["reaction"] == "inf"
 
 

@@ -54,6 +54,15 @@ def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_p
         assert (np.abs(curves - np.array(colour)).sum(axis=2) == 0).sum() > 1000
 
 
+def test_both_pictures_of_a_settlement_have_one_unit(arch_results, other, tmp_path, monkeypatch):
+    """That of the run that goes further."""
+    titles, blank = [], Image.new("RGB", (800, 620))
+    picture = "blockvis.pictures.drawer.Drawer.picture"
+    monkeypatch.setattr(picture, lambda *of, title="", **look: titles.append(title.split("   ")[0]) or blank)
+    assert main(["compare", str(arch_results), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    assert titles == [f"Settlement {at} m" for at in ("0.0200", "0.0400", "0.0600") for _ in range(2)]
+
+
 @pytest.mark.slow
 def test_places_of_several_settlements_are_told_as_their_sum(tmp_path):
     structure, folders = solver.Structure(generators.arch(voussoirs=5), friction_coefficient=2.0), []
