@@ -118,8 +118,9 @@ def _areas(shapes: Outlines, contacts: Contacts) -> np.ndarray:
     step = np.where(np.diff(face[order]) == 0, np.diff(along[order]), 0.0)
     length = np.zeros(len(point))
     length[order] = (np.append(step, 0.0) + np.append(0.0, step)) / 2.0 if len(contacts) else 0.0
-    # A corner at a bend of the side that it stands on has two points there.
-    _, corner_of = np.unique(face * len(side) + vertex[point], return_inverse=True)
+    # A corner at a bend of the side that it stands on has two points there; a corner on a corner has one.
+    standing = np.where(on_corner, len(side) + np.arange(len(contacts)), vertex)[point]
+    _, corner_of = np.unique(face * (len(side) + len(contacts)) + standing, return_inverse=True)
     length = (np.bincount(corner_of, length) / np.bincount(corner_of))[corner_of]
     thickness = np.minimum(shapes.thickness[contacts.block_a], shapes.thickness[contacts.block_b])
     return length.reshape(-1, 2).sum(axis=1) * thickness
