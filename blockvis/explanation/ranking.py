@@ -74,6 +74,12 @@ class Cause:
     trials: tuple[Trial, ...]
     weights: tuple[float, ...]
 
+    @property
+    def falls_at(self) -> float:
+        """Amount [m or rad] by which the model has fallen in all runs that agree; inf where one of them goes on."""
+        agree = [t for t, w in zip(self.trials, self.weights, strict=True) if w * TOLD_APART >= max(self.weights)]
+        return max(float(t.run.amounts[-1]) * t.twin.scale if t.run.fell else np.inf for t in agree)
+
 
 @dataclass(frozen=True)
 class Measurement:

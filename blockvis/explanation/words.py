@@ -125,10 +125,20 @@ def in_words(found: Explanation) -> str:
             lines.append(f"{'':41}or, with the same cracks: {', '.join(cause.also)}")
     if len(found.causes) > LISTED:
         lines.append(f"and {len(found.causes) - LISTED} less probable causes")
-    lines += unexplained_texts(found)
+    lines += [*fall_texts(found), *unexplained_texts(found)]
     if len(found.causes) > 1:
         lines.append(f"measure next: {measurement_text(found.next_measurement)}")
     return "\n".join(lines)
+
+
+def fall_texts(found: Explanation) -> list[str]:
+    """Say where the first cause brings the model down: larger amounts are not weighed, and the structure may differ."""
+    return [
+        f"the first cause brings the model down at {amount_text(cause.falls_at, cause.unit)}; larger amounts have no "
+        "probability, though the structure may stand farther"
+        for cause in found.causes[:1]
+        if math.isfinite(cause.falls_at)
+    ]
 
 
 def unexplained_texts(found: Explanation) -> list[str]:
@@ -239,6 +249,7 @@ def _cause_values(cause: Cause) -> dict[str, Any]:
         "amount_low": low,
         "amount_high": high,
         "best_amount": float(cause.best.amounts[cause.at]),
+        "falls_at": cause.falls_at if math.isfinite(cause.falls_at) else None,
         "friction": list(cause.friction),
         "log_likelihood": float(cause.best.log_likelihood[cause.at]),
         "motions": {name: list(motion) for name, motion in candidate.motions.items()},

@@ -21,6 +21,7 @@ from .picture import draw_explanation
 from .words import (
     amount_text,
     cause_text,
+    fall_texts,
     measurement_text,
     percent,
     point_text,
@@ -80,7 +81,7 @@ def explanation_html(found: Explanation, picture: bytes) -> str:
         picture=base64.b64encode(picture).decode("ascii"),
         words=html.escape(_picture_text(found)),
         causes=_causes(found),
-        alike=_alike(found),
+        alike=" ".join([_alike(found), *(f"{html.escape(text.capitalize())}." for text in fall_texts(found))]),
         problems="".join(f"<li>{html.escape(text)}</li>" for text in problems)
         or "<li>The first cause makes all open joints and points, within what observations and model leave open.</li>",
         measurement=html.escape(measurement_text(found.next_measurement)),

@@ -225,6 +225,17 @@ def test_a_point_that_no_candidate_moves_so_is_unexplained(tmp_path):
 
 
 @pytest.mark.slow
+def test_where_the_model_falls_is_told_for_larger_amounts_are_not_weighed(tmp_path):
+    thin = SINKING.replace("voussoirs = 10", "voussoirs = 6, thickness = 0.12").replace('["down"]', '["right"]')
+    (tmp_path / "case.toml").write_text(thin, encoding="utf-8")
+    found = blockvis.explain(tmp_path / "case.toml", [{"joint": "voussoir 3 | voussoir 4", "width [mm]": 30}], tmp_path)
+    best = found.causes[0]
+    assert best.amount[2] <= best.falls_at < best.best.amounts[-1]
+    assert f"the first cause brings the model down at {1e3 * best.falls_at:.3g} mm; larger" in str(found)
+    assert "The first cause brings the model down" in (tmp_path / "explain.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
 def test_the_benchmark_of_causes_runs(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "benchmarks"))
     cases = importlib.import_module("explain_cases")
