@@ -684,8 +684,6 @@ def _run(options: argparse.Namespace) -> int:
     outputs = options.outputs
     if outputs is None:
         outputs = (Drawing(film=not options.no_film, pictures=not options.no_pictures),)
-    if options.output == "":
-        raise ValueError("-o is empty; name the folder of the results")
     started, seconds = time.perf_counter(), options.increment_seconds
     if seconds is not None:
         seconds = _number(seconds)
@@ -851,8 +849,6 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _convert(options: argparse.Namespace) -> int:
-    from dataclasses import replace
-
     from .formats.read import read_layout, write_layout
     from .layout.assemble import assemble, without_twins
     from .layout.layout import layout_of

@@ -203,10 +203,6 @@ class BlockvisAccessor:
             As of :meth:`layout`.
         **options
             As of :meth:`structure`.
-
-        Returns
-        -------
-        solver.Response
         """
         dimension = 3 if direction is not None and len(direction) == 3 else dimension
         structure = self.structure(roles, dimension=dimension, **options)
@@ -242,10 +238,6 @@ class BlockvisAccessor:
             As of :meth:`layout`.
         **options
             As of :meth:`structure`.
-
-        Returns
-        -------
-        solver.LimitLoad
         """
         dimension = 3 if weight_fraction is not None and len(weight_fraction) == 3 else dimension
         structure = self.structure(roles, loads=loads, dimension=dimension, **options)

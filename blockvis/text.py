@@ -31,15 +31,18 @@ def refuse_magnitude(value: float) -> str:
     return f"give a number of {SMALLEST:g} to {LARGEST:g}" if out else ""
 
 
-def length_text(length: float) -> str:
-    """Write a round length [m] with its unit.
+def place_text(place: Iterable[float], digits: int = 4) -> str:
+    """Write a place.
 
     Examples
     --------
-    >>> length_text(0.2), length_text(5.0), length_text(0.002)
-    ('0.2 m', '5 m', '0.002 m')
+    >>> place_text((0.12345, 2.0))
+    '(0.1235, 2)'
+    >>> place_text((1.24e-16, -1e-12))
+    '(0, 0)'
     """
-    return f"{length:g} m"
+    # A place at 0 would be said with the digits of its rounding.
+    return f"({', '.join(f'{round(value, 9) + 0.0:.{digits}g}' for value in place)})"
 
 
 def width_text(width: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,6 +87,8 @@ def fall(response: solver.Response, time: float, shape: str) -> pv.UnstructuredG
         raise ValueError(
             f"nothing falls here ({response.stop}): fall(t) is of what collapses; mesh(-1) is the last equilibrium"
         )
+    if math.isnan(time):
+        raise ValueError(f"time is {time}; give the seconds since the last equilibrium")
     time = min(max(float(time), 0.0), float(found.times[-1]))
     return pv.UnstructuredGrid(fall_grid(response, found, time, shape, falling_in(response)))
 

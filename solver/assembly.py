@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.words import counted, numbers_of
+from solver.words import counted, numbers_of, plain
 
 from .geometry.contacts import Contacts
 from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
@@ -26,7 +26,7 @@ Shapes = Polygons | Polyhedra
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Assembly(Shown):
     """Rigid blocks of a masonry structure, supports included.
 
@@ -266,6 +266,7 @@ class Assembly(Shown):
 
     def outline(self, block: int) -> np.ndarray:
         """(n, 2) array [m]: in the plane, corners of one block, counter-clockwise, before any movement."""
+        block = range(self.n_blocks)[block]
         return self.vertices[self.offsets[block] : self.offsets[block + 1]]
 
     def index(self, name: str) -> int:
@@ -313,7 +314,7 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
     if not assembly.free.any():
         raise ValueError(f"{counted(assembly.n_blocks, 'block')}, all supports; at least one must be free")
     tolerance = DRAWN_GAP * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
-    if not tolerance >= 0.0:
+    if not plain(tolerance, "float", "overlap_tolerance") >= 0.0:
         raise ValueError(f"overlap_tolerance is {tolerance:g} m; it must be at least 0")
     i, j, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
     real = np.flatnonzero(assembly.free[i] | assembly.free[j])

@@ -10,24 +10,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .assembly import Assembly
-from .words import make_plain
+from .words import checked, make_plain, plain
 
 #: Friction coefficient above which it is probably an angle.
 STEEPEST = 3.0
 
 
 def steep_note(friction: float) -> str:
-    """Say what a friction coefficient too large for masonry may have been meant as.
-
-    Parameters
-    ----------
-    friction : float
-
-    Returns
-    -------
-    str
-        Empty for one of masonry, up to 3.
-    """
+    """Say what a friction coefficient too large for masonry may have been meant as; empty for one of up to 3."""
     if friction <= STEEPEST:
         return ""
     angle = f"; if it is an angle in degrees, give its tangent, {math.tan(math.radians(friction)):.3g}"
@@ -75,16 +65,13 @@ class InterfaceLaw:
     def __post_init__(self) -> None:
         """Check the values."""
         make_plain(self)
-        mu = self.friction_coefficient
-        if not (np.isfinite(mu) and mu >= 0):
-            raise ValueError(f"friction_coefficient is {mu:g}; it must be a finite number of at least 0")
-        if not (np.isfinite(self.cohesion) and self.cohesion >= 0.0):
-            raise ValueError(f"cohesion is {self.cohesion:g} Pa; it must be a finite number of at least 0")
+        units = {"friction_coefficient": "", "cohesion": " Pa", "tensile_strength": " Pa"}
+        for name, unit in (units | {"fracture_opening": " m", "fracture_slip": " m"}).items():
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise ValueError(f"{name} is {getattr(self, name):g}{unit}; it must be a finite number of at least 0")
+        mu, tension = self.friction_coefficient, self.tensile_strength
         if not self.compressive_strength > 0.0:
             raise ValueError(f"compressive_strength is {self.compressive_strength:g} Pa; it must be positive")
-        tension = self.tensile_strength
-        if not (np.isfinite(tension) and tension >= 0.0):
-            raise ValueError(f"tensile_strength is {tension:g} Pa; it must be a finite number of at least 0")
         if mu * tension > self.cohesion * (1.0 + 1e-9):
             raise ValueError(
                 f"tensile_strength is {tension:g} Pa, above cohesion / friction_coefficient {self.cohesion / mu:g} Pa, "
@@ -96,8 +83,6 @@ class InterfaceLaw:
                 raise ValueError(f"{name} is {value:g} Pa/m; it must be positive, or left out for a rigid joint")
         for name in ("fracture_opening", "fracture_slip"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
             if value > 0.0 and self.cohesion == 0.0 and tension == 0.0:
                 raise ValueError(
                     f"{name} is {value:g} m, but there is no strength to lose; give cohesion, or leave it out"
@@ -142,6 +127,12 @@ class JointScatter:
 
     seed: int
     quantile: Callable[[np.ndarray], np.ndarray]
+
+    def __post_init__(self) -> None:
+        """Check the seed."""
+        make_plain(self)
+        if self.seed < 0:
+            raise ValueError(f"seed is {self.seed}; give a whole number of at least 0")
 
     def factors(self, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
         """(n,) array: factor of each pair of blocks, in either order."""
@@ -190,14 +181,20 @@ class Interfaces:
     ground: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the ground, and that no pair has two laws."""
-        for (first, second), law in self.pairs.items():
+        """Check the laws, the ground, and that no pair has two laws."""
+        make_plain(self)
+        checked(self.default, InterfaceLaw, "the default law of interfaces")
+        for pair, law in self.pairs.items():
+            checked(law, InterfaceLaw, f"the law of the interface of {pair}")
+            if not isinstance(pair, tuple) or len(pair) != 2:
+                raise ValueError(f"pairs have a law for {pair!r}; give it for two materials")
+            first, second = pair
             if self.pairs.get((second, first), law) != law:
                 raise ValueError(
                     f"the interface of '{first}' and '{second}' has another law as '{second}' and '{first}'; give one"
                 )
         for name, stiffness in self.ground.items():
-            if not (np.isfinite(stiffness) and stiffness > 0.0):
+            if not 0.0 < plain(stiffness, "float", f"the stiffness of the ground under '{name}'") < np.inf:
                 raise ValueError(
                     f"the ground under '{name}' has a stiffness of {stiffness:g} Pa/m; it must be positive"
                 )

@@ -11,9 +11,10 @@ from scipy.sparse.csgraph import connected_components
 
 from .assembly import Assembly
 from .geometry.contacts import Contacts
+from .words import numbers_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pose:
     """Positions and rotations of all blocks, in the plane or in space.
 
@@ -27,6 +28,18 @@ class Pose:
 
     positions: np.ndarray
     rotations: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Check the shapes, and that all is finite."""
+        positions, rotations = (numbers_of(getattr(self, name), name) for name in ("positions", "rotations"))
+        wanted = (len(positions), rotation_count(positions.shape[1])) if positions.ndim == 2 else None
+        if rotations.shape != wanted:
+            what = f"positions of shape {positions.shape} and rotations of shape {rotations.shape}"
+            raise ValueError(f"a pose has {what}; give d and d (d - 1) / 2 numbers per block")
+        for block in np.flatnonzero(~np.isfinite(np.hstack([positions, rotations])).all(axis=1)):
+            raise ValueError(f"the pose of block {block} is {positions[block]}, {rotations[block]}; not finite")
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "rotations", rotations)
 
     @classmethod
     def initial(cls, assembly: Assembly) -> Pose:
@@ -145,7 +158,7 @@ def moved(pose: Pose, q: np.ndarray) -> Pose:
 
 def moved_vertices(assembly: Assembly, pose: Pose) -> np.ndarray:
     """(n_vertices, d) array [m]: corners of all blocks at a pose."""
-    if (given := np.shape(pose.positions)) != (own := assembly.centroids.shape):
+    if (given := pose.positions.shape) != (own := assembly.centroids.shape):
         raise ValueError(f"the pose is of another structure: its positions have shape {given}, the blocks {own}")
     block = assembly.block_of_vertex
     arms = assembly.vertices - assembly.centroids[block]

@@ -20,13 +20,13 @@ from .kinematics import (
     turned,
     turned_moments,
 )
-from .words import make_plain
+from .words import checked, make_plain, numbers_of
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Loads:
     """External loads; they keep their direction when the blocks turn.
 
@@ -36,7 +36,7 @@ class Loads:
         Forces and moments about the centroid on each block as drawn, self-weight included: in the plane fx, fy and the
         counter-clockwise moment, in space fx, fy, fz, mx, my, mz.
     live : (n_blocks, n_dof) array [N, N·m]
-        Loads that the load multiplier scales.
+        Loads that the load multiplier scales; a settlement leaves them out.
     fills : tuple of Backfill
         Fill over the blocks, whose load follows them.
     dead_arms, live_arms : (n_blocks, d, d) array, optional [N·m]
@@ -64,6 +64,8 @@ class Loads:
         load, arms = forces.load(assembly), forces.arms(assembly)
         if kind == "dead":
             return replace(self, dead=self.dead + load, dead_arms=added(self.dead_arms, arms))
+        if kind != "live":
+            raise ValueError(f"kind of the forces is {kind!r}; it is 'dead' or 'live'")
         return replace(self, live=self.live + load, live_arms=added(self.live_arms, arms))
 
     def total(self, multiplier: float = 0.0) -> np.ndarray:
@@ -109,7 +111,7 @@ class PointForces:
     @classmethod
     def at(cls, block: int, force: Sequence[float] | np.ndarray, point: Sequence[float] | np.ndarray) -> PointForces:
         """Return one force."""
-        return cls(np.array([block]), np.array([force], dtype=float), np.array([point], dtype=float))
+        return cls(np.array([block]), numbers_of([force], "force"), numbers_of([point], "point"))
 
     def arms(self, assembly: Assembly) -> np.ndarray:
         """(n_blocks, d, d) array [N·m]: sums of arm from the centroid ⊗ force."""
@@ -212,7 +214,7 @@ class Settlement:
         for stop in self.stops:
             if not 0.0 <= stop <= self.limit:
                 raise ValueError(f"settlement stop {stop:g} is not between 0 and the limit of {self.limit:g}")
-        object.__setattr__(self, "stops", tuple(sorted(float(stop) for stop in self.stops)))
+        object.__setattr__(self, "stops", tuple(sorted(self.stops)))
 
     def _check_profile(self) -> None:
         """Scale the profile so that its largest displacement, or angle where nothing is displaced, is 1."""
@@ -220,9 +222,11 @@ class Settlement:
             raise ValueError(
                 "a settlement with a profile has its supports and motions; give no direction, centre or blocks"
             )
-        motions = {name: np.asarray(motion, dtype=float) for name, motion in (self.profile or {}).items()}
+        given = (self.profile or {}).items()
+        motions = {name: numbers_of(motion, f"settlement profile of '{name}'") for name, motion in given}
+        shapes = [motion.shape for motion in motions.values()]
         for name, motion in motions.items():
-            if motion.shape not in ((3,), (6,)) or not np.isfinite(motion).all():
+            if motion.shape not in ((3,), (6,)) or motion.shape != shapes[0] or not np.isfinite(motion).all():
                 wanted = "[dx, dy, rotation], in space [dx, dy, dz, rx, ry, rz]"
                 raise ValueError(f"settlement profile of '{name}' is {motion.tolist()}; give {wanted}")
         table = np.abs(list(motions.values())).reshape(len(motions), -1 if motions else 3)
@@ -341,7 +345,7 @@ def set_vectors(owner: Any, what: str, counts: Mapping[str, tuple[int, ...]], un
         value = getattr(owner, name)
         if value is None:
             continue
-        vector = np.asarray(value, dtype=float)
+        vector = numbers_of(value, f"{what} {name}")
         if vector.ndim != 1 or len(vector) not in count or not np.isfinite(vector).all():
             wanted = "two finite numbers [x, y]" if count[0] == 2 else "three finite numbers [x, y, z]"
             more = ", or in space three, [x, y, z]" if count == (2, 3) else ""
@@ -401,7 +405,7 @@ def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.nd
     -------
     (n_blocks, n_dof) array [N, N·m]
     """
-    load, parts = _no_load(assembly), np.asarray(fraction)
+    load, parts = _no_load(assembly), numbers_of(fraction, "a fraction of the weight")
     chosen = slice(None) if blocks is None else chosen_blocks(assembly, blocks)
     if parts.shape != (assembly.dimension,):
         raise ValueError(
@@ -437,9 +441,10 @@ def point_load(
         Of the block as drawn: with :meth:`Loads.with_forces` the point goes with its block.
     """
     load, d = _no_load(assembly), assembly.dimension
+    chosen_blocks(assembly, block)
     if d == 3 and np.ndim(moment) == 0 and moment != 0.0:
         raise ValueError(f"a moment in space is {moment!r}; give three numbers, about x, y and z")
-    load[block, d:] = np.asarray(moment, dtype=float)
+    load[block, d:] = numbers_of(moment, "moment")
     acts, at = np.zeros(d) if force is None else force, assembly.centroids[block] if point is None else point
     return load + PointForces.at(block, acts, at).load(assembly)
 
@@ -448,12 +453,12 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
     """Check loads for shape and finite numbers; self-weight where none are given."""
     if loads is None:
         return self_weight(assembly)
-    shape = _no_load(assembly).shape
+    shape, loads = _no_load(assembly).shape, checked(loads, Loads, "loads")
     components = "fx, fy, moment" if assembly.dimension == 2 else "fx, fy, fz, mx, my, mz"
     of_arms = (*assembly.centroids.shape, assembly.dimension), "arm ⊗ force"
     wanted = {"dead": (shape, components), "live": (shape, components), "dead_arms": of_arms, "live_arms": of_arms}
     arrays: dict[str, Any] = {
-        name: np.asarray(given, dtype=float) for name in wanted if (given := getattr(loads, name)) is not None
+        name: numbers_of(given, f"{name} loads") for name in wanted if (given := getattr(loads, name)) is not None
     }
     for name, array in arrays.items():
         size, words = wanted[name]

@@ -36,9 +36,13 @@ class PhaseChange:
 
 
 def removed_before(changes: Sequence[PhaseChange], phase: int, n_blocks: int) -> np.ndarray:
-    """(n_blocks,) bool array: blocks that are taken away before a settlement."""
-    removed = [change.removed for change in changes if change.phase == phase and change.removed is not None]
-    return np.any([np.zeros(n_blocks, dtype=bool), *removed], axis=0)
+    """(n_blocks,) bool array: blocks that are taken away before a settlement, and have not been before."""
+    now, earlier = np.zeros((2, n_blocks), dtype=bool)
+    for change in changes:
+        if change.phase <= phase and change.removed is not None:
+            of = now if change.phase == phase else earlier
+            of |= np.asarray(change.removed, dtype=bool)
+    return now & ~earlier
 
 
 def loads_in(loads: Loads, changes: Sequence[PhaseChange], phase: int) -> Loads:

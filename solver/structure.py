@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from solver.words import counted
+from solver.words import checked, counted, numbers_of
 
 from .analysis.increments import Increments
 from .analysis.limit_load import find_limit_load
@@ -28,7 +29,7 @@ from .ties import Tie, TieForces
 from .views import Shown
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True, init=False, eq=False)
 class Structure(Shown):
     """Blocks with their joints and loads.
 
@@ -68,17 +69,17 @@ class Structure(Shown):
     ) -> None:
         if (interfaces is None) == (friction_coefficient is None):
             raise TypeError("a structure needs either a friction_coefficient or interfaces; give one of them")
-        if interfaces is None:
-            interfaces = uniform(friction_coefficient or 0.0)
+        if friction_coefficient is not None:
+            interfaces = uniform(friction_coefficient)
         if not isinstance(interfaces, Interfaces):
             raise TypeError(
                 f"interfaces are {interfaces!r}; give solver.Interfaces, or friction_coefficient by its name"
             )
-        interfaces.check(assembly)
+        interfaces.check(checked(assembly, Assembly, "assembly"))
         object.__setattr__(self, "assembly", assembly)
         object.__setattr__(self, "interfaces", interfaces)
         object.__setattr__(self, "loads", checked_loads(assembly, loads))
-        object.__setattr__(self, "ties", tuple(ties))
+        object.__setattr__(self, "ties", tuple(checked(tie, Tie, "one of the ties") for tie in ties))
 
     def __repr__(self) -> str:
         """Say how many blocks it has."""
@@ -102,7 +103,7 @@ class Structure(Shown):
         if isinstance(live, PointForces):
             none = replace(self.loads, live=np.zeros_like(self.loads.dead), live_arms=None)
             return replace(self, loads=none.with_forces(self.assembly, live, "live"))
-        return replace(self, loads=replace(self.loads, live=np.asarray(live, dtype=float), live_arms=None))
+        return replace(self, loads=replace(self.loads, live=numbers_of(live, "live loads"), live_arms=None))
 
     def settle(
         self,
@@ -112,7 +113,7 @@ class Structure(Shown):
         changes: Sequence[PhaseChange] = (),
         on_increment: Callable[[Increment], None] | None = None,
     ) -> Response:
-        """Follow the structure from its drawing through the settlement of its supports to collapse.
+        """Follow the structure under its dead loads from its drawing through the settlement of supports to collapse.
 
         Parameters
         ----------
@@ -139,6 +140,8 @@ class Structure(Shown):
         rigid blocks, no-tension frictional contact points, gap functions, a convex program per increment, the geometry
         updated after each, until no equilibrium exists.
         """
+        if self.loads.live.any():
+            warnings.warn("a settlement leaves the live loads out; add what acts during it to the dead", stacklevel=2)
         phases = _phases(settlement)
         increments = settlement_increments(
             self.assembly,
@@ -325,7 +328,7 @@ class Structure(Shown):
         pose, flow, torsion, ties_at, bonds_at, fallen
             As in :meth:`limit_load`.
         """
-        positions = np.asarray(positions, dtype=float)
+        positions = numbers_of(positions, "positions")
         if positions.ndim != 1 or len(positions) == 0:
             raise ValueError(f"positions have shape {positions.shape}; give at least one number")
         given: Any = {"pose": pose, "flow": flow, "torsion": torsion}

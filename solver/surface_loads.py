@@ -8,6 +8,7 @@ import numpy as np
 
 from .assembly import Assembly
 from .loads import PointForces, chosen_blocks
+from .words import numbers_of
 
 
 def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) -> np.ndarray:
@@ -39,7 +40,7 @@ def edge_force(assembly: Assembly, block: int, edge: int, pressure: float) -> Po
     start, stop = ring[edge], ring[(edge + 1) % len(ring)]
     along = stop - start
     inward = np.array([-along[1], along[0]])
-    force = pressure * float(assembly.thickness[block]) * inward
+    force = numbers_of(pressure, "pressure") * float(assembly.thickness[block]) * inward
     return PointForces.at(block, force, (start + stop) / 2.0)
 
 
@@ -75,18 +76,20 @@ def surface_forces(
     direction: Sequence[float] = (0.0, -1.0),
     *,
     blocks: np.ndarray | None = None,
+    removed: np.ndarray | None = None,
 ) -> PointForces:
     """Find the forces of a uniform pressure on what a direction meets first: snow on a top, wind on a flank.
 
-    As :func:`surface_pressure`; each acts where it meets its block, and goes with it.
+    As :func:`surface_pressure`; each acts where it meets its block, and goes with it. Blocks of ``removed``, an
+    (n_blocks,) bool array, have been taken away and shield nothing.
     """
-    push = np.asarray(direction, dtype=float)
+    push = numbers_of(direction, "pressure direction")
     if push.shape != (2,) or not 0.0 < (size := float(np.hypot(*push))) < np.inf:
         raise ValueError(f"pressure direction is {push.tolist()}; give the direction in which it pushes, two numbers")
     push = push / size
     across = np.array([-push[1], push[0]])
     chosen = assembly.free if blocks is None else chosen_blocks(assembly, blocks)
-    strips, depth, block = _first_met(assembly, push, across)
+    strips, depth, block = _first_met(assembly, push, across, removed)
     centre = (strips[:-1] + strips[1:]) / 2.0
     loaded = np.isfinite(depth)
     loaded[loaded] = chosen[block[loaded]]
@@ -139,7 +142,9 @@ def force_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1
     return PointForces.at(owner, force, (x, top))
 
 
-def _first_met(assembly: Assembly, push: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _first_met(
+    assembly: Assembly, push: np.ndarray, across: np.ndarray, removed: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Divide the structure into strips along a direction, between all corners, and find what each meets first.
 
     Gives the ends of the strips, (n + 1,) [m] across, the depth in the middle of each, infinite where there is no
@@ -154,7 +159,8 @@ def _first_met(assembly: Assembly, push: np.ndarray, across: np.ndarray) -> tupl
     low, high = np.minimum(a, b), np.maximum(a, b)
     depth, block = np.full(len(centre), np.inf), np.full(len(centre), -1)
     first, last = np.searchsorted(centre, low), np.searchsorted(centre, high)
-    for edge in np.flatnonzero(last > first).tolist():
+    there = True if removed is None else ~removed[assembly.block_of_vertex]
+    for edge in np.flatnonzero((last > first) & there).tolist():
         under = slice(int(first[edge]), int(last[edge]))
         part = (centre[under] - a[edge]) / (b[edge] - a[edge])
         at = start[edge] @ push + part * float((stop[edge] - start[edge]) @ push)

@@ -150,14 +150,7 @@ def check_ties(ties: Sequence[Tie], assembly: Assembly, n_phases: int) -> None:
 
 
 def tie_ends(ties: Sequence[Tie], assembly: Assembly, pose: Pose) -> np.ndarray:
-    """(n_ties, 2, d) array [m]: where the ends of members are at a pose.
-
-    Parameters
-    ----------
-    ties : sequence of Tie
-    assembly : Assembly
-    pose : Pose
-    """
+    """(n_ties, 2, d) array [m]: where the ends of members are at a pose."""
     drawn = np.array([tie.points for tie in ties], dtype=float).reshape(len(ties), 2, assembly.dimension)
     blocks = _blocks(ties)
     moved = carried(drawn.reshape(-1, assembly.dimension), blocks.ravel(), Pose.initial(assembly), pose)

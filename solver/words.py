@@ -5,9 +5,11 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable
 from dataclasses import fields
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+
+T = TypeVar("T")
 
 #: What to look for where blocks do not stand as drawn.
 REMEDY = (
@@ -17,13 +19,7 @@ REMEDY = (
 
 
 def counted(number: int, one: str, many: str = "") -> str:
-    """Write a number of things: of one in the singular.
-
-    Parameters
-    ----------
-    number : int
-    one, many : str
-        What there is of them; ``many`` is ``one`` with an s unless it is given.
+    """Write a number of things: of one in the singular; ``many`` is ``one`` with an s unless it is given.
 
     Examples
     --------
@@ -37,24 +33,35 @@ def make_plain(owner: Any) -> None:
     """Make plain what a dataclass is given, as JSON takes it; refuse by its name what is none, or not a number."""
     for part in fields(owner):
         kind, _, optional = str(part.type).partition(" | ")
-        value = getattr(owner, part.name)
-        if kind not in _PLAIN or (optional and value is None):
-            continue
-        (wanted, make), text = _PLAIN[kind], isinstance(value, str)
-        try:
-            made = make(np.nan if text else value)
-        except (TypeError, ValueError):
-            made = np.nan
-        if np.any(made != made):
-            what = f"{part.name} is {f'the text {value!r}' if text else value}; give {wanted}"
-            raise TypeError(what) if text else ValueError(what)
-        object.__setattr__(owner, part.name, made)
+        kind, value = kind if kind in _PLAIN else kind.partition("[")[0], getattr(owner, part.name)
+        if kind in _PLAIN and not (optional and value is None):
+            object.__setattr__(owner, part.name, plain(value, kind, part.name))
+
+
+def plain(value: Any, kind: str, what: str) -> Any:
+    """Make plain a value of an annotation; raises ``ValueError``, or for texts ``TypeError``, that says what it is."""
+    (wanted, make), text = _PLAIN[kind], isinstance(value, str)
+    try:
+        made = make(np.nan if text else value)
+    except (TypeError, ValueError):
+        made = np.nan
+    if np.any(made != made):
+        message = f"{what} is {f'the text {value!r}' if text else value}; give {wanted}"
+        raise TypeError(message) if text else ValueError(message)
+    return made
+
+
+def checked(value: Any, kind: type[T], what: str) -> T:
+    """Return a value of this type; raises ``TypeError`` that says what another was to be."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{what} is {value!r}; give solver.{kind.__name__}")
+    return value
 
 
 def numbers_of(value: Any, what: str) -> np.ndarray:
     """Make an array of numbers; raises ``ValueError`` that says what it was to be where there are others."""
     try:
-        return np.asarray(value, dtype=float)
+        return np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"{what} is {value!r}; give numbers, as many in each row") from None
 
@@ -63,6 +70,9 @@ def numbers_of(value: Any, what: str) -> np.ndarray:
 _PLAIN: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "float": ("a number", float),
     "int": ("a whole number", operator.index),
+    "bool": ("True or False", lambda value: bool(value) if value in (False, True) else np.nan),
     "tuple[str, ...]": ("a sequence of names", lambda names: tuple(map(str, names))),
+    "tuple[float, ...]": ("a sequence of numbers", lambda numbers: tuple(map(float, numbers))),
+    "Mapping": ("a mapping, by names", dict),
     "np.ndarray": ("an array of numbers", np.asarray),
 }

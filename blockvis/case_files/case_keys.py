@@ -13,7 +13,7 @@ import numpy as np
 import solver
 from blockvis.cases.backfill import BACKFILL
 from blockvis.cases.bonds import BOND
-from blockvis.cases.build import DENSITY, THICKNESS
+from blockvis.cases.build import THICKNESS
 from blockvis.cases.explain_settings import EXPLAIN
 from blockvis.cases.imperfections import IMPERFECTIONS
 from blockvis.cases.key import (
@@ -41,6 +41,7 @@ from blockvis.cases.ties import TIES
 from blockvis.cases.toml_table import Table, shortened
 from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
+from blockvis.layout.inspect import DENSITY
 from blockvis.layout.joints.close import WAYS
 from blockvis.layout.sights import SIGHTS, read_cut, read_sight
 from blockvis.layout.units import UNITS
@@ -347,8 +348,8 @@ SUPPORTS = Section(
             [[-0.5, -0.3], [4.0, -0.3], [4.0, 0.0], [-0.5, 0.0]], "m", required=True),
         Key("levels", _LEVELS, "In space, z of its bottom and top", [-0.3, 0.0], "m", otherwise="required in space"),
         Key("material", TEXT, "Material, for [[interfaces]]", "rock", otherwise="none"),
-        Key("stiffness", POSITIVE, "Subgrade modulus of the ground, which gives under the blocks on it and does not "
-            "pull; a settlement is that of the ground below", 5e7, "Pa/m", otherwise="rigid"),
+        Key("stiffness", POSITIVE, "Subgrade modulus of the ground, which along a path gives under the blocks on it "
+            "and does not pull; a settlement is that of the ground below", 5e7, "Pa/m", otherwise="rigid"),
     ),
     several=True,
 )  # fmt: skip

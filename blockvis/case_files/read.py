@@ -32,18 +32,14 @@ from . import case_keys as keys
 from .decimal_comma import decimal_comma
 
 
-def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
+def read_case(path: str | Path, changes: str | Sequence[str] = ()) -> Case:
     """Read and check a case file.
 
     Parameters
     ----------
     path : str or Path
-    changes : sequence of str
+    changes : str or sequence of str
         Changes for this time, as ``"material.friction_coefficient=0.5"``; see :func:`changed_text`.
-
-    Returns
-    -------
-    Case
 
     Raises
     ------
@@ -53,6 +49,7 @@ def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
     """
     path = Path(path)
     text = case_file_text(path)
+    changes = (changes,) if isinstance(changes, str) else changes
     return parse_case(changed_text(text, path, changes) if changes else text, path)
 
 
@@ -262,13 +259,15 @@ def _check_phases(case: Case) -> None:
 
 
 def refuse_increment_seconds(case: Case, seconds: float | None) -> None:
-    """Raise ValueError where nothing looks at the time that an increment may take: where there are no steps.
+    """Raise ValueError for no time above 0, and where nothing looks at it: where there are no steps.
 
     Parameters
     ----------
     case : Case
     seconds : float or None [s]
     """
+    if seconds is not None and not seconds > 0.0:
+        raise ValueError(f"increment_seconds is {seconds:g}; give seconds above 0")
     has_steps = bool(KINDS[case.analysis].course(case).drivers)
     if seconds is not None and (not has_steps or case.controls.increments == mechanics.INCREMENTS[1]):
         raise ValueError(

@@ -39,15 +39,13 @@ def first_sentence(case: Path) -> str:
     return re.split(r"(?<=\.)\s", remarks, maxsplit=1)[0]
 
 
-def copy_case(name: str, folder: str | Path = ".", *, overwrite: bool = False) -> list[Path]:
-    """Copy a shipped case, and the drawing or the table of cracks that it names, into one folder.
+def copy_case(name: str, *, overwrite: bool = False) -> list[Path]:
+    """Copy a shipped case, and the drawing or the table of cracks that it names, into the working directory.
 
     Parameters
     ----------
     name : str
         With or without ``.toml``.
-    folder : str or Path
-        It is made if it is missing.
     overwrite : bool
         Whether files that are there may be replaced.
 
@@ -77,7 +75,7 @@ def copy_case(name: str, folder: str | Path = ".", *, overwrite: bool = False) -
     for quoted in text.split('"')[1::2]:
         if quoted.startswith(_DRAWINGS):
             contents[PurePosixPath(quoted).name] = (source.parent / quoted).read_bytes()
-    targets = {Path(folder) / file: content for file, content in contents.items()}
+    targets = {Path(file): content for file, content in contents.items()}
     for target in targets:
         if target.exists() and not overwrite:
             raise FileExistsError(f"{target} is there already; --force replaces it")

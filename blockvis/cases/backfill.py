@@ -128,6 +128,8 @@ def lay_backfill(
     for key, value, least in (("unit_weight", unit_weight, 1e-300), ("pressure_coefficient", pressure_coefficient, 0)):
         if not least <= value < np.inf:
             raise ValueError(f"{where} {key} is {value:g}; give a number {'of at least' if least == 0 else 'above'} 0")
+    if not np.isfinite(surface):
+        raise ValueError(f"{where} surface is {surface:g} m; give the height of its top, a finite number")
     pieces, block = extrados(assembly, _chosen(names, assembly, where), surface)
     if not len(pieces):
         raise ValueError(f"{where} over: none of {_listed(names)} looks up to the surface; name the topmost blocks")

@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import ArrayLike
 
 import solver
+from blockvis.text import place_text
 
 #: A point on a block's edge or face lies in it, up to this, in block sizes.
 ON_EDGE = 1e-6
@@ -60,16 +61,20 @@ def note_outside(assembly: solver.Assembly, point: Sequence[float], block: int, 
     corners = assembly.vertices[assembly.block_of_vertex == block]
     apart = float(np.linalg.norm(point - np.clip(point, corners.min(axis=0), corners.max(axis=0))))
     if apart > assembly.block_size:
-        place = ", ".join(f"{x:g}" for x in point)
         warnings.warn(
-            f"{where} ({place}) lies {apart:.3g} m outside block '{assembly.names[block]}', {role} all the same: "
-            "is it in m?",
+            f"{where} {place_text(point, 6)} lies {apart:.3g} m outside block '{assembly.names[block]}', {role} all "
+            "the same: is it in m?",
             stacklevel=3,
         )
 
 
 def block_at(
-    assembly: solver.Assembly, point: Sequence[float], chosen: np.ndarray, towards: Sequence[float], where: str
+    assembly: solver.Assembly,
+    point: Sequence[float],
+    chosen: np.ndarray,
+    towards: Sequence[float],
+    where: str,
+    gone: np.ndarray,
 ) -> int:
     """Find the block that holds a point.
 
@@ -85,15 +90,17 @@ def block_at(
         Of a force at the point.
     where : str
         File, table and key, for the message.
+    gone : (n_blocks,) bool array
+        Blocks that have been taken away before, which hold nothing.
 
     Raises
     ------
     ValueError
-        If none of them holds the point; names the nearest and how far it is.
+        If none of them that is left holds the point; names the nearest and how far it is.
     """
     apart = distances_to(assembly, point)
     holding = chosen[apart[chosen] <= ON_EDGE * assembly.block_size]
-    place = f"({', '.join(f'{x:g}' for x in point)})"
+    place = place_text(point, 6)
     if len(holding) == 0:
         nearest = int(chosen[apart[chosen].argmin()])
         other = int(apart.argmin())
@@ -105,6 +112,12 @@ def block_at(
             f"{where} {place} m lies in none of the blocks meant; the nearest is '{assembly.names[nearest]}', "
             f"{apart[nearest]:.3g} m away{inside}"
         )
+    if gone[holding].all():
+        raise ValueError(
+            f"{where} {place} m lies in '{assembly.names[holding[0]]}', which [[remove]] has taken away by then; give "
+            "a point of a block that is left"
+        )
+    holding = holding[~gone[holding]]
     if len(holding) == 1:
         return int(holding[0])
     size = float(np.linalg.norm(towards))

@@ -16,6 +16,7 @@ from blockvis.formats.read import overlap_remedy, read_layout, read_outlines
 from blockvis.layout import layout
 from blockvis.layout.assemble import assemble, supports_of
 from blockvis.layout.facing import DEFAULT_FACING
+from blockvis.layout.inspect import DENSITY
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.units import better_unit, doubt
@@ -29,8 +30,8 @@ from .contents import Case
 from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
-from .profiles import cut_ground, pieces_named, with_profiles
-from .removals import removed_blocks, removed_ties
+from .profiles import cut_ground, pieces_named
+from .removals import gone_in, removed_blocks, removed_ties
 from .role_places import with_roles_by_place
 from .ties import check_layers, drawn_ties, ties_of, without_tie_lines
 
@@ -46,8 +47,8 @@ LONGEST_STEP = 0.1
 #: A settlement that ends further than so many times the size of the structure is probably in mm.
 FARTHEST_LIMIT = 5.0
 
-#: Defaults of blocks for which neither file nor case has a value [kg/m³, m].
-DENSITY, THICKNESS = 2000.0, 1.0
+#: Default of blocks for which neither file nor case has a value [m]; for density that of what is inspected.
+THICKNESS = 1.0
 
 
 def case_assembly(case: Case) -> solver.Assembly:
@@ -64,7 +65,7 @@ def case_assembly(case: Case) -> solver.Assembly:
         For a layout that cannot be read or built, for a file whose unit is in doubt while the case gives none, and for
         settlements without a moving support.
     """
-    sketch = _case_layout(case)
+    sketch = without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[0]
     _refuse_doubted_unit(case, sketch)
     sketch = with_roles_by_place(sketch, case.role_places)
     _refuse_shared_names(case, sketch)
@@ -253,10 +254,6 @@ def _chosen(case: Case) -> dict[str, Any]:
     return {"view": case.view, "ignore": ignore, "only": case.only, "window": case.window, **case.image}
 
 
-def _case_layout(case: Case) -> layout.Layout:
-    return without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[0]
-
-
 def _drawn_layout(case: Case) -> layout.Layout:
     thickness = case.thickness or THICKNESS
     if case.file is not None and case.bonds:
@@ -307,7 +304,7 @@ def case_interfaces(case: Case) -> solver.Interfaces:
 
 def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
     """Sum self-weight and the loads of a case that do not move [N, N·m], and lay its fill over the blocks."""
-    loads = loads_of(case.loads, assembly, case.source)
+    loads = loads_of(case.loads, assembly, case.source, gone_in(case.removals, assembly, 1))
     return replace(loads, fills=backfills(case.backfills, assembly))
 
 
@@ -324,7 +321,7 @@ def case_changes(case: Case, assembly: solver.Assembly, ties: Sequence[solver.Ti
         for one in case.removals
     ]
     for phase in sorted({load.phase for load in case.loads} - {1}):
-        added = loads_of(case.loads, assembly, case.source, phase)
+        added = loads_of(case.loads, assembly, case.source, gone_in(case.removals, assembly, phase), phase)
         changes.append(solver.PhaseChange(phase - 1, dead=added.dead, dead_arms=added.dead_arms))
     return tuple(changes)
 
@@ -335,9 +332,6 @@ def case_ties(case: Case, assembly: solver.Assembly) -> tuple[solver.Tie, ...]:
     if case.tie_layers:
         check_layers(case.ties, case.tie_layers, case.source)
         lines = without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[1]
-    return ties_of(drawn_ties(case.ties, lines), assembly)
-
-
-def case_settlements(case: Case, assembly: solver.Assembly) -> tuple[solver.Settlement, ...]:
-    """Settlements of a case, those with a profile as the motion of each support of the assembly."""
-    return with_profiles(case.settlements, case.profiles, assembly, case.source)
+    ties = drawn_ties(case.ties, lines)
+    gone = {phase: gone_in(case.removals, assembly, phase) for phase in {tie.phase for tie in ties}}
+    return ties_of(ties, assembly, gone)

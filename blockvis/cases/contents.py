@@ -43,7 +43,7 @@ class Case:
     settings : optional
         What that kind has read from its own keys; see :meth:`blockvis.kinds.kind.AnalysisKind.read`.
     profiles : tuple of Profile or None
-        Of the settlements along x; :func:`blockvis.cases.build.case_settlements` makes motions of supports of them.
+        Of the settlements along x; :func:`blockvis.cases.profiles.with_profiles` makes motions of supports of them.
     increment_seconds : float or None [s]
         What an increment of a path may take.
     explain : ExplainSettings

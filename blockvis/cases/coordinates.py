@@ -21,6 +21,8 @@ def check_coordinates(case: Case, assembly: solver.Assembly) -> None:
     d = assembly.dimension
     control = case.settings if isinstance(case.settings, solver.ControlDisplacement) else None
     given = [("control", key, getattr(control, key, None)) for key in ("direction", "point")]
+    for tie in case.ties:
+        given += [(f"ties '{tie.name}'", key, end.point) for key, end in zip(("from", "to"), tie.ends, strict=False)]
     for table, key, numbers in (*_of_settlements(case, d), *_of_loads(case, d), *given):
         if numbers is not None and len(numbers) != d:
             wanted = "three numbers [x, y, z]" if d == 3 else "two numbers [x, y]"
@@ -74,6 +76,8 @@ def _refuse_plane_keys(case: Case) -> None:
     for key, is_given in (
         ("closing", case.closing != "auto"),
         ("outline_tolerance", case.outline_tolerance is not None),
+        # Of a drawing that dimension = 3 sets up it is the depth.
+        ("thickness", case.thickness is not None and case.dimension != 3),
     ):
         if is_given:
             raise ValueError(f"{case.source}: [geometry] {key} belongs to outlines in the plane; leave it out in space")

@@ -71,7 +71,7 @@ class LoadCase:
 
 
 def loads_of(
-    entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path, phase: int | None = None
+    entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path, gone: np.ndarray, phase: int | None = None
 ) -> solver.Loads:
     """Sum self-weight and the loads that do not move and act from the start.
 
@@ -81,6 +81,8 @@ def loads_of(
     assembly : solver.Assembly
     source : Path
         The case file, for messages.
+    gone : (n_blocks,) bool array
+        Blocks that have been taken away before the loads begin to act: they neither carry them nor shield others.
     phase : int, optional
         Instead of those all loads, without self-weight, that begin to act with this settlement, counted from 1.
 
@@ -92,8 +94,8 @@ def loads_of(
     Raises
     ------
     ValueError
-        For a pattern that matches no free block, a point in none of those it matches, and for an edge that a block
-        does not have.
+        For a pattern that matches no free block that is left, a point in none of those it matches, and for an edge
+        that a block does not have.
     """
     loads = solver.self_weight(assembly)
     if phase is not None:
@@ -101,16 +103,17 @@ def loads_of(
     for number, load in enumerate(entries):
         if load.positions or load.phase != (phase or 1):
             continue
-        chosen = _chosen(load, assembly, f"{source}: [loads {number + 1}] blocks")
+        named = _named(load, assembly, gone, f"{source}: [loads {number + 1}] blocks")
+        chosen = named[~gone[named]]
         if load.weight_fraction is not None:
             loads = _plus(loads, load.kind, solver.weight_fraction(assembly, load.weight_fraction, chosen))
-        for block in _loaded(load, chosen, assembly, f"{source}: [loads {number + 1}]"):
+        for block in _loaded(load, named, gone, assembly, f"{source}: [loads {number + 1}]"):
             loads = _plus(loads, load.kind, solver.point_load(assembly, block, moment=load.moment))
             if load.has_force:
                 point = assembly.centroids[block] if load.point is None else load.point
                 loads = loads.with_forces(assembly, solver.PointForces.at(block, load.force, point), load.kind)
         if load.pressure is not None and load.edge is None:
-            forces = solver.surface_forces(assembly, load.pressure, load.direction, blocks=chosen)
+            forces = solver.surface_forces(assembly, load.pressure, load.direction, blocks=chosen, removed=gone)
             loads = loads.with_forces(assembly, forces, load.kind)
         if load.pressure is not None and load.edge is not None:
             for block in chosen:
@@ -180,13 +183,14 @@ def with_moving_load(
     return loads.with_forces(assembly, live(int(np.argmin(np.abs(places - x)))), "live")
 
 
-def _loaded(load: LoadCase, chosen: np.ndarray, assembly: solver.Assembly, where: str) -> list[int]:
+def _loaded(load: LoadCase, named: np.ndarray, gone: np.ndarray, assembly: solver.Assembly, where: str) -> list[int]:
     """List the blocks on which a force or moment acts: with a point, the one that holds it."""
     if not (load.has_force or load.has_moment):
         return []
-    if load.point is not None and len(chosen) > 1:
+    if load.point is not None and len(named) > 1:
         towards = load.force if load.has_force else (0.0,) * assembly.dimension
-        return [block_at(assembly, load.point, chosen, towards, f"{where} point")]
+        return [block_at(assembly, load.point, named, towards, f"{where} point", gone)]
+    chosen = named[~gone[named]]
     if load.point is not None:
         note_outside(assembly, load.point, int(chosen[0]), f"{where} point", "on which the force acts")
     if load.has_force and len(chosen) > 1:
@@ -199,7 +203,7 @@ def _loaded(load: LoadCase, chosen: np.ndarray, assembly: solver.Assembly, where
     return chosen.tolist()
 
 
-def _chosen(load: LoadCase, assembly: solver.Assembly, where: str) -> np.ndarray:
+def _named(load: LoadCase, assembly: solver.Assembly, gone: np.ndarray, where: str) -> np.ndarray:
     named = [i for i, name in enumerate(assembly.names) if matches([name], [load.blocks])]
     chosen = [i for i in named if assembly.free[i]]
     if not chosen and named:
@@ -209,5 +213,10 @@ def _chosen(load: LoadCase, assembly: solver.Assembly, where: str) -> np.ndarray
         raise ValueError(
             f"{where} '{load.blocks}' matches no free block{nearest(load.blocks, names)}; "
             f"the layout has {', '.join(names[:12])}"
+        )
+    if gone[chosen].all():
+        raise ValueError(
+            f"{where} '{load.blocks}' matches only what [[remove]] has taken away before settlement {load.phase}, from "
+            "which on the load acts; name a block that is left, or leave the load out"
         )
     return np.array(chosen)

@@ -67,16 +67,28 @@ def removed_blocks(removal: Removal, assembly: solver.Assembly) -> np.ndarray:
     return np.isin(assembly.names, _matching(removal.blocks, assembly.names, f"{removal.where} blocks", "block"))
 
 
+def gone_in(removals: Sequence[Removal], assembly: solver.Assembly, phase: int) -> np.ndarray:
+    """(n_blocks,) bool array: blocks that have been taken away before a settlement, counted from 1, or earlier."""
+    gone = [removed_blocks(one, assembly) for one in removals if one.phase <= phase]
+    return np.any([np.zeros(assembly.n_blocks, dtype=bool), *gone], axis=0)
+
+
 def removed_ties(removal: Removal, ties: Sequence[solver.Tie]) -> tuple[str, ...]:
     """Names of the ties that a table takes away.
 
     Raises
     ------
     ValueError
-        For a name that no tie has.
+        For a name that no tie has, and a tie that is installed later.
     """
-    names = [tie.name for tie in ties]
-    return tuple(_matching(removal.ties, names, f"{removal.where} ties", "tie"))
+    chosen = _matching(removal.ties, [tie.name for tie in ties], f"{removal.where} ties", "tie")
+    late = next((tie for tie in ties if tie.name in chosen and tie.phase >= removal.phase), None)
+    if late is not None:
+        raise ValueError(
+            f"{removal.where} ties: '{late.name}' is installed before settlement {late.phase}, and taken away before "
+            f"settlement {removal.phase}; give phase = {late.phase + 1} or later, or leave it out"
+        )
+    return tuple(chosen)
 
 
 def _matching(patterns: Sequence[str], names: Sequence[str], where: str, what: str) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 import solver
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, in_words, matches
-from blockvis.text import nearest
+from blockvis.text import nearest, place_text
 from solver import mechanics
 
 from .block_at import ON_EDGE, block_at, distances_to, note_outside
@@ -303,7 +303,9 @@ def drawn_ties(entries: Sequence[TieCase], lines: Sequence[LeftOut]) -> list[Tie
     return found
 
 
-def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[solver.Tie, ...]:
+def ties_of(
+    entries: Sequence[TieCase], assembly: solver.Assembly, gone: Mapping[int, np.ndarray]
+) -> tuple[solver.Tie, ...]:
     """Find the blocks that hold the ends of ties.
 
     Parameters
@@ -311,26 +313,29 @@ def ties_of(entries: Sequence[TieCase], assembly: solver.Assembly) -> tuple[solv
     entries : sequence of TieCase
         As of :func:`drawn_ties`.
     assembly : solver.Assembly
+    gone : mapping of int to (n_blocks,) bool array
+        By phase: blocks that have been taken away before ties are installed.
 
     Raises
     ------
     ValueError
-        For an end in no block, both in one, a tie without length; names the tie and the remedy.
+        For an end in no block that is left, both in one, a tie without length; names the tie and the remedy.
     """
-    return tuple(_in_blocks(entry, assembly) for entry in entries)
+    return tuple(_in_blocks(entry, assembly, gone[entry.phase]) for entry in entries)
 
 
-def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> solver.Tie:
+def _in_blocks(entry: TieCase, assembly: solver.Assembly, gone: np.ndarray) -> solver.Tie:
     where = f"{entry.where} '{entry.name}'"
-    points = tuple(_place(end.point, assembly, where) for end in entry.ends)
-    length = float(np.linalg.norm(np.subtract(points[1], points[0])))
+    points = tuple(_place(end.point, assembly) for end in entry.ends)
+    along = np.subtract(points[0], points[1])
+    length = float(np.linalg.norm(along))
     if not length > 0.0:
         raise ValueError(
-            f"{where}: a {entry.kind} has no length: both ends are at {_written(points[0])}; give two places"
+            f"{where}: a {entry.kind} has no length: both ends are at {place_text(points[0], 6)}; give two places"
         )
     blocks = tuple(
-        _holding(end, points[k], np.subtract(points[k], points[1 - k]), assembly, f"{where} {('from', 'to')[k]}", entry)
-        for k, end in enumerate(entry.ends)
+        _holding(end, points[k], away, assembly, gone, f"{where} {('from', 'to')[k]}", entry)
+        for k, (end, away) in enumerate(zip(entry.ends, (along, -along), strict=True))
     )
     if blocks[0] == blocks[1]:
         held = "the ground" if blocks[0] is None else f"the block '{assembly.names[blocks[0]]}'"
@@ -349,17 +354,19 @@ def _in_blocks(entry: TieCase, assembly: solver.Assembly) -> solver.Tie:
     )
 
 
-def _place(point: tuple[float, ...], assembly: solver.Assembly, where: str) -> tuple[float, ...]:
+def _place(point: tuple[float, ...], assembly: solver.Assembly) -> tuple[float, ...]:
     """Give a point as many coordinates as the blocks have: a drawing in the plane stands upright in space."""
-    if len(point) == assembly.dimension:
-        return point
-    if len(point) == 2:
-        return (point[0], 0.0, point[1])
-    raise ValueError(f"{where}: {_written(point)} has three coordinates, and the blocks lie in the plane; give [x, y]")
+    return point if len(point) == assembly.dimension else (point[0], 0.0, point[1])
 
 
 def _holding(
-    end: TieEnd, point: tuple[float, ...], away: np.ndarray, assembly: solver.Assembly, where: str, entry: TieCase
+    end: TieEnd,
+    point: tuple[float, ...],
+    away: np.ndarray,
+    assembly: solver.Assembly,
+    gone: np.ndarray,
+    where: str,
+    entry: TieCase,
 ) -> int | None:
     """Find the block that holds an end; None for the ground."""
     if end.fixed:
@@ -371,6 +378,11 @@ def _holding(
                 f"{where}: no block is called '{end.block}'{near}; the layout has {', '.join(assembly.names[:12])}"
             )
         block = assembly.index(end.block)
+        if gone[block]:
+            raise ValueError(
+                f"{where}: [[remove]] has taken '{end.block}' away before settlement {entry.phase}, before which the "
+                f"{entry.kind} is installed; name a block that is left"
+            )
         note_outside(assembly, point, block, where, "which holds this end")
         return block
     every = np.arange(assembly.n_blocks)
@@ -387,11 +399,11 @@ def _holding(
                 f"{where.rpartition(' ')[2]} = {fixed} and {other}; the line itself goes to another layer"
             )
         raise ValueError(
-            f"{where} {_written(point)} m lies in no block; the nearest is '{near}', {apart.min():.3g} m away"
+            f"{where} {place_text(point, 6)} m lies in no block; the nearest is '{near}', {apart.min():.3g} m away"
             f"{_in_metres(point, assembly)}; {remedy}"
         )
     # Where several blocks meet, it is the one behind the anchor.
-    return block_at(assembly, point, every, away.tolist(), where)
+    return block_at(assembly, point, every, away.tolist(), where, gone)
 
 
 def _in_metres(point: tuple[float, ...], assembly: solver.Assembly) -> str:
@@ -399,9 +411,5 @@ def _in_metres(point: tuple[float, ...], assembly: solver.Assembly) -> str:
     for unit, factor in UNITS.items():
         scaled = tuple(factor * x for x in point)
         if distances_to(assembly, scaled).min() <= ON_EDGE * assembly.block_size:
-            return f" (if it is in {unit}, write {_written(scaled)}: coordinates of a case are in m)"
+            return f" (if it is in {unit}, write {place_text(scaled, 6)}: coordinates of a case are in m)"
     return ""
-
-
-def _written(point: Sequence[float]) -> str:
-    return f"({', '.join(f'{x:g}' for x in point)})"

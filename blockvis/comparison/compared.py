@@ -55,7 +55,7 @@ class Side:
     folder: Path
     response: solver.Response
     fall: Fall | None
-    case: dict[str, str]
+    case: dict[str, Any]
 
     @property
     def end(self) -> float:
@@ -123,6 +123,11 @@ class Comparison:
             return np.zeros(1)
         return self.common_end * np.arange(1, STATIONS + 1) / STATIONS
 
+    @property
+    def longest(self) -> solver.Response:
+        """The response that goes further: its parameter's unit is that of both."""
+        return max(self.sides, key=lambda side: side.end).response
+
     def place_text(self, at: float) -> str:
         """Write a parameter with its name and unit.
 
@@ -130,15 +135,22 @@ class Comparison:
         ----------
         at : float [m or rad]
         """
-        response = max(self.sides, key=lambda side: side.end).response
+        response = self.longest
         several = any(increment.phase for side in self.sides for increment in side.response.path)
         return f"{response.parameter.name} {parameter_text(at, response)}{', all phases added' if several else ''}"
 
     def changed_keys(self) -> list[tuple[str, str, str]]:
         """List the keys of the cases whose values differ, with both."""
         one, other = (side.case for side in self.sides)
-        keys = dict.fromkeys([*one, *other])
-        return [(key, one.get(key, "–"), other.get(key, "–")) for key in keys if one.get(key) != other.get(key)]
+        found = []
+        for key in dict.fromkeys([*one, *other]):
+            values = one.get(key), other.get(key)
+            if values[0] != values[1]:
+                first, second = (_value_text(value, _unit_of(key)) for value in values)
+                # Beyond the digits of people.
+                first, second = map(str, values) if first == second else (first, second)
+                found.append((key, first, second))
+        return found
 
     def rows(self) -> list[tuple[str, str, str]]:
         """List the numbers of both runs under one name, as the report of each has them."""
@@ -237,7 +249,7 @@ def _labels(one: Path, other: Path) -> tuple[str, str]:
     return short if all(short) and short[0] != short[1] else (first, second)
 
 
-def _flat(values: Any, name: str = "") -> Iterator[tuple[str, str]]:
+def _flat(values: Any, name: str = "") -> Iterator[tuple[str, Any]]:
     """Yield the values of a table of TOML with the keys that lead to them."""
     if isinstance(values, Mapping):
         for key, value in values.items():
@@ -246,7 +258,7 @@ def _flat(values: Any, name: str = "") -> Iterator[tuple[str, str]]:
         for number, value in enumerate(values, start=1):
             yield from _flat(value, f"{name} {number}")
     else:
-        yield name, _value_text(values, _unit_of(name))
+        yield name, values
 
 
 def _unit_of(name: str) -> str:
@@ -259,10 +271,12 @@ def _unit_of(name: str) -> str:
 
 
 def _value_text(value: Any, unit: str) -> str:
-    """Write a value of a case as people do."""
+    """Write a value of a case as people do, of one that is not there a dash."""
+    if value is None:
+        return "–"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, int | float):
+    if isinstance(value, float) or (isinstance(value, int) and unit):
         return quantity_text(value, unit)
     if isinstance(value, list):
         return ", ".join(_value_text(one, unit) for one in value)

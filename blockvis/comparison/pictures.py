@@ -10,9 +10,17 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
 from blockvis.pictures import palette
-from blockvis.pictures.captions import drops_at_start, force_unit, parameter_label, parameter_unit, value_label
+from blockvis.pictures.captions import (
+    drops_at_start,
+    force_unit,
+    parameter_label,
+    parameter_unit,
+    state_text,
+    value_label,
+)
 from blockvis.pictures.curves import TEXT
 from blockvis.pictures.drawer import Drawer, Look
+from blockvis.pictures.figures import plain_text
 from blockvis.pictures.film import END, PAUSE
 from blockvis.pictures.frame import fitting_font, framed
 from blockvis.pictures.swing import shown_increments
@@ -37,11 +45,12 @@ FPS, SECONDS = 25.0, 6.0
 STRIP = 40
 
 
+@plain_text
 def draw_curves(comparison: Comparison, path: Path) -> Path:
     """Draw both curves in one plot, with where each collapses."""
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     axes = figure.add_subplot()
-    longest = max(comparison.sides, key=lambda side: side.end).response
+    longest = comparison.longest
     per_length, _ = parameter_unit(longest)
     responses = [side.response for side in comparison.sides]
     largest = max(responses, key=lambda response: float(np.nan_to_num(np.abs(response.values)).max()))
@@ -53,7 +62,7 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
         # The drop from rest is no part of the path, as in the curve of one run.
         first = 1 if drops_at_start(response) else 0
         axes.plot(x[: 2 * first], y[: 2 * first], ":", color=ink, linewidth=1.5)
-        axes.plot(x[first:], y[first:], line, marker=marker, color=ink, linewidth=2.0, label=side.label)
+        axes.plot(x[first:], y[first:], line, marker=marker, color=ink, linewidth=2.0, label=f" {side.label}")
         if response.collapse is not None:
             axes.plot(x[-1:], y[-1:], "X", color=ink, markersize=9)
             axes.axvline(x[-1], color=ink, linewidth=1.0, linestyle=":")
@@ -81,7 +90,7 @@ class Pair:
     """
 
     def __init__(self, comparison: Comparison, look: Look, *, falls: bool = False) -> None:
-        self.sides = comparison.sides
+        self.sides, self._longest = comparison.sides, comparison.longest
         self._below = all(_aspect(side) > WIDE for side in self.sides)
         self._panel = WIDE_PANEL if self._below else TALL_PANEL
         self.drawers = [
@@ -114,6 +123,12 @@ class Pair:
             page.paste(image, (left, top + STRIP))
         return page
 
+    def path_picture(self, k: int, parameter: float, *, widths: bool = False) -> Image.Image:
+        """Draw one of both at a parameter over all phases [m or rad], which has the same unit in both."""
+        state = self.sides[k].state(parameter)
+        title = state_text(state, self.sides[k].response, self._longest)
+        return self.drawers[k].picture(state, title=title, widths=widths)
+
     def at(self, parameter: float, *, widths: bool = False) -> Image.Image:
         """Draw both at a parameter over all phases [m or rad].
 
@@ -123,12 +138,7 @@ class Pair:
         widths : bool
             Write the widths of the main cracks.
         """
-        return self.picture(
-            [
-                drawer.picture(side.state(parameter), widths=widths)
-                for side, drawer in zip(self.sides, self.drawers, strict=True)
-            ]
-        )
+        return self.picture([self.path_picture(k, parameter, widths=widths) for k in (0, 1)])
 
 
 def draw_stations(comparison: Comparison, path: Path) -> Path:
@@ -165,10 +175,11 @@ def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int,
         shown: list[object] = [None, None]
         for frame in range(count):
             time = frame / FPS
-            for k, (side, drawer) in enumerate(zip(comparison.sides, pair.drawers, strict=True)):
-                moment = _moment(side, time, end)
+            for k, side in enumerate(comparison.sides):
+                what, at = moment = _moment(side, time, end)
                 if moment != shown[k] or last[k] is None:
-                    last[k], shown[k] = _drawn(side, drawer, moment), moment
+                    last[k] = pair.drawers[k].falling_picture(at) if what == "fall" else pair.path_picture(k, at)
+                    shown[k] = moment
             if progress is not None:
                 progress(frame + 1, count)
             yield pair.picture([image for image in last if image is not None])
@@ -199,10 +210,3 @@ def _moment(side: Side, time: float, end: float) -> tuple[str, float]:
     if side.fall is None or time < arrival + PAUSE:
         return "path", side.end
     return "fall", min(time - arrival - PAUSE, float(side.fall.times[-1]))
-
-
-def _drawn(side: Side, drawer: Drawer, moment: tuple[str, float]) -> Image.Image:
-    what, at = moment
-    if what == "fall":
-        return drawer.falling_picture(at)
-    return drawer.picture(side.state(at))

@@ -87,10 +87,6 @@ def explain(
     progress : bool
         Whether a bar, and lines where stderr is no terminal, count the runs and name their causes.
 
-    Returns
-    -------
-    Explanation
-
     Raises
     ------
     ValueError
@@ -109,17 +105,7 @@ def explain(
         if not isinstance(case, Case):
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
-        if case.removals:
-            raise ValueError(
-                f"{case.removals[0].where} takes away what blockvis explain would follow: it knows the structure as "
-                "drawn; leave it out, and such blocks out of the drawing"
-            )
-        for tie in case.ties:
-            if tie.phase > 1:
-                raise ValueError(
-                    f"{tie.where} '{tie.name}': phase is {tie.phase}, and blockvis explain follows one movement of the "
-                    "supports; leave phase out, or a tie that was installed after the cracks"
-                )
+        _refuse_phases(case)
         refuse_ties(case)
         drawn = case_assembly(case)
         _refuse_grounded(case_ties(case, drawn), case)
@@ -166,6 +152,27 @@ def explain(
     if folder is not None:
         write_explanation(found, Path(folder))
     return found
+
+
+def _refuse_phases(case: Case) -> None:
+    """Raise ValueError for what happens between two settlements: one movement is followed, from the drawing on."""
+    if case.removals:
+        raise ValueError(
+            f"{case.removals[0].where} takes away what blockvis explain would follow: it knows the structure as "
+            "drawn; leave it out, and such blocks out of the drawing"
+        )
+    for tie in case.ties:
+        if tie.phase > 1:
+            raise ValueError(
+                f"{tie.where} '{tie.name}': phase is {tie.phase}, and blockvis explain follows one movement of the "
+                "supports; leave phase out, or a tie that was installed after the cracks"
+            )
+    for number, load in enumerate(case.loads, start=1):
+        if load.phase > 1:
+            raise ValueError(
+                f"{case.source}: [loads {number}] phase is {load.phase}, and blockvis explain has no settlement "
+                "before which the load begins to act; leave phase out if it acts from the start, or the load"
+            )
 
 
 def _refuse_grounded(ties: Sequence[solver.Tie], case: Case) -> None:

@@ -18,6 +18,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 import solver
 from blockvis.pictures import palette
 from blockvis.pictures.drawer import WHOLE, magnified
+from blockvis.pictures.figures import plain_text
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.cracks import SMALLEST_OPENING
@@ -52,6 +53,7 @@ ALIKE = 0.02
 MOST_LABELS = 24
 
 
+@plain_text
 def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     """Draw what was observed, and what the two most probable causes make.
 

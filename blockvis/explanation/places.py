@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 import shapely
 
@@ -63,17 +61,3 @@ def _on_lines(points: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndar
 def nearest_block(assembly: solver.Assembly, point: np.ndarray) -> int:
     """Find the block in which a point lies, or the nearest."""
     return int(np.argmin(distances_to(assembly, point)))
-
-
-def place_text(place: Iterable[float], digits: int = 4) -> str:
-    """Write a place.
-
-    Examples
-    --------
-    >>> place_text((0.12345, 2.0))
-    '(0.1235, 2)'
-    >>> place_text((1.24e-16, -1e-12))
-    '(0, 0)'
-    """
-    # A place at 0 would be said with the digits of its rounding.
-    return f"({', '.join(f'{round(value, 9) + 0.0:.{digits}g}' for value in place)})"

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from blockvis.text import place_text
 from solver.mechanics import counted
-
-from .places import place_text
 
 if TYPE_CHECKING:
     from .observations import Observations

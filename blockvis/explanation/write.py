@@ -44,13 +44,7 @@ MOST_CAUSES, MOST_OBSERVATIONS = 12, 200
 
 
 def write_explanation(found: Explanation, folder: Path) -> None:
-    """Write the page, its numbers and its picture.
-
-    Parameters
-    ----------
-    found : Explanation
-    folder : Path
-    """
+    """Write the page, its numbers and its picture."""
     make_folder(folder)
     write_atomic(folder / "explain.json", json.dumps(values_of(found), indent=2, ensure_ascii=False) + "\n")
     picture = draw_explanation(found, folder / "explain.png")

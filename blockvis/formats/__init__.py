@@ -53,5 +53,6 @@ FORMATS = {
     **dict.fromkeys((
         ".inp", ".bdf", ".fem", ".nas", ".med", ".mesh", ".meshb", ".su2", ".ugrid", ".vol", ".xdmf", ".xmf",
         ".mdpa", ".avs", ".cgns", ".exo", ".f3grid", ".tec", ".wkt", ".h5m", ".xml", ".post", ".dato", ".hmf",
+        ".e", ".ex2",
     ), Format("meshio_files")),
 }  # fmt: skip

@@ -21,6 +21,7 @@ from blockvis.layout.selection import MORTAR
 from blockvis.layout.solids import fans, volume, width_of
 from blockvis.layout.views import VIEWS, axis_across, view_along
 from solver import mechanics
+from solver.mechanics import counted
 
 from .accepted import bend_of, bent_note, pieces_note
 from .reading import Reading
@@ -183,7 +184,8 @@ def layout_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
             best = one
     name, along = view_along(best.axis), "xyz"[best.axis]
     notes: list[str] = [
-        f"{len(bodies)} bodies were read as outlines in {name}; their depth along {along} is the thickness "
+        f"{counted(len(bodies), 'body was read as an outline', 'bodies were read as outlines')} in {name}; "
+        f"{'their' if len(bodies) > 1 else 'its'} depth along {along} is the thickness "
         "(dimension = 3 takes them into space)"
     ]
     middle = (best.low + best.high) / 2.0
@@ -354,7 +356,7 @@ def _selected(found: Bodies, path: Path | str, reading: Reading) -> _Selection:
     size = float(spread_of(every, f"'{path}'").max())
     if not 0.0 < size < LARGEST_SIZE:
         raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
-    return _Selection(bodies, [_with_role(found.rows[k]) for k in kept], size, dropped)
+    return _Selection(bodies, [with_role(found.rows[k]) for k in kept], size, dropped)
 
 
 def _mortar(found: Bodies, labels: Sequence[Sequence[str]], only: Sequence[str]) -> list[int]:
@@ -375,7 +377,7 @@ def _mortar(found: Bodies, labels: Sequence[Sequence[str]], only: Sequence[str])
     return around
 
 
-def _with_role(row: dict[str, Any]) -> dict[str, Any]:
+def with_role(row: dict[str, Any]) -> dict[str, Any]:
     """Take the role of a body from the beginning of its group or name: modellers number objects, "fixed.001"."""
     if row.get("role"):
         return row

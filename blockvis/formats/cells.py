@@ -14,12 +14,12 @@ import numpy as np
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
-from blockvis.layout.notes import UPRIGHT, kind_of
+from blockvis.layout.notes import LEFT_OUT, UPRIGHT, Note, kind_of
 from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 from solver import mechanics
 from solver.mechanics import counted
 
-from .bodies import Bodies, Body
+from .bodies import Bodies, Body, with_role
 from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
 
 #: Names of the cell array that numbers the blocks, in order of preference.
@@ -90,7 +90,7 @@ def layout_of_cells(
     first = np.unique(owner, return_index=True)[1]
     notes = tuple(text for text in (how, note) if text)
     layout = Layout(blocks=tuple(outlines), names=tuple(names), unit="", notes=notes)
-    layout = with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
+    layout = with_rows(layout, [with_role(row_of(data, int(cell), names[k])) for k, cell in enumerate(first)])
     return layout.leaving_out(unusable)
 
 
@@ -150,6 +150,15 @@ def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, An
         if key in data and len(data[key]) > cell and np.ndim(data[key][cell]) == 0:
             row[key] = float(data[key][cell])
     return row
+
+
+def flat_beside(bodies: Sequence[np.ndarray], flat: Sequence[np.ndarray]) -> tuple[str, ...]:
+    """Count in a note the flat cells that are no skin of those with a volume; given are the points of each cell."""
+    if not len(flat):
+        return ()
+    lost = ~np.isin(np.concatenate(flat), np.concatenate([np.ravel(one) for one in bodies]))
+    n = int(np.logical_or.reduceat(lost, np.cumsum([0, *map(len, flat)])[:-1]).sum())
+    return (Note(LEFT_OUT, f"left out: {counted(n, 'flat cell')} beside bodies"),) if n else ()
 
 
 def merged(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path | str) -> Layout | Bodies:
@@ -234,7 +243,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
     )
     groups = [{"group": label} if label else {} for part, label in parts for _ in range(part.n_blocks)]
     rows = [row for part in named for row in rows_of(part)]
-    return with_rows(layout, [group | row for group, row in zip(groups, rows, strict=True)])
+    return with_rows(layout, [with_role(group | row) for group, row in zip(groups, rows, strict=True)])
 
 
 def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path | str) -> Layout | Bodies:

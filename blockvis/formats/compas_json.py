@@ -72,11 +72,13 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies 
     ValueError
         For damaged meshes, bodies that are not closed, and blocks whose geometry is no mesh.
     """
+    meshes: list[_Mesh] = []
     try:
-        meshes = list(_meshes(content, _Context()))
+        meshes.extend(_meshes(content, _Context()))
     except (LookupError, TypeError, AttributeError, OverflowError) as error:
         raise ValueError(
-            f"'{path}' has a mesh of COMPAS that cannot be read ({type(error).__name__} {error}); export it again"
+            f"'{path}' has a mesh of COMPAS that cannot be read, number {len(meshes) + 1} ({type(error).__name__} "
+            f"{error}); export it again"
         ) from None
     except ValueError as error:
         raise ValueError(f"'{path}': {error}") from None
@@ -244,7 +246,11 @@ def _matrix(data: Mapping[str, Any]) -> np.ndarray:
     """(4, 4) array: the transformation of an element or model, or that of its frame."""
     transformation = _unwrapped(data.get("transformation"))[0]
     if isinstance(transformation, dict):
-        return np.array(transformation["matrix"], dtype=float).reshape(4, 4)
+        numbers = np.array(transformation["matrix"], dtype=float)
+        if numbers.size != 16:
+            called = data.get("name") or data.get("guid") or "without a name"
+            raise ValueError(f"the transformation of '{called}' has {numbers.size} numbers, not 4 × 4; export it again")
+        return numbers.reshape(4, 4)
     return _of_frame(_unwrapped(data.get("frame"))[0])
 
 
@@ -308,8 +314,8 @@ def _mesh(points: np.ndarray, faces: list[list[int]], data: dict[str, Any], name
     if context.material.get("name"):
         row["material"] = str(context.material["name"])
     density = context.material.get("density", attributes.get("density"))
-    if isinstance(density, int | float) and density > 0:
-        row["density"] = float(density)
+    if density:
+        row["density"] = density
     outside = [k for face in faces for k in face if not 0 <= k < len(points)]
     if outside:
         raise IndexError(f"a face uses point {outside[0]} of {len(points)}")

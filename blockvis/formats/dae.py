@@ -50,12 +50,19 @@ def drawn_in(path: Path) -> Drawn:
     text = path.read_bytes()
     if re.search(rb"<!\s*(DOCTYPE|ENTITY)", text, re.IGNORECASE):
         raise ValueError("it defines XML entities")
+    if re.search(rb"<(?:\w+:)?float_array[^>]*>[^<]*\bnan\b", text, re.IGNORECASE):
+        # pycollada reads it as 0.
+        raise ValueError("it has NaN for a number; coordinates must be finite")
     # Faults of materials and cameras are no matter here; of geometry they are.
     document = collada.Collada(str(path), ignore=[collada.common.DaeError])
     announced = len(re.findall(rb"<(?:\w+:)?geometry\s", text))
     if len(document.geometries) < announced:
         damaged = f"{announced - len(document.geometries)} of {announced} geometries are damaged"
         raise ValueError(f"{damaged}: {document.errors[-1]}" if document.errors else damaged)
+    broken = (error.msg for error in document.errors if isinstance(error, collada.common.DaeBrokenRefError))
+    lost = next((words for words in broken if re.match("Geometry|Controller|Node", words)), None)
+    if lost is not None:
+        raise ValueError(f"it places what is not in it: {lost}")
     about = document.assetInfo
     order, up = UP.get(str(about.upaxis), UP["Y_UP"])
     metres = float(about.unitmeter or 1.0)

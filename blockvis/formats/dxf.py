@@ -18,7 +18,7 @@ from blockvis.layout.choice import Choice, look_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import CHANGED, LEFT_OUT, UPRIGHT, Note, kind_of
-from blockvis.layout.outlines import FLAT, arc_points
+from blockvis.layout.outlines import FLAT, arc_points, sagitta
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import metres_per
 from blockvis.layout.views import VIEWS, axis_across, upright_note
@@ -61,6 +61,7 @@ class _Outlines:
     layers: list[str] = field(default_factory=list)
     rows: list[dict[str, Any]] = field(default_factory=list)
     looks: list[tuple[str, ...]] = field(default_factory=list)
+    offs: list[float] = field(default_factory=list)
     loose: list[Line] = field(default_factory=list)
     skipped: Counter[str] = field(default_factory=Counter)
     hidden: Counter[str] = field(default_factory=Counter)
@@ -70,8 +71,10 @@ class _Outlines:
     meshes: list[DrawnMesh] = field(default_factory=list)
     faces: list[int] = field(default_factory=list)
 
-    def add(self, ring: np.ndarray, entity: Any, handle: str) -> None:
+    def add(self, ring: np.ndarray, entity: Any, handle: str, off: float = 0.0) -> None:
+        """Add an outline (n, 3) whose chords are up to ``off`` from its curves."""
         self.rings.append(ring)
+        self.offs.append(off)
         self.layers.append(str(entity.dxf.layer))
         self.names.append(f"block {handle}")
         self.rows.append(_own_data(entity))
@@ -80,6 +83,7 @@ class _Outlines:
     def append(self, ring: np.ndarray, level: float, layer: str, name: str, looks: tuple[str, ...]) -> None:
         """Add an outline (n, 2) that lines make, at a level."""
         self.rings.append(np.column_stack([ring, np.full(len(ring), level)]))
+        self.offs.append(0.0)
         self.layers.append(layer)
         self.names.append(name)
         self.rows.append({})
@@ -103,9 +107,10 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     from ezdxf import recover
 
     try:
-        with path.open("rb") as file:
-            is_binary = file.read(len(BINARY)) == BINARY
-        if is_binary:
+        content = path.read_bytes()
+        if b"SECTION" not in content:
+            raise ValueError(f"it begins with {content[:16]!r}")
+        if content.startswith(BINARY):
             # recover reads text only.
             document = ezdxf.readfile(path)
             audit = document.audit()
@@ -130,7 +135,7 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     if closed:
         found.meshes += closed
         for k in reversed(found.faces):
-            for each in (found.rings, found.names, found.layers, found.rows, found.looks):
+            for each in (found.rings, found.names, found.layers, found.rows, found.looks, found.offs):
                 del each[k]
     meshes = _chosen_meshes(found, reading)
     if meshes:
@@ -289,14 +294,14 @@ def _inserted(insert: Any, path: Path) -> Iterator[Any]:
         ) from None
 
 
-def _points(curve: Any, tolerance: float | None) -> np.ndarray:
-    """(n, 3) array: points of a path, its arcs replaced by chords within the tolerance, both ends included."""
+def _points(curve: Any, tolerance: float | None) -> tuple[np.ndarray, float]:
+    """(n, 3) array: points of a path, its arcs replaced by chords, both ends included; how far these are off it."""
     box = np.array([(p.x, p.y, p.z) for p in curve.control_vertices()])
     size = float(np.ptp(box, axis=0).max()) if len(box) and np.isfinite(box).all() else 0.0
     if not curve.has_curves or size == 0.0:
-        return box
+        return box, 0.0
     distance = max(1e-3 * size if tolerance is None else tolerance, 1e-6 * size)
-    return np.array([(p.x, p.y, p.z) for p in curve.flattening(distance, segments=2)])
+    return np.array([(p.x, p.y, p.z) for p in curve.flattening(distance, segments=2)]), distance
 
 
 def _add(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
@@ -325,8 +330,7 @@ def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | No
     if kind == "SPLINE":
         clamped = _clamped(entity.control_points, entity.weights, entity.knots, entity.dxf.degree)
         entity.control_points, entity.weights, entity.knots = clamped
-    exact = _circular(entity, tolerance)
-    points = _points(make_path(entity), tolerance) if exact is None else exact
+    points, off = _circular(entity, tolerance) or _points(make_path(entity), tolerance)
     if len(points) < 2:
         found.skipped[f"{kind} without length"] += 1
         return
@@ -340,13 +344,14 @@ def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | No
     if joined is not None:
         ring, miss = joined
         # A closed polyline may have a short last edge: it stays.
-        found.add(points if closes and miss > CLOSES * float(np.ptp(points, axis=0).max()) else ring, entity, handle)
+        short = closes and miss > CLOSES * float(np.ptp(points, axis=0).max())
+        found.add(points if short else ring, entity, handle, off)
         found.misses += [] if closes else [miss]
         return
     if closes and kind not in ("LINE", "ARC") and len(points) > 3:
-        found.add(points, entity, handle)
+        found.add(points, entity, handle, off)
         return
-    found.loose.append(Line(points, str(entity.dxf.layer), handle, kind not in ("LINE", "ARC"), _looks(entity)))
+    found.loose.append(Line(points, str(entity.dxf.layer), handle, kind not in ("LINE", "ARC"), _looks(entity), off))
 
 
 def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, Any, Any]:
@@ -376,8 +381,8 @@ def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, A
     return (found[:, :-1] / found[:, -1:]).tolist(), found[:, -1].tolist() if len(weights) else [], ends.tolist()
 
 
-def _circular(entity: Any, tolerance: float | None) -> np.ndarray | None:
-    """(n, 3) array: points of an entity of lines and circular arcs; None for other entities.
+def _circular(entity: Any, tolerance: float | None) -> tuple[np.ndarray, float] | None:
+    """(n, 3) array: points of an entity of lines and circular arcs, and how far chords are off it; None for others.
 
     The chords are measured on the arcs themselves: ezdxf's paths replace an arc by a cubic first, which deviates from
     it by up to 2.7e-4 of the radius.
@@ -386,40 +391,44 @@ def _circular(entity: Any, tolerance: float | None) -> np.ndarray | None:
     if kind == "SPLINE" and entity.dxf.degree == 1 and len(entity.control_points):
         # Straight from corner to corner: ezdxf would put a smooth curve through them.
         straight = np.array([(*point,) for point in entity.control_points])
-        return np.concatenate([straight, straight[:1]]) if entity.closed else straight
+        return (np.concatenate([straight, straight[:1]]) if entity.closed else straight), 0.0
     if kind in ("CIRCLE", "ARC"):
         start, end = (0.0, 360.0) if kind == "CIRCLE" else (entity.dxf.start_angle, entity.dxf.end_angle)
         sweep = math.radians((end - start) % 360.0 or 360.0)
-        c = entity.dxf.center
-        flat = arc_points(np.array([c.x, c.y]), abs(float(entity.dxf.radius)), math.radians(start), sweep, tolerance)
+        c, radius = entity.dxf.center, abs(float(entity.dxf.radius))
+        flat = arc_points(np.array([c.x, c.y]), radius, math.radians(start), sweep, tolerance)
+        off = sagitta(radius, sweep / (len(flat) - 1))
         level = float(c.z)
     elif kind == "LWPOLYLINE":
-        flat = _with_bulges([(x, y, b) for x, y, b in entity.get_points("xyb")], bool(entity.closed), tolerance)
+        flat, off = _with_bulges([(x, y, b) for x, y, b in entity.get_points("xyb")], bool(entity.closed), tolerance)
         level = float(entity.dxf.elevation)
     elif kind == "POLYLINE" and entity.is_2d_polyline and not entity.dxf.flags & 6:
         corners = [(v.dxf.location.x, v.dxf.location.y, float(v.dxf.bulge)) for v in entity.vertices]
-        flat = _with_bulges(corners, bool(entity.is_closed), tolerance)
+        flat, off = _with_bulges(corners, bool(entity.is_closed), tolerance)
         level = float(entity.dxf.elevation.z) if entity.dxf.hasattr("elevation") else 0.0
     else:
         return None
     system = entity.ocs()
-    return np.array([(*system.to_wcs((x, y, level)),) for x, y in flat]).reshape(-1, 3)
+    return np.array([(*system.to_wcs((x, y, level)),) for x, y in flat]).reshape(-1, 3), off
 
 
-def _with_bulges(corners: list[tuple[float, float, float]], closed: bool, tolerance: float | None) -> np.ndarray:
-    """(n, 2) array: points of a polyline, its arcs replaced by chords; a closed one ends where it starts."""
+def _with_bulges(
+    corners: list[tuple[float, float, float]], closed: bool, tolerance: float | None
+) -> tuple[np.ndarray, float]:
+    """(n, 2) array: points of a polyline, a closed one ends where it starts; how far the chords are off its arcs."""
     from ezdxf.math import bulge_to_arc
 
-    points = [np.array(corner[:2]) for corner in corners[:1]]
+    points, off = [np.array(corner[:2]) for corner in corners[:1]], 0.0
     following = [*corners[1:], *(corners[:1] if closed else [])]
     for (x, y, bulge), (u, v, _) in zip(corners, following, strict=False):
         if bulge and np.isfinite(bulge) and (x, y) != (u, v):
             centre, start, end, radius = bulge_to_arc((x, y), (u, v), bulge)
             sweep = (end - start) % (2 * math.pi)
             arc = arc_points(np.array([centre.x, centre.y]), radius, start, sweep, tolerance)
+            off = max(off, sagitta(radius, sweep / (len(arc) - 1)))
             points += list((arc if bulge > 0 else arc[::-1])[1:-1])
         points.append(np.array([u, v]))
-    return np.array(points).reshape(-1, 2)
+    return np.array(points).reshape(-1, 2), off
 
 
 def _looks(entity: Any) -> tuple[str, ...]:
@@ -437,8 +446,8 @@ def _looks(entity: Any) -> tuple[str, ...]:
     return (kind, "#{:02x}{:02x}{:02x}".format(*int2rgb(DXF_DEFAULT_COLORS[number])), str(number))
 
 
-def _hatch_rings(entity: Any, tolerance: float | None) -> list[np.ndarray]:
-    """(n, 3) arrays: boundaries of a hatch."""
+def _hatch_rings(entity: Any, tolerance: float | None) -> list[tuple[np.ndarray, float]]:
+    """(n, 3) arrays: boundaries of a hatch, and how far their chords are off its curves."""
     from ezdxf.math import Vec2
     from ezdxf.path import from_hatch
 
@@ -451,16 +460,16 @@ def _hatch_rings(entity: Any, tolerance: float | None) -> list[np.ndarray]:
                     edge.control_points, edge.weights, edge.knot_values = Vec2.list(clamped[0]), *clamped[1:]
             # Boundaries of separate edges may turn either way and contain splines: ezdxf orders them.
             return [_points(curve, tolerance) for curve in from_hatch(entity)]
-        flat = _with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance)
+        flat, off = _with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance)
         system = entity.ocs()
         level = float(entity.dxf.elevation.z) if entity.dxf.hasattr("elevation") else 0.0
-        rings.append(np.array([(*system.to_wcs((x, y, level)),) for x, y in flat]).reshape(-1, 3))
+        rings.append((np.array([(*system.to_wcs((x, y, level)),) for x, y in flat]).reshape(-1, 3), off))
     return rings
 
 
 def _add_hatch(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
-    rings = _hatch_rings(entity, tolerance)
-    rings = [ring[:-1] if (ring[0] == ring[-1]).all() else ring for ring in rings if len(ring) > 2]
+    bounds = [(ring, off) for ring, off in _hatch_rings(entity, tolerance) if len(ring) > 2]
+    rings = [ring[:-1] if (ring[0] == ring[-1]).all() else ring for ring, _ in bounds]
     if not rings:
         found.skipped["HATCH without boundary"] += 1
         return
@@ -478,9 +487,9 @@ def _add_hatch(entity: Any, handle: str, found: _Outlines, tolerance: float | No
         layer, name = str(entity.dxf.layer), f"hatch {handle}"
         found.left_out.append(LeftOut("hole", outer, message, layer, name, holes=holes, looks=_looks(entity)))
         return
-    outlined = [ring for ring in rings if not _drawn_already(ring, found)]
-    for k, ring in enumerate(outlined):
-        found.add(ring, entity, handle if len(rings) == 1 else f"{handle}.{k}")
+    outlined = [k for k, ring in enumerate(rings) if not _drawn_already(ring, found)]
+    for number, k in enumerate(outlined):
+        found.add(rings[k], entity, handle if len(rings) == 1 else f"{handle}.{number}", bounds[k][1])
 
 
 def _within(inner: np.ndarray, outer: np.ndarray) -> bool:
@@ -501,14 +510,14 @@ def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     unwanted, wanted = _chosen_lines(found, reading)
     # Outlines that will be left out are not cut.
     able = [i for i, layer in enumerate(found.layers) if not unwanted.takes([layer], found.looks[i])]
-    faces = faces_of_lines(wanted, [found.rings[i][:, :2] for i in able])
+    faces = faces_of_lines(wanted, [found.rings[i][:, :2] for i in able], [found.offs[i] for i in able])
     found.left_out += faces.left_out
     for k, pieces in sorted(faces.pieces.items(), reverse=True):
         i = able[k]
         level = float(found.rings[i][0, 2])
         for number, piece in enumerate(pieces):
             found.append(piece, level, found.layers[i], f"{found.names[i]}.{number}", found.looks[i])
-        for values in (found.rings, found.layers, found.names, found.rows, found.looks):
+        for values in (found.rings, found.layers, found.names, found.rows, found.looks, found.offs):
             del values[i]
     for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
         found.append(ring, 0.0, layer, f"face {number}", ("face",))

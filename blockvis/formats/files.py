@@ -58,6 +58,8 @@ def _of_one_format(found: list[Path], path: Path) -> list[Path]:
     """Order the files that a name stands for; refuse those of several formats, and too many."""
     suffixes = sorted({entry.suffix.lower() for entry in found})
     if len(suffixes) > 1:
+        if (path / "summary.json").is_file():
+            raise ValueError(f"'{path}' is a folder of results; give '{path / 'blocks.pvd'}', or one of its .vtu")
         counts = ", ".join(f"{sum(e.suffix.lower() == suffix for e in found)} {suffix}" for suffix in suffixes[:8])
         example = (path if path.is_dir() else path.parent) / f"*{suffixes[0]}"
         raise ValueError(f"'{path}' holds files of several formats ({counts}); choose one of them: '{example}'")

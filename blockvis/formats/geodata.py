@@ -227,7 +227,9 @@ def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Fe
     if start is None or blob[3] & 32:
         raise ValueError(f"{called} is of an extended kind, which is not read; export it again")
     try:
-        return Feature(shapely.from_wkb(blob[8 + start :]), row, layer)
+        # What is not finite is refused by its place.
+        with np.errstate(invalid="ignore"):
+            return Feature(shapely.from_wkb(blob[8 + start :]), row, layer)
     except NotImplementedError:
         remedy = f"ogr2ogr -nlt CONVERT_TO_LINEAR {path.stem}_straight.gpkg {path.name}"
         raise ValueError(f"{called} has arcs or is in space, which is not read; straighten it: {remedy}") from None
@@ -302,7 +304,7 @@ def layout_of_features(
         notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
     kinds = _parts(rows, found.of)
     wanted, unwanted = _lines(found, rows, order, reading)
-    faces = faces_of_lines(wanted, rings)
+    faces = faces_of_lines(wanted, rings, [0.0] * len(rings))
     _replace_cut(rings, kinds, faces)
     holes = [_hole(*(ring[:, order] for ring in holed), row=rows[k]) for holed, k in found.holed]
     left_out = [*holes, *unwanted, *faces.left_out]
@@ -399,10 +401,10 @@ def _order(points: np.ndarray, view: str | None, path: Path) -> tuple[list[int],
             f"'{path}' lies in {flat[0]}: seen as {view} it has no area; give view = \"{flat[0]}\", or none"
         )
     chosen = view or (flat[0] if flat else "xy")
-    if chosen != "xy":
-        return list(VIEWS[chosen]), [upright_note(chosen)]
-    seen = [] if flat else [Note(CHANGED, "elevations were ignored: the drawing was read as seen from above")]
-    return [0, 1], list(seen)
+    notes = [] if chosen == "xy" else [upright_note(chosen)]
+    seen = "from above" if chosen == "xy" else f"along {'xyz'[axis_across(chosen)]}"
+    notes += [] if flat else [Note(CHANGED, f"elevations were ignored: the drawing was read as seen {seen}")]
+    return list(VIEWS[chosen]), list(notes)
 
 
 def _check_degrees(

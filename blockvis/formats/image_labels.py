@@ -339,7 +339,11 @@ def _two_colours(rgb: np.ndarray, colour: np.ndarray, weight: np.ndarray) -> np.
     first = colour[weight.argmax()]
     second = colour[(np.abs(colour - first).sum(axis=1) * np.sqrt(weight)).argmax()]
     if np.abs(first - second).max() < 3 * FLAT:
-        return None
+        # Joints may be too narrow to lie flat.
+        unlike = np.abs(rgb - first).max(axis=2) > 3 * FLAT
+        if unlike.mean() <= THIN:
+            return None
+        second = np.median(rgb[unlike], axis=0)
     far = np.minimum(*(np.abs(rgb - one).max(axis=2) for one in (first, second))) > 2 * FLAT
     stray = np.minimum(*(np.abs(colour - one).max(axis=1) for one in (first, second))) > 2 * FLAT
     return None if far.mean() > MOST_BETWEEN or weight[stray].sum() > 0.01 * weight.sum() else np.stack([first, second])

@@ -36,6 +36,8 @@ class Line:
         Whether it is a polyline, and so part of an outline; a single line may also be a dimension or an axis.
     looks : tuple of str
         Kind of entity and colour.
+    off : float
+        Largest distance of its chords from the curve for which they stand.
     """
 
     points: np.ndarray
@@ -43,6 +45,7 @@ class Line:
     handle: str
     must_close: bool
     looks: tuple[str, ...] = ()
+    off: float = 0.0
 
 
 @dataclass
@@ -68,7 +71,7 @@ class Faces:
     notes: list[str] = field(default_factory=list)
 
 
-def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -> Faces:
+def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: Sequence[float]) -> Faces:
     """Find the faces between lines, and the pieces into which they cut outlines.
 
     Parameters
@@ -76,6 +79,8 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -
     lines : sequence of Line
     outlines : sequence of (n, 2) arrays
         Closed outlines of the same drawing.
+    offs : sequence of float
+        Largest distance of the chords of each outline from the curve for which they stand.
 
     Notes
     -----
@@ -91,32 +96,38 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -
         return found
     every = cKDTree(np.concatenate([*flat, *outlines]))
     size = float(np.ptp(every.data, axis=0).max())
-    usable = [float(np.ptp(ring, axis=0).max()) > GRID * size for ring in outlines]
-    borders = [shapely.LinearRing(ring) for ring, good in zip(outlines, usable, strict=True) if good]
-    flat = _joined(flat, borders, size, found)
-    segments = shapely.set_precision([shapely.LineString(points) for points in flat], GRID * size)
-    cutting = _cut_outlines(
-        [ring if good else None for ring, good in zip(outlines, usable, strict=True)], segments, every, size, found
-    )
+    usable = [i for i, ring in enumerate(outlines) if float(np.ptp(ring, axis=0).max()) > GRID * size]
+    flat += [np.concatenate([outlines[i], outlines[i][:1]]) for i in usable]
+    flat = _joined(flat, len(lines), [*(line.off for line in lines), *(offs[i] for i in usable)], size, found)
+    segments = shapely.set_precision([shapely.LineString(points) for points in flat[: len(lines)]], GRID * size)
+    cutting = _cut_outlines(dict(zip(usable, flat[len(lines) :], strict=True)), segments, every, size, found)
     rest = [k for k in range(len(lines)) if k not in cutting]
     _add_faces([lines[k] for k in rest], [segments[k] for k in rest], outlines, every, size, found)
     return found
 
 
-def _cut_outlines(
-    outlines: Sequence[np.ndarray | None], segments: Any, every: Any, size: float, found: Faces
-) -> set[int]:
-    """Cut outlines, but None, along the lines within them; numbers of the lines that cut one."""
+def _cut_outlines(outlines: dict[int, np.ndarray], segments: Any, every: Any, size: float, found: Faces) -> set[int]:
+    """Cut outlines, by their numbers, along the lines within them; numbers of the lines that cut one."""
     import shapely
 
     cutting: set[int] = set()
     tree = shapely.STRtree(segments)
-    for i, ring in enumerate(outlines):
-        area = shapely.Polygon(ring)
+    areas = shapely.STRtree([shapely.Polygon(ring) for ring in outlines.values()])
+    openings = 0
+    for i, area in zip(outlines, areas.geometries, strict=True):
         if area.is_empty or not area.is_valid:
             continue
         inside = tree.query(area.buffer(2 * MEETS * size), "contains").tolist()
-        pieces = _cut(area, [segments[k] for k in inside], GRID * size) if inside else []
+        if not inside:
+            continue
+        cuts = [segments[k] for k in inside]
+        # Lines may end on an outline within this one, as between two circles.
+        within = areas.geometries[areas.query(area, "contains_properly")]
+        border, line = tree.query(shapely.get_exterior_ring(within), "dwithin", GRID * size)
+        reached = within[np.unique(border[np.isin(line, inside)])].tolist()
+        pieces = _cut(area, cuts, reached, GRID * size) if reached else []
+        openings += len(reached) if pieces else 0
+        pieces = pieces or _cut(area, cuts, [], GRID * size)
         if pieces:
             found.pieces[i] = [_sharpened(piece, every, GRID * size) for piece in pieces]
             cutting |= set(inside)
@@ -124,6 +135,8 @@ def _cut_outlines(
         n = sum(map(len, found.pieces.values()))
         around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
         said = f"cut: {counted(len(cutting), 'line')} within {around} into {counted(n, 'block')}"
+        if openings:
+            said += f" around {counted(openings, 'outline')}, a block too: ignore it by its name if it is an opening"
         found.notes.append(Note(CHANGED, f"{said}; leave their layer out (ignore) if they are no joints"))
     return cutting
 
@@ -184,16 +197,17 @@ def nothing_closed(faces: Faces) -> str:
     return words
 
 
-def _joined(flat: list[np.ndarray], borders: list[Any], size: float, found: Faces) -> list[np.ndarray]:
-    """Move ends of lines that miss another line or outline by little onto it."""
+def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: float, found: Faces) -> list[np.ndarray]:
+    """Let the ends of the first n lines meet what they miss by little, and be corners of every line that they meet."""
     import shapely
 
-    flat = [points.copy() for points in flat]
-    others = [*(shapely.LineString(points) for points in flat), *borders]
+    # An end on a curve hangs between it and its chord: the curve gets a corner there.
+    curves = {j: off + MEETS * size for j, off in enumerate(offs) if off > 0.0}
+    flat = _with_corners(flat, n, curves, MEETS * size)
+    others = [shapely.LineString(points) for points in flat]
     tree = shapely.STRtree(others)
-    ends = [(k, e) for k in range(len(flat)) for e in (0, -1)]
-    places = shapely.points(np.array([flat[k][e] for k, e in ends]))
-    which, other = tree.query(places, "dwithin", GRID * size)
+    ends = [(k, e) for k in range(n) for e in (0, -1)]
+    which, other = tree.query(shapely.points(np.array([flat[k][e] for k, e in ends])), "intersects")
     own = np.array([k for k, _ in ends])
     meeting = set(which[other != own[which]].tolist())
     moved = []
@@ -204,23 +218,52 @@ def _joined(flat: list[np.ndarray], borders: list[Any], size: float, found: Face
         reach = min(MEETS * size, SHORTENED * float(shapely.length(others[k])))
         near = [int(j) for j in tree.query(shapely.Point(end), "dwithin", MEETS * size) if j != k]
         # A line that has moved is taken where it is now.
-        there = [shapely.LineString(flat[j]) if j < len(flat) else others[j] for j in near]
-        best, distance = _nearest(there, end, reach)
+        best, distance, j = _nearest({j: shapely.LineString(flat[j]) for j in near}, end, reach)
         if distance < reach and distance > 0.0:
             flat[k][e] = best
+            # An end of that line may move, too.
+            flat[j] = _with_corner(flat[j], best, 0.0)
             moved.append(distance)
-    if moved:
-        said = f"joined: {len(moved)} ends of lines that missed another by up to {max(moved):.3g} units"
+    far = [distance for distance in moved if distance > GRID * size]
+    if far:
+        said = f"joined: {len(far)} ends of lines that missed another by up to {max(far):.3g} units"
         found.notes.append(Note(CHANGED, said))
-    return flat
+    # On the grid an end and a slanted line that it meets would be rounded apart.
+    return _with_corners(flat, n, dict.fromkeys(range(len(flat)), GRID * size), 0.0)
 
 
-def _nearest(lines: Sequence[Any], end: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
-    """Find the place on lines to which an end belongs, and its distance; corners and ends of a line come first."""
+def _with_corners(lines: Sequence[np.ndarray], n: int, reach: dict[int, float], apart: float) -> list[np.ndarray]:
+    """Make the ends of the first n lines corners of the others that they reach, but for those near a corner."""
     import shapely
 
-    best, distance = end, reach
-    for line in lines:
+    lines = [points.copy() for points in lines]
+    ends = np.array([lines[k][e] for k in range(n) for e in (0, -1)])
+    near = np.array([shapely.LineString(lines[j]) for j in reach], dtype=object)
+    which, number = shapely.STRtree(shapely.points(ends)).query(near, "dwithin", [*reach.values()])
+    for j, i in zip(np.array([*reach], dtype=int)[which].tolist(), number.tolist(), strict=True):
+        if i // 2 != j:
+            lines[j] = _with_corner(lines[j], ends[i], apart)
+    return lines
+
+
+def _with_corner(points: np.ndarray, end: np.ndarray, apart: float) -> np.ndarray:
+    """Make an end a corner of a line between its own ends, but for one near a corner."""
+    import shapely
+
+    if np.hypot(*(points - end).T).min() <= apart:
+        return points
+    along = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
+    place = shapely.LineString(points).project(shapely.Point(end))
+    within = 0.0 < place < along[-1]
+    return np.insert(points, 1 + np.searchsorted(along, place), end, axis=0) if within else points
+
+
+def _nearest(lines: dict[int, Any], end: np.ndarray, reach: float) -> tuple[np.ndarray, float, int]:
+    """Find the place on lines to which an end belongs, its distance and the line; corners of a line come first."""
+    import shapely
+
+    best, distance, found = end, reach, -1
+    for j, line in lines.items():
         corners = np.array(line.coords)
         apart = np.hypot(*(corners - end).T)
         point = line.interpolate(line.project(shapely.Point(end)))
@@ -229,19 +272,20 @@ def _nearest(lines: Sequence[Any], end: np.ndarray, reach: float) -> tuple[np.nd
             ((point.x, point.y), point.distance(shapely.Point(end))),
         ):
             if d <= distance:
-                best, distance = np.array(candidate), float(d)
+                best, distance, found = np.array(candidate), float(d), j
                 break
-    return best, distance
+    return best, distance, found
 
 
-def _cut(area: Any, segments: list[Any], grid: float) -> list[np.ndarray]:
-    """Pieces of an outline along its border, two or more; empty where the lines do not cut it."""
+def _cut(area: Any, segments: list[Any], inner: list[Any], grid: float) -> list[np.ndarray]:
+    """Pieces of an outline around inner ones along its border, two or more; empty where the lines do not cut it."""
     import shapely
 
     border = shapely.set_precision(area.exterior, grid)
-    noded = shapely.union_all([border, *segments], grid_size=grid)
+    noded = shapely.union_all([border, *segments, *(one.exterior for one in inner)], grid_size=grid)
     faces = list(shapely.polygonize([*shapely.get_parts(noded)]).geoms)
     faces = [face for face in faces if area.buffer(2 * grid).contains(face)]
+    faces = [face for face in faces if not any(one.contains(face.representative_point()) for one in inner)]
     at_border = [face for face in faces if face.exterior.intersection(border.buffer(2 * grid)).length > 10 * grid]
     if len(at_border) < 2 or any(len(face.interiors) for face in faces):
         return []

@@ -16,7 +16,7 @@ from blockvis.layout.layout import Layout
 from solver.mechanics import counted
 
 from .bodies import Bodies
-from .cells import block_array, layout_of_cells, row_of
+from .cells import block_array, flat_beside, layout_of_cells, row_of
 from .node_order import MESHIO, ring_of_nodes
 from .reading import Reading
 from .volumes import MESHIO_SOLIDS, Faces, bodies_of_cells
@@ -53,17 +53,18 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
             f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again, with straight cells "
             "(order 1), or as .msh or .vtu"
         ) from None
-    if path.suffix.lower() == ".f3grid":
+    if suffix == ".f3grid":
         mesh.cell_sets = _groups(mesh)
     points = np.asarray(mesh.points, dtype=float)
-    sets = sets or _sets_of_mesh(mesh)
+    sets = sets or _sets_of_mesh(mesh) or (_element_blocks(mesh) if suffix in (".e", ".ex2", ".exo") else {})
     solid = [(k, shape) for k, block in enumerate(mesh.cells) if (shape := _shape(block.type))]
     if solid:
-        # Surface cells beside cells with a volume are their skin.
         chosen = [(k, len(mesh.cells[k].data)) for k, _ in solid]
         cells = [(shape, np.asarray(mesh.cells[k].data, dtype=np.int64)) for k, shape in solid]
         data, notes = _cell_data(mesh, chosen, sets)
         bodies = _bodies(points, cells, data)
+        flat = [cell for block in mesh.cells if block.type in MESHIO for cell in block.data]
+        notes += flat_beside([nodes for _, nodes in cells], flat)
         return replace(bodies, notes=bodies.notes + notes)
     rings: list[np.ndarray] = []
     chosen = []
@@ -167,12 +168,24 @@ def _check_text(path: Path) -> None:
 
 
 def _sets_of_mesh(mesh: Any) -> dict[str, np.ndarray]:
-    """Numbers of the cells of each named set, counted through all blocks of cells."""
+    """Numbers of the cells of each named set, and group of MED, counted through all blocks of cells."""
     sets, starts = {}, _starts(mesh.cells)
     for name, parts in mesh.cell_sets.items():
         members = [starts[k] + np.asarray(part, dtype=np.int64) for k, part in enumerate(parts) if part is not None]
         sets[str(name)] = np.concatenate([np.zeros(0, dtype=np.int64), *members])
+    families = getattr(mesh, "cell_tags", None) or {}
+    if families and "cell_tags" in mesh.cell_data:
+        own = np.concatenate(mesh.cell_data["cell_tags"])
+        for name in dict.fromkeys(name for names in families.values() for name in names):
+            sets[str(name)] = np.flatnonzero(np.isin(own, [tag for tag, names in families.items() if name in names]))
     return sets
+
+
+def _element_blocks(mesh: Any) -> dict[str, np.ndarray]:
+    """Numbers of the cells of each element block of Exodus; none where these tell kinds of cells apart, not stones."""
+    kinds, starts = [block.type for block in mesh.cells], _starts(mesh.cells)
+    several = len(set(kinds)) < len(kinds)
+    return {f"block {k + 1}": np.arange(starts[k], starts[k + 1]) for k in range(len(kinds)) if several}
 
 
 def _arrays_of_sets(sets: Mapping[str, np.ndarray], total: int) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:

@@ -20,7 +20,7 @@ from blockvis.layout.notes import LEFT_OUT, Note
 from solver.mechanics import counted
 
 from .bodies import Bodies, Body, body_of_polygons, in_dimension
-from .cells import block_array, layout_of_cells, merged, row_of
+from .cells import block_array, flat_beside, layout_of_cells, merged, row_of
 from .node_order import VTK, ring_of_nodes
 from .reading import Reading
 from .volumes import VTK_SOLIDS, bodies_of_cells
@@ -294,11 +294,15 @@ def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | 
             f"'{path}': all {len(gone)} blocks are gone by the cell array '{GONE}'; give a file before that"
         )
     note = (Note(LEFT_OUT, f"left out: {counted(int(gone.sum()), 'block')} taken away or lost (array '{GONE}')"),)
-    notes = note if gone.any() else ()
-    if np.isin(types, [*VTK_SOLIDS, POLYHEDRON]).any():
-        found: Layout | Bodies = _bodies_of_solids(grid, path, ~gone)
-        return replace(found, notes=found.notes + notes)
+    notes: tuple[str, ...] = note if gone.any() else ()
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
+    solid = np.isin(types, [*VTK_SOLIDS, POLYHEDRON])
+    if solid.any():
+        found: Layout | Bodies = _bodies_of_solids(grid, path, ~gone)
+        points_of = np.split(connectivity, offset[1:-1])
+        flat = [points_of[k] for k in np.flatnonzero(np.isin(types, list(VTK)) & ~gone)]
+        notes += flat_beside([points_of[k] for k in np.flatnonzero(solid)], flat)
+        return replace(found, notes=found.notes + notes)
     surface = np.flatnonzero(np.isin(types, list(VTK)) & ~gone)
     rings = []
     for cell in surface:
@@ -362,7 +366,7 @@ def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
 
 
 def _bodies_of_solids(grid: Any, path: Path | str, stands: np.ndarray) -> Bodies:
-    """Read the bodies of the cells with a volume that stand; surface cells beside them are their skin."""
+    """Read the bodies of the cells with a volume that stand."""
     types = np.asarray(grid.celltypes)
     solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, POLYHEDRON]) & stands)
     data = {str(key): np.asarray(grid.cell_data[key])[solid] for key in grid.cell_data}

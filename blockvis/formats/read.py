@@ -123,6 +123,8 @@ def _reading(
 ) -> Reading:
     if unit is not None:
         metres_per(unit)
+    if chord_tolerance is not None and not 0.0 < chord_tolerance < np.inf:
+        raise ValueError(f"chord_tolerance is {chord_tolerance:g} m; it must be a length above 0")
     ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
     return Reading(unit, chord_tolerance, checked_view(view), ignore, only, checked_dimension(dimension), {**image})
 
@@ -280,10 +282,6 @@ def read(
         As of :func:`read_layout`.
     width, height, pixel, background, smallest
         Of an image; as of :class:`blockvis.formats.image_scale.ImageKeys`.
-
-    Returns
-    -------
-    solver.Assembly
     """
     chosen: dict[str, Any] = {"chord_tolerance": chord_tolerance, "view": view, "only": only, "window": window}
     chosen |= {"dimension": dimension, "thickness": thickness, "width": width, "height": height, "pixel": pixel}
@@ -319,10 +317,6 @@ def from_compas(model: Any, **options: Any) -> solver.Assembly:
         ``roles`` says otherwise.
     **options
         As of :func:`read`.
-
-    Returns
-    -------
-    solver.Assembly
 
     Raises
     ------

@@ -74,6 +74,8 @@ def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> En
 def _obj(path: Path) -> dae.Drawn:
     """Read the objects of an .obj file, or, where it has none, its groups, in the order of the file."""
     data = path.read_bytes()
+    if b"\0" in data:
+        raise ValueError(f"'{path}' is no .obj file: it begins with {data[:16]!r}; give it the suffix that it has")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -129,6 +131,10 @@ def _scene(path: Path) -> dae.Drawn:
     # What it would print of a missing texture is no fault of a stone.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL + 1)
     suffix = path.suffix.lower()
+    text = path.read_bytes() if suffix == ".stl" else b""
+    begun, ended = (len(re.findall(rb"(?im)^\s*%s\b" % word, text)) for word in (b"solid", b"endsolid"))
+    if begun > ended and re.search(rb"(?i)\bvertex\s", text):
+        raise ValueError(f"'{path}' breaks off: {begun} bodies begin and {ended} end (endsolid); export it again")
     try:
         scene = trimesh.load_scene(str(path), process=False)
         parts = [
@@ -235,17 +241,27 @@ def _standing(bodies: Sequence[Body], axis: int, size: float) -> int:
 def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:
     """Meshes of a scene with its transforms applied, and their names.
 
-    In a .glb file the node has the name of the stone: several nodes may place one mesh.
+    In a .glb file the node has the name of the stone: several nodes may place one mesh, and have one name.
     """
-    nodes = _description(path).get("nodes", []) if path.suffix.lower() == ".glb" else []
-    number = {node["name"]: k for k, node in enumerate(nodes) if isinstance(node, dict) and "name" in node}
+    from trimesh.util import unique_name
+
+    description = _description(path) if path.suffix.lower() == ".glb" else {}
+    nodes, meshes = description.get("nodes", []), description.get("meshes", [])
+    # trimesh numbers nodes of the same name.
+    number, counts = dict[str, int](), dict[str | None, int]()
+    for k, node in enumerate(nodes):
+        number[unique_name(node.get("name", str(k)), number, counts=counts)] = k
+        if "mesh" in node and not 0 <= node["mesh"] < len(meshes):
+            raise ValueError(f"node {node.get('name', k)} has mesh {node['mesh']} of {len(meshes)}")
     order = {name: k for k, name in enumerate(scene.geometry)}
     placed = [(*scene.graph[node], str(node)) for node in scene.graph.nodes_geometry]
     found = []
     for transform, name, node in sorted(placed, key=lambda item: (order[item[1]], number.get(item[2], -1), item[2])):
         mesh = scene.geometry[name]
         if hasattr(mesh, "faces"):
-            found.append((node if node in number else str(name), mesh.copy().apply_transform(transform)))
+            drawn = nodes[number[node]] if node in number else {"name": str(name)}
+            own = drawn.get("name") or meshes[drawn["mesh"]].get("name") or path.name
+            found.append((str(own), mesh.copy().apply_transform(transform)))
     return found
 
 

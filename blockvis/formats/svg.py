@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape, quoteattr
 
@@ -24,7 +24,7 @@ from blockvis.layout.choice import Choice
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import LEFT_OUT, Note
-from blockvis.layout.outlines import LARGEST_CHORD
+from blockvis.layout.outlines import LARGEST_CHORD, sagitta
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import UNITS, metres_per
 from solver import mechanics
@@ -59,6 +59,14 @@ DEEPEST = 200
 MOST_CHORDS = 512
 
 
+class _Part(NamedTuple):
+    """A part of a shape: points, whether it is closed, and how far its chords are off its curves."""
+
+    points: np.ndarray
+    closed: bool
+    off: float = 0.0
+
+
 @dataclass
 class _Outlines:
     """Outlines found so far, in user units, y down."""
@@ -67,6 +75,7 @@ class _Outlines:
     rows: list[dict[str, Any]] = field(default_factory=list)
     labels: list[tuple[str, ...]] = field(default_factory=list)
     looks: list[tuple[str, ...]] = field(default_factory=list)
+    offs: list[float] = field(default_factory=list)
     loose: list[Line] = field(default_factory=list)
     loose_labels: list[tuple[str, ...]] = field(default_factory=list)
     misses: list[float] = field(default_factory=list)
@@ -143,7 +152,7 @@ def _root(path: Path) -> ElementTree.Element:
 def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     """Leave out what is not wanted, add the faces between loose lines, cut outlines along the lines within them."""
     wanted = _wanted_lines(found, reading)
-    faces = faces_of_lines(wanted, found.rings)
+    faces = faces_of_lines(wanted, found.rings, found.offs)
     found.left_out += faces.left_out
     for k, pieces in sorted(faces.pieces.items(), reverse=True):
         row, looks = found.rows[k], found.looks[k]
@@ -175,6 +184,7 @@ def _wanted_lines(found: _Outlines, reading: Reading) -> list[Line]:
 
     for k in reversed([k for k, own in enumerate(every) if not wants(*own)]):
         ring, row, looks = found.rings.pop(k), found.rows.pop(k), found.looks.pop(k)
+        del found.offs[k]
         found.left_out.append(LeftOut("asked", ring, "", row.get("group", ""), row.get("name", ""), looks=looks))
         del found.labels[k]
     wanted = []
@@ -338,7 +348,7 @@ def _called(element: ElementTree.Element) -> str:
     return f"<{_tag(element)}> '{element.get('id', 'without id')}'"
 
 
-def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], where: _Context, found: _Outlines) -> None:
+def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, found: _Outlines) -> None:
     own = element.get("data-blockvis")
     try:
         kept = json.loads(own) if own else {}
@@ -348,22 +358,24 @@ def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], whe
     name = title.strip() or element.get(f"{_INKSCAPE}label") or element.get("id") or ""
     looks = (_tag(element), *_colour(where))
     labels = (*where.layers, *(x for x in (title.strip(), element.get(f"{_INKSCAPE}label"), element.get("id")) if x))
-    rings = []
-    for points, closed in parts:
+    rings, offs = [], []
+    for points, closed, off in parts:
         if len(points) < 2:
             continue
         if not np.isfinite(points).all():
             raise ValueError(f"'{where.path}': {_called(element)} has a point that is not a finite number; repair it")
         placed = points @ where.matrix[:2, :2].T + where.matrix[:2, 2]
+        off *= float(np.linalg.norm(where.matrix[:2, :2], 2))
         joined = joined_ends(placed)
         if joined is None and not (closed and len(placed) > 2):
             handle = name or f"<{_tag(element)}>"
-            found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks))
+            found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks, off))
             found.loose_labels.append(labels)
             continue
         # A closed path may have a short last edge: it stays.
         short = joined is None or (closed and joined[1] > 1e-6 * float(np.ptp(placed, axis=0).max()))
         rings.append(placed if short or joined is None else joined[0])
+        offs.append(off)
         found.misses += [] if joined is None or closed else [joined[1]]
     hole = _hole(rings)
     if hole is not None:
@@ -379,6 +391,7 @@ def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], whe
     for k, ring in enumerate(rings):
         row = _row(where.layer, "" if not name else name if len(rings) == 1 else f"{name} {k + 1}")
         found.rings.append(ring)
+        found.offs.append(offs[k])
         found.rows.append(kept if isinstance(kept, dict) and kept else row)
         found.labels.append(labels)
         found.looks.append(looks)
@@ -464,12 +477,12 @@ def _length(element: ElementTree.Element, key: str) -> float:
     return float(match[1])
 
 
-def _rectangle(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarray, bool]]:
+def _rectangle(element: ElementTree.Element, where: _Context) -> list[_Part]:
     x, y, w, h = (_length(element, key) for key in ("x", "y", "width", "height"))
-    return [(np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]]), True)] if w > 0 and h > 0 else []
+    return [_Part(np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]]), True)] if w > 0 and h > 0 else []
 
 
-def _ellipse(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarray, bool]]:
+def _ellipse(element: ElementTree.Element, where: _Context) -> list[_Part]:
     centre = np.array([_length(element, "cx"), _length(element, "cy")])
     if _tag(element) == "circle":
         radii = np.full(2, _length(element, "r"))
@@ -479,19 +492,20 @@ def _ellipse(element: ElementTree.Element, where: _Context) -> list[tuple[np.nda
         return []
     n = _chords(2 * math.pi, float(radii.max()), where)
     angles = 2 * math.pi * np.arange(n) / n
-    return [(centre + radii * np.stack([np.cos(angles), np.sin(angles)], axis=1), True)]
+    points = centre + radii * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return [_Part(points, True, sagitta(float(radii.max()), 2 * math.pi / n))]
 
 
-def _polygon(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarray, bool]]:
+def _polygon(element: ElementTree.Element, where: _Context) -> list[_Part]:
     numbers = [float(x) for x in re.findall(_NUMBER, element.get("points", ""))]
     if len(numbers) % 2:
         raise ValueError(f"has {len(numbers)} coordinates, an odd number; repair it")
-    return [(np.array(numbers).reshape(-1, 2), _tag(element) == "polygon")]
+    return [_Part(np.array(numbers).reshape(-1, 2), _tag(element) == "polygon")]
 
 
-def _segment(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarray, bool]]:
+def _segment(element: ElementTree.Element, where: _Context) -> list[_Part]:
     ends = np.array([[_length(element, f"{axis}{end}") for axis in "xy"] for end in (1, 2)])
-    return [(ends, False)]
+    return [_Part(ends, False)]
 
 
 def _chords(sweep: float, radius: float, where: _Context) -> int:
@@ -513,11 +527,12 @@ def _tokens(d: str) -> list[tuple[str, str]]:
     return tokens
 
 
-def _path(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarray, bool]]:
+def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
     """Points of each subpath, and whether Z closes it."""
     tokens = _tokens(element.get("d", ""))
-    parts: list[tuple[np.ndarray, bool]] = []
+    parts: list[_Part] = []
     points: list[np.ndarray] = []
+    off = 0.0
     at = start = control = np.zeros(2)
     command, before, k = "", "", 0
     while k < len(tokens):
@@ -529,16 +544,16 @@ def _path(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarra
         v = _numbers_of(command, tokens[k : k + _TAKES[kind]])
         k += _TAKES[kind]
         if kind == "Z":
-            parts.append((np.array(points).reshape(-1, 2), True))
-            at, points = start, [start]
+            parts.append(_Part(np.array(points).reshape(-1, 2), True, off))
+            at, points, off = start, [start], 0.0
             before = kind
             continue
         base = at if relative else np.zeros(2)
         if kind == "M":
             if len(points) > 1:
-                parts.append((np.array(points), False))
+                parts.append(_Part(np.array(points), False, off))
             at = start = base + v
-            points = [at]
+            points, off = [at], 0.0
             command = "l" if relative else "L"
         elif kind in "LHV":
             if kind == "L":
@@ -548,17 +563,20 @@ def _path(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarra
             points.append(at)
         elif kind == "A":
             end = base + v[5:]
-            points += _arc(at, end, v[:5], where)
-            at = end
+            curve, apart = _arc(at, end, v[:5], where)
+            points += curve
+            off, at = max(off, apart), end
         else:
             pairs = [base + pair for pair in np.array(v).reshape(-1, 2)]
             smooth = 2 * at - control if before in ("CS" if kind in "CS" else "QT") and before else at
             pairs = [smooth, *pairs] if kind in "ST" else pairs
-            points += _bezier([at, *pairs], where)
+            curve, apart = _bezier([at, *pairs], where)
+            points += curve
+            off = max(off, apart)
             control, at = pairs[-2], pairs[-1]
         before = kind
     if len(points) > 1:
-        parts.append((np.array(points), False))
+        parts.append(_Part(np.array(points), False, off))
     return parts
 
 
@@ -569,32 +587,33 @@ def _numbers_of(command: str, taken: Sequence[tuple[str, str]]) -> list[float]:
     return [float(token[1]) for token in taken]
 
 
-def _bezier(controls: list[np.ndarray], where: _Context) -> list[np.ndarray]:
-    """Points of a quadratic or cubic Bézier curve after its start."""
+def _bezier(controls: list[np.ndarray], where: _Context) -> tuple[list[np.ndarray], float]:
+    """Points of a quadratic or cubic Bézier curve after its start, and how far the chords are off it."""
     c = np.array(controls)
     degree = len(c) - 1
     size = float(np.ptp(c, axis=0).max())
     bend = float(np.abs(np.diff(c, 2, axis=0)).max(initial=0.0))
     allowed = 1e-3 * size if where.tolerance is None else max(where.tolerance, 1e-6 * size)
     # Wang's bound: chords of n equal parts stay within degree·(degree - 1)/8·bend/n² of the curve.
-    n = math.ceil(math.sqrt(degree * (degree - 1) / 8.0 * bend / allowed)) if bend > 0 else 1
-    t = np.linspace(0.0, 1.0, min(max(n, 1), MOST_CHORDS) + 1)[1:, None]
+    most = degree * (degree - 1) / 8.0 * bend
+    n = min(max(math.ceil(math.sqrt(most / allowed)) if bend > 0 else 1, 1), MOST_CHORDS)
+    t = np.linspace(0.0, 1.0, n + 1)[1:, None]
     while len(c) > 1:
         c = c[:-1, None] * (1 - t) + c[1:, None] * t if c.ndim == 2 else c[:-1] * (1 - t) + c[1:] * t
-    return list(c[0])
+    return list(c[0]), most / n**2
 
 
-def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Context) -> list[np.ndarray]:
-    """Points of an elliptical arc after its start; SVG 1.1, appendix F.6.5 and F.6.6."""
+def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Context) -> tuple[list[np.ndarray], float]:
+    """Points of an elliptical arc after its start, how far chords are off it; SVG 1.1, appendix F.6.5 and F.6.6."""
     rx, ry, turn = abs(v[0]), abs(v[1]), math.radians(v[2])
     if rx == 0 or ry == 0 or (start == end).all():
-        return [end]
+        return [end], 0.0
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     half = rotation.T @ (start - end) / 2.0 / [rx, ry]
     grow = float(half @ half)
     if not (math.isfinite(grow) and grow > 1e-24):
         # The ends coincide compared with the radii, or numbers overflow: a straight line.
-        return [end]
+        return [end], 0.0
     if grow > 1:
         rx, ry, half = rx * math.sqrt(grow), ry * math.sqrt(grow), half / math.sqrt(grow)
     factor = math.sqrt(max(0.0, 1.0 / float(half @ half) - 1.0)) * (-1.0 if bool(v[3]) == bool(v[4]) else 1.0)
@@ -606,13 +625,14 @@ def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Context) ->
         sweep += 2 * math.pi
     elif not v[4] and sweep > 0:
         sweep -= 2 * math.pi
-    angles = begin + sweep * np.linspace(0, 1, _chords(sweep, max(rx, ry), where) + 1)[1:-1]
+    n = _chords(sweep, max(rx, ry), where)
+    angles = begin + sweep * np.linspace(0, 1, n + 1)[1:-1]
     middle = (start + end) / 2.0 + rotation @ (centre * [rx, ry])
     local = np.stack([rx * np.cos(angles), ry * np.sin(angles)], axis=1)
-    return [*(middle + local @ rotation.T), end]
+    return [*(middle + local @ rotation.T), end], sagitta(max(rx, ry), sweep / n)
 
 
-_SHAPES: dict[str, Callable[[ElementTree.Element, _Context], list[tuple[np.ndarray, bool]]]] = {
+_SHAPES: dict[str, Callable[[ElementTree.Element, _Context], list[_Part]]] = {
     "rect": _rectangle,
     "circle": _ellipse,
     "ellipse": _ellipse,

@@ -138,10 +138,6 @@ def build(name: str, parameters: Mapping[str, Any] | None = None) -> solver.Asse
     parameters : mapping, optional
         Numbers, texts, lists and tables, as in TOML and JSON. A whole number may be written 12.0.
 
-    Returns
-    -------
-    solver.Assembly
-
     Raises
     ------
     ValueError

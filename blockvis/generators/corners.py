@@ -169,8 +169,8 @@ def two_leaf_wall(
     >>> two_leaf_wall(bricks=4, courses=3).roles[-2:].tolist()
     ['fixed', 'moving']
     """
-    n, every, spacing = whole("bricks", bricks, 2), whole("header_courses", header_courses, 1), header_spacing
-    spacing = whole("header_spacing", spacing, 1)
+    n, every = whole("bricks", bricks, 2), whole("header_courses", header_courses, 1)
+    spacing = whole("header_spacing", header_spacing, 1)
     length, height, width = _brick(brick_length, brick_height)
     gap = at_least_zero("cavity", cavity)
     deep = 2.0 * width + gap

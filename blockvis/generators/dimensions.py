@@ -37,11 +37,11 @@ def above_zero(name: str, value: Any, unit: str = "m") -> float:
     return number
 
 
-def at_least_zero(name: str, value: Any, unit: str = "m") -> float:
+def at_least_zero(name: str, value: Any) -> float:
     """Return the value as a float if it is a finite number of at least zero."""
-    number = finite(name, value, unit)
+    number = finite(name, value)
     if number < 0.0:
-        raise ValueError(f"{name} is {number:g}{f' {unit}' if unit else ''}; give a number of at least 0")
+        raise ValueError(f"{name} is {number:g} m; give a number of at least 0")
     return number
 
 

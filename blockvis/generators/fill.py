@@ -206,10 +206,6 @@ def filled(
         Where other blocks stand in the wall.
     mortar : bool
         Whether the joints of the pattern are left open.
-
-    Returns
-    -------
-    Layout
     """
     # Far from the origin, as in maps, corners have no digits left for a grid.
     corner = np.array(wall.bounds[:2])

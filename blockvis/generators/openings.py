@@ -17,6 +17,15 @@ from .dimensions import above_zero, at_least_zero, choice, finite, whole
 
 HEADS = ("lintel", "flat arch", "segmental arch", "round arch", "none")
 
+#: Heads that a key belongs to.
+_OF_HEADS = {
+    "depth": ("lintel", "flat arch", "segmental arch", "round arch"),
+    "bearing": ("lintel",),
+    "rise": ("segmental arch", "round arch"),
+    "skew": ("flat arch",),
+    "voussoirs": ("flat arch", "segmental arch", "round arch"),
+}
+
 
 @dataclass(frozen=True)
 class Opening:
@@ -71,10 +80,6 @@ def checked_opening(
         From 1, for messages.
     brick_length, brick_height, wall_height : float [m]
 
-    Returns
-    -------
-    Opening
-
     Raises
     ------
     ValueError
@@ -91,6 +96,9 @@ def checked_opening(
     width, height = above_zero(f"{where}: width", values["width"]), above_zero(f"{where}: height", values["height"])
     to_top = y + height >= wall_height * (1.0 - 1e-9)
     head = choice(f"{where}: head", values.get("head", "none" if to_top else "lintel"), HEADS)
+    for key, heads in _OF_HEADS.items():
+        if key in values and head not in heads:
+            raise ValueError(f"{where}: {key} is that of a {' or '.join(heads)}; its head is '{head}': leave {key} out")
     courses = math.ceil(brick_length / brick_height - 1e-9)
     depths = {"lintel": 2 * brick_height, "flat arch": courses * brick_height}
     depth = above_zero(f"{where}: depth", values.get("depth", depths.get(head, brick_length)))

@@ -12,6 +12,7 @@ from types import NoneType
 from typing import Any
 
 import solver
+from blockvis.cases.build import case_interfaces
 from blockvis.cases.contents import Case
 from blockvis.cases.key import Key, Section, read_keys
 from blockvis.cases.toml_table import Table
@@ -249,13 +250,9 @@ def needs_live_load(case: Case) -> None:
         )
 
 
-def _interfaces(case: Case) -> solver.Interfaces:
-    return solver.Interfaces(case.law, dict(case.interfaces), ground=case.ground)
-
-
 def needs_no_crushing(case: Case, when: str = "") -> None:
     """Raise ValueError where a joint of a case has a compressive strength, which no path follows, or too much else."""
-    interfaces = _interfaces(case)
+    interfaces = case_interfaces(case)
     try:
         interfaces.refuse_crushing(f"a {case.analysis}{when}")
         if case.controls.increments == mechanics.INCREMENTS[1]:

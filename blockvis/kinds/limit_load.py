@@ -17,7 +17,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
-from blockvis.results.about import collapse_phase, in_phase, unit_in
+from blockvis.results.about import collapse_phase, governing_limit, in_phase, unit_in
 from blockvis.results.swinging import swing_factors, swung_increment
 from blockvis.results.tables import finite
 from blockvis.text import force_text
@@ -209,6 +209,7 @@ class LimitLoadKind(AnalysisKind):
                     "live_load": limit.live_force,
                     "programs": limit.programs,
                     **({"torsion": limit.torsion} if limit.torsion != "points" else {}),
+                    **({} if limit.staying_open is None else {"staying_open": finite(limit.staying_open)}),
                 }
                 for number, (limit, _) in enumerate(states)
             ],
@@ -242,13 +243,16 @@ class LimitLoadKind(AnalysisKind):
         rows = io.StringIO()
         table = csv.writer(rows, lineterminator="\n")
         first = ["phase", "settlement"] if over_settlement else ["position"]
-        table.writerow([*first, "load_multiplier", "static", "kinematic", "status", "flow", "mechanism"])
+        known = any(limit.staying_open is not None for limit in response.limits)
+        last = ["staying_open"] if known and not over_settlement else []
+        table.writerow([*first, "load_multiplier", "static", "kinematic", "status", "flow", "mechanism", *last])
         for limit, state in response.limit_states:
             place = [repr(float(state.parameter))]
             numbers = [repr(float(v)) for v in (limit.multiplier, *limit.bounds)]
             words = str(mechanics.mechanism_of(response.assembly, state)) if limit.mechanism.any() else ""
             where = [str(state.phase), *place] if over_settlement else place
-            table.writerow([*where, *numbers, str(limit.status), limit.flow, words])
+            own = [repr(math.nan if limit.staying_open is None else float(limit.staying_open)) for _ in last]
+            table.writerow([*where, *numbers, str(limit.status), limit.flow, words, *own])
         return {"capacity.csv" if over_settlement else "envelope.csv": rows.getvalue()}
 
     def headline(self, response: solver.Response) -> str:
@@ -290,7 +294,7 @@ class LimitLoadKind(AnalysisKind):
             before = _before(response)
             drawn = "" if before is None else f"   before it {before:.6g}"
             lines.append(f"after a settlement of{state.parameter:12.6g} {place}{drawn}")
-        lines += [f"note: {note}" for note in (_unconverged_note(response),) if note]
+        lines += [f"note: {note}" for note in _notes_on_places(response)]
         if response.collapse is not None:
             lines.append(response.message)
         else:
@@ -318,7 +322,7 @@ class LimitLoadKind(AnalysisKind):
             rows.append(("settlement alone: collapse at", place))
         if state is None or not np.isfinite(state.load_multiplier):
             return rows
-        limit = next((limit for limit, found in response.limit_states if found is state), None)
+        limit = governing_limit(response)
         rows.append(("load multiplier α", f"{state.load_multiplier:.6g}"))
         if limit is not None:
             rows.append(("static, kinematic value", f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))
@@ -337,7 +341,7 @@ class LimitLoadKind(AnalysisKind):
             before = _before(response)
             if before is not None:
                 rows.append(("before it", f"{before:.6g}"))
-        rows += [("note", note) for note in (_unconverged_note(response),) if note]
+        rows += [("note", note) for note in _notes_on_places(response)]
         return rows
 
 
@@ -347,13 +351,21 @@ def _before(response: solver.Response) -> float | None:
     return first.load_multiplier if first.phase == 0 and first.parameter == 0.0 else None
 
 
-def _unconverged_note(response: solver.Response) -> str:
-    """Say at which of several positions of a load no limit load is known; empty where one is at all."""
+def _notes_on_places(response: solver.Response) -> list[str]:
+    """Say at which of several positions of a load no limit load is known, and where joints that stay open lower it."""
     states = response.limit_states
     if response.parameter.is_path or len(states) < 2:
-        return ""
+        return []
     places = [state.parameter for limit, state in states if limit.status is solver.LimitStatus.NOT_CONVERGED]
-    return _unconverged(places, len(states))
+    other = sorted(
+        (limit.staying_open, limit.multiplier, state.parameter)
+        for limit, state in states
+        if limit.staying_open is not None and _differs(limit, limit.staying_open)
+    )
+    told = (f"{least:.6g} instead of {most:.6g} at x = {x:.6g} m" for least, most, x in other[:MOST_LISTED])
+    listed = "; ".join(told) + "; ..." * (len(other) > MOST_LISTED)
+    note = f"where open joints stay open α is less at {len(other)} of {len(states)} positions: {listed}"
+    return [*filter(None, (_unconverged(places, len(states)), note if other else ""))]
 
 
 def _unconverged(places: Sequence[float], number: int) -> str:
@@ -398,6 +410,7 @@ def _stored_limits(summary: Mapping[str, Any], increments: Sequence[solver.Incre
                 programs=stored["programs"],
                 held=state.held,
                 torsion=stored.get("torsion", "points"),
+                staying_open=stored.get("staying_open"),
             )
         )
     return tuple(limits)
@@ -421,7 +434,7 @@ def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, foun
             # In equilibrium under the dead load: the settlement has proved it.
             state = _limit_state(run, run.given.loads, increment.pose, increment, programs)
             if shown is None or _is_last_wanted(case, increment):
-                state = replace(state, notes=(*state.notes, *_closing_note(run, state, increment, shown is None)))
+                state = replace(state, notes=(*state.notes, *_closing_note(run, increment, shown is None)))
             shown, programs = replace(state, status=solver.Status.EQUILIBRIUM), 0
             reached = increment.checkpoint
             yield replace(shown, checkpoint=None if reached is None else _checkpoint(run, settlement=reached))
@@ -463,6 +476,7 @@ def _over_places(
         else:
             loads = standing.with_forces(run.given.assembly, live(number), "live")
             state = replace(_limit_state(run, loads, pose, None, programs, ties, bonds), parameter=float(x))
+            run.limits[-1] = replace(run.limits[-1], staying_open=_staying_open(run, loads, pose, ties, bonds))
             if number == 0 and (words := _closing_words(run)):
                 state = replace(state, notes=(*state.notes, words))
             programs = 0
@@ -522,29 +536,34 @@ def _closing_words(run: AnalysisRun) -> str:
     return f"joints that are open may close by up to {within:.4g} m for the live load ([analysis] displacement)"
 
 
-def _closing_note(run: AnalysisRun, state: solver.Increment, at: solver.Increment, first: bool) -> list[str]:
-    """Say within which displacement open joints may close, at the first state, and what is carried where they do not.
+def _differs(limit: solver.LimitLoad, least: float) -> bool:
+    """Whether the multiplier of joints that stay open is another, notably."""
+    return math.isfinite(least) and not math.isclose(limit.multiplier, least, rel_tol=NOTABLE)
 
-    Parameters
-    ----------
-    run : AnalysisRun
-    state : solver.Increment
-        The limit state.
-    at : solver.Increment
-        Of the settlement.
-    first : bool
-        Whether it is the first state.
-    """
-    case, words = run.given.case, _closing_words(run)
-    if not words:
-        return []
+
+def _staying_open(
+    run: AnalysisRun,
+    loads: solver.Loads,
+    pose: solver.Pose | None,
+    ties: mechanics.TieForces | None,
+    bonds: mechanics.Bonds | None,
+) -> float | None:
+    """Find the multiplier of the last limit load where joints that are open stay so; None where they do, or unknown."""
     # Without dilatancy it takes many programs, not one more.
-    if case.settings.flow == FLOWS[0] and np.isfinite(state.load_multiplier):
-        least = _limit(run, run.given.loads, at.pose, at.ties, at.bonds, 0.0).multiplier
-        if np.isfinite(least) and abs(state.load_multiplier - least) > NOTABLE * abs(state.load_multiplier):
-            where = f"{at.parameter:.6g} {case.settlements[at.phase].unit}"
-            return [f"at a settlement of {where} α = {state.load_multiplier:.6g}, {least:.6g} without: {words}"]
-    return [words] if first else []
+    asked = _closing_words(run) and run.given.case.settings.flow == FLOWS[0]
+    if not asked or math.isnan(run.limits[-1].multiplier):
+        return None
+    return _limit(run, loads, pose, ties, bonds, 0.0).multiplier
+
+
+def _closing_note(run: AnalysisRun, at: solver.Increment, first: bool) -> list[str]:
+    """Say within which displacement open joints may close, at the first state, and α where they do not."""
+    words, limit = _closing_words(run), run.limits[-1]
+    least = _staying_open(run, run.given.loads, at.pose, at.ties, at.bonds)
+    if least is not None and _differs(limit, least):
+        where = f"{at.parameter:.6g} {run.given.case.settlements[at.phase].unit}"
+        return [f"at a settlement of {where} α = {limit.multiplier:.6g}, {least:.6g} without: {words}"]
+    return [words] if words and first else []
 
 
 def _limit_state(

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-import numpy as np
-
 import solver
 from blockvis.cases.contents import Case
 from blockvis.cases.key import FRACTION, POSITIVE, TEXT, VECTOR, Key, Section
@@ -104,13 +102,12 @@ class PushoverKind(AnalysisKind):
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
         """Give the control displacement, and the multiplier at the start and where it is largest."""
-        values, control = response.values, response.control
-        largest = int(np.nanargmax(values)) if np.isfinite(values).any() else None
+        values, control, largest = response.values, response.control, _largest(response)
         return {
             "control": asdict(control) if isinstance(control, solver.ControlDisplacement) else None,
             "limit_load_multiplier": float(values[0]) if len(values) and math.isfinite(values[0]) else None,
-            "largest_load_multiplier": None if largest is None else float(values[largest]),
-            "largest_load_multiplier_at": None if largest is None else response.path[largest].parameter,
+            "largest_load_multiplier": None if largest is None else largest.load_multiplier,
+            "largest_load_multiplier_at": None if largest is None else largest.parameter,
         }
 
     def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
@@ -123,11 +120,14 @@ class PushoverKind(AnalysisKind):
         path, weight = response.path, response.total_weight
         lines = []
         if path:
-            largest = max(path, key=lambda i: i.load_multiplier)
-            for name, i in (("first", path[0]), ("largest", largest), ("last", path[-1])):
+            words = {
+                "first": ", were joints and ground rigid" if response.interfaces.elastic else "",
+                "largest": ", the largest of the told increments",
+            }
+            for name, i in (("first", path[0]), ("largest", _largest(response) or path[0]), ("last", path[-1])):
                 # Moments have no resultant.
                 load = f", live load {i.reaction:.6g} N = {i.reaction / weight:.6f} W" if i.reaction else ""
-                load += ", the largest of the told increments" if name == "largest" else ""
+                load += words.get(name, "")
                 name = f"{name} multiplier"
                 lines.append(f"{name:<21}{i.load_multiplier:12.6g}     at {i.parameter:.6g} m{load}")
         if response.collapse is not None:
@@ -154,9 +154,18 @@ class PushoverKind(AnalysisKind):
             rows.append((_lost(response), place))
         if response.path:
             values = response.values
-            rows.append(("load multiplier α at the start", f"{values[0]:.6g}"))
-            rows.append(("largest of the told increments, last", f"{np.nanmax(values):.6g}, {values[-1]:.6g}"))
+            rigid = ", were joints and ground rigid" if response.interfaces.elastic else ""
+            rows.append((f"load multiplier α at the start{rigid}", f"{values[0]:.6g}"))
+            largest = (_largest(response) or response.path[0]).load_multiplier
+            rows.append(("largest of the told increments, last", f"{largest:.6g}, {values[-1]:.6g}"))
         return rows
+
+
+def _largest(response: solver.Response) -> solver.Increment | None:
+    """Find the told increment of the largest multiplier; where joints or ground give, the first one is not carried."""
+    path = response.path[1:] if response.interfaces.elastic else response.path
+    found = [increment for increment in path if math.isfinite(increment.load_multiplier)]
+    return max(found, key=lambda increment: increment.load_multiplier, default=None)
 
 
 def _lost(response: solver.Response) -> str:

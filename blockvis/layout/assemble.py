@@ -15,7 +15,7 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from .facing import faced, facing_tolerance
-from .inspect import inspected
+from .inspect import DENSITY, inspected
 from .layout import Layout
 from .notes import changes_analysis
 from .repair import duplicates, overlaps, refuse_overlaps, repaired
@@ -36,7 +36,7 @@ def assemble(
     *,
     roles: Mapping[str, str] | None = None,
     supports: Sequence[Mapping[str, Any]] = (),
-    density: float = 2000.0,
+    density: float = DENSITY,
     thickness: float = 1.0,
     joint_thickness: float | str = 0.0,
     overlap_tolerance: float | None = None,
@@ -258,6 +258,8 @@ def _levels_of(support: Mapping[str, Any], name: str) -> tuple[float, float]:
         bottom, top = map(float, support["levels"])
     except (KeyError, TypeError, ValueError):
         bottom = top = np.nan
+    if bottom >= top:
+        raise ValueError(f"support '{name}': levels is [{bottom:g}, {top:g}]; give the lower first, in m")
     if not bottom < top:
         raise ValueError(
             f"support '{name}' stands in space: give levels = [bottom, top] in m beside its outline in plan [x, y]"

@@ -71,7 +71,8 @@ def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
 
 def _number(value: Any, key: str, name: str) -> float:
     try:
-        return float(value)
+        # A yes is no length.
+        return float(str(value) if isinstance(value, bool) else value)
     except (TypeError, ValueError):
         raise ValueError(f"block '{name}' has {key} {value!r}; give a number") from None
 

@@ -303,3 +303,8 @@ def arc_points(
     n = min(max(1, math.ceil(abs(sweep) / widest - 1e-9)), 4096)
     angles = start + sweep * np.linspace(0.0, 1.0, n + 1)
     return centre + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def sagitta(radius: float, angle: float) -> float:
+    """Largest distance of a chord from its arc of an angle [rad]."""
+    return radius * (1.0 - math.cos(angle / 2.0))

@@ -21,6 +21,7 @@ from blockvis.system.atomic_files import write_atomic
 from solver import mechanics
 
 from . import palette
+from .swing import shown_increments
 
 #: Seconds in which the path passes, that the last equilibrium and the end stand, and of a frame of pseudo-time.
 PATH, STANDS, FRAME = 6.0, 0.5, 0.1
@@ -117,7 +118,7 @@ def _played(
         poses += [fall.pose(k) for k in range(len(fall))]
         tied += [fall.ties_at(float(time), response) for time in fall.times]
     else:
-        frames = [i for i in response.increments if i.status == solver.Status.FALLING]
+        frames = [i for i in shown_increments(response) if i.status == solver.Status.FALLING]
         if frames:
             times, poses, tied = [*times, start], [*poses, poses[-1]], [*tied, tied[-1]]
         times += [start + FRAME * (k + 1) for k in range(len(frames))]

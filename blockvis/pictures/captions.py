@@ -30,10 +30,15 @@ NOTABLE = 0.05
 
 
 def drops_at_start(response: solver.Response) -> bool:
-    """Whether the reaction has left that at rest by the first increment: it does so at once, not along a line."""
+    """Whether the reaction has left that at rest by the first increment: it does so at once, not along a line.
+
+    So does the multiplier, whose first one is that of rigid joints, where these or the ground give.
+    """
     path = response.path
-    if len(path) < 2 or not response.measured.is_force or not response.parameter.is_path:
+    if len(path) < 2 or not response.parameter.is_path:
         return False
+    if not response.measured.is_force:
+        return response.interfaces.elastic and path[0].parameter == 0.0
     # Increments by linear program have no reaction at rest, and no upper bound.
     if path[0].parameter != 0.0 or np.isnan(path[0].largest):
         return False
@@ -80,13 +85,18 @@ def in_one_unit(response: solver.Response, phase: int | None = None) -> solver.R
 def parameter_unit(response: solver.Response) -> tuple[float, str]:
     """Factor and unit in which the parameter reads well."""
     parameter = response.parameter
-    largest = max((abs(i.parameter) for i in response.increments), default=0.0)
-    millimetres = parameter.unit == "m" and 0.0 < largest < 0.1 and parameter.is_path
+    millimetres = parameter.unit == "m" and 0.0 < _largest_parameter(response) < 0.1 and parameter.is_path
     return (1e3, "mm") if millimetres else (1.0, parameter.unit)
+
+
+def _largest_parameter(response: solver.Response) -> float:
+    return max((abs(i.parameter) for i in response.increments), default=0.0)
 
 
 def parameter_text(value: float, response: solver.Response) -> str:
     """Write a parameter with its unit, in mm where the whole response stays below a decimetre.
+
+    All of a response have as many decimals, of which the largest has three digits at least.
 
     Parameters
     ----------
@@ -94,7 +104,8 @@ def parameter_text(value: float, response: solver.Response) -> str:
     response : solver.Response
     """
     factor, unit = parameter_unit(response)
-    return f"{value * factor:.2f} {unit}" if unit == "mm" else f"{value * factor:.4f} {unit}"
+    power = int(np.floor(np.log10(factor * _largest_parameter(response) or 1.0)))
+    return f"{value * factor:.{max(2 if unit == 'mm' else 4, 2 - power)}f} {unit}"
 
 
 def parameter_label(response: solver.Response) -> str:
@@ -168,10 +179,10 @@ def matters(increment: solver.Increment, response: solver.Response) -> bool:
     return increment.measured <= MOST_OVER_LOWEST * lowest.measured
 
 
-def state_text(increment: solver.Increment, response: solver.Response) -> str:
-    """Write the first line of a caption: the parameter and what is measured there."""
+def state_text(increment: solver.Increment, response: solver.Response, beside: solver.Response | None = None) -> str:
+    """Write the first line of a caption: the parameter, in the unit of a response beside it, and what is measured."""
     response = in_one_unit(response, increment.phase)
-    place = parameter_text(increment.parameter, response)
+    place = parameter_text(increment.parameter, beside or response)
     if response.parameter.is_path:
         text = f"{response.parameter.name.capitalize()} {place}"
     else:
@@ -240,8 +251,7 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
         Of the displacements.
     """
     parts = [_state(response, increment), *phase_words(response, increment)]
-    # A mechanism that swings out of a limit state has no scale.
-    if not (response.swings and increment.status == solver.Status.FALLING):
+    if not _swings_out(response, increment):
         parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")
     parts.append(f"W = {force_text(response.total_weight)}")
     return state_text(increment, response), "   ·   ".join([*parts, *loss_words(increment)])
@@ -262,14 +272,23 @@ def phase_words(response: solver.Response, increment: solver.Increment) -> list[
     return [f"phase {increment.phase + 1} of {len(response.settlements)}"] if several else []
 
 
+def _swings_out(response: solver.Response, increment: solver.Increment) -> bool:
+    """Whether a frame is one of a mechanism without scale: of a limit load, or made for want of frames of the fall."""
+    made = all(increment is not one for one in response.increments)
+    return increment.status == solver.Status.FALLING and (made or response.swings)
+
+
 def _state(response: solver.Response, increment: solver.Increment) -> str:
     if increment.status == solver.Status.FALLING:
         if response.swings:
             return "pseudo-motion: the mechanism at the limit load, followed to first order and out of scale"
+        if _swings_out(response, increment):
+            return "no equilibrium: the mechanism, followed to first order and out of scale"
         return "no equilibrium: the mechanism followed step by step"
     if response.limits:
         lowest = len(response.path) > 1 and not response.parameter.is_path and _decides(response, increment)
-        words = f"limit state, {response.limits[0].flow} friction"
+        state = "limit state" if np.isfinite(increment.measured) else "equilibrium under the dead load"
+        words = f"{state}, {response.limits[0].flow} friction"
         return words + (f"   ·   the lowest of {len(response.path)} positions" if lowest else "")
     last = response.path[-1]
     if (increment.phase, increment.parameter) == (last.phase, last.parameter):

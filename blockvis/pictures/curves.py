@@ -37,6 +37,7 @@ from .captions import (
     unit_for,
     value_label,
 )
+from .figures import plain_text
 
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
@@ -57,6 +58,7 @@ WIDE_BAND = 0.2
 TEXT, LETTERS = 11.0, 11.0
 
 
+@plain_text
 def draw_curve(
     response: solver.Response,
     path: str | os.PathLike[str],
@@ -78,10 +80,6 @@ def draw_curve(
         Width and height; a PNG has 200 pixels per inch.
     band : ReactionRange, optional
         Of the reaction, drawn behind it.
-
-    Returns
-    -------
-    pathlib.Path
     """
     path, name = Path(path), about(response).name
     if in_one_unit(response) is not response:
@@ -120,6 +118,7 @@ class CurvePanel:
         Height of the text in pixels.
     """
 
+    @plain_text
     def __init__(self, response: solver.Response, size: tuple[int, int], text: int) -> None:
         response = in_one_unit(response)
         self._response, self._text = response, text
@@ -220,7 +219,8 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
             "-",
             color=colour,
             linewidth=2.0,
-            label=f"{name}{', slack' * bool((states == mechanics.SLACK).all())}",
+            # Labels that begin with "_" matplotlib leaves out.
+            label=f" {name}{', slack' * bool((states == mechanics.SLACK).all())}",
         )
         for state, mark, word in ((mechanics.YIELDING, "o", "yields"), (mechanics.BROKEN, "X", "broken")):
             first = np.flatnonzero(states == state)[:1]
@@ -301,7 +301,8 @@ def _draw_line(
         # On the side that the curve leaves free.
         above = values[0] > values[1]
         axes.annotate(
-            "at rest", (total[0], values[0]), xytext=(-4, 6 if above else -6), textcoords="offset points",
+            "at rest" if response.measured.is_force else "rigid",
+            (total[0], values[0]), xytext=(-4, 6 if above else -6), textcoords="offset points",
             va="bottom" if above else "top", fontsize=0.9 * text, zorder=4,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )  # fmt: skip

@@ -132,8 +132,8 @@ class _Series:
         Displacement of any free block.
     widest : float [m]
         Opening of any crack in equilibrium.
-    cracks, sliding, hinges, lost : bool
-        Whether there are any anywhere; of blocks that are lost.
+    cracks, sliding, hinges, lost, pulls : bool
+        Whether there are any anywhere; of blocks that are lost, of joints that pull.
     largest_force : float [N]
     forces : list of arrays [N]
         Sizes, of the increments sampled.
@@ -146,6 +146,7 @@ class _Series:
     sliding: bool = False
     hinges: bool = False
     lost: bool = False
+    pulls: bool = False
     largest_force: float = 0.0
     forces: list[np.ndarray] = field(default_factory=list)
 
@@ -215,7 +216,7 @@ class Drawer:
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
-        bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
+        bar = ColourBar(self.largest, fall is not None) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
         self.sheet = Sheet(size, bar, beside)
         self.panel: CurvePanel | None = None
@@ -225,10 +226,11 @@ class Drawer:
 
             self.panel = CurvePanel(response, (beside, self.sheet.inside_size[1]), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
-        self._arrow = ARROW_IN_SPACE * float(frame.size.max())
+        whole = frame.fitted(*self.sheet.inside_size) if self._flat else frame
+        self._arrow = (ARROW if self._flat else ARROW_IN_SPACE) * float(whole.size.max())
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
         heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
-        ends = np.concatenate([self.live.tails, heads, *self._arrow_tips(extra), tied])
+        ends = np.concatenate([self.live.tails, heads, *self._arrow_ends(frame, extra), tied])
         if self._plane is not None:
             ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
         frame = self._with_floor(frame.holding(self._projected(ends)))
@@ -238,8 +240,6 @@ class Drawer:
             palette.block_colours(assembly.materials, assembly.free) if plain else palette.role_colours(assembly)
         )
         self.scene = self._scene(frame)
-        if self._flat:
-            self._arrow = ARROW * float(self.scene.frame.size.max())
         self._loses = bool(response.losses)
         self.force_scale, self.force_shown = self._force_scale()
         self.tints: np.ndarray | None = None
@@ -321,12 +321,12 @@ class Drawer:
         """(n, d) array [m]: places in the picture, or in each of several, of points (n, d) [m]."""
         return points if not self._views else np.asarray(points @ self._axes.T)
 
-    def _arrow_tips(self, extra: tuple[solver.Pose, ...]) -> Iterator[np.ndarray]:
-        """Yield where the arrows at supports in space end: at first and last, and at the extra poses."""
-        if not self._flat:
-            first, last = (self.increments[k] for k in (0, -1))
-            for increment, pose in ((first, first.pose), (last, last.pose), *((last, pose) for pose in extra)):
-                yield self._settlement_arrows(increment, pose)[1]
+    def _arrow_ends(self, frame: Frame, extra: tuple[solver.Pose, ...]) -> Iterator[np.ndarray]:
+        """Yield where the arrows at supports begin and end: at first and last as shown, and at the extra poses."""
+        first, last = (self.increments[k] for k in (0, -1))
+        shown = [(one, magnified(self.assembly, one.pose, self.look.magnification)) for one in (first, last)]
+        for increment, pose in (*shown, *((last, pose) for pose in extra)):
+            yield from self._settlement_arrows(increment, pose, frame if self._flat else None)
 
     def _surveyed(self) -> Iterator[solver.Pose]:
         """Yield the poses as shown, and note what must be the same in all pictures.
@@ -347,7 +347,9 @@ class Drawer:
                 seen.hinges |= len(found.hinges) > 0
             if look.forces != "none" and matters(increment, self.response):
                 sizes = np.linalg.norm(joint_forces(increment, look.forces)[1], axis=1)
-                seen.largest_force = max(seen.largest_force, float(sizes.max(initial=0.0)))
+                largest = float(sizes.max(initial=0.0))
+                seen.largest_force = max(seen.largest_force, largest)
+                seen.pulls |= bool((increment.forces[:, 0] < -SMALLEST_RESULTANT * largest).any())
                 if number in seen.sampled:
                     seen.forces.append(sizes)
             yield magnified(self.assembly, increment.pose, look.magnification)
@@ -537,7 +539,8 @@ class Drawer:
             return [Key("", "forces not shown", palette.FAINT)]
         if self.force_scale == 0.0:
             return []
-        text = "compression" if self.look.forces == "thrust" else "contact force"
+        joint = "force of a joint" if self._seen.pulls else "compression"
+        text = joint if self.look.forces == "thrust" else "contact force"
         if not self._flat:
             # Lengths in space are foreshortened: no bar is their scale.
             return [Key("line", f"{text} up to {force_text(self._seen.largest_force)}", palette.FORCE)]

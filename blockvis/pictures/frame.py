@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 import solver
-from blockvis.text import length_text, rounded_length
+from blockvis.text import rounded_length
 from solver import mechanics
 
 from . import palette
@@ -62,9 +62,12 @@ class ColourBar:
     Attributes
     ----------
     largest : float [m]
+    exceeded : bool
+        Whether some may go further, as in a fall: they have the last colour.
     """
 
     largest: float
+    exceeded: bool = False
 
 
 @dataclass(frozen=True)
@@ -199,7 +202,7 @@ class Sheet:
         for end in (x, x + pixels - thick + 1):
             draw.rectangle((end, y - tick, end + thick - 1, y + tick), fill=palette.INK)
         font = _font(round(0.9 * self.text))
-        label = length_text(length)
+        label = f"{length:g} m"
         draw.text((x + pixels / 2, y - tick - 0.15 * self.text), label, palette.INK, font, anchor="mb")
         return int(max(x + pixels, x + pixels / 2 + draw.textlength(label, font) / 2))
 
@@ -249,8 +252,8 @@ class Sheet:
         font = _font(round(0.85 * self.text))
         unit, factor = ("mm", 1e3) if bar.largest < 1.0 else ("m", 1.0)
         step = rounded_length(bar.largest * factor / 4.0)
-        value = 0.0
-        while value <= bar.largest * factor * (1 + 1e-9):
+        value, end = 0.0, bar.largest * factor * (1 + 1e-9)
+        while value <= end:
             y = (
                 top + height - 1 - value / (bar.largest * factor) * (height - 1)
                 if bar.largest > 0
@@ -258,7 +261,8 @@ class Sheet:
             )
             x = left + strip.shape[1]
             draw.line((x, y, x + 0.3 * self.text, y), fill=palette.INK, width=max(1, self.text // 14))
-            draw.text((x + 0.5 * self.text, y), f"{value:g}", palette.INK, font, anchor="lm")
+            label = f"{'≥ ' * (bar.exceeded and value + step > end)}{value:g}"
+            draw.text((x + 0.5 * self.text, y), label, palette.INK, font, anchor="lm")
             value += step
             if bar.largest == 0:
                 break

@@ -11,10 +11,11 @@ import numpy as np
 
 import solver
 from blockvis.layout.joints.facing_edges import Facing
-from blockvis.text import length_text, rounded_length
+from blockvis.text import rounded_length
 from solver import mechanics
 
 from . import palette
+from .figures import plain_text
 from .frame import room_in
 
 if TYPE_CHECKING:
@@ -131,6 +132,7 @@ class _Canvas:
         return np.asarray(points @ self.axis.T)
 
 
+@plain_text
 def draw_contents(contents: Contents, path: str | Path) -> Path:
     """Draw what a drawing holds on a sheet with title, findings and legend.
 
@@ -219,7 +221,7 @@ def _in_space(figure: Any, contents: Contents) -> _Canvas:
     axes.imshow(picture, extent=(left, right, bottom, top), interpolation="antialiased")
     axes.set_axis_off()
     length = rounded_length(0.2 * (right - left))
-    scale = length_text(length) if contents.unit == "m" else f"{length:g} [{contents.unit}]"
+    scale = f"{length:g} m" if contents.unit == "m" else f"{length:g} [{contents.unit}]"
     x, y = left + 0.02 * (right - left), bottom + 0.02 * (top - bottom)
     axes.plot([x, x + length], [y, y], color=palette.hexadecimal(palette.INK), linewidth=2.5, solid_capstyle="butt")
     axes.text(x + length / 2.0, y, f"{scale}\n", ha="center", va="bottom", fontsize=8, linespacing=0.4)

@@ -82,7 +82,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     blocks = np.flatnonzero(size > ROUNDING * np.abs(live).max(initial=0.0))
     if assembly.dimension == 3:
         blocks = evenly(blocks, MOST_ARROWS)
-        points = leaving(assembly, pose, blocks, -forces[blocks] / size[blocks, None])
+        points = leaving(assembly, pose, blocks, pose.positions[blocks], -forces[blocks] / size[blocks, None])
     else:
         points = np.array([_entry(assembly, pose, int(block), live[block]) for block in blocks]).reshape(-1, 2)
     if len(blocks) > MOST_ARROWS:

@@ -24,8 +24,12 @@ WIDEST, STEEPEST = 0.5, 0.5
 #: the mark of a brick beside a large stone would lie outside both.
 SHORTEST = 0.3
 
-#: Resultants below this fraction of the largest are not drawn.
+#: Resultants, and arrows of a support, below this fraction of the largest are not drawn.
 SMALLEST_RESULTANT = 2e-3
+
+#: Where normal forces of a joint leave less than this part of what presses and pulls there, as of mortar that is bent
+#: or sheared, the resultant runs along the joint and crosses it far off: it is drawn at the middle.
+ALONG = 0.1
 
 #: Blocks of one part are grown by this fraction of the block size, merged and shrunk back: between faces that touch,
 #: the last digit leaves slivers otherwise.
@@ -43,6 +47,9 @@ ON_HINGE = 0.05
 #: Arrows of at most so many supports or blocks in space; of more, evenly chosen ones stand for all. In the plane, where
 #: supports lie side by side, the one in the middle does.
 MOST_ARROWS, MOST_IN_PLANE = 24, 4
+
+#: A support that turns has two arrows, so far from its middle as a part of its extent.
+END = 0.35
 
 
 def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndarray) -> np.ndarray:
@@ -180,34 +187,37 @@ def cracks_between(
 
 
 def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Resultant of the contact forces of each pair of blocks.
+    """Resultant of the contact forces of each pair of blocks, pressed or pulled.
 
     Returns
     -------
     points : (n, d) array [m]
-        Where the resultant crosses the joint, at the increment's pose.
+        Where the resultant crosses the joint, at the increment's pose; by mortar it may be beside it.
     forces : (n, d) array [N]
         On ``blocks[:, 0]``.
     blocks : (n, 2) int array
     """
-    contacts, carrying = increment.contacts, increment.forces[:, 0] > 0.0
+    contacts, carrying = increment.contacts, np.flatnonzero(increment.forces.any(axis=1))
     sense = np.where(contacts.block_a > contacts.block_b, -1.0, 1.0)
     force = np.einsum("ki,kij->kj", increment.forces, contacts.frames) * sense[:, None]
     pairs, which = contacts[carrying].joints()
-    forces, points = np.zeros((2, len(pairs), contacts.points.shape[1]))
-    normal = increment.forces[carrying, 0]
+    forces, points, middles = np.zeros((3, len(pairs), contacts.points.shape[1]))
+    normal, places = increment.forces[carrying, 0], contacts.points[carrying]
     np.add.at(forces, which, force[carrying])
-    np.add.at(points, which, normal[:, None] * contacts.points[carrying])
-    weight = np.bincount(which, weights=normal, minlength=len(pairs))
-    return points / weight[:, None], forces, pairs
+    np.add.at(points, which, normal[:, None] * places)
+    np.add.at(middles, which, places)
+    middles /= np.bincount(which, minlength=len(pairs))[:, None]
+    weight, every = (np.bincount(which, weights=of, minlength=len(pairs)) for of in (normal, np.abs(normal)))
+    crosses = np.abs(weight) > ALONG * every
+    middles[crosses] = points[crosses] / weight[crosses, None]
+    return middles, forces, pairs
 
 
 def joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find points (n, d) [m], forces (n, d) [N] and blocks (n, 2) of the resultants, or by "points" of all contacts."""
     if kind == "thrust":
         return resultants(increment)
-    contacts = increment.contacts
-    carrying = increment.forces[:, 0] > 0.0
+    contacts, carrying = increment.contacts, np.flatnonzero(increment.forces.any(axis=1))
     force = np.einsum("ki,kij->kj", increment.forces, contacts.frames)
     blocks = np.stack([contacts.block_a, contacts.block_b], axis=1)
     return contacts.points[carrying], force[carrying], blocks[carrying]
@@ -305,41 +315,69 @@ def settlement_arrows(
     -------
     blocks : (n,) int array
         The supports; one or a few of many stand for all.
+        Twice where they turn.
     places : (n, d) array [m]
         In the plane inside the part of each that is seen, in space where the arrow leaves the support.
     directions : (n, d) array
-        Unit vectors; a support that turns about its place has no arrow.
+        To the scale of each support, whose longest is a unit vector.
     """
-    blocks = np.flatnonzero(settlement.taking_part(assembly))
-    rate = settlement.rate(assembly, solver.Pose.initial(assembly), 0.0)
-    if assembly.dimension == 2:
-        blocks, places = _seen_places(assembly, blocks, pose, seen)
+    d, rate = assembly.dimension, settlement.rate(assembly, solver.Pose.initial(assembly), 0.0)
+    blocks = np.flatnonzero(settlement.taking_part(assembly) & rate.any(axis=1))
+    if d == 2:
+        blocks, places, extents = _seen_places(assembly, blocks, pose, seen)
     else:
+        blocks = evenly(blocks, MOST_ARROWS)
         places = pose.positions[blocks]
-    speeds = mechanics.point_velocities(places, blocks, pose, rate)
+        corners = [assembly.free[assembly.block_of_vertex], *(assembly.block_of_vertex == b for b in blocks)]
+        extents = np.array([np.ptp(assembly.vertices[chosen], axis=0) for chosen in corners])
+        # Of a slab that goes on beyond the structure nobody sees the ends.
+        extents = np.minimum(extents[1:], extents[0].max())
+    blocks, places = _with_ends(blocks, places, extents, rate[:, d:])
+    speeds, largest = mechanics.point_velocities(places, blocks, pose, rate), np.zeros(assembly.n_blocks)
     sizes = np.linalg.norm(speeds, axis=1)
-    moves = evenly(np.flatnonzero(sizes > 0.0), MOST_ARROWS)
-    blocks, directions = blocks[moves], speeds[moves] / sizes[moves, None]
-    places = places[moves] if assembly.dimension == 2 else leaving(assembly, pose, blocks, directions)
-    return blocks, places, directions
+    np.maximum.at(largest, blocks, sizes)
+    moves = sizes > SMALLEST_RESULTANT * largest[blocks]
+    blocks, places, speeds, sizes = blocks[moves], places[moves], speeds[moves], sizes[moves]
+    if d == 3:
+        places = leaving(assembly, pose, blocks, places, speeds / sizes[:, None])
+    return blocks, places, speeds / largest[blocks, None]
+
+
+def _with_ends(
+    blocks: np.ndarray, places: np.ndarray, extents: np.ndarray, spins: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Blocks and places with the two ends of each support that turns: one arrow would show it as pushed.
+
+    They lie apart along the axis on which the speeds differ most.
+    """
+    turning = spins[blocks].any(axis=1)
+    axes, spin = np.eye(extents.shape[1]), spins[blocks[turning]]
+    differ = np.abs(spin) if len(axes) == 2 else np.linalg.norm(np.cross(spin[:, None], axes), axis=2)
+    differ = differ * extents[turning]
+    # As many digits as do not tell the sides of a square apart, which turns.
+    axis = np.round(differ / differ.max(axis=1, keepdims=True), 2).argmax(axis=1)
+    end = END * extents[turning] * axes[axis]
+    twice = [blocks[~turning], blocks[turning], blocks[turning]]
+    return np.concatenate(twice), np.concatenate([places[~turning], places[turning] - end, places[turning] + end])
 
 
 def _seen_places(
     assembly: solver.Assembly, blocks: np.ndarray, pose: solver.Pose, seen: Frame | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Blocks of the plane that are seen, of many the one in the middle, and places (n, 2) [m] inside what is seen."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Blocks of the plane that are seen, of many the one in the middle; place inside and extent (n, 2) [m] of that."""
     corners = mechanics.moved_vertices(assembly, pose)
     outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in blocks]
     shown = outlines if seen is None else shapely.intersection(outlines, shapely.box(*seen.low, *seen.high))
     rows = [k for k, outline in enumerate(shown) if not outline.is_empty]
     if len(rows) > MOST_IN_PLANE:
         rows = [rows[len(rows) // 2]]
-    places = np.zeros((len(rows), 2))
+    places, extents = np.zeros((2, len(rows), 2))
     for row, k in enumerate(rows):
+        extents[row] = np.ptp(shapely.get_coordinates(shown[k]), axis=0)
         # A bent support may have its centroid outside.
         inside = shown[k].centroid if shown[k].contains(shown[k].centroid) else shown[k].point_on_surface()
         places[row] = inside.coords[0]
-    return blocks[rows], places
+    return blocks[rows], places, extents
 
 
 def evenly(numbers: np.ndarray, most: int) -> np.ndarray:
@@ -349,13 +387,18 @@ def evenly(numbers: np.ndarray, most: int) -> np.ndarray:
     return np.asarray(numbers[np.linspace(0, len(numbers) - 1, most).round().astype(int)])
 
 
-def leaving(assembly: solver.Assembly, pose: solver.Pose, blocks: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """(n, 3) array [m]: as far from the centroids of blocks along directions (n, 3) as their corners lie."""
+def leaving(
+    assembly: solver.Assembly, pose: solver.Pose, blocks: np.ndarray, places: np.ndarray, directions: np.ndarray
+) -> np.ndarray:
+    """(n, 3) array [m]: from places (n, 3) [m] in blocks along unit vectors (n, 3) to where the blocks end at most."""
     corners, offsets = mechanics.moved_vertices(assembly, pose), assembly.polyhedra.offsets
-    places = pose.positions[blocks].copy()
+    places = places.copy()
     for k, block in enumerate(blocks.tolist()):
-        reach = (corners[offsets[block] : offsets[block + 1]] - places[k]) @ directions[k]
-        places[k] += max(float(reach.max()), 0.0) * directions[k]
+        around, direction = corners[offsets[block] : offsets[block + 1]] - places[k], directions[k]
+        # Of a wide slab that tilts the corners are far off, the sides of the box around it are not.
+        along = direction != 0.0
+        box = (np.where(direction > 0.0, around.max(axis=0), around.min(axis=0))[along] / direction[along]).min()
+        places[k] += max(min(float((around @ direction).max()), float(box)), 0.0) * direction
     return places
 
 

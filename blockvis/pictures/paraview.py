@@ -124,7 +124,8 @@ state_bar.WindowLocation, state_bar.ScalarBarLength = "Upper Right Corner", 0.25
 forces = Glyph(Input=carrying, GlyphType="Arrow")
 forces.OrientationArray, forces.ScaleArray = ["POINTS", "force"], ["POINTS", "force"]
 UpdatePipeline(last, carrying)
-largest = carrying.PointData["normal_force"].GetRange()[1] if carrying.PointData.GetNumberOfArrays() else 0.0
+normal = carrying.PointData["normal_force"].GetRange() if carrying.PointData.GetNumberOfArrays() else (0.0, 0.0)
+largest = max(abs(force) for force in normal)
 forces.ScaleFactor = 0.1 * (x1 - x0) / largest if largest > 0 else 1.0
 forces.GlyphMode = "All Points"
 RenameSource("contact forces", forces)

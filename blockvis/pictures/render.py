@@ -75,10 +75,6 @@ def draw_still(
     section : str or mapping, optional
         A plane that cuts blocks in space open: "x", "y = 1.2" [m], or ``{"point": (x, y, z), "normal": (x, y, z)}``.
 
-    Returns
-    -------
-    pathlib.Path
-
     Raises
     ------
     ValueError
@@ -141,10 +137,6 @@ def draw_mechanism(
         As of :func:`draw_still`.
     section : str or mapping, optional
         As of :func:`draw_still`.
-
-    Returns
-    -------
-    pathlib.Path
     """
     response = response.response if isinstance(response, solver.LimitLoad) else response
     _check_response(response)
@@ -206,10 +198,6 @@ def animate(
         As of :func:`draw_still`; a film has one view.
     poster : path, optional
         Of a picture that stands for the film where it does not play: the frame in which the fall is fastest.
-
-    Returns
-    -------
-    pathlib.Path
     """
     _check_response(response)
     look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
@@ -230,7 +218,8 @@ def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
     n = int(parts.max(initial=-1)) + 1
     bodies = f"{mechanics.counted(n, 'moving part')}{', darker where faster' if n > MOST_PARTS else ''}"
     if response.collapse is None and response.limits:
-        return f"mechanism at the limit load   ·   {response.limits[-1].flow} friction   ·   {bodies}"
+        friction = f"{response.limits[-1].flow} friction"
+        return f"mechanism at the limit load   ·   {friction}   ·   {bodies}" if n else f"no mechanism   ·   {friction}"
     if response.collapse is None:
         if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM:
             when = f"before any {response.parameter.name}" if response.measured.is_force else "under the dead load"
@@ -255,6 +244,9 @@ def _check_response(response: solver.Response) -> None:
 
 
 def _save(picture: Image.Image, path: str | os.PathLike[str]) -> Path:
+    path = Path(path)
+    if Image.registered_extensions().get(path.suffix.lower()) not in Image.SAVE:
+        raise ValueError(f"'{path}' is no picture that blockvis draws; end its name in .png, or as Pillow writes")
     with atomic_file(path) as partial:
         picture.save(partial)
-    return Path(path)
+    return path

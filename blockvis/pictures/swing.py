@@ -76,20 +76,19 @@ def swing_of(response: solver.Response) -> Swing:
 
 
 def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:
-    """Increments that films and pages show: those of a response, and in space enough frames of a fall.
+    """Increments that films and pages show: those of a response, and enough frames of a fall.
 
-    In space blocks that fall soon meet others, and the analysis ends there; the mechanism then swings out instead, ever
-    faster, as it begins at the last equilibrium.
+    In space blocks that fall soon meet others, and the analysis ends there, as it does at once where nothing ever
+    stood; the mechanism then swings out instead, ever faster, as it begins at the last equilibrium.
     """
     path = response.path
-    if response.assembly.dimension == 2 or response.collapse is None or not path:
-        return response.increments
-    if len(response.increments) - len(path) >= ENOUGH_FRAMES:
+    stood = bool(path) and (response.assembly.dimension == 2 or response.collapse is None)
+    if stood or not response.increments or len(response.increments) - len(path) >= ENOUGH_FRAMES:
         return response.increments
     swing = swing_of(response)
     if not swing.moves:
         return response.increments
-    reaches = (SWING_REACH * (k / SWING_FRAMES) ** 2 for k in range(1, SWING_FRAMES + 1))
+    reaches = (SWING_REACH * (k / SWING_FRAMES) ** 2 for k in range(1 if path else 0, SWING_FRAMES + 1))
     return (*path, *(swung_increment(swing.increment, reach * swing.motion) for reach in reaches))
 
 

@@ -58,10 +58,6 @@ def show(response: solver.Response, *, height: int = 760) -> Player:
     response : solver.Response
     height : int
         Pixels.
-
-    Returns
-    -------
-    Player
     """
     return Player(response, height)
 

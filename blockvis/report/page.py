@@ -41,7 +41,7 @@ from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.marks import STEEPEST, WIDEST
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.pictures.ties import DrawnTies
-from blockvis.results.about import about, certified, counts_text, loss_of
+from blockvis.results.about import about, certified, counts_text, governing_limit, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
@@ -120,10 +120,6 @@ def write_report(
         What of and how large, "error of the steps: reaction ± 0.2 %"; :func:`add_error` may say it later.
     band : ReactionRange, optional
         Of the reaction, drawn behind the curve.
-
-    Returns
-    -------
-    pathlib.Path
     """
     return write_atomic(path, report_html(response, case_text, title=title, fall=fall, error=error, band=band))
 
@@ -335,7 +331,8 @@ def _fill(
 ) -> dict[str, Any] | None:
     """Give the pieces of blocks under fill, which carry it as they move, with the law of its load; None without fill.
 
-    A piece has its block, its ends and the surface [m], thickness times unit weight [N/m²], the pressure coefficient.
+    A piece has its block, its ends, the surface and the base [m], thickness times unit weight [N/m²], the pressure
+    coefficient.
     """
     fills = response.loads.fills
     if not fills:
@@ -346,8 +343,8 @@ def _fill(
         ends = np.round(fill.pieces - origin, 5)
         weights = fill.unit_weight * fill.thickness
         for block, (first, last), weight in zip(fill.block.tolist(), ends.tolist(), weights.tolist(), strict=True):
-            surface = round(float(fill.surface - origin[1]), 5)
-            pieces.append([block, *first, *last, surface, weight, fill.pressure_coefficient])
+            surface, base = (round(float(level - origin[1]), 5) for level in (fill.surface, max(fill.base, -1e9)))
+            pieces.append([block, *first, *last, surface, base, weight, fill.pressure_coefficient])
     largest = max(float(np.abs(fill.load(response.assembly, shown[0].pose)[:, :2]).max()) for fill in fills)
     return {
         "pieces": pieces,
@@ -497,8 +494,11 @@ def _ticks(low: float, high: float, n: int) -> list[float]:
 def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tuple[str, str]]:
     """Sum up a response in words and numbers with their units."""
     assembly, path = response.assembly, response.path
+    limit = governing_limit(response) if response.swings else None
     # That a limit load is found is no collapse that has happened.
-    status = "limit load found" if response.swings and response.limits else str(response.stop)
+    status = str(response.stop if limit is None else limit.status)
+    if limit is not None and limit.status is solver.LimitStatus.FOUND:
+        status = "limit load found"
     rows = [("analysis", response.analysis), ("status", status), *KINDS[response.analysis].rows(response)]
     apart = len(response.increments) - len(path)
     loss = loss_of(response)

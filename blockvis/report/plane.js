@@ -112,8 +112,8 @@
   const hatched = model.fill && tiled(model.fill.colours);
   function fillPieces(k) {
     const gone = new Set(model.fill.gone[k]);
-    return model.fill.pieces.filter(([b]) => !gone.has(b)).map(([b, x0, y0, x1, y1, surface, weight, across]) => {
-      const p = carried(shown, b, x0, y0), r = carried(shown, b, x1, y1), depth = Math.max(0, surface - (p[1] + r[1]) / 2);
+    return model.fill.pieces.filter(([b]) => !gone.has(b)).map(([b, x0, y0, x1, y1, surface, base, weight, across]) => {
+      const p = carried(shown, b, x0, y0), r = carried(shown, b, x1, y1), depth = Math.max(0, surface - Math.max(base, (p[1] + r[1]) / 2));
       // Along the outward normal, which is upwards.
       const up = p[0] - r[0], load = up > 0 ? weight * depth : 0;
       return { p, r, surface, fx: load * across * (p[1] - r[1]), fy: -load * up };

@@ -39,6 +39,11 @@ class About:
     version: str
 
 
+def governing_limit(response: solver.Response) -> solver.LimitLoad | None:
+    """Find the limit load of the increment that decides; none where that is no limit state."""
+    return next((limit for limit, state in response.limit_states if state is response.governing), None)
+
+
 def about(response: solver.Response) -> About:
     """Find where a response comes from, by the results folder that its increments are in."""
     folder = folder_of(response.increments[0]) if response.increments else None

@@ -240,7 +240,7 @@ def contact_grid(
     grid = _grid_between(assembly, increment, places, blocks, VTK_VERTEX, shape)
     normal, tangent = contacts.frames[:, 0], contacts.frames[:, 1]
     balanced = increment.forces * (increment.status != solver.Status.FALLING)
-    carries = (states != mechanics.ContactState.OPEN) & (balanced[:, 0] > 0.0)
+    carries = (states != mechanics.ContactState.OPEN) & balanced.any(axis=1)
     shear = np.einsum("ki,kij->kj", balanced[:, 1:], contacts.frames[:, 1:])
     force = balanced[:, :1] * normal + shear
     in_space = assembly.dimension == 3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import importlib
 import io
 import json
@@ -22,6 +23,7 @@ from solver import mechanics
 
 from .cracks import MOST_LISTED, cracks_of
 from .fall_files import remove_fall
+from .given import GIVEN, write_given
 from .increments import StoredIncrements, packed_increment
 from .joints import LargestMovements
 from .mechanism_arrays import at_last_equilibrium
@@ -29,7 +31,7 @@ from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_json, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
 from .ties import COLUMNS as TIE_COLUMNS
-from .ties import TIES, TieCourses, stored_ties, tie_rows, write_ties
+from .ties import TIES, TieCourses, stored_ties, tie_courses, tie_rows, write_ties
 from .viewer_files import MOVED, ViewerFiles, ViewerFormat, ViewerWriter, restore_grids, write_end, write_lists
 
 #: Where a run can go on from, beside the increments it belongs to.
@@ -54,7 +56,7 @@ _LISTS = (
     *("ties.csv", "ties.pvd"),
     *LIMIT_TABLES,
 )
-_STARTED = (RECORD, CHECKPOINT, "assembly.npz", TIES)
+_STARTED = (RECORD, CHECKPOINT, "assembly.npz", TIES, GIVEN)
 _PICTURES = (
     *("report.html", "report.pdf", "curve.png", "curve.svg", "mechanism.png", "cracks.png", "last.png", "poster.png"),
     "paraview_colours.py",
@@ -75,6 +77,8 @@ class ResultsExist(ValueError):
 
 def refuse_results(path: str | Path, overwrite: bool = False) -> None:
     """Raise :class:`ResultsExist` if a folder holds results that may not be replaced."""
+    if path == "":
+        raise ValueError("the folder is '': -o is empty; name the folder of the results")
     path = Path(path)
     unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
     go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
@@ -141,7 +145,7 @@ class ResultsFolder:
         self.path, self.assembly, self.record = Path(path), assembly, record or Record(versions=versions())
         self.increments: list[solver.Increment] = []
         self._files = StoredIncrements(self.path)
-        refuse_results(self.path, overwrite)
+        refuse_results(path, overwrite)
         make_folder(self.path / "increments")
         self._release = _locked(self, self.path)
         # Lists of files go first, so that none ever names a file that is gone.
@@ -216,6 +220,7 @@ class ResultsFolder:
         Afterwards the folder keeps the numbers of the increment, not its arrays; see
         :mod:`blockvis.results.increments`.
         """
+        self._refuse_gone()
         number = len(self.increments)
         write_atomic(self._files.file(number), packed_increment(increment))
         self.increments.append(self._files.without_arrays(number, increment))
@@ -245,6 +250,8 @@ class ResultsFolder:
         tables : mapping from file name to text, optional
             Tables of the kind of analysis.
         """
+        self._refuse_gone()
+        self.tell(response)
         if not self.viewer.finish():
             restore_grids(self.path, self.assembly, self.increments, self.vtu)
         if response.path and response.collapse is not None:
@@ -252,7 +259,11 @@ class ResultsFolder:
             write_end(self.path, response, self.vtu, self._movements.joints)
             self._rows.seek(self._last_row)
             self._rows.truncate()
-            self._write_row(len(response.path) - 1, at_last_equilibrium(response))
+            last = at_last_equilibrium(response)
+            self._write_row(len(response.path) - 1, last)
+            if len(response.path) == len(self.increments):
+                # There is no frame of the fall that has the mechanism.
+                write_atomic(self._files.file(len(response.path) - 1), packed_increment(last))
         self._write_table(durable=True)
         write_lists(self.path, self.increments, durable=True)
         write_atomic(self.path / "joints.csv", self._movements.table(response.settlements))
@@ -260,15 +271,21 @@ class ResultsFolder:
             write_atomic(self.path / name, text)
         cracks = []
         if response.path:
-            last = response.path[-1]
-            cracks = cracks_of(self.assembly, last.pose, self._movements.joints, last.fallen)
+            end = response.path[-1]
+            cracks = cracks_of(self.assembly, end.pose, self._movements.joints, end.fallen)
         listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         if self.ties:
-            listed["ties"] = [asdict(course) for course in self._courses.courses]
+            courses = self._courses.courses if response.parameter.is_path else tie_courses(response)
+            listed["ties"] = [asdict(course) for course in courses]
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_atomic(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
         return summary
+
+    def tell(self, response: solver.Response) -> None:
+        """Write the laws and loads of a response where no case file tells them."""
+        if not self.record.case:
+            write_given(self.path, response)
 
     def own_viewer(self) -> ViewerWriter:
         """Make what writes the files for viewers in this process."""
@@ -280,7 +297,7 @@ class ResultsFolder:
         self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
         self._tie_rows = io.StringIO()
         self._tie_table = csv.writer(self._tie_rows, lineterminator="\n")
-        self._tie_table.writerow(TIE_COLUMNS)
+        self._tie_table.writerow((*TIE_COLUMNS, *own_columns(self.parameter)))
         self._courses = TieCourses(self.ties)
         self._movements = LargestMovements(self.assembly, self.parameter)
 
@@ -290,7 +307,7 @@ class ResultsFolder:
             self._write_row(number, increment)
             self._movements.add(increment)
             if self.ties:
-                self._tie_table.writerows(tie_rows(self.ties, number, increment))
+                self._tie_table.writerows(tie_rows(self.ties, number, increment, self.parameter))
                 self._courses.add(increment)
 
     def _write_row(self, number: int, increment: solver.Increment) -> None:
@@ -300,6 +317,11 @@ class ResultsFolder:
         write_atomic(self.path / "response.csv", self._rows.getvalue(), last=False, durable=durable)
         if self.ties:
             write_atomic(self.path / "ties.csv", self._tie_rows.getvalue(), last=False, durable=durable)
+
+    def _refuse_gone(self) -> None:
+        """Raise ``OSError`` where the folder was moved during the run: made again, it would hold half of the run."""
+        if not self.path.is_dir():
+            raise FileNotFoundError(errno.ENOENT, "it was moved or removed during the run", str(self.path))
 
     def flush(self) -> None:
         """Flush the VTU files to the disk: each increment waits for its state only, of which they are made."""
@@ -467,8 +489,9 @@ def _collapse_of(
         return None
     mechanism = np.zeros((assembly.n_blocks, 3 * assembly.dimension - 3))
     falling = [i for i in increments if i.status == solver.Status.FALLING]
-    if falling:
-        motion = falling[0].velocity
+    moving = [*falling, *increments[-1:]]
+    if moving:
+        motion = moving[0].velocity
         mechanism = motion / max(mechanics.motion_size(motion, assembly.block_size).max(), 1e-300)
     return solver.Collapse(
         displacement=summary["collapse_displacement"],

@@ -104,10 +104,6 @@ class StoredIncrements:
     def read(self, number: int) -> solver.Increment:
         """Read an increment with its arrays, from its file or from memory.
 
-        Parameters
-        ----------
-        number : int
-
         Raises
         ------
         ValueError

@@ -237,7 +237,8 @@ class LargestMovements:
 
     def add(self, increment: solver.Increment) -> None:
         """Take an increment in equilibrium into account."""
-        moved = np.abs(opening_and_slip(self.assembly, self.joints, increment.pose))
+        moved = opening_and_slip(self.assembly, self.joints, increment.pose)
+        moved[:, 1] = np.abs(moved[:, 1])
         larger = moved > self._largest
         self._largest[larger] = moved[larger]
         self._at[larger], self._phases[larger] = increment.parameter, increment.phase

@@ -113,17 +113,20 @@ def finite(value: float) -> float | None:
 def _removed(response: solver.Response) -> list[dict[str, Any]]:
     """Blocks and ties that are taken away before each settlement, its number from 1, and the blocks' weight."""
     names, weights = response.assembly.names, response.assembly.masses * solver.GRAVITY
-    blocks = [np.flatnonzero(() if change.removed is None else change.removed) for change in response.changes]
-    return [
-        {
-            "phase": change.phase + 1,
-            "blocks": [names[k] for k in taken],
-            "ties": list(change.ties),
-            "weight": float(weights[taken].sum()),
-        }
-        for change, taken in zip(response.changes, blocks, strict=True)
-        if len(taken) or change.ties
-    ]
+    there, removed = np.ones(len(names), dtype=bool), list[dict[str, Any]]()
+    for change in sorted(response.changes, key=lambda change: change.phase):
+        taken = np.flatnonzero(there & (False if change.removed is None else change.removed))
+        there[taken] = False
+        if len(taken) or change.ties:
+            removed.append(
+                {
+                    "phase": change.phase + 1,
+                    "blocks": [names[k] for k in taken],
+                    "ties": list(change.ties),
+                    "weight": float(weights[taken].sum()),
+                }
+            )
+    return removed
 
 
 def _joint_counts(response: solver.Response) -> dict[str, int | None]:

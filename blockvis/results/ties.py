@@ -17,6 +17,7 @@ from solver import mechanics
 from .about import in_phase, unit_in
 from .increments import folder_of
 from .npz import packed, unpacked
+from .tables import own_columns
 
 #: File of the ties of a results folder, which is there where it has any.
 TIES = "ties.npz"
@@ -30,7 +31,7 @@ NEGLIGIBLE = 1e-6
 #: Ties whose force is drawn over the settlement: more would not be told apart.
 MOST_CURVES = 6
 
-#: Columns of ties.csv.
+#: Columns of ties.csv, before those that response.csv has for a parameter of its own.
 COLUMNS = ("increment", "phase", "settlement", "name", "kind", "force", "elongation", "state")
 
 
@@ -89,29 +90,27 @@ def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: so
     return mechanics.TieForces(np.zeros(n), np.zeros(n), np.full(n, np.nan), np.zeros(n, dtype=np.int64), ends)
 
 
-def tie_rows(ties: Sequence[solver.Tie], number: int, increment: solver.Increment) -> list[tuple[Any, ...]]:
-    """Make the rows of ties.csv for an increment, in the order of :data:`COLUMNS`; none outside of equilibrium.
+def tie_rows(
+    ties: Sequence[solver.Tie], number: int, increment: solver.Increment, parameter: mechanics.Quantity
+) -> list[tuple[Any, ...]]:
+    """Make the rows of ties.csv for an increment by its number, in the order of :data:`COLUMNS`, its parameter last.
 
-    Parameters
-    ----------
-    ties : sequence of solver.Tie
-    number : int
-        Of the increment.
-    increment : solver.Increment
+    There are none outside of equilibrium.
     """
     if increment.status != solver.Status.EQUILIBRIUM:
         return []
-    found = increment.ties
-    place = number, increment.phase, repr(float(increment.parameter))
+    found, value = increment.ties, repr(float(increment.parameter))
+    place = number, increment.phase, value if parameter.is_path else repr(0.0)
+    own = [value for _ in own_columns(parameter)]
     return [
-        (*place, tie.name, tie.kind, repr(float(force)), repr(float(elongation)), STATE_WORDS[state])
+        (*place, tie.name, tie.kind, repr(float(force)), repr(float(elongation)), STATE_WORDS[state], *own)
         for tie, force, elongation, state in zip(ties, found.forces, found.elongations, found.states, strict=True)
     ]
 
 
 @dataclass(frozen=True)
 class TieCourse:
-    """What a tie does along a path, as summary.json has it.
+    """What a tie does along a path, or at the state that governs, as summary.json has it.
 
     Attributes
     ----------
@@ -189,8 +188,11 @@ class TieCourses:
 
 
 def tie_courses(response: solver.Response) -> tuple[TieCourse, ...]:
-    """Work out what each tie of a response does along its path; its increments are gone through once."""
-    courses = TieCourses(known_ties(response))
+    """Work out what each tie of a response does along its path, gone through once, or at the state that governs."""
+    courses, governing = TieCourses(known_ties(response)), response.governing
+    if not response.parameter.is_path and governing is not None:
+        courses.add(governing)
+        return courses.courses
     for increment in response.path if courses.ties else ():
         courses.add(increment)
     return courses.courses
@@ -245,11 +247,19 @@ def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, s
     def place(at: float, phase: int) -> str:
         return f"{at:.4g} {unit_in(response, phase - 1)}{in_phase(response, phase - 1)}"
 
-    sense = "tension" if course.largest_force > 0.0 else "compression"
+    name = f"{course.name} ({course.kind})" if course.kind not in course.name.split() else course.name
+
+    def carried(force: float) -> str:
+        return f"{force_text(abs(force))} {'tension' if force > 0.0 else 'compression'}" if force else "no force"
+
+    if not response.parameter.is_path:
+        # States that stand by themselves have no before.
+        load = f", load at x = {course.largest_force_at:.6g} m" if len(response.path) > 1 else ""
+        return name, carried(course.last_force), f"{course.last_state}{load}"
     # It breaks between two increments.
     at = "by" if (course.largest_force_at, course.phase) == (course.breaks_at, course.breaks_in_phase) else "at"
-    where = f"{sense} {at} {place(course.largest_force_at, course.phase)}"
-    largest = f"{force_text(abs(course.largest_force))} {where}" if course.largest_force else "no force"
+    where = f" {at} {place(course.largest_force_at, course.phase)}" if course.largest_force else ""
+    largest = f"{carried(course.largest_force)}{where}"
     fates = (("yields", course.yields_at, course.yields_in_phase), ("breaks", course.breaks_at, course.breaks_in_phase))
     told = ((word, place(at, phase)) for word, at, phase in fates if at is not None and phase is not None)
     fate = [f"{word} at {where} or before" for word, where in told]
@@ -261,8 +271,4 @@ def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, s
             if course.last_force
             else f"{course.last_state} at the end"
         )
-    return (
-        f"{course.name} ({course.kind})" if course.kind not in course.name.split() else course.name,
-        largest,
-        ", ".join(fate),
-    )
+    return name, largest, ", ".join(fate)

@@ -225,8 +225,10 @@ def output_times(increments: Sequence[solver.Increment]) -> list[float]:
         if increment.phase != phase:
             before, phase = last, increment.phase
         time = before + increment.parameter
-        if (times and time <= times[-1]) or increment.status == solver.Status.FALLING:
-            time = last + 0.01 * (abs(last) or 1.0) if not times else times[-1] + 0.01 * (abs(last) or 1.0)
+        if times and time <= times[-1]:
+            # Row 0 of a phase is at the end of the one before, and what tells them apart takes no time.
+            step = 0.01 if increment.status == solver.Status.FALLING else 1e-9
+            time = times[-1] + step * (abs(last) or 1.0)
         else:
             last = time
         times.append(float(time))

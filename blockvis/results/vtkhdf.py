@@ -64,12 +64,7 @@ def write_vtkhdf(response: solver.Response, path: Path) -> Path:
 
 
 class _Series(VTKPythonAlgorithmBase):
-    """The increments of a path as a pipeline of VTK asks for them, by their times.
-
-    Parameters
-    ----------
-    response : solver.Response
-    """
+    """The increments of a path as a pipeline of VTK asks for them, by their times."""
 
     def __init__(self, response: solver.Response) -> None:
         super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkMultiBlockDataSet")

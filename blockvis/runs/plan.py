@@ -12,10 +12,10 @@ from blockvis.cases.build import (
     case_controls,
     case_interfaces,
     case_loads,
-    case_settlements,
     case_ties,
 )
 from blockvis.cases.contents import Case
+from blockvis.cases.profiles import with_profiles
 from blockvis.kinds.kind import AnalysisRun, RunInput
 from blockvis.kinds.kinds import KINDS
 from solver import mechanics
@@ -51,7 +51,7 @@ def planned(
         raise ValueError(f"a {case.analysis} cannot go on from a {type(resume).__name__}")
     case = replace(
         case,
-        settlements=case_settlements(case, assembly),
+        settlements=with_profiles(case.settlements, case.profiles, assembly, case.source),
         profiles=(),
         controls=case_controls(case, assembly),
     )
@@ -67,7 +67,10 @@ def planned(
         )
     given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly), changes, members)
     if case.settlements:
-        mechanics.check_settlement(assembly, case.settlements, case.controls, changes, members)
+        try:
+            mechanics.check_settlement(assembly, case.settlements, case.controls, changes, members)
+        except ValueError as error:
+            raise ValueError(f"{case.source}: {error}") from None
     return kind.start(given, resume, found)
 
 

@@ -12,20 +12,18 @@ from blockvis.cases.loads import with_moving_load
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.about import collapse_phase, unit_in
 from blockvis.results.folder import stored_case, stored_response
+from blockvis.results.given import with_given
 
 
 def open_results(folder: str | Path) -> solver.Response:
     """Reopen a results folder as the response it was written from, without solving.
 
-    Parameters
-    ----------
-    folder : str or Path
-
     Returns
     -------
     solver.Response
-        Whose increments read their arrays from the folder when they are asked for; the settlements' limits and
-        the loads are known only where the case can be read back from the summary.
+        Whose increments read their arrays from the folder when they are asked for. Laws and loads are those of the
+        case file, or, of a case made or changed in Python, those that the folder holds; a warning names what it does
+        not hold: the scatter of friction from joint to joint.
 
     Raises
     ------
@@ -44,7 +42,7 @@ def open_results(folder: str | Path) -> solver.Response:
         # Stored is the unit of the last settlement, which may turn where the one before moves.
         response = replace(response, collapse=replace(response.collapse, unit=unit_in(response, phase)))
     if case is None:
-        return response
+        return with_given(folder, response)
     if "parameter" not in summary:
         # The run was stopped before it wrote a summary.
         course = kind.course(case)

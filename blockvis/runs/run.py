@@ -28,6 +28,7 @@ from .outputs import Clock, Drawing, Output, viewer_format
 from .plan import planned
 from .progress import Progress
 from .reopen import open_results
+from .step_check import stored_case
 from .write import finish
 
 
@@ -120,7 +121,7 @@ def run_case(
     if not isinstance(case, Case):
         case = read_case(case)
     refuse_increment_seconds(case, increment_seconds)
-    folder = Path(f"{case.source.stem}{RESULTS}") if folder is None else Path(folder)
+    folder = f"{case.source.stem}{RESULTS}" if folder is None else folder
     refuse_results(folder, overwrite)
     outputs = (Drawing(film=film, pictures=pictures),) if outputs is None else outputs
     with _begun(case, outputs):
@@ -138,6 +139,7 @@ def run_case(
                 vtu=viewer_format(case),
                 ties=run.given.ties,
             )
+            results.tell(run.response((), mechanics.Ending(solver.Status.INTERRUPTED)))
         except OSError as error:
             raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
         limit = case.increment_seconds if increment_seconds is None else increment_seconds
@@ -173,10 +175,7 @@ def resume_run(
     changed are named in a warning, and not read again. Of a run that has finished, what is not drawn yet is drawn.
     """
     folder = Path(folder)
-    record = read_record(folder)
-    if not record.case:
-        raise ValueError(f"'{folder}' was written from Python, without a case file; run it again from there")
-    case = parse_case(record.case, Path(record.case_file or folder / "case.toml"))
+    case, record = stored_case(folder), read_record(folder)
     outputs = (Drawing(),) if outputs is None else outputs
     finished = _finished(folder)
     if finished is not None:
@@ -305,6 +304,11 @@ def _follow(
 
 def _write_error(folder: Path, error: OSError) -> OSError:
     """Remove half-written files when the disk is full or gone in the middle of a run; returns the error to raise."""
+    if not folder.is_dir():
+        return OSError(
+            f"'{folder}' was moved or removed during the run; go on with it where it is now by blockvis run --resume "
+            "FOLDER, or run the case again"
+        )
     for half in folder.rglob(PARTIAL):
         half.unlink(missing_ok=True)
     return OSError(

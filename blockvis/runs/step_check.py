@@ -181,7 +181,7 @@ def stored_case(folder: Path) -> Case:
     """
     record = read_record(folder)
     if not record.case:
-        raise ValueError(f"'{folder}' was written from Python, without a case file; it cannot be followed again")
+        raise ValueError(f"'{folder}' was written from Python, without a case file; run it again from there")
     return parse_case(record.case, Path(record.case_file or folder / "case.toml"))
 
 

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 import solver
 from blockvis.pictures import palette
+from blockvis.pictures.figures import plain_text
 from blockvis.pictures.ties import COLOURS
 from blockvis.results.about import LOCAL
 from blockvis.system.atomic_files import atomic_file
@@ -71,6 +72,7 @@ def draw_study(records: StudyFolder, table: pd.DataFrame) -> list[Path]:
     return drawn
 
 
+@plain_text
 def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     """Draw the probability of collapse against the settlement, with its confidence band.
 
@@ -116,6 +118,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     return _saved(figure, path)
 
 
+@plain_text
 def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     """Draw the swing of the collapse displacement with every parameter, and Sobol' indices beside it."""
     found, indices = swings(study, table)[:12], first_order(study, table)
@@ -172,6 +175,7 @@ def _draw_swing(axes: Axes, place: int, swing: Swing, centre: float, factor: flo
         )  # fmt: skip
 
 
+@plain_text
 def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     """Draw the collapse displacement of every run against the parameters with the largest swings, by mechanism."""
     factor, unit = _length(table)
@@ -214,6 +218,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     return _saved(figure, path)
 
 
+@plain_text
 def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path) -> Path:
     """Draw one run of each mechanism found, the most frequent first."""
     classes = classes_of(table)

@@ -132,7 +132,7 @@ def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, flo
     -------
     dict
         The index and half its 95 % interval by name of the parameter, for a "saltelli" study also of all imperfections
-        together; empty if there are too few runs, none collapsed, or the outcome is the same in all.
+        together; empty if there are too few runs, none collapsed, or the outcome is the same in nearly all.
 
     Notes
     -----
@@ -148,13 +148,17 @@ def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, flo
     few = np.isfinite(y).sum() < FEWEST_RUNS and study.method != "grid"
     if few or not np.isfinite(y).any() or np.nanstd(y) <= 1e-9 * max(abs(float(np.nanmean(y))), 1e-300):
         return {}
-    if study.design.factors:
-        return _exchanged(study, y)
     known = np.isfinite(y)
     u = study.design.probabilities[known]
-    if study.method == "grid":
-        return {p.name: _of_groups(u[:, k], y[known]) for k, p in enumerate(study.parameters) if p.n_levels > 1}
-    return _of_sample(study.parameters, u, y[known], study.seed)
+    if study.design.factors:
+        found = _exchanged(study, y)
+    elif study.method == "grid":
+        found = {p.name: _of_groups(u[:, k], y[known]) for k, p in enumerate(study.parameters) if p.n_levels > 1}
+    else:
+        # Where a single run differs, resamples without it have no variance.
+        with np.errstate(invalid="ignore"):
+            found = _of_sample(study.parameters, u, y[known], study.seed)
+    return {name: pair for name, pair in found.items() if np.isfinite(pair).all()}
 
 
 def _exchanged(study: Study, y: np.ndarray) -> dict[str, tuple[float, float]]:

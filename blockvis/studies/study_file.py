@@ -100,9 +100,9 @@ class Study:
     case_source : Path
         The base case; paths in it are relative to its folder.
     values : dict
-        The base case as parsed TOML, with the imperfections of the study before its own.
+        The base case as parsed TOML, with the imperfections of the study behind its own.
     n_seeded : int
-        Number of the first of these imperfections, those of the study, which get a new seed in every run.
+        Number of the last of these imperfections, those of the study, which get a new seed in every run.
     parameters : tuple of Parameter
     method : str
     runs : int
@@ -185,12 +185,13 @@ def run_values(values: Mapping[str, Any], order: Mapping[str, Any], n_seeded: in
     order : mapping
         Of :meth:`Study.order`.
     n_seeded : int
-        Number of the first imperfections, those of the study, which get the run's seed.
+        Number of the last imperfections, those of the study, which get the run's seed.
     """
     case = copy.deepcopy(dict(values))
     for path, value in order["paths"].items():
         put(case, parse_path(path), copy.deepcopy(value))
-    for imperfection in case.get("imperfections", [])[:n_seeded]:
+    found = case.get("imperfections", [])
+    for imperfection in found[len(found) - n_seeded :]:
         imperfection["seed"] = order["seed"]
     return case
 
@@ -228,8 +229,10 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
     imperfections = _imperfections(top)
     if not parameters and not imperfections:
         raise ValueError(f"{where}nothing is varied; give [parameters] or [[imperfections]]")
-    if imperfections:
-        values["imperfections"] = [*imperfections, *_as_list(values.get("imperfections", []))]
+    # Paths of parameters count those of the case.
+    scattered = [*_as_list(values.get("imperfections", [])), *imperfections]
+    if scattered:
+        values["imperfections"] = scattered
     method = asked["method"]
     if method == "grid" and "runs" in head.values:
         raise head.error("runs", "is given, but a grid has as many as its values make; give repeats instead")
@@ -278,6 +281,9 @@ def _check(study: Study, where: str) -> None:
     for run in study.keep:
         if run >= n:
             raise ValueError(f"{where}[study] keep names run {run}; runs are numbered from 0 to {n - 1}")
+    drawn = next((p for p in study.parameters if p.points and study.method != "grid"), None)
+    if drawn is not None:
+        raise ValueError(f'{where}[parameters] "{drawn.path}": points belong to a grid; give [study] runs')
     _check_paths(study, where)
     _check_runs(study, where)
 

@@ -30,7 +30,8 @@ def atomic_file(path: str | os.PathLike[str], *, last: bool = True, durable: boo
     Parameters
     ----------
     path : path
-        Its folder is made if it does not exist. A link stays a link; a pipe or device is written to directly.
+        For what is durable its folder is made if it does not exist. A link stays a link; a pipe or device is written
+        to directly.
     last : bool
         Whether this is the last of several files written together: only then the folder's list of names is flushed.
     durable : bool
@@ -47,11 +48,14 @@ def atomic_file(path: str | os.PathLike[str], *, last: bool = True, durable: boo
     the files on the disk are complete and were written in this order.
     """
     path = Path(path)
+    if not path.name:
+        raise ValueError(f"'{path}' names no file; give the name of the file that is to be written")
     if path.exists() and not path.is_file() and not path.is_dir():
         yield path
         return
     path = path.resolve() if path.is_symlink() else path
-    make_folder(path.parent)
+    if durable:
+        make_folder(path.parent)
     partial = partial_of(path)
     try:
         yield partial

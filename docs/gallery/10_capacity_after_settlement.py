@@ -2,7 +2,7 @@
 What a settlement leaves
 ========================
 
-The same horizontal capacity before and after the right support of a block has sunk: a settlement first, then the
+The same horizontal capacity before and after a springer of an arch has moved outwards: a settlement first, then the
 limit load of the pose that it leaves.
 """
 

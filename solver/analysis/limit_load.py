@@ -41,7 +41,7 @@ from solver.ties import (
     tie_lengths,
 )
 from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
-from solver.words import counted
+from solver.words import checked, counted, plain
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25
@@ -140,10 +140,10 @@ def find_limit_load(
     loads = checked_live(left, loads)
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
-    pose = Pose.initial(assembly) if pose is None else pose
+    pose = Pose.initial(assembly) if pose is None else checked(pose, Pose, "pose")
     loads = replace(loads, dead=loads.dead_at(assembly, pose), live=loads.live_at(pose))
     for name, value in (("displacement", displacement), ("closed_gap", closed_gap)):
-        if not (np.isfinite(value) and value >= 0.0):
+        if not 0.0 <= plain(value, "float", name) < np.inf:
             raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
     gone = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else np.asarray(fallen)
     states = np.full(len(ties), ELASTIC) if ties_at is None else ties_at.states
@@ -227,12 +227,12 @@ class _Problem:
         cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around, areas)
         gaps, is_open = contacts.gaps, contacts.gaps > closed_gap
         if bonded is not None:
-            # As along the path: closed is what has no gap beyond the give of its joint, or holds by tension.
-            gaps = _beyond_give(assembly, interfaces, contacts, gaps - bonded.rest, tension > 0.0)
+            # As along the path: an open joint with a rest of its strength holds, and does not push.
+            gaps = _beyond_give(assembly, interfaces, contacts, gaps - bonded.rest, tension, bonded.areas)
             is_open = (gaps > closed_gap) & (tension == 0.0)
             near = ~is_open | (gaps <= reach)
-            contacts, gaps, is_open = contacts[near], gaps[near], is_open[near]
-            cohesion, crushing, tension = cohesion[near], crushing[near], tension[near]
+            contacts, gaps, is_open, cohesion = contacts[near], gaps[near], is_open[near], cohesion[near]
+            tension, crushing = tension[near], np.where(is_open | (gaps <= closed_gap), crushing[near], 0.0)
         friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         there = ~np.isin(tie_states, (ABSENT, BROKEN))
         if there.any():
@@ -502,13 +502,19 @@ def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs:
 
 
 def _beyond_give(
-    assembly: Assembly, interfaces: Interfaces, contacts: Contacts, gaps: np.ndarray, holds: np.ndarray
+    assembly: Assembly,
+    interfaces: Interfaces,
+    contacts: Contacts,
+    gaps: np.ndarray,
+    tension: np.ndarray,
+    areas: np.ndarray,
 ) -> np.ndarray:
-    """(n,) array [m]: gaps, from those without force, beyond the give; some hold by tension, an (n,) bool array."""
+    """(n,) array [m]: gaps, from those without force, beyond the give under the largest tension [N] over areas [m²]."""
     (stiffness,) = interfaces.values(assembly, contacts.block_a, contacts.block_b, "normal_stiffness")
     # Give of elastic joints is neither a gap nor a penetration.
-    gives = (stiffness > 0.0) & np.isfinite(stiffness) & (holds | (gaps < 0.0))
-    return np.where(gives, 0.0, gaps)
+    gives = (stiffness > 0.0) & np.isfinite(stiffness)
+    pulled = np.divide(tension, stiffness * areas, out=np.zeros_like(gaps), where=gives & (areas > 0.0))
+    return np.where(gives, np.maximum(gaps - pulled, 0.0), gaps)
 
 
 def remaining(assembly: Assembly, fallen: np.ndarray | None) -> Assembly:

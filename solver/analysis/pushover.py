@@ -20,7 +20,7 @@ from solver.path.state import PathState
 from solver.programs.problem import SolveError
 from solver.results.increment import Bonds, Increment, Status
 from solver.ties import Tie, TieForces, check_ties
-from solver.words import counted
+from solver.words import checked, counted
 
 from .increments import Increments
 from .limit_load import checked_live, remaining
@@ -46,22 +46,16 @@ def pushover_increments(
 
     Parameters
     ----------
-    ties_at : TieForces, optional
-        Of the increment that the pose is from; new ones by default.
-    bonds_at : Bonds, optional
-        Of that increment: the strength that joints have left; joints that have some need it.
-    fallen : (n_blocks,) bool array, optional
-        Of that increment: blocks that have left the structure.
     resume : PathState, optional
         Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
         for bit as if the loop had not been interrupted. ``pose`` is not looked at then.
     on_step : callable, optional
         Called with the :class:`PathState` after every step within an increment.
     """
-    controls = controls or Controls()
+    controls = checked(Controls() if controls is None else controls, Controls, "controls")
     if controls.increments == LINEAR_PROGRAM:
         raise ValueError("increments = 'linear program' is for settlements; leave it out for a pushover")
-    control.check_dimension(assembly)
+    checked(control, ControlDisplacement, "control").check_dimension(assembly)
     check_blocks(assembly, controls.overlap_tolerance)
     interfaces.refuse_crushing("a pushover")
     if pose is not None and bonds_at is None:
@@ -90,7 +84,7 @@ def pushover_increments(
         loads = replace(loads, fills=tuple(fill.shifted(-origin) for fill in loads.fills))
         if control.point is not None:
             control = replace(control, point=tuple((np.asarray(control.point) - origin).tolist()))
-    start = Pose.initial(near) if pose is None else Pose(pose.positions - origin, pose.rotations)
+    start = Pose.initial(near) if pose is None else Pose(checked(pose, Pose, "pose").positions - origin, pose.rotations)
     if resume is not None:
         start = resume.start
     model = model_of(near, loads, interfaces, controls, loads.live, ties)

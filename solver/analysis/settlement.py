@@ -23,7 +23,7 @@ from solver.program.model import Model
 from solver.programs.problem import SolveError
 from solver.results.increment import Increment, Status
 from solver.ties import Tie, check_ties
-from solver.words import counted
+from solver.words import checked, counted
 
 from .increments import Increments
 
@@ -52,7 +52,7 @@ def settlement_increments(
     on_step : callable, optional
         Called with the :class:`PathState` after every step within an increment.
     """
-    controls = controls or Controls()
+    controls = checked(Controls() if controls is None else controls, Controls, "controls")
     check_settlement(assembly, phases, controls, changes, ties)
     interfaces.refuse_crushing("a settlement")
     by_program = controls.increments == LINEAR_PROGRAM
@@ -153,7 +153,6 @@ def model_of(
         drawn,
         length,
         force,
-        length / 4.0,
         live=live,
         ties=ties,
         fills=loads.fills,
@@ -179,7 +178,7 @@ def check_settlement(
         For no settlement, no free block, a phase that moves no support, none that is still there or a block with
         another role, a change before a phase that does not exist, blocks that overlap (both named, with depth).
     """
-    controls = controls or Controls()
+    controls = checked(Controls() if controls is None else controls, Controls, "controls")
     if not phases:
         raise ValueError("no settlement was given; give one Settlement, or several phases")
     for number, phase in enumerate(phases):

@@ -151,16 +151,13 @@ def self_crossings(vertices: np.ndarray, offsets: np.ndarray) -> dict[int, tuple
         first, second = first[apart], second[apart]
         ring = vertices[corners]
         end = np.roll(ring, -1, axis=1)
-        hit = segments_cross(ring[:, first], end[:, first], ring[:, second], end[:, second])
+        a0, a1, b0, b1 = ring[:, first], end[:, first], ring[:, second], end[:, second]
+        # Each separates the ends of the other.
+        hit = (_side(a0, a1, b0) * _side(a0, a1, b1) < 0) & (_side(b0, b1, a0) * _side(b0, b1, a1) < 0)
         for row in np.flatnonzero(hit.any(axis=1)):
             k = int(np.flatnonzero(hit[row])[0])
             crossings[int(chosen[row])] = int(first[k]), int(second[k])
     return crossings
-
-
-def segments_cross(a0: np.ndarray, a1: np.ndarray, b0: np.ndarray, b1: np.ndarray) -> np.ndarray:
-    """Whether segments a and b properly cross (each separates the ends of the other)."""
-    return (_side(a0, a1, b0) * _side(a0, a1, b1) < 0) & (_side(b0, b1, a0) * _side(b0, b1, a1) < 0)
 
 
 def _side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:

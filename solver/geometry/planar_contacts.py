@@ -108,13 +108,19 @@ def _areas(shapes: Outlines, contacts: Contacts) -> np.ndarray:
     on_corner = corner >= 0
     over[on_corner] = _facing_edge(shapes, vertex[on_corner], edge[on_corner], corner[on_corner])[:, None]
     low, high = np.sort([side[over], np.broadcast_to(side[edge][:, None], over.shape)], axis=0).astype(np.int64)
-    _, first, face = np.unique((low * len(side) + high).ravel(), return_index=True, return_inverse=True)
+    _, face = np.unique((low * len(side) + high).ravel(), return_inverse=True)
+    # Along the mean of its edges, whichever of the two blocks they are of and comes first.
     point = np.repeat(np.arange(len(contacts)), 2)
-    along = np.einsum("ki,ki->k", contacts.points[point], contacts.frames[point[first[face]], 1])
+    tangent = np.where(side[edge][point] == low.ravel(), 1.0, -1.0)[:, None] * contacts.frames[point, 1]
+    direction = np.stack([np.bincount(face, tangent[:, axis]) for axis in (0, 1)], axis=1)[face]
+    along = _dot(contacts.points[point], _unit(direction))
     order = np.lexsort((along, face))
     step = np.where(np.diff(face[order]) == 0, np.diff(along[order]), 0.0)
     length = np.zeros(len(point))
     length[order] = (np.append(step, 0.0) + np.append(0.0, step)) / 2.0 if len(contacts) else 0.0
+    # A corner at a bend of the side that it stands on has two points there.
+    _, corner_of = np.unique(face * len(side) + vertex[point], return_inverse=True)
+    length = (np.bincount(corner_of, length) / np.bincount(corner_of))[corner_of]
     thickness = np.minimum(shapes.thickness[contacts.block_a], shapes.thickness[contacts.block_b])
     return length.reshape(-1, 2).sum(axis=1) * thickness
 

@@ -209,7 +209,9 @@ class Stepper:
         """Return the contact points of blocks at a pose; those of the last pose are kept."""
         if self._last is None or self._last[0] is not pose:
             model = self.model
-            found = find_contacts(model.assembly, moved_vertices(model.assembly, pose), model.reach)
+            # Contact points with a larger gap are not looked at.
+            reach = model.length / 4.0
+            found = find_contacts(model.assembly, moved_vertices(model.assembly, pose), reach)
             if model.fallen is not None:
                 found = found[~(model.fallen[found.block_a] | model.fallen[found.block_b])]
             self._last = pose, found
@@ -241,7 +243,9 @@ class Stepper:
         gaps, limits = self.joint_limits(place, contacts)
         of_members = self.members.force_limits(contacts, gap)
         least = np.where(is_member(contacts), of_members.least, limits.least)
-        return replace(contacts, gaps=gaps), replace(limits, least=least, most=of_members.most)
+        # An open joint with a rest of its strength holds, and does not push.
+        pulls = (limits.least < 0.0) & (gaps > gap * self.model.length)
+        return replace(contacts, gaps=gaps), replace(limits, least=least, most=np.where(pulls, 0.0, of_members.most))
 
     def joint_limits(
         self, place: Place, contacts: Contacts, forces: np.ndarray | None = None

@@ -207,7 +207,7 @@ class StaticProgram:
         matrix = sp.hstack([self.matrix, unit, -unit], format="csc")
         cost = np.append(np.zeros(self.matrix.shape[1]), np.ones(2 * self.rows))
         try:
-            solution = self._solve(cost, matrix, np.zeros(self.rows), CONIC_ROUTES[::-1])
+            solution = self._solve(cost, matrix, np.zeros(self.rows), (*CONIC_ROUTES[1::-1], *CONIC_ROUTES[2:]))
         except SolveError as error:
             best = error.best
             if best is None:

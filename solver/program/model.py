@@ -24,8 +24,6 @@ class Model:
     length : float [m]
     force : float [N]
         Block size and mean load of a free block: the program is written in these units.
-    reach : float [m]
-        Largest gap of a contact point.
     live : (n_blocks, n_dof) array [N, N·m], optional
         Loads whose multiplier is an unknown of every program.
     fallen : (n_blocks,) bool array, optional
@@ -43,7 +41,6 @@ class Model:
     load: np.ndarray
     length: float
     force: float
-    reach: float
     live: np.ndarray | None = None
     fallen: np.ndarray | None = None
     ties: tuple[Tie, ...] = ()

@@ -12,11 +12,11 @@ import numpy as np
 
 from solver.assembly import Assembly
 from solver.interfaces import Interfaces
-from solver.kinematics import Pose
+from solver.kinematics import Pose, moved_vertices
 from solver.loads import GRAVITY, Loads, Settlement
 from solver.phases import PhaseChange, loads_in
 from solver.ties import Tie
-from solver.tolerances import AT_LIMIT
+from solver.tolerances import AT_LIMIT, DRAWN_GAP
 from solver.views import Shown, views
 from solver.words import REMEDY, counted
 
@@ -103,7 +103,7 @@ class Control(Protocol):
         """Of the limit."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Response(Shown):
     """A whole analysis.
 
@@ -317,13 +317,6 @@ def total_weight(assembly: Assembly) -> float:
     return float(assembly.masses[assembly.free].sum() * GRAVITY)
 
 
-#: What is said with a limit load in space whose joints lift where they slide.
-CAVEAT = (
-    "associative friction lifts what slides: in grooves and wedges of blocks in space the multiplier may be too high; "
-    'flow = "non-associative" slides without lift'
-)
-
-
 class LimitStatus(StrEnum):
     """What a limit load is.
 
@@ -370,6 +363,8 @@ class LimitLoad(HasState, Shown):
         memory, or in a file; None where it is kept with the increment that reports the limit load.
     analysed : (Assembly, Interfaces, Loads, ties), optional
         Whose limit load it is.
+    staying_open : float, optional
+        Multiplier where joints that are open may not close for the live load; None where it has not been asked for.
     """
 
     multiplier: float
@@ -382,6 +377,7 @@ class LimitLoad(HasState, Shown):
     held: State | StoredState | None = field(default=None, repr=False, compare=False)
     torsion: str = "points"
     analysed: Analysed | None = field(default=None, repr=False, compare=False)
+    staying_open: float | None = None
 
     @property
     def mechanism(self) -> np.ndarray:
@@ -398,7 +394,12 @@ class LimitLoad(HasState, Shown):
         Friction without dilatancy may carry less than associative friction, in space more often than in the plane: what
         is pushed along a groove of half-angle 45° with μ = 0.5 slides at 0.707 of its weight, associative at 0.816.
         """
-        return CAVEAT if self.flow == "associative" and self.mechanism.shape[1] == 6 else ""
+        if self.flow != "associative" or self.mechanism.shape[1] == 3:
+            return ""
+        return (
+            "associative friction lifts what slides: in grooves and wedges of blocks in space the multiplier may be "
+            'too high; flow = "non-associative" slides without lift'
+        )
 
     @property
     def gap(self) -> float:
@@ -455,9 +456,14 @@ class LimitLoad(HasState, Shown):
         """Say how large it is, or why there is none."""
         moving = np.flatnonzero(np.abs(self.mechanism).max(axis=1) > 0.01)
         if self.status is LimitStatus.NO_EQUILIBRIUM:
-            named = f" ({self.analysed[0].listed(moving, 4)})" if self.analysed else ""
-            falling = counted(len(moving), "block falls", "blocks fall")
-            return f"no equilibrium under the dead load: {falling}{named}; {REMEDY}"
+            falling, inside = counted(len(moving), "block falls", "blocks fall"), ""
+            if self.analysed is not None:
+                assembly, pose = self.analysed[0], self.state.pose
+                falling += f" ({assembly.listed(moving, 4)})"
+                tolerance = DRAWN_GAP * float(assembly.widths.min())
+                depth = assembly.shapes.overlaps(moved_vertices(assembly, pose), tolerance)[2].max(initial=0.0)
+                inside = f"; blocks overlap by up to {depth:.3g} m at this pose" if depth > 0.0 else ""
+            return f"no equilibrium under the dead load: {falling}{inside}; {REMEDY}"
         if self.status is LimitStatus.UNBOUNDED:
             return "unbounded: no live load of this pattern brings the structure down"
         law = "" if self.torsion == "points" else f", {self.torsion} torsion"

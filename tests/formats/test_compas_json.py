@@ -194,8 +194,20 @@ def test_what_is_three_dimensional_or_damaged_is_refused(tmp_path):
         read(saved(tmp_path, [mesh("pier", *TRILITHON["pier"], faces=FACES[1:])]))
     broken = parts()
     broken[0]["face"]["0"] = [0, 1, 99]
-    with pytest.raises(ValueError, match="has a mesh of COMPAS that cannot be read"):
+    with pytest.raises(ValueError, match="has a mesh of COMPAS that cannot be read, number 1"):
         read(saved(tmp_path, broken))
+    for change, words in (
+        ({"transformation": {"dtype": "t", "data": {"matrix": [1, 2, 3]}}}, "'lintel' has 3 numbers, not 4 × 4"),
+        ({"density": "heavy"}, "has density 'heavy'; give a number"),
+        ({"density": -5}, "has density -5"),
+    ):
+        model = block_model()
+        if "density" in change:
+            next(iter(model["data"]["materials"].values()))["data"] |= change
+        else:
+            next(iter(model["data"]["elements"].values()))["data"] |= {"name": "lintel", **change}
+        with pytest.raises(ValueError, match=words):
+            read(saved(tmp_path, model))
     brep = element(0, {})
     brep["data"]["geometry"] = {"dtype": "compas_occ.brep/OCCBrep", "data": {"faces": []}}
     model = block_model()

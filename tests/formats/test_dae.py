@@ -71,8 +71,11 @@ def test_damaged_files_are_refused(tmp_path):
     for broken, words in (
         (text[: len(text) // 2], "cannot be read as .dae"),
         (text.replace("#corners", "#nothing"), "1 of 1 geometries are damaged"),
+        (text.replace('url="#shape"', 'url="#none"'), "Geometry #none not found"),
+        (text.replace(">0 0 0 ", ">NaN 0 0 "), "it has NaN for a number"),
         ("<!DOCTYPE x [<!ENTITY a 'b'>]>" + text, "defines XML entities"),
     ):
+        assert broken != text
         path.write_text(broken, encoding="utf-8")
         with pytest.raises(ValueError) as caught:
             blockvis.read_layout(path)

@@ -32,6 +32,14 @@ def test_garbage_is_refused(tmp_path, suffix, content):
         read(path)
 
 
+@pytest.mark.parametrize(("suffix", "content"), [(".dxf", b"%PDF-1.4\n1 0 obj"), (".obj", b"glTF\2\0\0\0")])
+def test_what_has_another_suffix_than_its_own_is_told_by_its_beginning(tmp_path, suffix, content):
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=rf"begins with {re.escape(repr(content[:16]))}"):
+        read(path)
+
+
 @pytest.mark.parametrize(
     "suffix", [".msh", ".json", ".geojson", ".dxf", ".svg", ".vtu", ".vtp", ".obj", ".ply", ".stl"]
 )

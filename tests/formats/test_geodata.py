@@ -70,6 +70,7 @@ def test_words_for_roles(tmp_path):
 def test_a_thickness_that_is_no_number_is_refused_by_its_block(tmp_path):
     path = geojson(tmp_path / "a.geojson", [polygon(SQUARES[0], thickness="0.3"), polygon(SQUARES[1], thickness="0,4")])
     assert "block 'block 1' has thickness '0,4'; give a number" in refusal(path)
+    assert "has thickness True" in refusal(geojson(path, [polygon(SQUARES[0], thickness=True)]))
 
 
 def test_properties_give_names_groups_and_roles(tmp_path):
@@ -136,6 +137,9 @@ def test_a_facade_that_stands_upright_is_turned(tmp_path):
     layout = blockvis.read_layout(geojson(tmp_path / "facade.geojson", [polygon(ring) for ring in upright]))
     assert np.ptp(layout.points, axis=0) == pytest.approx([0.8, 0.4])
     assert any("upright" in note for note in layout.notes)
+    slanting = [[[0.8 * x, 7 + 0.6 * x, z] for x, z in ring] for ring in SQUARES]
+    seen = blockvis.read_layout(geojson(tmp_path / "facade.geojson", [polygon(ring) for ring in slanting]), view="xz")
+    assert "elevations were ignored: the drawing was read as seen along y" in seen.notes
 
 
 def test_degrees_are_refused_with_the_command_that_makes_them_metres(tmp_path):
@@ -212,7 +216,9 @@ def test_damaged_geopackages_are_refused(tmp_path):
     assert "is no readable GeoPackage" in refusal(path)
     geopackage(path := tmp_path / "cut.gpkg", {"wall": (-1, [(shapely.Polygon(SQUARES[0]), "a")])})
     arc = struct.pack("<BII6d", 1, 8, 3, 0.0, 0.0, 1.0, 1.0, 2.0, 0.0)
-    damaged = {b"GP\0\1" + bytes(4) + arc: "straighten it: ogr2ogr -nlt CONVERT_TO_LINEAR cut_straight.gpkg cut.gpkg"}
+    nan = struct.pack("<BIII6d", 1, 3, 1, 3, 0.0, 0.0, 1.0, np.nan, 0.0, 0.0)
+    damaged = {b"GP\0\1" + bytes(4) + nan: "must be finite numbers"}
+    damaged |= {b"GP\0\1" + bytes(4) + arc: "straighten it: ogr2ogr -nlt CONVERT_TO_LINEAR cut_straight.gpkg cut.gpkg"}
     damaged |= {b"GP\0\1": "no header", b"GP\0\x21" + bytes(9): "extended", b"GP\0\1" + bytes(9): "cannot be read"}
     for blob, words in damaged.items():
         with closing(sqlite3.connect(path)) as base:

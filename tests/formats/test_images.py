@@ -146,19 +146,31 @@ def test_a_noisy_mask_is_that_of_the_exact_image(tmp_path):
     assert float((layout.sizes**2).sum()) == pytest.approx((np.asarray(image) > 0).sum() * 1e-4, rel=0.01)
 
 
+@pytest.mark.parametrize("quality", [30, 75, 100])
+def test_joints_of_a_noisy_mask_may_be_narrow(tmp_path, quality):
+    image, n = drawn_wall(gap=2)
+    image = image.crop((25, 20, 275, 138)).resize((750, 354), Image.Resampling.NEAREST)
+    image.save(tmp_path / "wall.jpg", quality=quality)
+    layout = read_layout(tmp_path / "wall.jpg", width=7.5)
+    assert layout.n_blocks == n
+    assert float((layout.sizes**2).sum()) == pytest.approx((np.asarray(image) > 0).sum() * 1e-4, rel=0.01)
+
+
 def test_the_scan_of_a_drawing_in_ink_is_no_mask_of_the_shades_of_its_paper(tmp_path, capsys):
     ink, n = drawn_wall(gap=2)
     paper = np.where(np.asarray(ink) > 0, 245.0, 30.0)
     paper[:18], paper[140:], paper[:, :24], paper[:, 276:] = 245.0, 245.0, 245.0, 245.0
     paper = paper.repeat(2, axis=0).repeat(2, axis=1)
     y, x = np.meshgrid(*(np.linspace(-1, 1, pixels) for pixels in paper.shape), indexing="ij")
-    grey = paper * (1 - 0.08 * (x**2 + y**2)) + np.random.default_rng(0).normal(0, 3, paper.shape)
-    Image.fromarray(grey.clip(0, 255).astype("uint8")).save(tmp_path / "scan.jpg", quality=70)
-    code, out, err = informed(capsys, tmp_path / "scan.jpg", "--width", 3)
+    for shade in (0.08, 0.2):
+        grey = paper * (1 - shade * (x**2 + y**2)) + np.random.default_rng(0).normal(0, 3, paper.shape)
+        Image.fromarray(grey.clip(0, 255).astype("uint8")).save(tmp_path / f"scan{shade}.jpg", quality=70)
+    code, out, err = informed(capsys, tmp_path / "scan0.2.jpg", "--width", 3)
     assert (code, out) == (2, "")
     assert "is a photograph: its colours are no labels" in err
     Image.fromarray((grey > 140).astype("uint8") * 255).save(tmp_path / "scan.png")
-    assert read_layout(tmp_path / "scan.png", width=3.0).n_blocks == n
+    for name in ("scan.png", "scan0.08.jpg"):
+        assert read_layout(tmp_path / name, width=3.0).n_blocks == n
 
 
 def test_specks_go_to_what_is_around_them_and_are_told(tmp_path, capsys):

@@ -1,5 +1,7 @@
 """Outlines cut by joint lines, ends that miss by little, and what is said where nothing closes."""
 
+import math
+
 import ezdxf
 import pytest
 import shapely
@@ -101,6 +103,76 @@ def test_ends_that_miss_by_a_ten_thousandth_meet_and_by_a_hundredth_do_not(tmp_p
         match=r"found: 4 lines close nothing \(4 on layer '0'\); their ends are 2 to 2(\.\d+)? from the nearest",
     ):
         read(dxf(tmp_path, square(2.0)))
+
+
+def arch(n, over, ring):
+    """Radial lines of an arch of 1 to 1.2 m from 0° to 180°, which reach over both arcs; within a closed ring less."""
+    angles = [math.pi * k / n for k in range(n + 1)][ring : n + (not ring)]
+    return [[(r * math.cos(a) * 1000, r * math.sin(a) * 1000) for r in (1.0 - over, 1.2 + over)] for a in angles]
+
+
+def arch_as_dxf(tmp_path, n, over, ring):
+    def draw(space):
+        if ring:
+            corners = [(1000, 0, 0), (1200, 0, 1), (-1200, 0, 0), (-1000, 0, -1)]
+            space.add_lwpolyline(corners, format="xyb", close=True)
+        else:
+            space.add_arc((0, 0), 1000, 0, 180)
+            space.add_arc((0, 0), 1200, 0, 180)
+        for a, b in arch(n, over, ring):
+            space.add_line(a, b)
+
+    return dxf(tmp_path, draw)
+
+
+def arch_as_svg(tmp_path, n, over, ring):
+    link = "L-1200 0" if ring else "M-1200 0"
+    arcs = f'<path d="M1000 0A1000 1000 0 0 0 -1000 0{link}A1200 1200 0 0 1 1200 0{"Z" if ring else ""}"/>'
+    lines = "".join(f'<line x1="{x}" y1="{-y}" x2="{u}" y2="{-v}"/>' for (x, y), (u, v) in arch(n, over, ring))
+    return svg(tmp_path, arcs + lines, "-1300 -1300 2600 1300")
+
+
+@pytest.mark.parametrize(
+    ("over", "ring"), [(over, ring) for ring in (False, True) for over in (0.0, -1e-6, 1e-6, 1e-4)] + [(2e-3, False)]
+)
+@pytest.mark.parametrize("draw", [arch_as_dxf, arch_as_svg])
+def test_joints_that_end_on_an_arc_cut_it(tmp_path, draw, over, ring):
+    for n in (5, 7, 15, 20, 25):
+        drawing = read_layout(draw(tmp_path, n, over, ring))
+        # The chords lie within a thousandth of the radius of the arcs.
+        exact = math.pi / 2 * (1.2**2 - 1.0) / n
+        areas = [shapely.Polygon(ring).area for ring in drawing.outlines]
+        assert areas == pytest.approx([exact] * n, rel=5e-3)
+        assert drawing.left_out == ()
+
+
+def test_lines_between_two_circles_cut_the_ring(tmp_path):
+    def draw(space):
+        for radius in (1000, 1200):
+            space.add_circle((0, 0), radius)
+        for sign in (1, -1):
+            for a, b in arch(9, 0.0, False)[:-1]:
+                space.add_line((sign * a[0], sign * a[1]), (sign * b[0], sign * b[1]))
+
+    path = dxf(tmp_path, draw)
+    drawing = read_layout(path)
+    assert drawing.n_blocks == 19
+    assert any("18 blocks around 1 outline, a block too: ignore it by its name" in note for note in drawing.notes)
+    areas = [shapely.Polygon(ring).area for ring in drawing.outlines]
+    disc = drawing.names[areas.index(max(areas))]
+    assert read_layout(path, ignore=[disc]).n_blocks == 18
+
+
+def test_joints_that_end_on_slanted_beds_cut_them(tmp_path):
+    # Exact ends and beds, which a grid rounds apart.
+    def at(x, y):
+        return 1000 * x - 313 * y, 347 * x + 1000 * y
+
+    cuts = [0, 0.137, 0.171, 0.3, 0.371, 0.42, 0.511, 0.6, 0.667, 0.7, 0.831, 0.88, 0.9, 1]
+    lines = [(at(0, y), at(1, y)) for y in (0, 0.2)] + [(at(x, 0), at(x, 0.2)) for x in cuts]
+    drawing = read_layout(dxf(tmp_path, lambda space: [space.add_line(a, b) for a, b in lines]))
+    assert drawing.n_blocks == len(cuts) - 1
+    assert not any("joined" in note for note in drawing.notes)
 
 
 def test_an_outline_whose_ends_miss_by_little_is_closed_with_a_note(tmp_path):

@@ -41,6 +41,36 @@ def test_groups_of_flac3d_name_the_blocks_and_their_roles(tmp_path):
     np.testing.assert_allclose(drawing.volumes, 1.0)
 
 
+QUADS = np.array([[0, 1, 2, 3], [1, 4, 5, 2], [4, 6, 7, 5]])
+CORNERS = np.array([[x, y, 0.0] for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (2, 1), (4, 0), (4, 1))])
+
+
+def test_sets_of_flat_cells_name_roles(tmp_path):
+    sets = {name: [np.array([k])] for k, name in enumerate(("fixed base", "stone", "moving.001"))}
+    meshio.write(tmp_path / "a.inp", meshio.Mesh(CORNERS, [("quad", QUADS)], cell_sets=sets))
+    assert read_layout(tmp_path / "a.inp").roles == ("fixed", "", "moving")
+
+
+def test_groups_of_med_name_the_blocks_and_their_roles(tmp_path, monkeypatch):
+    mesh = meshio.Mesh(CORNERS, [("quad", QUADS)], cell_data={"cell_tags": [np.array([-1, -2, -3])]})
+    mesh.cell_tags = {-1: ["fixed base", "wall"], -2: ["stone", "wall"], -3: ["moving b"]}
+    # h5py, by which meshio reads .med, is no dependency.
+    monkeypatch.setattr(meshio, "read", lambda path: mesh)
+    (tmp_path / "a.med").write_text("HDF", encoding="utf-8")
+    layout = read_layout(tmp_path / "a.med")
+    assert layout.names == ("fixed base", "stone", "moving b")
+    assert layout.groups == ("wall", "wall", "")
+    assert layout.roles == ("fixed", "", "moving")
+
+
+@pytest.mark.parametrize(("suffix", "areas"), [(".exo", [2, 2]), (".e", [2, 2]), (".xdmf", [1, 1, 2])])
+def test_element_blocks_of_exodus_are_blocks(tmp_path, monkeypatch, suffix, areas):
+    mesh = meshio.Mesh(CORNERS, [("quad", QUADS[:2]), ("quad", QUADS[2:])])
+    monkeypatch.setattr(meshio, "read", lambda path: mesh)
+    (tmp_path / f"a{suffix}").write_text("CDF", encoding="utf-8")
+    assert read(tmp_path / f"a{suffix}").areas == pytest.approx(areas)
+
+
 def test_lines_are_no_blocks(tmp_path):
     meshio.write(tmp_path / "a.inp", meshio.Mesh(POINTS, [("line", [[0, 1]])]))
     with pytest.raises(ValueError, match="has no surface cells"):

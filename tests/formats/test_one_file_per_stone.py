@@ -119,6 +119,10 @@ def test_what_is_no_set_of_stones_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"no file fits '.*\*\.obj'; check the folder and the pattern"):
         read(folder / "*.obj")
     stones(folder, ".ply", n=2)
+    (folder / "summary.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"is a folder of results; give '.*blocks.pvd', or one of its .vtu"):
+        read(folder)
+    (folder / "summary.json").unlink()
     with pytest.raises(
         ValueError, match=r"files of several formats \(2 .ply, 2 .stl\); choose one of them: '.*\*.ply'"
     ):

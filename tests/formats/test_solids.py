@@ -1,5 +1,6 @@
 """Bodies in space: prisms become outlines with a thickness, everything else is refused."""
 
+import json
 import re
 
 import numpy as np
@@ -85,6 +86,40 @@ def test_touching_bodies_of_which_one_is_turned_inside_out_are_refused(tmp_path)
     trimesh.util.concatenate(pair).export(tmp_path / "a.stl")
     with pytest.raises(ValueError, match=r"holds bodies that touch and cannot be told apart: 4 edges .* per block"):
         read(tmp_path / "a.stl")
+
+
+def glb(path, nodes):
+    """Write a box and nodes that place it."""
+    data = trimesh.creation.box((1, 1, 1)).export(file_type="glb")
+    length = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + length])
+    tree |= {"nodes": nodes, "scenes": [{"nodes": list(range(len(nodes)))}], "scene": 0}
+    tree["meshes"][0].pop("name", None)
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    rest = data[20 + length :]
+    size = (20 + len(text) + len(rest)).to_bytes(4, "little")
+    path.write_bytes(data[:8] + size + len(text).to_bytes(4, "little") + data[16:20] + text + rest)
+    return path
+
+
+def test_nodes_of_one_name_or_none_keep_it_and_their_roles(tmp_path):
+    at = [[0, 0, 0], [4, 0, 0], [2, 0, 0]]
+    names = [{"name": "fixed pier"}, {"name": "fixed pier"}, {}]
+    nodes = [{**name, "mesh": 0, "translation": place} for name, place in zip(names, at, strict=True)]
+    layout = read_layout(glb(tmp_path / "a.glb", nodes))
+    assert layout.names == ("fixed pier", "fixed pier", "a.glb")
+    assert layout.roles == ("fixed", "fixed", "")
+    nodes[2]["mesh"] = 5
+    with pytest.raises(ValueError, match="node 2 has mesh 5 of 1"):
+        read_layout(glb(tmp_path / "a.glb", nodes))
+
+
+def test_bodies_that_break_off_are_refused(tmp_path):
+    text = "".join(body.export(file_type="stl_ascii") for body in bricks(2))
+    (tmp_path / "a.stl").write_text(text[: 3 * len(text) // 4], encoding="utf-8")
+    with pytest.raises(ValueError, match=r"2 bodies begin and 1 end \(endsolid\)"):
+        read_layout(tmp_path / "a.stl")
 
 
 def test_what_is_no_prism_is_refused(tmp_path):

@@ -138,6 +138,9 @@ def test_entities_are_refused_before_parsing(tmp_path):
 def test_one_curve_has_a_bounded_number_of_chords(tmp_path):
     path = saved(tmp_path, '<circle cx="0" cy="0" r="1"/>', 'viewBox="0 0 1 1"')
     assert len(read(path, chord_tolerance=1e-12).vertices) <= 512
+    for tolerance in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match=f"chord_tolerance is {tolerance:g} m; it must be a length above 0"):
+            read(path, chord_tolerance=tolerance)
 
 
 def test_a_scale_of_width_and_view_box_that_is_no_unit_is_kept(tmp_path):

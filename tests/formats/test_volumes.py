@@ -118,6 +118,19 @@ def test_volumes_and_skin_of_a_vtu(tmp_path, kind):
     assert layout.materials == ("stone", "brick", "brick")
     assert read(tmp_path / "a.vtu").areas == pytest.approx([0.5] * 3)
     assert layout.thickness == pytest.approx([0.25] * 3)
+    assert not any("flat cell" in note for note in layout.notes)
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".inp"])
+def test_flat_cells_that_are_no_skin_are_counted(tmp_path, suffix):
+    points, cells, _ = bricks("hexahedron")
+    apart = points.max(axis=0) + np.array([[1, 0, 0], [2, 0, 0], [2, 0, 1], [1, 0, 1]])
+    flat = np.array([[0, 1, 2, 3], [0, 1, 2, 3]]) + len(points)
+    flat[0] = cells[0][:4]
+    mesh = meshio.Mesh(np.concatenate([points, apart]), [("hexahedron", cells), ("quad", flat)])
+    mesh.write(tmp_path / f"a{suffix}")
+    layout = read_layout(tmp_path / f"a{suffix}")
+    assert "left out: 1 flat cell beside bodies" in layout.notes
 
 
 def test_pieces_of_a_vtu_without_ids(tmp_path):

@@ -159,6 +159,87 @@ def test_envelope_of_a_load_that_moves_over_an_arch(tmp_path, capsys):
     assert "load multiplier α" in curve
 
 
+#: An arch over piers that a settlement has opened: its tie is slack but at the last place of the load.
+TIED = """
+[geometry]
+layout = "arch on piers"
+[geometry.parameters]
+span = 2.0
+rise = 0.8
+thickness = 0.35
+voussoirs = 13
+pier_width = 0.8
+pier_height = 1.6
+pier_blocks = 4
+depth = 0.7
+[material]
+friction_coefficient = 0.7
+[analysis]
+kind = "limit load"
+[[ties]]
+name = "iron"
+from = { block = "left pier 4", point = [-1.4, 1.4] }
+to = { block = "right pier 4", point = [1.4, 1.4] }
+stiffness = 2e6
+strength = 2500.0
+prestress = 500.0
+[[backfill]]
+over = "voussoir*"
+surface = 3.2
+unit_weight = 16000.0
+pressure_coefficient = 0.35
+[[loads]]
+blocks = "left pier 4"
+force = [0.0, -2000.0]
+point = [-1.6, 1.6]
+[[loads]]
+kind = "live"
+force = [500.0, -1000.0]
+positions = [-0.4, 1.6, 6]
+[settlement]
+direction = [1.0, -0.3]
+increment = 0.01
+limit = 0.03
+"""
+
+
+@pytest.fixture(scope="module")
+def tied(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tied")
+    (folder / "case.toml").write_text(TIED, encoding="utf-8")
+    return blockvis.run_case(folder / "case.toml", folder / "out", outputs=())
+
+
+@pytest.mark.slow
+def test_a_load_that_moves_is_told_with_joints_that_stay_open(tied):
+    rows = table(tied.folder / "envelope.csv")
+    case = tied.folder.parent / "apart.toml"
+    case.write_text(TIED.replace('kind = "limit load"', 'kind = "limit load"\ndisplacement = 0.0'), encoding="utf-8")
+    apart = blockvis.run_case(case, tied.folder.parent / "apart", outputs=())
+    without = [limit.multiplier for limit in apart.response.limits]
+    assert [float(row["staying_open"]) for row in rows] == pytest.approx(without, rel=1e-6)
+    assert [limit["staying_open"] for limit in tied.summary["limit_loads"]] == pytest.approx(without, rel=1e-6)
+    (k,) = (k for k, row in enumerate(rows) if float(row["load_multiplier"]) > 1.01 * without[k])
+    least, most, x = without[k], float(rows[k]["load_multiplier"]), float(rows[k]["position"])
+    note = f"at 1 of 6 positions: {least:.6g} instead of {most:.6g} at x = {x:.6g} m"
+    assert f"note: where open joints stay open α is less {note}\n" in _in_words(tied.response, tied.folder)
+    again = blockvis.open_results(tied.folder)
+    assert [limit.staying_open for limit in again.limits] == [limit.staying_open for limit in tied.response.limits]
+    assert "staying_open" not in table(apart.folder / "envelope.csv")[0]
+
+
+@pytest.mark.slow
+def test_a_tie_beside_a_load_that_moves_is_told_at_the_place_that_governs(tied):
+    rows, place = table(tied.folder / "ties.csv"), tied.summary["governing_position"]
+    assert [row["state"] for row in rows] == ["slack"] * 5 + ["yielding"]
+    assert {row["settlement"] for row in rows} == {"0.0"}
+    assert [float(row["load_position"]) for row in rows] == [state.parameter for state in tied.response.path]
+    (iron,) = tied.summary["ties"]
+    assert (iron["last_force"], iron["last_state"], iron["yields_at"]) == (0.0, "slack", None)
+    said = f"iron (tie): no force: slack, load at x = {place:.6g} m\n"
+    assert said in _in_words(tied.response, tied.folder)
+
+
 @pytest.mark.slow
 def test_live_load_is_drawn_where_it_acts_at_each_position(tmp_path):
     """The arrow stands over the place of the load, whichever position is drawn."""
@@ -316,6 +397,18 @@ def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     assert "control displacement [m]" in page
 
 
+def test_the_largest_multiplier_where_joints_give_is_one_that_is_carried(tmp_path, capsys):
+    """Springs k A / 2 at the ends of the base: α W h / 2 = (k A b² / 4 - W h / 2) θ until an end lifts at 0.098."""
+    text = PUSHED.replace("friction_coefficient = 0.7", "friction_coefficient = 0.7\nnormal_stiffness = 2e6")
+    _, summary = ran(text.replace("increment = 0.03", "increment = 0.03\nlimit = 0.15"), tmp_path)
+    weight = 0.2 * 2000.0 * 9.81
+    by_hand = (2e6 * 0.2 * 0.2**2 / 4.0 / (weight * 0.5) - 1.0) * 0.09
+    assert summary["limit_load_multiplier"] == pytest.approx(0.2, abs=1e-6)
+    assert summary["largest_load_multiplier"] == pytest.approx(by_hand, rel=0.01)
+    assert summary["largest_load_multiplier_at"] == pytest.approx(0.09)
+    assert re.search(r"first multiplier .* at 0 m, .*, were joints and ground rigid\n", capsys.readouterr().out)
+
+
 @pytest.mark.thorough
 @pytest.mark.path
 def test_pushover_that_snaps_says_at_which_multiplier(tmp_path, capsys):
@@ -383,6 +476,7 @@ def test_a_load_without_limit_is_unbounded(tmp_path, capsys):
     assert summary["initial_reaction"] is summary["reaction_at_rest"] is summary["last_reaction"] is None
     opened = blockvis.open_results(folder)
     assert opened.limits[0].multiplier == opened.path[0].reaction == np.inf
+    assert "<td>status</td><td>unbounded</td>" in blockvis.write_report(opened, folder / "page.html").read_text("utf-8")
     assert next(csv.DictReader((folder / "response.csv").open()))["reaction"] == "inf"
 
 

@@ -15,6 +15,7 @@ from blockvis import generators
 from blockvis.cli import main
 
 CASE = Path(__file__).parents[2] / "examples" / "semicircular_arch.toml"
+SCATTER = 'kind = "density", distribution = "lognormal", deviation = 0.01'
 
 
 @pytest.fixture
@@ -53,6 +54,15 @@ def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_p
         assert (np.abs(curves - np.array(colour)).sum(axis=2) == 0).sum() > 1000
 
 
+def test_both_pictures_of_a_settlement_have_one_unit(arch_results, other, tmp_path, monkeypatch):
+    """That of the run that goes further."""
+    titles, blank = [], Image.new("RGB", (800, 620))
+    picture = "blockvis.pictures.drawer.Drawer.picture"
+    monkeypatch.setattr(picture, lambda *of, title="", **look: titles.append(title.split("   ")[0]) or blank)
+    assert main(["compare", str(arch_results), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    assert titles == [f"Settlement {at} m" for at in ("0.0200", "0.0400", "0.0600") for _ in range(2)]
+
+
 @pytest.mark.slow
 def test_places_of_several_settlements_are_told_as_their_sum(tmp_path):
     structure, folders = solver.Structure(generators.arch(voussoirs=5), friction_coefficient=2.0), []
@@ -83,7 +93,8 @@ def test_what_the_cases_differ_in_is_told(tmp_path):
     for friction, density in (("1.5", "1850.5"), ("2.0", "2000.0")):
         folders.append(tmp_path / friction)
         changes = [f"material.friction_coefficient={friction}", "settlement.limit=0.02", "output.animation=false"]
-        changes.append(f"material.density={density}")
+        # Of numbers as of dates the seventh digit tells.
+        changes += [f"material.density={density}", f"imperfections=[{{{SCATTER}, seed={20260100 + int(friction[0])}}}]"]
         blockvis.run_case(blockvis.read_case(CASE, changes=changes), folders[-1], outputs=())
     assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
     page = (tmp_path / "both" / "compare.html").read_text(encoding="utf-8")
@@ -91,6 +102,7 @@ def test_what_the_cases_differ_in_is_told(tmp_path):
         "": ["1.5", "2.0"],
         "material.friction_coefficient": ["1.5", "2"],
         "material.density": ["1850.5 kg/m³", "2000 kg/m³"],
+        "imperfections 1.seed": ["20260101", "20260102"],
     }
 
 

@@ -104,6 +104,17 @@ def test_an_animation_in_space_has_y_upwards(tmp_path):
     np.testing.assert_allclose(last, [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]], atol=1e-3)
 
 
+def test_what_never_stood_swings_out(tmp_path):
+    """The crown of an arch that is too thin goes down."""
+    thin = solver.settle(
+        blockvis.generators.arch(thickness_ratio=0.05), solver.Settlement((1, 0)), friction_coefficient=2.0
+    )
+    assert len(thin.increments) == 1
+    file = converted(blockvis.write(thin, tmp_path / "out"), tmp_path / "thin.glb")
+    (_, before), (_, after) = played(file, 0.0), played(file, 1.2)
+    assert after[1, 1] < before[1, 1] - 0.01
+
+
 @pytest.mark.parametrize("suffix", [pytest.param(".dxf", marks=pytest.mark.thorough), ".obj"])
 def test_the_deformed_layout_is_that_of_the_last_equilibrium(suffix, folder, tmp_path, capsys):
     file = converted(folder, tmp_path / f"deformed{suffix}")

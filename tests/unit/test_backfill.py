@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from structures import alike, assembly_of, box, case_from, pixels, rectangle
+from structures import alike, assembly_of, box, case_from, pixels, rectangle, report_of
 
 import solver
 from blockvis import draw_still, lay_backfill, run_case
@@ -104,6 +107,7 @@ FILL = {"over": '"voussoir *"', "surface": "2.0", "unit_weight": "18000.0"}
         ({"over": "[]"}, r"\[backfill\] over is empty"),
         ({"over": '"left springer"'}, "'left springer' are supports only; fill loads free blocks"),
         ({"surface": "1.0"}, r"surface is 1 m, below the extrados of block 'voussoir 2', which reaches 1.20"),
+        ({"surface": "inf"}, r"surface is inf.*a finite number"),
         ({"unit_weight": "-18000.0"}, r"\[backfill\] unit_weight is -18000"),
         ({"pressure_coefficient": "-0.1"}, r"\[backfill\] pressure_coefficient is -0.1"),
     ],
@@ -175,6 +179,23 @@ def test_fill_is_drawn_up_to_its_surface(tmp_path: Path) -> None:
         shown[name] = alike(pixels(drawn), (150, 128, 92), 30).sum()
     # The line of its surface is as long as the block is wide.
     assert shown["filled"] > shown["bare"] + 40
+
+
+def test_of_fill_on_fill_the_report_draws_the_load_that_it_has() -> None:
+    assembly = assembly_of(case_from(CASE))
+    low = lay(assembly, "voussoir *", 2.0)
+    high = replace(lay(assembly, "voussoir *", 3.0), base=2.0)
+    weight = solver.self_weight(assembly)
+    loads = solver.Loads(weight.dead, weight.live, (low, high))
+    settlement = solver.Settlement([1.0, 0.0], increment=1e-3, limit=1e-3)
+    response = solver.Structure(assembly, loads=loads, friction_coefficient=0.7).settle(settlement)
+    drawn = json.loads(re.findall(r'<script id="model" type="application/json">(.*?)</script>', report_of(response))[0])
+    # A piece has block, ends, surface, base, weight of a metre and coefficient; the load is of what is above both.
+    found = [
+        (x0 - x1) * w * max(0.0, surface - max(base, (y0 + y1) / 2.0))
+        for _, x0, y0, x1, y1, surface, base, w, _ in drawn["fill"]["pieces"]
+    ]
+    assert sum(found) == pytest.approx(sum(fill.weight(assembly) for fill in (low, high)), rel=1e-4)
 
 
 def test_fill_of_lists_is_that_of_arrays() -> None:

@@ -73,11 +73,14 @@ def test_rotations_and_loads_have_three_numbers(tmp_path):
         (DOME + DOWN + "[[loads]]\npressure = 3.0", r"pressure belongs to blocks in the plane; in space give forces"),
         (DOME.replace("\n", "\ndimension = 2\n", 1) + DOWN, r"dimension is 2, but the layout 'dome' is in space"),
         (DOME.replace("\n", "\ndimension = 4\n", 1) + DOWN, r'dimension is 4; give 2, 3 or "auto"'),
+        (DOME.replace("\n", "\nthickness = 0.7\n", 1) + DOWN, r"thickness belongs to outlines in the plane"),
         (DOME.replace("\n", '\nclosing = "faces"\n', 1) + DOWN, r"closing belongs to outlines in the plane"),
         (DOME + DOWN + '[[imperfections]]\nkind = "vertices"\ndistribution = "normal"\nmean = 0\ndeviation = 0.01\n',
          r"kind 'vertices' belongs to blocks in the plane"),
         (DOME + DOWN + '[[supports]]\noutline = [[0, 0], [1, 0], [1, 1]]\n',
          r"case\.toml: \[\[supports\]\] .* levels = \[bottom, top\] in m"),
+        (DOME + DOWN + '[[supports]]\nname = "g"\noutline = [[0, 0], [1, 0], [1, 1]]\nlevels = [0, -0.3]\n',
+         r"case\.toml: \[\[supports\]\] support 'g': levels is \[0, -0\.3\]; give the lower first, in m"),
         (ARCH + DOWN.replace("0, 0", "0") + '[[supports]]\noutline = [[0, 0], [1, 0], [1, 1]]\nlevels = [0, 1]\n',
          r"case\.toml: \[\[supports\]\] .* 'levels', which no support in the plane has; leave it out, "
          r"or give \[geometry\] dimension = 3 if the blocks are in space"),
@@ -90,6 +93,14 @@ def test_rotations_and_loads_have_three_numbers(tmp_path):
 def test_what_does_not_fit_is_named(text, reason, tmp_path):
     with pytest.raises(ValueError, match=reason):
         assembly_of(case(text, tmp_path))
+
+
+@pytest.mark.parametrize(("key", "end"), [("from", "[0, 5]"), ("to", "{ fixed = [2.0, 0.3] }")])
+def test_ends_of_ties_have_three_numbers(key, end, tmp_path):
+    ends = {"from": "[0, 0, 5]", "to": "{ fixed = [2.0, 0.0, 0.3] }"} | {key: end}
+    tie = '[[ties]]\nname = "iron"\nstiffness = 1e7\n' + "".join(f"{which} = {at}\n" for which, at in ends.items())
+    with pytest.raises(ValueError, match=rf"case\.toml: \[ties 'iron'\] {key} has 2 numbers, .* give three numbers"):
+        blockvis.run_case(case(DOME + DOWN + tie, tmp_path), tmp_path / "out", outputs=())
 
 
 def test_supports_of_a_drawing_without_them(tmp_path):

@@ -72,6 +72,19 @@ def test_the_collapse_has_the_count_of_its_mechanism_and_the_case_its_name(tmp_p
     assert "garden" in said(run.response, tmp_path / "named.svg")
 
 
+def test_a_name_is_text_whatever_it_holds(tmp_path):
+    """No formula between two "$", and in the legend also where it begins with "_"."""
+    (tmp_path / "$\\foo$ 5.toml").write_text(
+        '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.001\nlimit = 0.001\n'
+        '[[ties]]\nname = "_1 $x_1$"\nfrom = [-1.0, 0.2]\nto = [1.0, 0.2]\nstiffness = 1e5\n',
+        encoding="utf-8",
+    )
+    run = blockvis.run_case(tmp_path / "$\\foo$ 5.toml", tmp_path / "out", outputs=())
+    told = said(run.response, tmp_path / "named.svg")
+    assert "$\\foo$ 5" in told
+    assert " _1 $x_1$" in told
+
+
 def test_a_collapse_is_counted_once(tmp_path):
     """Not as a change to no hinges as well, where the supports alone move at the last equilibrium."""
     response = arch_response()
@@ -126,6 +139,14 @@ def test_a_reaction_that_leaves_that_at_rest_at_once_has_no_line_from_there(tmp_
 def test_small_settlements_are_written_in_millimetres(tmp_path):
     response = replace(parted(wall(4, 3), 3, 0, settlement=0.005), stop=solver.Status.SOLVER_FAILED)
     assert "solver failed at 5.00 mm: the curve is not complete" in said(response, tmp_path / "curve.svg")
+
+
+@pytest.mark.parametrize(("largest", "told"), [(2.5e-7, "0.000250 mm"), (2.28753e-4, "0.229 mm"), (0.0123, "12.30 mm")])
+def test_settlements_have_digits_however_small_they_are(largest, told, tmp_path):
+    response = arch_response()
+    small = tuple(replace(i, parameter=largest * k) for k, i in enumerate(response.path[:2]))
+    failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=small)
+    assert f"solver failed at {told}: the curve is not complete" in said(failed, tmp_path / "curve.svg")
 
 
 @pytest.mark.slow

@@ -110,6 +110,11 @@ def test_a_second_phase_starts_at_the_end_of_the_first(tmp_path):
     end = path[-1].settlement
     assert times[3] > end
     assert times[4:] == pytest.approx([end + i.settlement for i in path[1:]])
+    # Increments of a thousandth of what went before.
+    fine = [replace(i, phase=1, parameter=1e-3 * end * k) for k, i in enumerate(path)]
+    times = times_in(blockvis.write(replace(response, increments=(*path, *fine), collapse=None), tmp_path / "fine"))
+    assert times[3] > end
+    assert times[3:] == pytest.approx([end, 1.001 * end, 1.002 * end], rel=1e-8)
 
 
 def test_blocks_say_how_they_move_on_and_what_falls():
@@ -148,5 +153,7 @@ def test_the_fall_begins_at_the_last_equilibrium_and_is_found_by_its_seconds():
     assert later.field_data["time"][0] == 0.5
     assert later.points[:, 1].max() < start.points[:, 1].max() - 0.1
     assert response.fall(99.0).field_data["time"][0] < 99.0
+    with pytest.raises(ValueError, match="time is nan; give the seconds since the last equilibrium"):
+        response.fall(np.nan)
     with pytest.raises(ValueError, match="nothing falls"):
         replace(response, collapse=None).fall(0.5)

@@ -470,6 +470,16 @@ def test_supports_that_all_move_as_one_are_refused_before_anything_is_followed(t
         blockvis.explain(tmp_path / "case.toml", [{"joint": "voussoir 3 | voussoir 4", "width": 0.003}])
 
 
+def test_a_case_with_a_load_that_begins_later_has_no_causes(tmp_path):
+    settlement = "[[settlement]]\ndirection = [1, 0]\n"
+    load = '[[loads]]\nblocks = "voussoir 3"\nforce = [0, -300]\nphase = 2\n'
+    text = '[geometry]\nlayout = "arch"\n' + 2 * settlement + load
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "cracks.csv").write_text("kind,block_a,block_b,width\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"case.toml: \[loads 1\] phase is 2, and blockvis explain has no settlement"):
+        blockvis.explain(tmp_path / "case.toml", tmp_path / "cracks.csv")
+
+
 def test_a_case_that_crushes_has_no_causes(tmp_path):
     layout = '[geometry]\nlayout = "arch"\n[material]\nfriction_coefficient = 0.6\n'
     (tmp_path / "case.toml").write_text(layout + "compressive_strength = 1e6\n", encoding="utf-8")

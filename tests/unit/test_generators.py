@@ -351,6 +351,8 @@ def test_every_length_of_every_layout_is_refused_by_its_name_unless_it_is_one(na
         ({"head": "beam"}, "opening 1: head is 'beam'; choose from lintel"),
         ({"head": "round arch", "rise": 0.1}, "rise is 0.1 m; that of a round arch is 0.25 m"),
         ({"head": "segmental arch", "rise": 0.3}, "opening 1: rise is 0.3 m, more than half of its width of 0.5 m"),
+        ({"rise": 0.1}, "rise is that of a segmental arch or round arch; its head is 'lintel': leave rise out"),
+        ({"head": "none", "depth": 0.3}, "depth is that of a .*; its head is 'none'"),
         ({"head": "flat arch", "skew": 80}, "opening 1: skew is 80 degrees; give an angle above 0 and below 60"),
         ({"width": "wide"}, "opening 1: width is 'wide'; give a finite number in m"),
         ({"x": 2.8}, "opening 1 ends at x = 3.3 m, outside the wall of 3 m"),

@@ -52,6 +52,13 @@ def test_picture(layout, tmp_path):
     assert {(206, 209, 213), (91, 143, 214), (214, 96, 91)} <= colours
 
 
+def test_a_name_is_drawn_whatever_it_holds(tmp_path):
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
+    layout = tmp_path / "named.json"
+    save_layout(solver.Assembly.from_outlines([square], names=["$\\foo$"], roles=["free"]), layout)
+    assert main(["info", str(layout), "--picture", str(tmp_path / "found.png")]) == 0
+
+
 @pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")
 @pytest.mark.slow
 def test_facade():

@@ -158,6 +158,20 @@ def test_joints_csv_names_the_widest_crack_first(tmp_path):
     assert openings[3] == 0.0, "what a step leaves is no opening"
 
 
+def test_joints_csv_has_no_opening_of_a_joint_that_is_pressed_together(tmp_path):
+    outlines = [[[0, y], [1, y], [1, y + 1], [0, y + 1]] for y in range(3)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free", "free"])
+    soft = solver.Interfaces(solver.InterfaceLaw(0.6, normal_stiffness=1e6))
+    dead = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, -2e4, 0.0]])
+    response = solver.Structure(assembly, soft).settle(
+        [solver.Settlement([0.0, -1.0], increment=1e-3, limit=1e-3)] * 2, changes=[solver.PhaseChange(1, dead=dead)]
+    )
+    assert response.joints(-1)["opening"] == pytest.approx([-0.02, -0.02], rel=1e-3)
+    out = blockvis.write(response, tmp_path / "out")
+    rows = csv.DictReader((out / "joints.csv").read_text(encoding="utf-8").splitlines())
+    assert [row["largest opening [m]"] for row in rows] == ["0", "0"]
+
+
 def test_joints_csv_tells_the_phase_of_places_in_m_and_in_rad(tmp_path):
     response = moved_and_turned()
     out = blockvis.write(response, tmp_path / "out")

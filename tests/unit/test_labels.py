@@ -117,6 +117,10 @@ def test_the_legend_lists_what_is_drawn_and_what_is_too_much():
     assert many["sliding joints not shown"] == ""
     assert many["forces not shown"] == ""
     assert "hinge" not in keys_of(parted(wall(8, 6), 3, 0))
+    glued = solver.Interfaces(solver.InterfaceLaw(0.6, cohesion=1e6, tensile_strength=1e6))
+    sinks = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.01)
+    pulled = keys_of(solver.settle(generators.arch(voussoirs=6), sinks, interfaces=glued), forces="thrust")
+    assert any(text.startswith("force of a joint") for text in pulled)
     # Who asks for none gets none, and no excuse.
     assert not any("forces" in text for text in keys_of(parted(wall(20, 18), 3, 0), forces="none"))
 

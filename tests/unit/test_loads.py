@@ -7,6 +7,7 @@ import solver
 
 OUTLINES = [[[0, 0], [2, 0], [2, 1], [0, 1]], [[0, -1], [3, -1], [3, 0], [0, 0]], [[5, 0], [6, 0], [6, 1], [5, 1]]]
 ASSEMBLY = solver.Assembly.from_outlines(OUTLINES, names=["brick", "base", "pier"], roles=["free", "moving", "moving"])
+PUSH = solver.Settlement(direction=(1, 0))
 START = solver.Pose.initial(ASSEMBLY)
 
 MOTIONS = {
@@ -117,6 +118,15 @@ def test_direction_counts_as_a_direction_only():
         ({"direction": (1, 0), "increment": -0.1}, "increment"),
         ({"direction": (1, 0), "limit": np.nan}, "limit"),
         ({"direction": (1, 0), "tolerance": -1e-4}, "tolerance"),
+        ({"direction": "down"}, "settlement direction is 'down'; give numbers"),
+        ({"direction": (1, 0), "stops": 0.1}, "stops is 0.1; give a sequence of numbers"),
+        ({"direction": (1, 0), "stops": ["a"]}, r"stops is \['a'\]; give a sequence of numbers"),
+        ({"profile": [1.0]}, r"profile is \[1.0\]; give a mapping, by names"),
+        ({"profile": {"base": "down"}}, "settlement profile of 'base' is 'down'; give numbers"),
+        (
+            {"profile": {"base": (0, -1, 0), "pier": (0, 0, -1, 0, 0, 0)}},
+            r"settlement profile of 'pier' is \[.*\]; give \[dx, dy, rotation\], in space",
+        ),
         ({"direction": (1, 0), "limit": 0.5, "stops": (0.1, 0.6)}, r"stop 0.6 is not between 0 and the limit of 0.5"),
     ],
 )
@@ -174,6 +184,34 @@ def test_friction_given_in_degrees_warns():
         (lambda: solver.settle(ASSEMBLY, (1, 0), friction_coefficient=None), "friction_coefficient is None"),
         (lambda: solver.Settlement((1, 0), blocks="pier"), "blocks is the text 'pier'; give a sequence of names"),
         (lambda: solver.Structure(ASSEMBLY, 0.5), r"interfaces are 0\.5; .* or friction_coefficient by its name"),
+        (lambda: solver.Structure("a.json", friction_coefficient=1), r"assembly is 'a\.json'; give solver\.Assembly"),
+        (lambda: solver.Structure(ASSEMBLY, friction_coefficient=""), "friction_coefficient is the text ''"),
+        (lambda: solver.Structure(ASSEMBLY, friction_coefficient=[]), r"friction_coefficient is \[\]; give a number"),
+        (lambda: solver.Interfaces(0.5), r"default law of interfaces is 0\.5; give solver\.InterfaceLaw"),
+        (
+            lambda: solver.Interfaces(pairs={("a", "b"): 0.3}),
+            r"law of the interface of .* is 0\.3; give solver",
+        ),
+        (lambda: solver.Interfaces(pairs={"ab": solver.InterfaceLaw()}), "a law for 'ab'; give it for two materials"),
+        (lambda: solver.Interfaces(ground={"g": "x"}), "stiffness of the ground under 'g' is the text 'x'"),
+        (lambda: solver.JointScatter(2.5, np.sqrt), "seed is 2.5; give a whole number"),
+        (lambda: solver.JointScatter(-1, np.sqrt), "seed is -1; give a whole number of at least 0"),
+        (lambda: solver.Tie("t", (0, 1), ((0, 0), (1, 1)), 1e6, brittle="no"), "brittle is the text 'no'; give True"),
+        (lambda: solver.Structure(ASSEMBLY, friction_coefficient=1, ties=["a"]), "one of the ties is 'a'; give solver"),
+        (lambda: solver.Structure(ASSEMBLY, solver.Interfaces(), [1.0]), r"loads is \[1\.0\]; give solver\.Loads"),
+        (lambda: solver.point_load(ASSEMBLY, 0, "x"), r"force is \['x'\]; give numbers"),
+        (lambda: solver.edge_pressure(ASSEMBLY, 0, 0, "x"), "pressure is 'x'; give numbers"),
+        (lambda: solver.settle(ASSEMBLY, PUSH, controls={"local_loss": 0}), r"controls is {.*}; give solver\.Controls"),
+        (lambda: solver.settle(ASSEMBLY, PUSH, controls=0), r"controls is 0; give solver\.Controls"),
+        (lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), closed_gap="x"), "closed_gap is the text 'x'"),
+        (
+            lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), displacement=[]),
+            r"displacement is \[\]; give a",
+        ),
+        (
+            lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), pose=ASSEMBLY),
+            r"pose is <.*>; give solver\.Pose",
+        ),
     ],
 )
 def test_what_is_no_number_is_refused_by_its_name(make, message):
@@ -223,12 +261,20 @@ def test_what_of_a_settlement_is_for_space_is_named_in_the_plane(given, message)
         (lambda: solver.weight_fraction(ASSEMBLY, (1, 0), ["brick"]), r"\['brick'\]"),
         (lambda: solver.surface_forces(ASSEMBLY, 1.0, blocks=[5]), r"\[5\]"),
         (lambda: solver.edge_force(ASSEMBLY, 7, 0, 1.0), "7"),
+        (lambda: solver.point_load(ASSEMBLY, 7, (0, -1)), "7"),
         (lambda: solver.PointForces([3], [[1, 0]], [[1, 1]]).load(ASSEMBLY), r"\[3\]"),
     ],
 )
 def test_blocks_that_are_not_there_are_told_from_those_that_are(make, numbers):
     with pytest.raises(ValueError, match=f"there are no blocks {numbers}; give numbers from 0 to 2, assembly.index"):
         make()
+
+
+@pytest.mark.parametrize("kind", ["Dead", "Live", None])
+def test_forces_are_dead_or_live(kind):
+    """Another word was taken for live, and a settlement leaves live loads out."""
+    with pytest.raises(ValueError, match=f"kind of the forces is {kind!r}; it is 'dead' or 'live'"):
+        solver.self_weight(ASSEMBLY).with_forces(ASSEMBLY, solver.PointForces.at(0, (0, -1), (1, 1)), kind)
 
 
 def test_forces_at_points_take_lists():

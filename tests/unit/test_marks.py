@@ -178,6 +178,57 @@ def test_resultants_balance_every_voussoir():
     assert len(forces) == 13
 
 
+def corbel_on_a_wall():
+    """A stone glued to a wall, a second glued to its underside, a third on a moving support."""
+    boxes = {"wall": (-1, -1, 0, 1), "ground": (3, -1, 4, 0), "corbel": (0, 0, 0.5, 0.5), "hanger": (0.1, -0.4, 0.4, 0)}
+    outlines = [[(x, y), (u, y), (u, v), (x, v)] for x, y, u, v in (*boxes.values(), (3, 0, 4, 0.5))]
+    assembly = solver.Assembly.from_outlines(
+        outlines, names=[*boxes, "block"], roles=["fixed", "moving", *["free"] * 3], density=2000.0
+    )
+    law = solver.InterfaceLaw(0.6, cohesion=2e5, tensile_strength=1e5)
+    sinks = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.01)
+    return solver.settle(assembly, sinks, interfaces=solver.Interfaces(law))
+
+
+def test_resultants_of_mortar_that_is_bent_and_pulled_balance_the_stones():
+    response = corbel_on_a_wall()
+    increment, assembly = response.path[-1], response.assembly
+    points, forces, blocks = marks.resultants(increment)
+    weight = assembly.masses * solver.GRAVITY
+    told = {
+        tuple(assembly.names[k] for k in pair): (point, force)
+        for pair, point, force in zip(blocks, points, forces, strict=True)
+    }
+    place, force = told["corbel", "hanger"]
+    np.testing.assert_allclose(force, [0.0, -weight[3]], atol=1e-6 * weight[3])
+    np.testing.assert_allclose(place, [0.25, 0.0], atol=1e-9)
+    # Sheared and bent: what presses below pulls above, and the resultant never crosses the joint.
+    place, force = told["wall", "corbel"]
+    np.testing.assert_allclose(force, [0.0, -weight[2] - weight[3]], atol=1e-6 * weight[3])
+    np.testing.assert_allclose(place, [0.0, 0.25], atol=1e-9)
+    points, forces, _ = marks.joint_forces(increment, "points")
+    np.testing.assert_allclose(forces[points[:, 0] < 1.0][:, 1].sum(), weight[2] + 2.0 * weight[3])
+    contacts = response.contacts(-1)
+    assert contacts["carries"][contacts["normal_force"] < -1.0].all()
+
+
+def test_the_thrust_line_of_an_arch_with_mortar_leaves_the_stones():
+    law = solver.InterfaceLaw(0.6, cohesion=2e5, tensile_strength=1e5)
+    spread = solver.Settlement(direction=(1, 0), increment=0.002, limit=0.002)
+    response = solver.settle(generators.arch(thickness_ratio=0.15), spread, interfaces=solver.Interfaces(law))
+    increment, assembly = response.path[-1], response.assembly
+    points, forces, blocks = marks.resultants(increment)
+    total = np.zeros((assembly.n_blocks, 3))
+    for sense, of in ((1.0, blocks[:, 0]), (-1.0, blocks[:, 1])):
+        arms = points - increment.pose.positions[of]
+        moments = arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]
+        np.add.at(total, of, sense * np.column_stack([forces, moments]))
+    weight = assembly.masses * solver.GRAVITY
+    expected = np.outer(weight, [0.0, 1.0, 0.0])
+    np.testing.assert_allclose(total[assembly.free], expected[assembly.free], atol=1e-6 * weight.sum())
+    assert increment.forces[:, 0].min() < -100.0
+
+
 def test_arch_spreads_on_three_hinges_and_falls_on_five():
     response = arch_response()
     last, joints = response.path[-1], initial_joints(response.assembly)

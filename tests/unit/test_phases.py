@@ -221,7 +221,15 @@ def test_a_path_goes_on_across_a_removal_bit_for_bit() -> None:
         (REMOVED.replace("brick", "brik"), r"\[remove\] blocks: no block is named 'brik 3-3'"),
         ("[[remove]]\nphase = 2\n", r"\[remove\] blocks is missing"),
         ('[[remove]]\nphase = 2\nties = "tie"\n', r"\[remove\] ties: no tie is named 'tie'; the case has no ties"),
-        (REMOVED.replace("brick 3-3", "ground*"), "phase 2 moves only supports that have been taken away"),
+        (
+            REMOVED.replace("brick 3-3", "ground*"),
+            r"case\.toml: settlement phase 2 moves only supports that have been taken away",
+        ),
+        (
+            '[[ties]]\nname = "iron"\nfrom = [0.1, 0.1]\nto = [0.6, 0.2]\nstiffness = 1e5\nphase = 2\n'
+            '[[remove]]\nphase = 2\nties = "iron"\n',
+            r"case\.toml: \[remove\] ties: 'iron' is installed before settlement 2, .*; give phase = 3 or later",
+        ),
         ("[[loads]]\nforce = [0, -1]\nphase = 3\n", r"\[loads 1\] phase is 3; the case has 2 \[\[settlement\]\]"),
         ('[[loads]]\nkind = "live"\nforce = [0, -1]\nphase = 2\n', "a live load acts after all settlements"),
         (
@@ -240,6 +248,56 @@ def test_a_change_that_cannot_be_is_refused_in_one_line(more: str, words: str) -
 
     with pytest.raises(ValueError, match=words) as error:
         run()
+    assert "\n" not in str(error.value)
+
+
+COLUMNS = f"""
+[geometry]
+file = "columns.json"
+{SETTLEMENT}
+{SETTLEMENT}
+[[remove]]
+phase = 2
+blocks = "left"
+"""
+
+
+def columns(folder: Path, more: str) -> solver.Response:
+    """Two columns on a ground that sinks, of which the left one is taken away before the second settlement."""
+    outlines = {"left": rectangle(0.5, 0.0, 1.0, 1.0), "right": rectangle(2.0, 0.0, 2.5, 1.0)}
+    blocks: list[dict[str, Any]] = [{"name": name, "outline": ring.tolist()} for name, ring in outlines.items()]
+    blocks.append({"name": "ground", "role": "moving", "outline": rectangle(0.0, -0.5, 4.0, 0.0).tolist()})
+    (folder / "columns.json").write_text(json.dumps({"blocks": blocks}), encoding="utf-8")
+    return blockvis.run_case(case_from(COLUMNS + more, folder), folder / "out", outputs=()).response
+
+
+@pytest.mark.parametrize("blocks", ["", 'blocks = "right"'])
+def test_what_has_been_taken_away_shields_nothing_from_a_later_pressure(tmp_path: Path, blocks: str) -> None:
+    # 100 kN push on a column of 9.8 kN.
+    found = columns(tmp_path, f"[[loads]]\npressure = 1e5\ndirection = [1, 0]\nphase = 2\n{blocks}\n")
+    assert found.stop is solver.Status.COLLAPSED
+    assert [increment.phase for increment in found.path] == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ('[[loads]]\nblocks = "left"\nforce = [5e4, 0]\nphase = 2\n', "loads 1] blocks 'left' matches only what [[re"),
+        ("[[loads]]\npoint = [0.7, 0.5]\nforce = [5e4, 0]\nphase = 2\n", "(0.7, 0.5) m lies in 'left', which [[remo"),
+        (
+            '[[ties]]\nname = "t"\nstiffness = 1e7\nkind = "bar"\nphase = 2\nfrom = [1, 0.7]\nto = [2, 0.7]\n',
+            "[ties] 't' from (1, 0.7) m lies in 'left', which [[remove]] has taken away",
+        ),
+        (
+            '[[ties]]\nname = "t"\nstiffness = 1e7\nphase = 2\nto = [2, 0.7]\n'
+            'from = { block = "left", point = [1, 0.7] }\n',
+            "[ties] 't' from: [[remove]] has taken 'left' away before settlement 2",
+        ),
+    ],
+)
+def test_what_would_act_on_blocks_that_have_been_taken_away_is_refused(tmp_path: Path, more: str, words: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(words)) as error:
+        columns(tmp_path, more)
     assert "\n" not in str(error.value)
 
 
@@ -310,6 +368,17 @@ def test_a_tie_that_is_taken_away_is_named_in_the_summary(tmp_path: Path, capsys
     steps = SPREADING.replace("increment = 0.05\nlimit = 0.1", "increment = 0.002\nlimit = 0.002")
     _, summary = run_told(tmp_path, ARCH + 2 * steps + iron + '[[remove]]\nphase = 2\nties = "iron"\n', capsys)
     assert summary["removed"] == [{"phase": 2, "blocks": [], "ties": ["iron"], "weight": 0.0}]
+
+
+def test_a_block_named_twice_is_taken_away_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    column = (
+        '[geometry]\nlayout = "column"\nparameters = { blocks = 4, width = 0.6, block_height = 0.5, depth = 0.5 }\n'
+    )
+    away = '[[remove]]\nphase = 3\nblocks = ["block 4", "block 3"]\n[[remove]]\nphase = 2\nblocks = "block 4"\n'
+    _, summary = run_told(tmp_path, column + 3 * SETTLEMENT + away, capsys)
+    told = [(entry["phase"], entry["blocks"], entry["weight"]) for entry in summary["removed"]]
+    assert told == [(2, ["block 4"], pytest.approx(2943.0)), (3, ["block 3"], pytest.approx(2943.0))]
+    assert "block 'block 3' taken away before settlement 3, 2943 N" in summary["notes"][-1]
 
 
 @pytest.mark.parametrize("ranged", ["", "[analysis]\nrange = true\n"])

@@ -199,6 +199,16 @@ def test_a_load_without_limit_is_no_collapse():
     assert "no live load of this pattern" in response.message
 
 
+def test_without_friction_nothing_is_carried():
+    """What the check of a program lets pass, 1e-9 of the load, was followed as capacity to the limit."""
+    control = solver.ControlDisplacement("block", (1, 0), limit=0.05)
+    response = pushover(block(), control, loads=sideways(block()), friction_coefficient=0.0)
+    assert (response.stop, response.message) == (
+        solver.Status.NO_INITIAL_EQUILIBRIUM,
+        "no live load of this pattern is carried",
+    )
+
+
 @pytest.mark.slow
 def test_the_end_of_a_pushover_is_told_where_blocks_are_a_little_out_of_balance():
     opening = {"x": 0.25, "y": 0.0, "width": 0.5, "height": 0.7, "head": "flat arch"}

@@ -11,10 +11,10 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from structures import BENT, alike, arch_response, parted, pixels, wall
+from structures import BENT, alike, arch_response, box, parted, pixels, rectangle, wall
 
 import solver
-from blockvis import animate, draw_mechanism, draw_still
+from blockvis import animate, draw_mechanism, draw_still, generators
 from blockvis.pictures import flat_scene, palette
 from blockvis.pictures.curves import CurvePanel
 from blockvis.pictures.drawer import Drawer, Look, magnified
@@ -51,6 +51,39 @@ def test_what_is_where(tmp_path):
         )
     assert alike(colour_at(np.array([0.0, 0.3])), palette.PAPER)
     assert alike(colour_at(last.pose.positions[assembly.moving][0]), palette.SETTLEMENT)
+
+
+@pytest.mark.parametrize("foot", [0.0, -0.2], ids=["below its load", "at its centroid"])
+def test_a_support_that_turns_has_an_arrow_at_both_ends(foot, tmp_path):
+    """One arrow would show ground that tilts as pushed aside."""
+    stones = [rectangle(-0.3, 0.4 * k, 0.3, 0.4 * k + 0.4) for k in range(8)]
+    column = solver.Assembly.from_outlines([rectangle(-0.6, -0.4, 0.6, 0), *stones], roles=["moving", *["free"] * 8])
+    tilts = solver.Settlement(rotation=1.0, rotation_centre=(0.0, foot), increment=0.01, limit=0.01)
+    response = solver.Structure(column, friction_coefficient=0.7).settle(tilts)
+    picture = pixels(draw_still(response, 0, tmp_path / "tilt.png", size=SMALL, forces="none"))
+    columns = alike(picture, palette.SETTLEMENT, 30).any(axis=0)
+    middle = SMALL[0] // 2
+    assert not columns[middle]
+    assert columns[:middle].sum() == pytest.approx(columns[middle:].sum(), abs=2)
+    assert columns[middle:].sum() > 3
+
+
+@pytest.mark.parametrize("space", [False, True], ids=["of shallow ground", "magnified in space"])
+def test_arrows_of_supports_are_drawn_whole(space, tmp_path):
+    if space:
+        solids = [box((-1, -1, -0.4), (1, 1, 0)), box((-0.6, -0.6, 0), (0.6, 0.6, 1))]
+        column = solver.Assembly.from_solids(solids, roles=["moving", "free"])
+    else:
+        stones = [rectangle(-0.3, 0.4 * k, 0.3, 0.4 * k + 0.4) for k in range(30)]
+        column = solver.Assembly.from_outlines(
+            [rectangle(-0.6, -0.1, 0.6, 0), *stones], roles=["moving", *["free"] * 30]
+        )
+    motion = solver.Settlement((1, 0, 0) if space else (0, -1), increment=0.04, limit=0.04)
+    response = solver.Structure(column, friction_coefficient=0.7).settle(motion)
+    options = {"size": (500, 500), "magnification": 20.0, "view": "top"} if space else {"size": (1920, 1080)}
+    picture = pixels(draw_still(response, -1, tmp_path / "still.png", forces="none", **options))
+    lengths = np.ptp(np.argwhere(alike(picture, palette.SETTLEMENT)), axis=0)
+    assert lengths.max() >= (35 if space else 95), lengths
 
 
 def test_bent_blocks_are_filled_without_triangle_lines():
@@ -150,6 +183,12 @@ def test_mechanism_of_a_structure_that_never_stood(tmp_path):
     assert response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM
     picture = pixels(draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL))
     assert alike(picture, palette.SETTLEMENT).sum() > 50
+    thin = solver.settle(generators.arch(thickness_ratio=0.05), solver.Settlement((1, 0)), friction_coefficient=2.0)
+    assert len(thin.increments) == 1
+    with Image.open(animate(thin, tmp_path / "film.gif", size=(320, 180), fps=10)) as film:
+        first = np.asarray(film.convert("RGB")).astype(int)
+        film.seek(film.n_frames - 1)
+        assert (np.abs(first - np.asarray(film.convert("RGB"))) > 30).sum() > 1000, "the mechanism swings out"
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "gif", "webp"])
@@ -178,11 +217,27 @@ def test_films_have_their_frames(tmp_path, suffix, monkeypatch):
 
 
 @pytest.mark.slow
+def test_the_scale_of_displacements_tells_that_a_fall_goes_further(tmp_path, monkeypatch):
+    """The last tick has a sign beside its number."""
+    inked = []
+    for falls in (True, False):
+        if not falls:
+            monkeypatch.setattr("blockvis.pictures.render.fall_of", lambda response: None)
+        options = {"size": SMALL, "fps": 2, "seconds": 1.0, "colour_by": "displacement"}
+        frames = animate(arch_response(), tmp_path / f"{falls}", **options)
+        scale = pixels(min(frames.iterdir()))[60:280, int(0.93 * SMALL[0]) :]
+        inked.append((scale < 128).all(axis=2).sum())
+    assert inked[0] > inked[1] + 5, inked
+
+
+@pytest.mark.slow
 def test_films_that_cannot_be(tmp_path):
     with pytest.raises(ValueError, match=r"641 × 360.*even"):
         animate(arch_response(), tmp_path / "odd.mp4", size=(641, 360))
     with pytest.raises(ValueError, match=r"film\.avi.*\.mp4, \.gif, \.webp"):
         animate(arch_response(), tmp_path / "film.avi", size=SMALL)
+    with pytest.raises(ValueError, match=r"pic' is no picture that blockvis draws; end its name in \.png"):
+        draw_still(arch_response(), 0, tmp_path / "pic", size=SMALL)
     assert not list(tmp_path.iterdir())
 
 

@@ -3,10 +3,11 @@
 import csv
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import equal_certificates
+from structures import equal_certificates, report_of
 
 import blockvis
 import solver
@@ -42,6 +43,16 @@ def test_reopens_as_the_same_response(response, folder):
         assert np.array_equal(one.states, other.states)
         assert equal_certificates(one.certificate, other.certificate)
     np.testing.assert_allclose(again.collapse.mechanism, response.collapse.mechanism, rtol=1e-12)
+
+
+def test_a_collapse_without_frames_of_its_fall_comes_back_with_its_mechanism(response, tmp_path):
+    bare = replace(response, increments=response.path)
+    again = blockvis.open_results(blockvis.write(bare, tmp_path / "out"))
+    assert len(again.increments) == len(response.path)
+    np.testing.assert_allclose(again.collapse.mechanism, response.collapse.mechanism, rtol=1e-12)
+    assert np.array_equal(again.path[-1].pose.positions, response.path[-1].pose.positions)
+    for words in ("<td>mechanism</td>", "<td>falls</td>"):
+        assert words in report_of(again)
 
 
 def test_csv_counts_every_contact_once(response, folder):
@@ -135,6 +146,72 @@ def test_numbers_of_numpy_are_written(tmp_path):
     control = solver.ControlDisplacement("block", increment=np.float32(0.25), limit=np.int64(1))
     pushed = solver.pushover(assembly, control, loads=live, friction_coefficient=0.3)
     assert blockvis.open_results(blockvis.write(pushed, tmp_path / "pushed")).control == control
+
+
+def _stack(roles=("moving", "free", "free")):
+    outlines = [[[0, 0], [4, 0], [4, 1], [0, 1]], *([[1, y], [2, y], [2, y + 1], [1, y + 1]] for y in (1, 2))]
+    return solver.Assembly.from_outlines(outlines, names=["ground", "low", "top"], roles=roles)
+
+
+def test_laws_loads_and_changes_given_in_python_come_back(tmp_path):
+    """The fall, the pictures and the capacity of what is reopened are those of what was written."""
+    stack = _stack()
+    top = solver.PointForces.at(2, (0, -5e4), (1.5, 3))
+    loads = solver.self_weight(stack).with_forces(stack, top)
+    laws = solver.Interfaces(solver.InterfaceLaw(0.2), {("", ""): solver.InterfaceLaw(0.3)}, ground={"ground": 1e9})
+    phase = solver.Settlement(rotation_centre=(0, 0), rotation=1, increment=0.005, limit=0.005)
+    change = solver.PhaseChange(1, dead=[[0, 0, 0], [0, 0, 0], [0, -500, 0]])
+    response = solver.Structure(stack, laws, loads).settle([phase, phase], changes=[change])
+    again = blockvis.open_results(blockvis.write(response, tmp_path / "out"))
+    again = blockvis.open_results(blockvis.write(again, tmp_path / "copy"))
+    assert again.interfaces == response.interfaces
+    for one, other in ((again.increments[-1], response.increments[-1]), (again.path[0], response.path[0])):
+        assert np.array_equal(again.dead_at(one), response.dead_at(other))
+    assert np.array_equal(again.loads.dead_arms, loads.dead_arms)
+
+
+def test_what_a_folder_does_not_hold_is_told(tmp_path):
+    scatter = solver.JointScatter(3, lambda part: 0.9 + 0.2 * part)
+    laws = solver.Interfaces(solver.InterfaceLaw(0.4), scatter=scatter)
+    response = solver.settle(_stack(), solver.Settlement((0, -1), increment=1, limit=1), interfaces=laws)
+    folder = blockvis.write(response, tmp_path / "out")
+    with pytest.warns(UserWarning, match="does not hold the scatter of friction from joint to joint"):
+        assert blockvis.open_results(folder).interfaces.default == laws.default
+    (folder / "laws_and_loads.npz").unlink()
+    with pytest.warns(UserWarning, match="does not hold its laws, loads and changes; friction 0.6 and self-weight"):
+        blockvis.open_results(folder)
+
+
+def test_a_case_changed_in_python_reopens_as_it_ran(tmp_path):
+    text = '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 6 }\n[material]\nfriction_coefficient = 1.0\n'
+    (tmp_path / "case.toml").write_text(
+        f"{text}[settlement]\ndirection = [1, 0]\nincrement = 0.02\nlimit = 0.02\n", encoding="utf-8"
+    )
+    case = replace(blockvis.read_case(tmp_path / "case.toml"), friction_coefficient=0.5)
+    run = blockvis.run_case(case, tmp_path / "out", pictures=False)
+    assert blockvis.open_results(run.folder).interfaces == run.response.interfaces == solver.Interfaces(case.law)
+    assert case.law.friction_coefficient == 0.5
+    (run.folder / "summary.json").unlink()
+    assert blockvis.open_results(run.folder).interfaces == run.response.interfaces, "as of a run that was killed"
+
+
+def test_no_name_is_no_folder(response, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match="name the folder of the results"):
+        blockvis.write(response, "")
+    with pytest.raises(ValueError, match=r"'\.' names no file"):
+        blockvis.write_report(response, "")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("seconds", [-1, 0, np.nan])
+def test_seconds_that_an_increment_cannot_take_are_refused(seconds, tmp_path):
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\n', encoding="utf-8"
+    )
+    with pytest.raises(ValueError, match=f"increment_seconds is {seconds:g}; give seconds above 0"):
+        blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", increment_seconds=seconds)
+    assert blockvis.read_case(tmp_path / "case.toml", "settlement.limit=0.5").settlements[0].limit == 0.5
 
 
 @pytest.mark.parametrize(

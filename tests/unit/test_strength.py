@@ -135,6 +135,22 @@ def test_a_face_with_a_corner_that_is_none_is_shared_out_whole(middle):
     np.testing.assert_allclose(areas, 1.0, rtol=1e-3)
 
 
+def test_a_bent_face_is_shared_out_alike_in_any_order():
+    """A corner in the bend of the face above it has a contact point on either side of the bend."""
+    over, under = [[-1, 0], [0, 0], [2, -0.8], [2, 1], [-1, 1]], [[0, 0], [0, -2], [2, -2], [2, -0.8]]
+    areas = []
+    for order in ([0, 1], [1, 0]):
+        for first in range(4):
+            outlines = [over, np.roll(under, first, axis=0)]
+            assembly = solver.Assembly.from_outlines([outlines[k] for k in order], roles=["fixed", "free"])
+            contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-6)
+            vertical = np.abs(contacts.frames[:, 0, 1])
+            areas.append(contacts.areas[np.lexsort((vertical, contacts.points[:, 0].round(6)))])
+    # Half the length of the face at either end, seen along the mean of its edges.
+    np.testing.assert_allclose(areas[0], np.hypot(2.0, 0.8) / np.array([4, 4, 2]), rtol=0.01)
+    np.testing.assert_allclose(areas, [areas[0]] * len(areas), rtol=1e-12)
+
+
 def test_a_strong_joint_is_a_dry_joint():
     wall = generators.build("wall", {"bricks": 4, "courses": 5})
     live = solver.weight_fraction(wall, (1.0, 0.0), np.flatnonzero(wall.free))

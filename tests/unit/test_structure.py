@@ -1,6 +1,7 @@
 """A structure: blocks with their joints and loads, and what is asked of it."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -36,6 +37,57 @@ def test_loads_may_be_lists(block):
     assert found.multiplier == pytest.approx(0.5, rel=1e-6)
 
 
+def test_a_structure_keeps_the_loads_that_it_was_made_of(block):
+    dead, live = solver.self_weight(block).dead, solver.weight_fraction(block, (1, 0))
+    structure = solver.Structure(block, loads=solver.Loads(dead, live), friction_coefficient=0.7)
+    live *= 2.0
+    dead *= 3.0
+    assert structure.limit_load().multiplier == pytest.approx(0.5, rel=1e-6)
+
+
+def test_a_settlement_tells_that_it_leaves_live_loads_out(block):
+    moving = block.with_roles(["moving", "free"])
+    structure = solver.Structure(moving, friction_coefficient=0.7).with_live(acceleration=(9, 0))
+    with pytest.warns(UserWarning, match="a settlement leaves the live loads out"):
+        assert structure.settle(solver.Settlement((0, -1), increment=1, limit=1)).load_multiplier.tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("rotations", "message"),
+    [
+        (np.zeros(2), r"rotations of shape \(2,\); give d and d \(d - 1\) / 2 numbers per block"),
+        ([[0.0], [np.nan]], r"the pose of block 1 is .*nan.*; not finite"),
+        ("x", "rotations is 'x'; give numbers"),
+    ],
+)
+def test_a_pose_that_is_none_is_refused(block, rotations, message):
+    with pytest.raises(ValueError, match=message):
+        solver.Pose(block.centroids, rotations)
+    assert solver.Pose(block.centroids.tolist(), [[0], [0]]).rotations.dtype == float
+
+
+def test_blocks_inside_each_other_at_a_pose_are_told(block):
+    structure = solver.Structure(block, friction_coefficient=0.7)
+    sunk = solver.Pose(block.centroids - [[0, 0], [0, 0.15]], np.zeros((2, 1)))
+    limit = structure.limit_load(acceleration=(1, 0), pose=sunk)
+    assert "blocks overlap by up to 0.15 m at this pose" in str(limit)
+
+
+def test_what_holds_arrays_is_equal_to_itself_alone(block):
+    """Comparing arrays ended in words of numpy; now a structure is found in a list, and is a key."""
+    structure = solver.Structure(block, friction_coefficient=0.7)
+    response = structure.limit_load(acceleration=(1, 0)).response
+    for one in (block, structure, response, structure.loads, solver.Pose.initial(block)):
+        assert {one: [one].index(one)}[one] == 0
+    assert block != replace(block)
+
+
+def test_blocks_are_counted_from_the_end_too(block):
+    assert np.array_equal(block.outline(-1), block.outline(1))
+    with pytest.raises(IndexError):
+        block.outline(2)
+
+
 def test_friction_is_never_assumed(block):
     with pytest.raises(TypeError, match="either a friction_coefficient or interfaces"):
         solver.Structure(block)
@@ -43,7 +95,7 @@ def test_friction_is_never_assumed(block):
         solver.Structure(block, solver.Interfaces(), friction_coefficient=0.5)
     with pytest.raises(ValueError, match="friction_coefficient is -1"):
         solver.Structure(block, friction_coefficient=-1.0)
-    with pytest.raises(ValueError, match=r"is \[1, 0, 0\]; give 2 numbers, one per axis"):
+    with pytest.raises(ValueError, match=r"is \[1.0, 0.0, 0.0\]; give 2 numbers, one per axis"):
         solver.Structure(block, friction_coefficient=0.5).limit_load(acceleration=(1, 0, 0))
     with pytest.raises(TypeError, match="either the live loads or an acceleration"):
         solver.Structure(block, friction_coefficient=0.5).with_live()

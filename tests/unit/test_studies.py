@@ -120,9 +120,23 @@ def test_imperfections_of_the_case_keep_their_seed(study_file, tmp_path):
         file.write('[[imperfections]]\nkind = "friction"\ndistribution = "lognormal"\ndeviation = 0.1\n')
     study = read_study(study_file)
     found = [case_of(study.values_of(run), study.case_source).imperfections for run in (0, 1)]
-    assert [one.kind for one in found[0]] == ["friction", "density"]
-    assert found[0][1].seed == found[1][1].seed == 77
-    assert found[0][0].seed != found[1][0].seed
+    assert [one.kind for one in found[0]] == ["density", "friction"]
+    assert found[0][0].seed == found[1][0].seed == 77
+    assert found[0][1].seed != found[1][1].seed
+    # A path counts those of the case.
+    _with(study_file, "[parameters]\n", '[parameters]\n"imperfections[0].deviation" = [0.2, 0.3]\n')
+    study = read_study(study_file)
+    for run in range(8):
+        density, friction = case_of(study.values_of(run), study.case_source).imperfections
+        assert density.distribution.numbers["deviation"] in (0.2, 0.3)
+        assert friction.distribution.numbers["deviation"] == 0.1
+
+
+def test_a_case_with_one_table_of_imperfections_is_studied(study_file, tmp_path):
+    with open(tmp_path / "case.toml", "a", encoding="utf-8") as file:
+        file.write('[imperfections]\nkind = "density"\ndistribution = "lognormal"\ndeviation = 0.1\nseed = 77\n')
+    study = read_study(study_file)
+    assert [case_of(study.values_of(run), study.case_source).imperfections[0].seed for run in (0, 1)] == [77, 77]
 
 
 def test_a_parameter_may_be_a_number_of_an_imperfection(study_file):
@@ -237,6 +251,14 @@ def test_nothing_varied_is_refused(tmp_path):
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
     with pytest.raises(ValueError, match="nothing is varied"):
         read_study({"study": {"case": str(tmp_path / "case.toml")}})
+
+
+def test_points_of_a_distribution_belong_to_a_grid(study_file):
+    _with(study_file, "upper = 0.8 }", "upper = 0.8, points = 4 }")
+    with pytest.raises(
+        ValueError, match=r'"material.friction_coefficient": points belong to a grid; give \[study\] runs'
+    ):
+        read_study(study_file)
 
 
 @pytest.mark.slow
@@ -400,6 +422,12 @@ def test_values_chosen_by_hand_are_no_sample():
     summary = summary_of(study, _table(study, [0.0, 0.2], ["no initial equilibrium", "collapsed"]))
     assert "collapse by a, 0.4: none (no initial equilibrium); 0.5: 0.2 m" in in_words(summary)
     assert "share" not in in_words(summary), "each value has its run"
+
+
+def test_an_outcome_that_one_run_has_alone_has_no_index():
+    study = _study()
+    table = _table(study, np.where(np.arange(study.n_runs) < 1, 0.15, 0.14))
+    assert first_order(study, table) == {}
 
 
 def test_first_order_indices_of_a_linear_function():

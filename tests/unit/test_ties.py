@@ -91,7 +91,7 @@ def test_area_and_modulus_give_the_stiffness(tmp_path):
         ({"to": None}, "[ties 'iron'] to is missing; give a point [x, y]"),
         ({"name": None}, "name is missing"),
         ({"to": {"block": "right"}}, 'give [x, y], { block = "name", point = [x, y] } or { fixed = [x, y] }'),
-        ({"to": [2.75, 1.0, 1.5]}, "has three coordinates, and the blocks lie in the plane"),
+        ({"to": [2.75, 1.0, 1.5]}, "[ties 'iron'] to has 3 numbers, but the blocks are in the plane"),
         ({"layer": "TIES", "from": None, "to": None}, "layer is 'TIES', which is not in [geometry] ties"),
     ],
 )

@@ -192,6 +192,38 @@ def test_what_a_settlement_has_torn_off_is_missing_from_limit_load_and_pushover(
     assert pushed.values[1] == pytest.approx(friction, rel=1e-3)
 
 
+@pytest.mark.parametrize("stiffness", [np.inf, 1e8])
+@pytest.mark.parametrize("displacement", [0.0, 1e-4])
+def test_an_open_joint_with_a_rest_of_its_strength_does_not_push(stiffness, displacement):
+    """A block on ground that has sunk by 1 mm, glued to what is above it, is lifted by its weight; in a phase, too."""
+    give = {"normal_stiffness": stiffness, "fracture_opening": 2e-3, "fracture_slip": 4e-3}
+    mortar = solver.Interfaces(
+        solver.InterfaceLaw(0.6, 5e3, tensile_strength=4e3, **give), {("ground", "stone"): solver.InterfaceLaw(0.6)}
+    )
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(0, 0, 0.5, 0.5), rectangle(0, -0.5, 0.5, 0), rectangle(0, 0.5, 0.5, 1)],
+        roles=["free", "moving", "fixed"], materials=["stone", "ground", "stone"], names=["block", "ground", "above"],
+    )  # fmt: skip
+    weight = mechanics.total_weight(assembly)
+    lift = solver.Loads(solver.self_weight(assembly).dead, solver.weight_fraction(assembly, (0.0, 1.0), np.array([0])))
+    structure = solver.Structure(assembly, mortar, lift)
+    sinks = solver.Settlement(direction=(0.0, -1.0), increment=1e-3, limit=1e-3)
+    sunk = structure.settle(sinks).increments[-1]
+    is_open = sunk.contacts.gaps > 0.9e-3
+    assert (sunk.state.intact[is_open] > 0.1).all()
+    found = structure.limit_load(pose=sunk.pose, bonds_at=sunk.bonds, displacement=displacement)
+    assert found.multiplier == pytest.approx(1.0, rel=1e-6)
+    # Nothing wedges the block, so that the ground carries its weight at most.
+    assert sunk.largest == pytest.approx(weight, rel=1e-6)
+    force = np.zeros_like(lift.dead)
+    force[0, 1] = 2.0 * weight
+    lifted = solver.Structure(assembly, mortar).settle([sinks, sinks], changes=[solver.PhaseChange(1, dead=force)])
+    first = next(increment for increment in lifted.path if increment.phase == 1)
+    risen = first.pose.positions[0, 1] - sunk.pose.positions[0, 1]
+    assert risen == pytest.approx(1e-3 + weight / (0.5 * stiffness), rel=0.01)
+    assert holds(first)
+
+
 def block_on_two_springs(interfaces, sunk=5e-4):
     """A block of 1 x 1.5 m, pushed to the right at mid height by its weight, on pads of which the right one sinks."""
     assembly = solver.Assembly.from_outlines(
