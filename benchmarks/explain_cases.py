@@ -26,9 +26,15 @@ import numpy as np
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.cases.explain_settings import DIRECTIONS
 from blockvis.cases.profiles import Profile, cut_ground
-from blockvis.explanation.candidates import VECTORS, Candidate, differential, rotation_of, scaled_motions
+from blockvis.explanation.candidates import (
+    IN_PLANE,
+    Candidate,
+    differential,
+    rotation_of,
+    scaled_motions,
+    unit_vector,
+)
 from blockvis.results.joints import end_openings, initial_joints
 from blockvis.text import as_toml
 from solver import mechanics
@@ -169,7 +175,7 @@ def movement(structure: Structure, case: Case) -> tuple[solver.Assembly, Mapping
         motions = motions.motions(assembly, np.flatnonzero(~assembly.free).tolist(), (0.0, -1.0))
     else:
         if isinstance(motions, tuple):
-            motions = rotation_of(assembly, (motions[0],), motions[1])
+            motions = rotation_of(assembly, (motions[0],), (motions[1],))
         roles = assembly.roles.copy()
         roles[[i for i in supports if assembly.names[i] not in motions]] = mechanics.FIXED
         assembly = assembly.with_roles(roles)
@@ -308,9 +314,9 @@ def _cause(random: np.random.Generator, name: str, structure: Structure) -> Case
         part = "springer" if "arch" in name else "ground"
         side = str(random.choice(["left", "right"]))
         side = f"{side} {part}" if part == "springer" else f"{part} {side}"
-        way = str(random.choice([way for way in DIRECTIONS if way != "up"]))
+        way = str(random.choice(IN_PLANE))
         if way != "rotation":
-            return Case(name, f"{side} moves {way}", {side: (*VECTORS[way], 0.0)}, amount)
+            return Case(name, f"{side} moves {way}", {side: (*unit_vector(way, 2), 0.0)}, amount)
         sense, words = ((1.0, "counter-clockwise"), (-1.0, "clockwise"))[int(random.integers(2))]
         return Case(name, f"{side} turns {words}", (side, sense), amount)
     length = structure.real["settling"][1]

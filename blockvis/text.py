@@ -38,8 +38,11 @@ def place_text(place: Iterable[float], digits: int = 4) -> str:
     --------
     >>> place_text((0.12345, 2.0))
     '(0.1235, 2)'
+    >>> place_text((1.24e-16, -1e-12))
+    '(0, 0)'
     """
-    return f"({', '.join(f'{value:.{digits}g}' for value in place)})"
+    # A place at 0 would be said with the digits of its rounding.
+    return f"({', '.join(f'{round(value, 9) + 0.0:.{digits}g}' for value in place)})"
 
 
 def width_text(width: float) -> str:

@@ -69,8 +69,7 @@ class Side:
         ----------
         at : float [m or rad]
         """
-        value = float(np.interp(at, self.response.parameters, self.response.values))
-        measured = self.response.measured
+        value, measured = float(self.state(at).measured), self.response.measured
         return force_text(value, measured.unit == "N·m") if measured.is_force else f"{value:.5g}"
 
     def state(self, at: float) -> solver.Increment:
@@ -78,7 +77,11 @@ class Side:
         governing = self.response.governing
         if not self.response.parameter.is_path and governing is not None:
             return governing
-        return state_at(self.response, min(at, self.end))
+        at, path = min(at, self.end), self.response.path
+        here = np.flatnonzero(np.isclose(self.response.parameters, at, atol=0.0)).tolist()
+        # Where one settlement ends and the next begins, the end is meant: the next may go another way.
+        ends = [k for k in here if path[k].phase == path[here[0]].phase]
+        return path[ends[-1]] if ends else state_at(self.response, at)
 
 
 @dataclass(frozen=True)

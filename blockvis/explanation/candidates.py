@@ -309,7 +309,9 @@ def rotation_of(
     contacts = _touching(assembly)
     here = np.isin(contacts.block_a, blocks) | np.isin(contacts.block_b, blocks)
     low, high = contacts.points[here].min(axis=0), contacts.points[here].max(axis=0)
-    middle = solver.Pose(np.broadcast_to((low + high) / 2.0, (len(blocks), assembly.dimension)), np.zeros(0))
+    middle = solver.Pose(
+        np.broadcast_to((low + high) / 2.0, (len(blocks), assembly.dimension)), np.zeros((len(blocks), len(spin)))
+    )
     rate = np.concatenate([np.zeros_like(middle.positions), np.tile(spin, (len(blocks), 1))], axis=1)
     speeds = mechanics.point_velocities(assembly.centroids[blocks], np.arange(len(blocks)), middle, rate)
     return {assembly.names[i]: (*row, *spin) for i, row in zip(blocks, speeds.tolist(), strict=True)}

@@ -15,6 +15,7 @@ import solver
 from blockvis.case_files.read import case_file_text, case_of, parsed_toml
 from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cases.contents import Case
+from blockvis.cases.explain_settings import ExplainSettings
 from blockvis.kinds.kind import needs_no_crushing
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import refuse_files
@@ -82,6 +83,7 @@ def explain(
         Address of a Dask scheduler that exists, ``tcp://host:8786``.
     runs : dict, optional
         ``Explanation.runs`` of an earlier explanation: those that fit are not followed again, new ones are added.
+        Runs of another drawing, or of other keys than those of [explain], do not fit.
     progress : bool
         Whether a bar, and lines where stderr is no terminal, count the runs and name their causes.
 
@@ -103,17 +105,7 @@ def explain(
         if not isinstance(case, Case):
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
-        if case.removals:
-            raise ValueError(
-                f"{case.removals[0].where} takes away what blockvis explain would follow: it knows the structure as "
-                "drawn; leave it out, and such blocks out of the drawing"
-            )
-        for number, load in enumerate(case.loads, start=1):
-            if load.phase > 1:
-                raise ValueError(
-                    f"{case.source}: [loads {number}] phase is {load.phase}, and blockvis explain has no settlement "
-                    "before which the load begins to act; leave phase out if it acts from the start, or the load"
-                )
+        _refuse_phases(case)
         refuse_ties(case)
         drawn = case_assembly(case)
         _refuse_grounded(case_ties(case, drawn), case)
@@ -128,29 +120,59 @@ def explain(
     first = candidates_of(ground, case.explain, case.source)
     if not len(observations.points):
         first = [one for one in first if opens_cracks(ground.assembly, one)]
+    if not first:
+        raise ValueError(
+            f"{case.source}: [explain] supports moves all that the structure stands on as one, which opens no crack; "
+            'leave a support out, add "rotation" to directions, or observe displaced points'
+        )
     about = 3 * len(first)
     with workers_for(about, workers, scheduler) as processes, RunsProgress(shown=progress) as bar:
         search.carry_out(first, processes, bar)
     causes = search.ranked()
-    by_best = by_any = observations.widths > 0.0
+    opened, all_points = observations.widths > 0.0, np.ones(len(observations.points), dtype=bool)
+    strange: Sequence[np.ndarray] = (opened, opened, all_points, all_points)
     if causes:
-        by_best, by_any = unexplained(search.comparison, causes, search.trials)
+        strange = unexplained(search.comparison, causes, search.trials)
+    widths, widths_by_none, points, points_by_none = (tuple(np.flatnonzero(which).tolist()) for which in strange)
     found = Explanation(
         case=case,
         assembly=ground.assembly,
         observations=observations,
         comparison=search.comparison,
         causes=tuple(causes),
-        unexplained=tuple(np.flatnonzero(by_best).tolist()),
-        made_by_none=tuple(np.flatnonzero(by_any).tolist()),
+        unexplained=widths,
+        made_by_none=widths_by_none,
+        unexplained_points=points,
+        points_made_by_none=points_by_none,
         next_measurement=next_measurement(search.comparison, causes) if causes else None,
-        runs=search.runs,
+        runs=search.used,
         notes=tuple(notes),
     )
     found = replace(found, words=in_words(found))
     if folder is not None:
         write_explanation(found, Path(folder))
     return found
+
+
+def _refuse_phases(case: Case) -> None:
+    """Raise ValueError for what happens between two settlements: one movement is followed, from the drawing on."""
+    if case.removals:
+        raise ValueError(
+            f"{case.removals[0].where} takes away what blockvis explain would follow: it knows the structure as "
+            "drawn; leave it out, and such blocks out of the drawing"
+        )
+    for tie in case.ties:
+        if tie.phase > 1:
+            raise ValueError(
+                f"{tie.where} '{tie.name}': phase is {tie.phase}, and blockvis explain follows one movement of the "
+                "supports; leave phase out, or a tie that was installed after the cracks"
+            )
+    for number, load in enumerate(case.loads, start=1):
+        if load.phase > 1:
+            raise ValueError(
+                f"{case.source}: [loads {number}] phase is {load.phase}, and blockvis explain has no settlement "
+                "before which the load begins to act; leave phase out if it acts from the start, or the load"
+            )
 
 
 def _refuse_grounded(ties: Sequence[solver.Tie], case: Case) -> None:
@@ -207,12 +229,18 @@ class _Search:
     ground : Ground
     observations : Observations
     runs : dict
-        Followed earlier, by what they depend on.
+        Followed earlier, by what they depend on; new ones are added.
     """
 
     def __init__(self, case: Case, ground: Ground, observations: Observations, runs: dict[Any, Run]) -> None:
         self.case, self.ground, self.observations, self.runs = case, ground, observations, runs
-        settings, size = case.explain, ground.assembly.block_size
+        self.used: dict[Any, Run] = {}
+        settings, drawn = case.explain, ground.assembly
+        size = drawn.block_size
+        plain = replace(case, text="", explain=ExplainSettings())
+        arrays = drawn.vertices, drawn.masses, drawn.density
+        #: What runs depend on besides movement, friction and heavier side, which [explain] chooses.
+        self.structure = repr(plain), drawn.names, drawn.materials, *(values.tobytes() for values in arrays)
         place = 0.5 * size if settings.place_uncertainty is None else settings.place_uncertainty
         self.comparison = Comparison(
             ground.assembly, observations, Trust(settings.model_uncertainty, place, settings.outliers)
@@ -276,7 +304,8 @@ class _Search:
         for one, variant, twin, shared, order in wanted:
             factor, unit = per_amount(self.ground.assembly, one)
             twin = replace(twin, scale=twin.scale * factor, travel=twin.travel / factor)
-            run = self.runs[self._key(shared, variant)]
+            key = self._key(shared, variant)
+            run = self.used[key] = self.runs[key]
             largest = order.settlement.limit * twin.scale
             self.trials.append(tried(self.comparison, one, variant, run, twin, shared, unit, largest))
 
@@ -285,6 +314,6 @@ class _Search:
         return ranked(self.trials, apart=self.apart)
 
     def _key(self, candidate: Candidate, variant: Variant) -> Any:
-        """Name what a run depends on, within one case."""
+        """Name what a run depends on."""
         motions = tuple(sorted(scaled_motions(candidate).items()))
-        return (motions, variant, self.reach)
+        return (self.structure, motions, variant, self.reach)

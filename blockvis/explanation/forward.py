@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import active_children, get_context
 from typing import Any
@@ -99,13 +99,13 @@ class Run:
         Of the increments in equilibrium, from 0; empty where there is none.
     moved : (n, n_blocks, n_dof) array [m and rad]
         Displacement and rotation of each block.
-    message : str
-        Why it ended.
+    fell : bool
+        Whether it ended in a collapse.
     """
 
     amounts: np.ndarray
     moved: np.ndarray
-    message: str
+    fell: bool
 
     def at(self, amounts: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Interpolate values (n, ...) of the increments at amounts (m,): (m, ...) array."""
@@ -209,8 +209,8 @@ def followed(order: Order) -> Run:
     joints = initial_joints(assembly)
     amounts, moved = [], []
     steps = FOLLOWED.start(order.given, None, ()).steps
-    message = ""
-    try:
+    fell = False
+    with suppress(solver.SolveError):
         for increment in steps:
             if increment.status != solver.Status.EQUILIBRIUM:
                 continue
@@ -220,11 +220,9 @@ def followed(order: Order) -> Run:
                 steps.close()
                 break
         else:
-            message = steps.ending.message
-    except solver.SolveError as error:
-        message = str(error)
+            fell = steps.ending.collapse is not None
     shape = solver.Pose.initial(assembly).displacements(assembly).shape
-    return Run(np.array(amounts), np.array(moved).reshape(-1, *shape), message)
+    return Run(np.array(amounts), np.array(moved).reshape(-1, *shape), fell)
 
 
 @contextmanager

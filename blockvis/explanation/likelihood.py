@@ -241,6 +241,8 @@ class Trial:
         Which joint that is, as a pair of the comparison.
     gaps : (n_increments, n_corners) array [m]
         Openings at the corners of the faces, at the increments of the run.
+    displacements : (n, n_points, d) array [m]
+        Of the observed points.
     """
 
     candidate: Candidate
@@ -254,6 +256,7 @@ class Trial:
     widths: np.ndarray
     pairs: np.ndarray
     gaps: np.ndarray
+    displacements: np.ndarray
 
     @cached_property
     def log_evidence(self) -> float:
@@ -312,8 +315,9 @@ def tried(
     if len(run.amounts) < 2:
         widths = np.zeros((AMOUNTS, len(comparison.observations.widths)))
         gaps = np.zeros((1, len(comparison.joints.rings.points)))
-        none = np.full(AMOUNTS, -np.inf)
-        return Trial(candidate, variant, run, twin, shared, unit, amounts, none, widths, widths.astype(int), gaps)
+        none, still = np.full(AMOUNTS, -np.inf), np.zeros((AMOUNTS, *comparison.observations.points.shape))
+        pairs = widths.astype(int)
+        return Trial(candidate, variant, run, twin, shared, unit, amounts, none, widths, pairs, gaps, still)
     own = amounts / twin.scale
     # At the increments the pictures are exact; between them joints open evenly.
     gaps = comparison.openings(run.moved)
@@ -324,4 +328,4 @@ def tried(
     chosen = comparison.likeliest(pairs)
     widths = np.take_along_axis(pairs, chosen, axis=1)
     found[~comparison.made(widths, displacements)] = -np.inf
-    return Trial(candidate, variant, run, twin, shared, unit, amounts, found, widths, chosen, gaps)
+    return Trial(candidate, variant, run, twin, shared, unit, amounts, found, widths, chosen, gaps, displacements)

@@ -211,10 +211,11 @@ def _observed(canvas: _Canvas, found: Explanation) -> None:
     places = canvas.placed(given.places)
     panel.plot(*places[~opened].T, "o", ms=4.5, mfc="white", mec=palette.hexadecimal(palette.FAINT), zorder=4)
     _labels(panel, places, given.widths, found, sizes=given.widths)
-    strange = places[list(found.unexplained)]
+    points = canvas.placed(given.points)
+    strange = np.concatenate([places[list(found.unexplained)], points[list(found.unexplained_points)]])
     panel.plot(*strange.T, "o", ms=17, mfc="none", mec=palette.hexadecimal(palette.WARNING), mew=1.6, zorder=6)
     if len(given.points):
-        _arrows(panel, canvas.placed(given.points), canvas.placed(given.displacements), assembly)
+        _arrows(panel, points, canvas.placed(given.displacements), assembly)
     what = "Observed" + (": open joints [mm], ○ closed" if len(given.widths) else ": displaced points")
     panel.set_title(what, loc="left", fontsize=TEXT + 1, color=palette.hexadecimal(palette.INK))
     if len(strange):

@@ -14,7 +14,7 @@ from .observations import LEAST_UNCERTAINTY
 #: Causes less probable than the best by more than this factor are told apart from it.
 TOLD_APART = 10.0
 
-#: A width is explained where it is within so many standard deviations of what a cause makes.
+#: What was observed is explained where it is within so many standard deviations of what a cause makes.
 EXPLAINED = 3.0
 
 #: Shares of the probability below and above the range of an amount.
@@ -73,6 +73,12 @@ class Cause:
     at: int
     trials: tuple[Trial, ...]
     weights: tuple[float, ...]
+
+    @property
+    def falls_at(self) -> float:
+        """Amount [m or rad] by which the model has fallen in all runs that agree; inf where one of them goes on."""
+        agree = [t for t, w in zip(self.trials, self.weights, strict=True) if w * TOLD_APART >= max(self.weights)]
+        return max(float(t.run.amounts[-1]) * t.twin.scale if t.run.fell else np.inf for t in agree)
 
 
 @dataclass(frozen=True)
@@ -192,29 +198,29 @@ def alike(causes: Sequence[Cause]) -> list[Cause]:
     return [cause for cause in causes if cause.probability * TOLD_APART >= causes[0].probability]
 
 
-def unexplained(
-    comparison: Comparison, causes: Sequence[Cause], trials: Sequence[Trial]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Find widths that the best cause does not make, and those that no candidate makes at any amount.
+def unexplained(comparison: Comparison, causes: Sequence[Cause], trials: Sequence[Trial]) -> tuple[np.ndarray, ...]:
+    """Find what the best cause does not make, and what no candidate makes at any amount.
 
     Returns
     -------
-    by_best, by_any : (n_widths,) bool arrays
+    by_best, by_none : (n_widths,) bool arrays
+    points_by_best, points_by_none : (n_points,) bool arrays
     """
     widths = comparison.observations.widths
-    best = causes[0].best
-    displaced = comparison.displacements(best.moved(causes[0].at)[None])
-    misfit, _ = comparison.misfits(best.widths[[causes[0].at]], displaced)
-    by_best = np.abs(misfit[0]) > EXPLAINED
-    reached = np.zeros(len(widths))
+    best, at = causes[0].best, causes[0].at
+    misfit, far = comparison.misfits(best.widths[[at]], best.displacements[[at]])
+    by_best, points_by_best = np.abs(misfit[0]) > EXPLAINED, far[0] > EXPLAINED
+    reached, nearest = np.zeros(len(widths)), np.full(len(points_by_best), np.inf)
     for trial in trials:
         possible = np.isfinite(trial.log_likelihood)
         if possible.any():
             reached = np.maximum(reached, trial.widths[possible].max(axis=0, initial=0.0))
+            _, far = comparison.misfits(trial.widths[possible], trial.displacements[possible])
+            nearest = np.minimum(nearest, far.min(axis=0, initial=np.inf))
     slack = EXPLAINED * comparison.deviations[0]
     # What is within what is left of the model's own width is no sign of another cause.
-    by_any = (widths > 0.0) & (reached < np.maximum(widths - slack, MADE * widths))
-    return by_best & (widths > 0.0) | by_any, by_any
+    by_none = (widths > 0.0) & (reached < np.maximum(widths - slack, MADE * widths))
+    return by_best & (widths > 0.0) | by_none, by_none, points_by_best, nearest > EXPLAINED
 
 
 def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measurement | None:

@@ -32,6 +32,8 @@ class Explanation:
         Numbers of the observed widths that the best cause does not make.
     made_by_none : tuple of int
         Those of them that no candidate makes.
+    unexplained_points, points_made_by_none : tuple of int
+        Numbers of the observed points, likewise.
     next_measurement : Measurement or None
         The joint that would tell the first causes apart best.
     runs : dict
@@ -48,6 +50,8 @@ class Explanation:
     causes: tuple[Cause, ...]
     unexplained: tuple[int, ...]
     made_by_none: tuple[int, ...]
+    unexplained_points: tuple[int, ...]
+    points_made_by_none: tuple[int, ...]
     next_measurement: Measurement | None
     runs: dict[Any, Run] = field(repr=False, default_factory=dict)
     notes: tuple[str, ...] = ()

@@ -12,6 +12,7 @@ from blockvis.text import place_text
 from solver.mechanics import counted
 
 if TYPE_CHECKING:
+    from .observations import Observations
     from .ranking import Cause, Measurement
     from .result import Explanation
 
@@ -69,12 +70,12 @@ def percent(probability: float) -> str:
 
     Examples
     --------
-    >>> percent(0.123), percent(0.99999), percent(0.00001)
-    ('12 %', '> 99.9 %', '< 0.1 %')
+    >>> percent(0.123), percent(0.997), percent(0.99999), percent(0.00001)
+    ('12 %', '99.7 %', '> 99.9 %', '< 0.1 %')
     """
     if probability > 0.999:
         return "> 99.9 %"
-    return "< 0.1 %" if probability < 0.001 else f"{100.0 * probability:.2g} %"
+    return "< 0.1 %" if probability < 0.001 else f"{100.0 * probability:.{2 if probability < 0.99 else 3}g} %"
 
 
 def cause_text(cause: Cause) -> str:
@@ -123,20 +124,46 @@ def in_words(found: Explanation) -> str:
             lines.append(f"{'':41}or, with the same cracks: {', '.join(cause.also)}")
     if len(found.causes) > LISTED:
         lines.append(f"and {len(found.causes) - LISTED} less probable causes")
-    lines += unexplained_texts(found)
+    lines += [*fall_texts(found), *unexplained_texts(found)]
     if len(found.causes) > 1:
         lines.append(f"measure next: {measurement_text(found.next_measurement)}")
     return "\n".join(lines)
 
 
+def fall_texts(found: Explanation) -> list[str]:
+    """Say where the first cause brings the model down: larger amounts are not weighed, and the structure may differ."""
+    return [
+        f"the first cause brings the model down at {amount_text(cause.falls_at, cause.unit)}; larger amounts have no "
+        "probability, though the structure may stand farther"
+        for cause in found.causes[:1]
+        if math.isfinite(cause.falls_at)
+    ]
+
+
 def unexplained_texts(found: Explanation) -> list[str]:
     """Say which observations the best cause, or every candidate, leaves unexplained."""
-    lines = []
-    for k in found.unexplained:
-        width = f"{width_text(found.observations.widths[k])} mm at {found.observations.labels[k]}"
-        whom = "no candidate makes it" if k in found.made_by_none else "the first cause does not make it"
-        lines.append(f"unexplained: {width}; {whom}")
-    return lines
+    given = found.observations
+    widths = [
+        (f"{width_text(given.widths[k])} mm at {given.labels[k]}", k in found.made_by_none) for k in found.unexplained
+    ]
+    points = [
+        (f"{vector_text(given.displacements[k])} mm of {point_text(given, k)}", k in found.points_made_by_none)
+        for k in found.unexplained_points
+    ]
+    return [
+        f"unexplained: {what}; {'no candidate makes it' if by_none else 'the first cause does not make it'}"
+        for what, by_none in widths + points
+    ]
+
+
+def point_text(given: Observations, k: int) -> str:
+    """Name a displaced point by its block and place."""
+    return f"{given.blocks[k]} at {place_text(given.points[k], 3)} m"
+
+
+def vector_text(value: Iterable[float]) -> str:
+    """Write a displacement [m] in mm."""
+    return place_text((1e3 * part for part in value), 3)
 
 
 def values_of(found: Explanation) -> dict[str, Any]:
@@ -154,6 +181,14 @@ def values_of(found: Explanation) -> dict[str, Any]:
                 "made_by_no_candidate": k in found.made_by_none,
             }
             for k in found.unexplained
+        ]
+        + [
+            {
+                "place": point_text(given, k),
+                "displacement_mm": list(map(_mm, given.displacements[k])),
+                "made_by_no_candidate": k in found.points_made_by_none,
+            }
+            for k in found.unexplained_points
         ],
         "next_measurement": _measurement_values(found.next_measurement),
         "observations": {"source": given.source, "widths": _width_values(found), "points": _point_values(found)},
@@ -188,7 +223,7 @@ def _width_values(found: Explanation) -> list[dict[str, Any]]:
 
 def _point_values(found: Explanation) -> list[dict[str, Any]]:
     given = found.observations
-    computed = [found.comparison.displacements(c.best.moved(c.at)[None])[0] for c in found.causes[:2]]
+    computed = [cause.best.displacements[cause.at] for cause in found.causes[:2]]
     return [
         {
             "block": given.blocks[k],
@@ -213,6 +248,7 @@ def _cause_values(cause: Cause) -> dict[str, Any]:
         "amount_low": low,
         "amount_high": high,
         "best_amount": float(cause.best.amounts[cause.at]),
+        "falls_at": cause.falls_at if math.isfinite(cause.falls_at) else None,
         "friction": list(cause.friction),
         "log_likelihood": float(cause.best.log_likelihood[cause.at]),
         "motions": {name: list(motion) for name, motion in candidate.motions.items()},

@@ -13,7 +13,6 @@ from string import Template
 from typing import TYPE_CHECKING
 
 from blockvis.system.atomic_files import make_folder, write_atomic
-from blockvis.text import place_text
 from solver.mechanics import counted
 
 from .forward import LEANING
@@ -22,11 +21,14 @@ from .picture import draw_explanation
 from .words import (
     amount_text,
     cause_text,
+    fall_texts,
     measurement_text,
     percent,
+    point_text,
     range_text,
     unexplained_texts,
     values_of,
+    vector_text,
     verdict,
     width_text,
 )
@@ -73,9 +75,9 @@ def explanation_html(found: Explanation, picture: bytes) -> str:
         picture=base64.b64encode(picture).decode("ascii"),
         words=html.escape(_picture_text(found)),
         causes=_causes(found),
-        alike=_alike(found),
+        alike=" ".join([_alike(found), *(f"{html.escape(text.capitalize())}." for text in fall_texts(found))]),
         problems="".join(f"<li>{html.escape(text)}</li>" for text in problems)
-        or "<li>Every open joint is explained by the first cause, within what observations and model leave open.</li>",
+        or "<li>The first cause makes all open joints and points, within what observations and model leave open.</li>",
         measurement=html.escape(measurement_text(found.next_measurement)),
         observations=_observations(found),
         points=_points(found),
@@ -123,7 +125,7 @@ def _observations(found: Explanation) -> str:
     for k in order[:MOST_OBSERVATIONS]:
         width = "closed" if given.widths[k] == 0.0 else width_text(given.widths[k])
         computed = [width_text(cause.best.widths[cause.at][k]) for cause in best]
-        strange = "no candidate" if k in found.made_by_none else "unexplained" if k in found.unexplained else ""
+        strange = _strange(k in found.unexplained, k in found.made_by_none)
         rows.append((given.labels[k], width, f"{1e3 * given.uncertainties[k]:.2g}", *computed, strange))
     header = ("joint or place", "observed, mm", "± mm", *(f"cause {n}, mm" for n in range(1, len(best) + 1)), "")
     return "<h2>Widths</h2>" + _table(header, rows)
@@ -134,21 +136,21 @@ def _points(found: Explanation) -> str:
     if not len(given.points):
         return ""
     best = found.causes[:2]
-    computed = [found.comparison.displacements(c.best.moved(c.at)[None])[0] for c in best]
     rows = [
         (
-            f"{given.blocks[k]} at {place_text(given.points[k], 3)} m",
-            _vector(given.displacements[k]),
-            *(_vector(there[k]) for there in computed),
+            point_text(given, k),
+            vector_text(given.displacements[k]),
+            *(vector_text(cause.best.displacements[cause.at, k]) for cause in best),
+            _strange(k in found.unexplained_points, k in found.points_made_by_none),
         )
         for k in range(min(len(given.points), MOST_OBSERVATIONS))
     ]
-    header = ("point", "observed, mm", *(f"cause {n}, mm" for n in range(1, len(best) + 1)))
+    header = ("point", "observed, mm", *(f"cause {n}, mm" for n in range(1, len(best) + 1)), "")
     return "<h2>Displaced points</h2>" + _table(header, rows)
 
 
-def _vector(value: Sequence[float]) -> str:
-    return place_text((1e3 * part for part in value), 3)
+def _strange(unexplained: bool, by_none: bool) -> str:
+    return "no candidate" if by_none else "unexplained" if unexplained else ""
 
 
 def _assumed(found: Explanation) -> list[str]:

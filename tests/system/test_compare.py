@@ -75,6 +75,19 @@ def test_places_of_several_settlements_are_told_as_their_sum(tmp_path):
 
 
 @pytest.mark.slow
+def test_where_one_run_ends_the_next_settlement_of_the_other_has_not_begun(tmp_path):
+    structure = solver.Structure(generators.arch(voussoirs=5), friction_coefficient=2.0)
+    first, second = (solver.Settlement(way, increment=1e-3, limit=1e-3) for way in ((1, 0), (0, -1)))
+    folders = [tmp_path / "one", tmp_path / "two"]
+    for folder, settlements in zip(folders, ([first], [first, second]), strict=True):
+        blockvis.write(structure.settle(settlements), folder)
+    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    numbers = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "numbers")
+    (told,) = [cells for name, cells in numbers.items() if name.endswith("1.00 mm, all phases added")]
+    assert told[0] == told[1]
+
+
+@pytest.mark.slow
 def test_what_the_cases_differ_in_is_told(tmp_path):
     folders = []
     for friction, density in (("1.5", "1850.5"), ("2.0", "2000.0")):

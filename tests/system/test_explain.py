@@ -1,5 +1,6 @@
 """``blockvis explain``: from a case and a table of cracks to ranked causes, its page, numbers and picture."""
 
+import importlib
 import json
 import re
 from pathlib import Path
@@ -188,6 +189,62 @@ def test_a_crack_that_no_candidate_makes_is_unexplained(folder):
     assert still in strange.unexplained
     assert f"unexplained: 4.0 mm at {strange.observations.labels[still]}" in str(strange)
     assert strange.causes[0].name == "right springer moves right", "one strange crack does not change the cause"
+
+
+SINKING = CASE.replace('directions = ["down", "right"]', 'supports = ["right springer"]\ndirections = ["down"]')
+
+
+@pytest.mark.slow
+def test_runs_of_another_case_are_not_taken_for_its_own(tmp_path):
+    load = '[[loads]]\nblocks = "voussoir 3"\nforce = [0, -40000]\n'
+    (tmp_path / "bare.toml").write_text(SINKING, encoding="utf-8")
+    (tmp_path / "loaded.toml").write_text(SINKING + load, encoding="utf-8")
+    rows = [{"joint": "voussoir 1 | left springer", "width [mm]": 3.0}]
+    bare = blockvis.explain(tmp_path / "bare.toml", rows)
+    fresh = blockvis.explain(tmp_path / "loaded.toml", rows)
+    assert str(fresh) != str(bare)
+    runs = dict(bare.runs)
+    assert str(blockvis.explain(tmp_path / "loaded.toml", rows, runs=runs)) == str(fresh)
+    assert set(runs) == {*bare.runs, *fresh.runs}
+    # What [explain] trusts changes no run.
+    (tmp_path / "bare.toml").write_text(SINKING + "outliers = 0.1\n", encoding="utf-8")
+    again = blockvis.explain(tmp_path / "bare.toml", rows, runs=runs)
+    assert set(again.runs) <= set(runs) == {*bare.runs, *fresh.runs}
+
+
+def test_a_point_that_no_candidate_moves_so_is_unexplained(tmp_path):
+    (tmp_path / "case.toml").write_text(SINKING, encoding="utf-8")
+    rows = [{"block": "right springer", "dx": 0, "dy": -0.02}, {"block": "left springer", "dx": 0, "dy": 0.02}]
+    found = blockvis.explain(tmp_path / "case.toml", rows, tmp_path / "out")
+    assert (found.unexplained_points, found.points_made_by_none) == ((1,), (1,))
+    words = "(0, 20) mm of left springer at "
+    assert re.search(rf"unexplained: {re.escape(words)}\(.*\) m; no candidate makes it", str(found))
+    assert f"unexplained: {words}" in (tmp_path / "out" / "explain.html").read_text(encoding="utf-8")
+    (told,) = json.loads((tmp_path / "out" / "explain.json").read_text(encoding="utf-8"))["unexplained"]
+    assert (told["displacement_mm"], told["made_by_no_candidate"]) == ([0.0, 20.0], True)
+
+
+@pytest.mark.slow
+def test_where_the_model_falls_is_told_for_larger_amounts_are_not_weighed(tmp_path):
+    thin = SINKING.replace("voussoirs = 10", "voussoirs = 6, thickness = 0.12").replace('["down"]', '["right"]')
+    (tmp_path / "case.toml").write_text(thin, encoding="utf-8")
+    found = blockvis.explain(tmp_path / "case.toml", [{"joint": "voussoir 3 | voussoir 4", "width [mm]": 30}], tmp_path)
+    best = found.causes[0]
+    assert best.amount[2] <= best.falls_at < best.best.amounts[-1]
+    assert f"the first cause brings the model down at {1e3 * best.falls_at:.3g} mm; larger" in str(found)
+    assert "The first cause brings the model down" in (tmp_path / "explain.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_causes_runs(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "benchmarks"))
+    cases = importlib.import_module("explain_cases")
+    structure, (case, *_), (rows, *_) = cases.cases_on("arch", None)
+    result = cases.tried(structure, case, rows, {})
+    assert result["rank"] == 1
+    assert abs(result["off"]) < 0.25
+    _, drawn, _ = cases.cases_on("arch", 4)
+    assert any("turns" in one.cause for one in drawn)
 
 
 @pytest.mark.slow

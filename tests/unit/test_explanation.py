@@ -453,6 +453,23 @@ def test_a_case_of_which_something_is_taken_away_has_no_causes(tmp_path):
         blockvis.explain(tmp_path / "case.toml", tmp_path / "cracks.csv")
 
 
+def test_a_tie_that_came_between_two_settlements_has_no_place_in_one_movement(tmp_path):
+    settled = '[[settlement]]\nblocks = "right springer"\ndirection = [0, -1]\nlimit = 0.01\n'
+    case = f'[geometry]\nlayout = "arch"\nparameters = {{ voussoirs = 6 }}\n{2 * settled}{TIED}phase = 2\n'
+    (tmp_path / "case.toml").write_text(case, encoding="utf-8")
+    (tmp_path / "cracks.csv").write_text("kind,block_a,block_b,width\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"\[ties\] 'iron': phase is 2, and blockvis explain follows one movement"):
+        blockvis.explain(tmp_path / "case.toml", tmp_path / "cracks.csv")
+
+
+def test_supports_that_all_move_as_one_are_refused_before_anything_is_followed(tmp_path):
+    settings = '[explain]\nsupports = [["left springer", "right springer"]]\ndirections = ["down", "left"]\n'
+    layout = '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 6 }\n'
+    (tmp_path / "case.toml").write_text(layout + settings, encoding="utf-8")
+    with pytest.raises(ValueError, match=r"case.toml: \[explain\] supports moves all .* as one, which opens no crack"):
+        blockvis.explain(tmp_path / "case.toml", [{"joint": "voussoir 3 | voussoir 4", "width": 0.003}])
+
+
 def test_a_case_with_a_load_that_begins_later_has_no_causes(tmp_path):
     settlement = "[[settlement]]\ndirection = [1, 0]\n"
     load = '[[loads]]\nblocks = "voussoir 3"\nforce = [0, -300]\nphase = 2\n'
