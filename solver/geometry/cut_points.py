@@ -14,11 +14,15 @@ from .solids import dot
 from .spatial_features import ACROSS, ON_FACE
 
 
-def without_points_of_cuts(parts: ConvexParts, contacts: Contacts, planes: np.ndarray) -> tuple[Contacts, np.ndarray]:
+def without_points_of_cuts(
+    parts: ConvexParts, contacts: Contacts, planes: np.ndarray, near: float
+) -> tuple[Contacts, np.ndarray]:
     """Leave out points at cuts that lie between others in the same two faces.
 
     Parameters
     ----------
+    near : float [m]
+        Distance up to which points are at one place.
     planes : (n, 2) int array
         The planes of the two faces in which each point was found; -1 where it was not found between faces.
 
@@ -33,6 +37,8 @@ def without_points_of_cuts(parts: ConvexParts, contacts: Contacts, planes: np.nd
     Blocks are rigid and both faces plane: the gap at a point between others follows from theirs, and what it carries
     they can carry as well. Its area goes to them.
     """
+    from scipy.spatial import cKDTree
+
     solids, (kind, first, second, _) = parts.solids, contacts.features.T
     cut, made, corners = parts.cut_edges, parts.made, solids.corners
     edge = np.where(kind == ON_FACE, 0, first)
@@ -50,6 +56,11 @@ def without_points_of_cuts(parts: ConvexParts, contacts: Contacts, planes: np.nd
     chosen = chosen[np.argsort(group[chosen], kind="stable")]
     _, start, group_of = np.unique(group[chosen], return_index=True, return_inverse=True)
     group_of = group_of.ravel()
+    # A part that has a face of its block in the plane of the cut has no edge at it; the part beyond the cut has.
+    pairs = cKDTree(contacts.points[chosen]).query_pairs(near, output_type="ndarray")
+    pairs = pairs[group_of[pairs[:, 0]] == group_of[pairs[:, 1]]]
+    beside = chosen[np.concatenate([pairs[of_cut[chosen[pairs[:, k]]], 1 - k] for k in (0, 1)])]
+    of_cut[beside[kind[beside] == ACROSS]] = True
     # In the plane of the first point of each group, from there.
     origin, frame = contacts.points[chosen[start]][group_of], contacts.frames[chosen[start]][group_of]
     arms = contacts.points[chosen] - origin

@@ -177,15 +177,16 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
         owner = corners.owner[kept]
         labels.append(np.stack([parts.plane[face_i[owner]], parts.plane[face_j[owner]], inside[kept]], axis=1))
     contacts, label = joined_contacts(found), np.concatenate(labels)
+    at_one_place = CORNER_TOLERANCE * float(widths.min())
     if not parts.whole:
-        contacts, kept = without_points_of_cuts(parts, contacts, label[:, :2])
+        contacts, kept = without_points_of_cuts(parts, contacts, label[:, :2], at_one_place)
         contacts = contacts[label[kept, 2] > 0]
     contacts = contacts[np.lexsort(contacts.features.T[[2, 1, 0]])]
     # Parts of one block may have a point in common, and edges across each other a corner of a polygon.
     in_parts = np.bincount(block_of_part, minlength=len(widths)) > 1
     in_parts[crossed.block_a] = True
     duplicates = in_parts[contacts.block_a] | in_parts[contacts.block_b]
-    return _without_duplicates(contacts, duplicates, CORNER_TOLERANCE * float(widths.min()))
+    return _without_duplicates(contacts, duplicates, at_one_place)
 
 
 def _slivers(

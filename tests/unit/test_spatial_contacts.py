@@ -7,6 +7,7 @@ import pytest
 from structures import box, hull_of, turn_by
 
 import solver
+from blockvis import generators
 from solver import mechanics
 
 
@@ -224,3 +225,24 @@ def test_edges_across_each_other_are_one_point():
     contacts = found([hull_of(lower), hull_of(upper)], 1e-6)
     np.testing.assert_allclose(contacts.points, [[0.0, 0.0, 0.0]], atol=1e-9)
     np.testing.assert_allclose(np.abs(contacts.frames[:, 0, 2]), 1.0)
+
+
+@pytest.mark.parametrize("bonded", [True, False])
+def test_contact_points_do_not_depend_on_how_corners_are_numbered(bonded):
+    """Stones on the groins are cut into convex parts, in one of two ways that are as good."""
+    vault = generators.cross_vault(voussoirs=7, stone=1.2, bonded=bonded)
+    found = []
+    for seed in (None, 5):
+        solids = []
+        for block in range(vault.n_blocks):
+            vertices, faces = vault.polyhedra.surface(block)
+            order = np.arange(len(vertices)) if seed is None else np.random.default_rng(seed).permutation(len(vertices))
+            number = np.argsort(order)
+            solids.append((vertices[order], [[int(number[k]) for k in face] for face in faces]))
+        assembly = solver.Assembly.from_solids(solids)
+        contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-6)
+        points = np.column_stack([contacts.points, np.abs(contacts.frames[:, 0])])
+        order = np.lexsort(points.round(6).T)
+        found.append(np.column_stack([points, contacts.areas])[order])
+    assert found[0].shape == found[1].shape
+    np.testing.assert_allclose(found[1], found[0], atol=1e-9)
