@@ -476,7 +476,9 @@ def _over_places(
         else:
             loads = standing.with_forces(run.given.assembly, live(number), "live")
             state = replace(_limit_state(run, loads, pose, None, programs, ties, bonds), parameter=float(x))
-            run.limits[-1] = replace(run.limits[-1], staying_open=_staying_open(run, loads, pose, ties, bonds))
+            if (stays := _staying_open(run, loads, pose, ties, bonds)) is not None:
+                run.limits[-1] = replace(run.limits[-1], staying_open=stays.multiplier)
+                state = replace(state, programs=state.programs + stays.increment.programs)
             if number == 0 and (words := _closing_words(run)):
                 state = replace(state, notes=(*state.notes, words))
             programs = 0
@@ -547,20 +549,20 @@ def _staying_open(
     pose: solver.Pose | None,
     ties: mechanics.TieForces | None,
     bonds: mechanics.Bonds | None,
-) -> float | None:
-    """Find the multiplier of the last limit load where joints that are open stay so; None where they do, or unknown."""
+) -> solver.LimitLoad | None:
+    """Find the last limit load where joints that are open stay so; None where they do, or unknown."""
     # Without dilatancy it takes many programs, not one more.
     asked = _closing_words(run) and run.given.case.settings.flow == FLOWS[0]
     if not asked or math.isnan(run.limits[-1].multiplier):
         return None
-    return _limit(run, loads, pose, ties, bonds, 0.0).multiplier
+    return _limit(run, loads, pose, ties, bonds, 0.0)
 
 
 def _closing_note(run: AnalysisRun, at: solver.Increment, first: bool) -> list[str]:
     """Say within which displacement open joints may close, at the first state, and α where they do not."""
     words, limit = _closing_words(run), run.limits[-1]
-    least = _staying_open(run, run.given.loads, at.pose, at.ties, at.bonds)
-    if least is not None and _differs(limit, least):
+    stays = _staying_open(run, run.given.loads, at.pose, at.ties, at.bonds)
+    if stays is not None and _differs(limit, least := stays.multiplier):
         where = f"{at.parameter:.6g} {run.given.case.settlements[at.phase].unit}"
         return [f"at a settlement of {where} α = {limit.multiplier:.6g}, {least:.6g} without: {words}"]
     return [words] if words and first else []

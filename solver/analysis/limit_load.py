@@ -227,12 +227,10 @@ class _Problem:
         cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around, areas)
         gaps, is_open = contacts.gaps, contacts.gaps > closed_gap
         if bonded is not None:
-            # As along the path: an open joint with a rest of its strength holds, and does not push.
             gaps = _beyond_give(assembly, interfaces, contacts, gaps - bonded.rest, tension, bonded.areas)
-            is_open = (gaps > closed_gap) & (tension == 0.0)
-            near = ~is_open | (gaps <= reach)
-            contacts, gaps, is_open, cohesion = contacts[near], gaps[near], is_open[near], cohesion[near]
-            tension, crushing = tension[near], np.where(is_open | (gaps <= closed_gap), crushing[near], 0.0)
+            number, is_open = _carrying_points(gaps, tension, closed_gap, reach)
+            contacts, gaps, cohesion, tension = contacts[number], gaps[number], cohesion[number], tension[number]
+            crushing = np.where(is_open | (gaps <= closed_gap), crushing[number], 0.0)
         friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         there = ~np.isin(tie_states, (ABSENT, BROKEN))
         if there.any():
@@ -499,6 +497,19 @@ def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs:
         changes, of_errors = np.diff(normals, axis=0).T, np.diff(errors, axis=0).T
         moved -= (changes + RELAXATION * of_errors) @ np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
     return np.asarray(np.maximum(moved, 0.0))
+
+
+def _carrying_points(
+    gaps: np.ndarray, tension: np.ndarray, closed_gap: float, reach: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the contact points that carry, (m,) int array, and whether they do so only once they have closed.
+
+    As along the path an open joint with a rest of its strength holds, and does not push. Where it may close it is there
+    twice: as one that holds, and as an open one.
+    """
+    apart, holds = gaps > closed_gap, tension > 0.0
+    once, closing = np.flatnonzero(~apart | holds), np.flatnonzero(apart & (gaps <= reach))
+    return np.append(once, closing), np.repeat([False, True], [len(once), len(closing)])
 
 
 def _beyond_give(

@@ -461,7 +461,10 @@ class LimitLoad(HasState, Shown):
                 assembly, pose = self.analysed[0], self.state.pose
                 falling += f" ({assembly.listed(moving, 4)})"
                 tolerance = DRAWN_GAP * float(assembly.widths.min())
-                depth = assembly.shapes.overlaps(moved_vertices(assembly, pose), tolerance)[2].max(initial=0.0)
+                i, j, depths = assembly.shapes.overlaps(moved_vertices(assembly, pose), tolerance)
+                there = np.isnan(self.state.fell_at) if len(self.state.fell_at) else np.ones(len(pose.positions), bool)
+                free = assembly.free[i] | assembly.free[j]
+                depth = depths[free & there[i] & there[j]].max(initial=0.0)
                 inside = f"; blocks overlap by up to {depth:.3g} m at this pose" if depth > 0.0 else ""
             return f"no equilibrium under the dead load: {falling}{inside}; {REMEDY}"
         if self.status is LimitStatus.UNBOUNDED:
