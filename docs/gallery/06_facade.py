@@ -3,7 +3,7 @@ Façade on settling ground
 =========================
 
 A brick façade with one window, two dressed haunches and a key over it. The ground under its right part settles by 20
-mm: the jambs part, the key sinks between the haunches, and the façade stands.
+mm: the key goes down with the right haunch and slides along the left one, and the façade stands.
 """
 
 import blockvis

@@ -2,8 +2,9 @@
 Cross vault on a sinking corner
 ===============================
 
-One of the four supports of a cross vault sinks by 90 mm: joints open along the groins and between the webs, and the
-vault finds its way. Stones on the groins reach into both barrels; they are not convex and are cut for contact only.
+One of the four supports of a cross vault sinks by 90 mm: joints open between the stones of the crown and those on the
+groins, and at the springer that sinks. Stones on the groins reach into both barrels; they are not convex and are cut
+for contact only.
 """
 
 import blockvis

@@ -5,7 +5,7 @@ The paper's method, and Coulomb friction
 Portioli and Cascini (2017) follow a settlement by a linear program in each increment. Its joints slide by an
 associative flow rule, which lifts what slides; gap functions take the lift back, but of all forces in equilibrium the
 program takes those with the least reaction. Coulomb friction has no lift, and joints remember what they carried. Where
-a structure hinges both methods find the same path; where joints slide they part.
+statics leaves one reaction both methods find the same path; where joints slide they part.
 """
 
 import matplotlib.pyplot as plt
@@ -39,8 +39,9 @@ for increments in ("coulomb", "linear program"):
     assert abs(paths["arch", increments].collapse.displacement - 0.14104982) < 1e-4
 
 # %%
-# The lintel of the portal turns and slides on one of its bearings, to 0.85 m: statics leaves one reaction. Where more
-# joints begin to slide it is by up to 2 % another, and later the same again.
+# To 0.85 m the portal hinges, at its lintel and in the left column: statics leaves one reaction. Then the right column
+# hinges too, by each method at another joint, and at 1.2 m the lintel begins to slide: there the reactions differ by up
+# to 2 %. In the end they are the same again.
 both = [paths["portal", increments] for increments in ("coulomb", "linear program")]
 assert abs(both[0].collapse.displacement / both[1].collapse.displacement - 1.0) < 5e-3
 for increments, allowed in ((18, 1e-3), (36, 0.03)):
