@@ -73,12 +73,7 @@ def unit_lengths(n_dof: int, length: float) -> np.ndarray:
 
 
 def cross_rows(arms: np.ndarray) -> np.ndarray:
-    """(n, n_rot, d) array: ``moment = cross_rows(arm) @ force``, and ``cross_rows(arm).T @ spin`` the velocity there.
-
-    Parameters
-    ----------
-    arms : (n, d) array [m]
-    """
+    """(n, n_rot, d) array of arms (n, d) [m]: ``moment = rows @ force``, and ``rows.T @ spin`` the velocity there."""
     n, d = arms.shape
     if d == 2:
         return np.stack([-arms[:, 1], arms[:, 0]], axis=1)[:, None, :]

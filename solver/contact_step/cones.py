@@ -50,16 +50,9 @@ def longest_step(a: np.ndarray, change: np.ndarray) -> float:
 
 
 class Scaling:
-    """The scaling W in which forces u and distances z inside their cones are alike: W u = W⁻¹ z.
+    """The scaling W in which forces u and distances z, (d, n) arrays, inside their cones are alike: W u = W⁻¹ z.
 
-    Parameters
-    ----------
-    u, z : (d, n) arrays
-
-    Attributes
-    ----------
-    scaled_point : (d, n) array
-        W u.
+    ``scaled_point`` is W u.
     """
 
     def __init__(self, u: np.ndarray, z: np.ndarray) -> None:

@@ -13,22 +13,11 @@ def expand_ranges(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def box_pairs(vertices: np.ndarray, offsets: np.ndarray, reach: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All pairs i < j of polygons or solids whose axis-parallel boxes come within reach along every axis.
+    """(n_pairs,) int arrays: pairs i < j of polygons or solids whose boxes come within reach [m] along every axis.
 
-    Parameters
-    ----------
-    vertices : (n_vertices, d) array [m]
-    offsets : (n + 1,) int array
-    reach : float [m]
-        Negative for boxes that overlap by as much.
-
-    Returns
-    -------
-    i, j : (n_pairs,) int arrays
-
-    Notes
-    -----
-    Sort and sweep along the axis on which fewer pairs survive; one long block (the ground) costs n pairs, not n².
+    Polygon or solid ``i`` has the corners from entry ``i`` to entry ``i + 1`` of the offsets; a negative reach is for
+    boxes that overlap by as much. Sort and sweep along the axis on which fewer pairs survive; one long block (the
+    ground) costs n pairs, not n².
     """
     low, high = boxes(vertices, offsets)
     low, high = low - reach / 2.0, high + reach / 2.0

@@ -75,12 +75,7 @@ class FacingParts:
         return self.cosine <= -0.05
 
     def other_faces(self, placed: PlacedParts) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield other pairs of faces, round by round, those that oppose each other better first.
-
-        Yields
-        ------
-        pair, face_i, face_j : (n_round,) int arrays
-        """
+        """Yield pairs and their other faces, round by round, (n_round,) int arrays, those that oppose better first."""
         faces_of_part, normals = placed.solids.faces_of_block, placed.faces.normals
         equal = self.apart - SAME_SEPARATION * self.width
         columns = []
@@ -132,14 +127,9 @@ def _opposed_faces(placed: PlacedParts, leading: np.ndarray, j: np.ndarray) -> n
 
 
 def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray) -> FacingParts:
-    """Choose the faces of near parts that face each other, where no face separates them farther than ``reach``.
+    """Choose the faces of near parts that face each other, where no face separates them farther than ``reach`` [m].
 
-    Parameters
-    ----------
-    reach : float [m]
-    useful : (n_blocks,) bool array
-        One of two near parts must be of these blocks.
-    widths : (n_blocks,) array [m]
+    One of two near parts must be of the useful blocks, (n_blocks,) bool array, which have widths (n_blocks,) [m].
     """
     i, j, width = near_parts(placed, reach, useful, widths)
     inner = placed.parts.inner

@@ -32,14 +32,7 @@ def renumbered(vertices: np.ndarray, faces: list[list[int]]) -> tuple[np.ndarray
 
 
 def merged_faces(surface: tuple[np.ndarray, list[list[int]]], flatness: float) -> tuple[np.ndarray, list[list[int]]]:
-    """One face of neighbouring ones in one plane, and no corner in the middle of an edge.
-
-    Parameters
-    ----------
-    surface : (vertices, faces)
-    flatness : float [m]
-        Corners may be so far out of the plane.
-    """
+    """One face of neighbouring ones in one plane, up to the flatness [m], and no corner in the middle of an edge."""
     vertices, faces = surface
     areas = np.array([_area(vertices[face]) for face in faces])
     sizes = np.linalg.norm(areas, axis=1)

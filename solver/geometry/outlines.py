@@ -109,21 +109,8 @@ class Outlines(Bodies):
 
 
 def polygon_integrals(vertices: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Areas and centroids of polygons.
+    """Areas (n,) [m²], positive where corners run counter-clockwise, and centroids (n, 2) [m] of polygons.
 
-    Parameters
-    ----------
-    vertices : (n_vertices, 2) array [m]
-    offsets : (n + 1,) int array
-
-    Returns
-    -------
-    areas : (n,) array [m²]
-        Positive where the corners run counter-clockwise.
-    centroids : (n, 2) array [m]
-
-    Notes
-    -----
     Sums over the edges (Green's theorem) are taken from the first corner of each polygon, so that
     coordinates far from the origin (UTM) lose no digits.
     """

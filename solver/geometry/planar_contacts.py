@@ -56,7 +56,6 @@ def measured_points(
 
     Parameters
     ----------
-    shapes : Outlines
     vertices : (n_vertices, 2) array [m]
         Current corners of all blocks.
     features : (n, 4) int array
@@ -148,7 +147,6 @@ def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np
 
     Parameters
     ----------
-    shapes : Outlines
     vertices : (n_vertices, 2) array [m]
         Current corners of all blocks.
     reach : float [m]
@@ -188,7 +186,6 @@ def passed_edges(
 
     Parameters
     ----------
-    shapes : Outlines
     before, after : (n_vertices, 2) arrays [m]
     i, j : (n_pairs,) int arrays
         Blocks that overlap after it.

@@ -34,16 +34,7 @@ SLOW = 1e-3
 
 
 class Fall:
-    """The motion of blocks from a place of the path that is not in equilibrium, with the supports fixed.
-
-    Parameters
-    ----------
-    stepper : Stepper
-    checks : EquilibriumChecks
-    reports : Reports
-    n_frames : int
-        Frames of the fall after collapse.
-    """
+    """The motion of blocks from a place of the path that is not in equilibrium, with the supports fixed."""
 
     def __init__(self, stepper: Stepper, checks: EquilibriumChecks, reports: Reports, n_frames: int) -> None:
         self.stepper, self.checks, self.reports, self.n_frames = stepper, checks, reports, n_frames

@@ -35,14 +35,7 @@ class EquilibriumChecks:
         self.stepper, self.model, self.driver = stepper, stepper.model, stepper.driver
 
     def in_equilibrium(self, place: Place, gap: float = COMPUTED_GAP) -> bool:
-        """Whether a place is in equilibrium, with some of the live load where there is one.
-
-        Parameters
-        ----------
-        place : Place
-        gap : float
-            Of contact points that may carry, in block sizes.
-        """
+        """Whether points with gaps up to this one [block sizes] hold a place, with some of a live load."""
         program = self._program(place, gap)
         found = program.in_equilibrium()
         self.stepper.programs += program.programs
@@ -61,8 +54,6 @@ class EquilibriumChecks:
 
         Parameters
         ----------
-        place : Place
-        gap : float
         reaction : float, optional [N or N·m]
             Of the forces that are looked for.
         at_rest : bool
@@ -104,14 +95,7 @@ class EquilibriumChecks:
         return forces
 
     def check(self, place: Place, reaction: float, gap: float = COMPUTED_GAP) -> EquilibriumCheck:
-        """Bounds at a place, and forces in equilibrium with the reaction of the path, or with its multiplier.
-
-        Parameters
-        ----------
-        place : Place
-        reaction : float [N or N·m]
-            Of the path; not used under a live load.
-        """
+        """Bounds at a place, and forces in equilibrium with the path's reaction [N or N·m], or its multiplier."""
         contacts, friction = self._contacts_at(place)
         bounds = self.bounds(place, gap)
         # A pushover starts from its limit load.

@@ -70,10 +70,8 @@ class Path:
     ----------
     model : Model
         Units, loads, interfaces.
-    driver : Driver
     number : int
         Of the phase.
-    controls : Controls
     on_step : callable, optional
         Called with the :class:`PathState` after every step that was tried.
     """
@@ -192,11 +190,7 @@ class Path:
     def follow(self, state: PathState, resumed: bool = False) -> Generator[Increment, None, Ending]:
         """Yield the increments of the phase, return how it ended, and leave the last state in ``self.state``.
 
-        Parameters
-        ----------
-        state : PathState
-        resumed : bool
-            The increment at this state has been reported.
+        Of a resumed path the increment at the given state has been reported.
         """
         self.state = state
         if resumed:

@@ -181,14 +181,7 @@ def falling_blocks(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
 
 
 def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
-    """Message that names the blocks that fall before any settlement.
-
-    Parameters
-    ----------
-    assembly : Assembly
-    motion : (n_blocks, n_dof) array
-        Of the fall.
-    """
+    """Message that names the blocks that fall before any settlement, by their motion, (n_blocks, n_dof) array."""
     falling = falling_blocks(assembly, motion)
     return (
         f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
