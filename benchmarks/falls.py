@@ -28,7 +28,7 @@ from first_increments import row
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.cases.build import case_assembly, case_interfaces, case_loads, case_settlements
+from blockvis.cases.build import case_assembly, case_interfaces, case_loads
 from blockvis.dynamics.engine import Engine
 from blockvis.dynamics.fall import RATE, fall_of
 from solver import mechanics
@@ -49,9 +49,7 @@ def example(name: str) -> solver.Response:
     """Follow an example to its collapse."""
     case = blockvis.read_case(EXAMPLES / f"{name}.toml")
     assembly = case_assembly(case)
-    settlements = [
-        replace(given, tolerance=1e-3, limit=max(given.limit, 0.6)) for given in case_settlements(case, assembly)
-    ]
+    settlements = [replace(given, tolerance=1e-3, limit=max(given.limit, 0.6)) for given in case.settlements]
     return solver.settle(
         assembly, settlements, interfaces=case_interfaces(case), loads=case_loads(case, assembly), controls=SHORT
     )

@@ -21,7 +21,7 @@ from growth import INCREMENT, wall_of
 
 import blockvis
 import solver
-from blockvis.cases.build import case_assembly, case_interfaces, case_loads, case_settlements
+from blockvis.cases.build import case_assembly, case_interfaces, case_loads
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SIZES = (102, 205, 399, 805, 1629)
@@ -69,7 +69,7 @@ def example(name: str, limit: float | None) -> tuple[Costs, float]:
     """An example as its case file has it, and the processor seconds of all of it."""
     case = blockvis.read_case(EXAMPLES / f"{name}.toml")
     assembly = case_assembly(case)
-    settlements = case_settlements(case, assembly)
+    settlements = case.settlements
     if limit is not None:
         settlements = tuple(replace(given, limit=limit) for given in settlements)
     interfaces, loads = case_interfaces(case), case_loads(case, assembly)

@@ -29,7 +29,7 @@ from first_increments import exponent, followed, row
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.cases.build import case_assembly, case_interfaces, case_loads, case_settlements
+from blockvis.cases.build import case_assembly, case_interfaces, case_loads
 
 HINGING = ("8,6", "24,11", "36,27", "80,60")
 SLIDING = ("9,0.9", "15,0.5", "21,0.36", "31,0.25")
@@ -46,8 +46,7 @@ def one(kind: str, size: str, increments: int) -> dict[str, Any]:
         assembly = case_assembly(case)
         interfaces, loads = case_interfaces(case), case_loads(case, assembly)
         settlements = [
-            replace(given, limit=min(given.limit, increments * given.increment))
-            for given in case_settlements(case, assembly)
+            replace(given, limit=min(given.limit, increments * given.increment)) for given in case.settlements
         ]
     elif kind == "hinging":
         lunes, courses = map(int, size.split(","))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 import solver
 from blockvis.case_files.case_keys import SECTIONS
 from blockvis.dynamics.fall import Fall
-from blockvis.pictures.captions import in_one_unit, parameter_text
+from blockvis.pictures.captions import in_one_unit, left_rest, parameter_text
 from blockvis.pictures.film import state_at
 from blockvis.report.page import summary_rows, tie_rows
 from blockvis.results.cracks import Crack, cracks_of
@@ -63,17 +63,18 @@ class Side:
         return float(self.response.parameters[-1])
 
     def measured_at(self, at: float) -> str:
-        """Write what is measured at a parameter over all phases, between two increments on the line between theirs.
-
-        Parameters
-        ----------
-        at : float [m or rad]
-        """
+        """Write what is measured at a parameter over all phases [m or rad], a dash where no line leads there."""
         value, measured = float(self.state(at).measured), self.response.measured
+        if np.isnan(value):
+            return "–"
         return force_text(value, measured.unit == "N·m") if measured.is_force else f"{value:.5g}"
 
     def state(self, at: float) -> solver.Increment:
-        """Give the state at a parameter over all phases [m or rad], the last beyond the end; the lowest limit load."""
+        """Give the state at a parameter over all phases [m or rad], the last beyond the end; the lowest limit load.
+
+        Between two increments all is on the line between theirs, but for what is measured between rest and the first
+        one: it has left that at rest at once, and is nan.
+        """
         governing = self.response.governing
         if not self.response.parameter.is_path and governing is not None:
             return governing
@@ -81,7 +82,12 @@ class Side:
         here = np.flatnonzero(np.isclose(self.response.parameters, at, atol=0.0)).tolist()
         # Where one settlement ends and the next begins, the end is meant: the next may go another way.
         ends = [k for k in here if path[k].phase == path[here[0]].phase]
-        return path[ends[-1]] if ends else state_at(self.response, at)
+        if ends:
+            return path[ends[-1]]
+        state = state_at(self.response, at)
+        before = max(int(np.searchsorted(self.response.parameters, at)) - 1, 0)
+        on_line = np.isclose(left_rest(self.response, before), path[before].measured, atol=0.0)
+        return state if on_line else replace(state, measured=np.nan)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -93,16 +94,14 @@ class Pair:
         self.sides, self._longest = comparison.sides, comparison.longest
         self._below = all(_aspect(side) > WIDE for side in self.sides)
         self._panel = WIDE_PANEL if self._below else TALL_PANEL
-        self.drawers = [
-            Drawer(
-                side.response,
-                look,
-                self._panel,
-                side.response.path if falls and side.fall is not None else shown_increments(side.response),
-                fall=side.fall if falls else None,
-            )
-            for side in self.sides
-        ]
+        in_space = all(side.response.assembly.dimension == 3 for side in self.sides)
+        self.drawers: list[Drawer] = []
+        for side in self.sides:
+            shown = side.response.path if falls and side.fall is not None else shown_increments(side.response)
+            fall = side.fall if falls else None
+            self.drawers.append(Drawer(side.response, look, self._panel, shown, fall=fall))
+            # What is in front in one picture is so in the other.
+            look = replace(look, sight=self.drawers[0].sight if in_space else None)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -8,7 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.dynamics.fall import CAPTION
-from blockvis.results.about import collapse_phase, loss_of
+from blockvis.results.about import collapse_phase, least_reaction, loss_of
 from blockvis.text import force_text, padded_text
 from solver import mechanics
 
@@ -25,24 +25,34 @@ ROUNDING = 1e-9
 #: without limit.
 MOST_OVER_LOWEST = 8.0
 
-#: Change of the reaction up to the first increment, as a part of the largest, that is seen in a curve.
+#: Drop of the reaction from that at rest, as a part of the largest, that is seen in a curve.
 NOTABLE = 0.05
 
 
-def drops_at_start(response: solver.Response) -> bool:
-    """Whether the reaction has left that at rest by the first increment: it does so at once, not along a line.
+def left_rest(response: solver.Response, row: int = 0) -> float:
+    """Find what is measured as soon as anything moves after a row of the path, which is not what the row has at rest.
 
-    So does the multiplier, whose first one is that of rigid joints, where these or the ground give.
+    Equilibrium leaves the reaction at rest open, and a first movement takes it to the least, or near. Where joints or
+    the ground give, nothing tells how it gets to the next row: that is taken, and nan for a multiplier, whose first one
+    is that of rigid joints.
     """
-    path = response.path
-    if len(path) < 2 or not response.parameter.is_path:
-        return False
+    rest = response.path[row]
+    if row == len(response.path) - 1 or not response.parameter.is_path or rest.parameter != 0.0:
+        return rest.measured
     if not response.measured.is_force:
-        return response.interfaces.elastic and path[0].parameter == 0.0
+        return np.nan if response.interfaces.elastic else rest.measured
     # Increments by linear program have no reaction at rest, and no upper bound.
-    if path[0].parameter != 0.0 or np.isnan(path[0].largest):
+    if np.isnan(rest.largest):
+        return rest.measured
+    return response.path[row + 1].measured if response.interfaces.elastic else least_reaction(rest)
+
+
+def drops_at_start(response: solver.Response) -> bool:
+    """Whether the reaction, or the multiplier, leaves that at rest at once, not along a line, and by so much."""
+    if not response.path:
         return False
-    return bool(abs(path[1].measured - path[0].measured) > NOTABLE * np.abs(response.values).max())
+    left = left_rest(response)
+    return bool(np.isnan(left) or abs(left - response.path[0].measured) > NOTABLE * np.abs(response.values).max())
 
 
 def new_motions(response: solver.Response) -> list[int]:
@@ -196,6 +206,8 @@ def state_text(increment: solver.Increment, response: solver.Response, beside: s
 def _value_text(increment: solver.Increment, response: solver.Response) -> str:
     measured = response.measured
     name = measured.name.capitalize()
+    if np.isnan(increment.measured):
+        return f"{name} –"
     if measured.is_force:
         moment = measured.unit == "N·m"
         # Rounding is no reaction.

@@ -261,6 +261,11 @@ class Drawer:
         views = views_of(self.response, motion, self.joints, self.look.sight, self.look.cut)
         return views if self._still else views[:1]
 
+    @property
+    def sight(self) -> Sight | None:
+        """From where blocks in space are drawn, for other pictures that are to be from there; none in the plane."""
+        return Sight(self._views[0].around, self._views[0].above) if self._views else None
+
     def _framed(self, poses: Iterable[solver.Pose]) -> Frame:
         if not self._views:
             return framed(self.assembly, poses)

@@ -91,9 +91,10 @@ class PathRange:
             paths = [(run.parameters[run.phases == phase], run.measured[run.phases == phase]) for run in self.followed]
             paths = [path for path in paths if len(path[0])]
             for s in np.unique(np.concatenate([parameters for parameters, _ in paths])).tolist():
-                # Between two increments a reaction is on the line between them.
-                at = [float(np.interp(s, *path)) for path in paths if s <= path[0][-1]]
-                rows.append((phase, s, min(at), max(at), len(at)))
+                standing = [path for path in paths if s <= path[0][-1]]
+                # Between two increments a reaction is on the line between them; that at rest is left at once.
+                at = [float(np.interp(s, *path)) for path in standing if not path[0][0] < s < path[0][1]]
+                rows.append((phase, s, min(at), max(at), len(standing)))
         columns = [np.array(column) for column in zip(*rows, strict=True)]
         return ReactionRange(*columns)
 

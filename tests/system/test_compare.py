@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, case_from, moved_and_turned, pixels
+from structures import arch_response, box, case_from, moved_and_turned, pixels
 
 import blockvis
 import solver
@@ -61,6 +61,41 @@ def test_both_pictures_of_a_settlement_have_one_unit(arch_results, other, tmp_pa
     monkeypatch.setattr(picture, lambda *of, title="", **look: titles.append(title.split("   ")[0]) or blank)
     assert main(["compare", str(arch_results), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
     assert titles == [f"Settlement {at} m" for at in ("0.0200", "0.0400", "0.0600") for _ in range(2)]
+
+
+def test_between_rest_and_the_first_increment_no_reaction_is_told(tmp_path, monkeypatch):
+    """The reaction leaves that at rest at once: a line from there gave one path two reactions, by its increments."""
+    titles, blank, folders = [], Image.new("RGB", (800, 620)), []
+    picture = "blockvis.pictures.drawer.Drawer.picture"
+    monkeypatch.setattr(picture, lambda *of, title="", **look: titles.append(title) or blank)
+    structure = solver.Structure(generators.arch(voussoirs=5), friction_coefficient=2.0)
+    for step in (0.01, 0.02):
+        response = structure.settle(solver.Settlement((1, 0), increment=step, limit=0.04))
+        folders.append(blockvis.write(response, tmp_path / f"{step}"))
+    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    numbers = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "numbers")
+    first, second, last = (cells for name, cells in numbers.items() if name.startswith("reaction at settlement"))
+    assert first[1] == "–" != first[0]
+    assert "–" not in (*second, *last)
+    assert [title.endswith("Reaction –") for title in titles] == [False, True, False, False, False, False]
+
+
+def test_blocks_in_space_are_seen_from_one_side(tmp_path, monkeypatch):
+    sights, blank, folders = [], Image.new("RGB", (800, 620)), []
+    picture = "blockvis.pictures.drawer.Drawer.picture"
+    monkeypatch.setattr(picture, lambda drawer, *of, **look: sights.append(drawer.scene.view) or blank)
+    pads = [box((x, y, -0.2), (x + 0.3, y + 0.3, 0.0)) for x in (0.0, 0.7) for y in (0.0, 0.7)]
+    columns = [box((x + 0.05, y + 0.05, 0.0), (x + 0.25, y + 0.25, 1.0)) for x in (0.0, 0.7) for y in (0.0, 0.7)]
+    for sinks in (0, 3):
+        roles = ["moving" if k == sinks else "fixed" for k in range(4)] + ["free"] * 4
+        structure = solver.Structure(
+            solver.Assembly.from_solids([*pads, *columns], roles=roles), friction_coefficient=0.6
+        )
+        response = structure.settle(solver.Settlement((0, 0, -1), increment=0.01, limit=0.01))
+        folders.append(blockvis.write(response, tmp_path / f"{sinks}"))
+    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    assert len(sights) == 6
+    assert len(set(sights)) == 1
 
 
 @pytest.mark.slow

@@ -113,7 +113,8 @@ def test_the_reaction_ranges_over_the_runs_that_get_there():
     runs = [(Variation(), path(0.3, 0.35)), (Variation(0.95), path(0.2, 0.25, 1.1, unit=0.05))]
     reaction = PathRange(runs, ["m"]).reaction()
     assert reaction.settlements == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2, 0.3])
-    assert reaction.low == pytest.approx(10.0 + reaction.settlements)
+    # The first run tells nothing between rest, which its reaction leaves at once, and its first increment.
+    assert reaction.low == pytest.approx((10.0 + reaction.settlements) * [1.0, 1.1, 1.0, 1.0, 1.0, 1.0])
     assert reaction.high == pytest.approx((10.0 + reaction.settlements) * [1.1, 1.1, 1.1, 1.1, 1.1, 1.0])
     assert reaction.runs.tolist() == [2, 2, 2, 2, 2, 1]
 

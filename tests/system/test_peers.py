@@ -42,6 +42,17 @@ def test_a_peer_that_is_missing_is_named():
     assert len(rows) == 4
 
 
+def test_every_benchmark_can_be_imported():
+    """They are run by hand, long after a name that they take from the package has gone."""
+    files = sorted(PEERS.parent.rglob("*.py"))
+    lines = [
+        f"import sys; sys.path[:0] = {[str(PEERS.parent), str(PEERS)]}",
+        *(f"import {file.stem}" for file in files),
+    ]
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+
+
 def test_engines_get_convex_pieces_that_fill_a_brick(monkeypatch):
     """Engines take the convex hull of a shape: four notched bricks of a bay would press into the arch beside them."""
     monkeypatch.syspath_prepend(str(PEERS))

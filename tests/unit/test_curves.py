@@ -131,6 +131,9 @@ def test_a_reaction_that_leaves_that_at_rest_at_once_has_no_line_from_there(tmp_
     rest = replace(rest, measured=3500.0, reaction=3500.0, least=1000.0, largest=4000.0)
     response = replace(response, increments=(rest, *others))
     assert "at rest" in said(response, tmp_path / "curve.svg")
+    # In a large increment the reaction has risen again.
+    risen = replace(response, increments=(rest, *(replace(one, measured=3500.0) for one in others)))
+    assert "at rest" in said(risen, tmp_path / "curve.svg")
     # A linear program gives the least reaction from the first increment on.
     by_program = replace(response, increments=(replace(rest, largest=np.nan), *others))
     assert "at rest" not in said(by_program, tmp_path / "curve.svg")
