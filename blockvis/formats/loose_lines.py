@@ -202,8 +202,8 @@ def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: flo
     import shapely
 
     # An end on a curve hangs between it and its chord: the curve gets a corner there.
-    curves = {j: off + MEETS * size for j, off in enumerate(offs) if off > 0.0}
-    flat = _with_corners(flat, n, curves, MEETS * size)
+    curves = {j: off for j, off in enumerate(offs) if off > 0.0}
+    flat = _with_corners(flat, n, curves, MEETS * size, MEETS * size)
     others = [shapely.LineString(points) for points in flat]
     tree = shapely.STRtree(others)
     ends = [(k, e) for k in range(n) for e in (0, -1)]
@@ -229,19 +229,22 @@ def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: flo
         said = f"joined: {len(far)} ends of lines that missed another by up to {max(far):.3g} units"
         found.notes.append(Note(CHANGED, said))
     # On the grid an end and a slanted line that it meets would be rounded apart.
-    return _with_corners(flat, n, dict.fromkeys(range(len(flat)), GRID * size), 0.0)
+    return _with_corners(flat, n, dict.fromkeys(range(len(flat)), 0.0), GRID * size, 0.0)
 
 
-def _with_corners(lines: Sequence[np.ndarray], n: int, reach: dict[int, float], apart: float) -> list[np.ndarray]:
-    """Make the ends of the first n lines corners of the others that they reach, but for those near a corner."""
+def _with_corners(
+    drawn: Sequence[np.ndarray], n: int, offs: dict[int, float], meets: float, apart: float
+) -> list[np.ndarray]:
+    """Make the ends of the first n lines corners of the others that they meet, but for those near a corner."""
     import shapely
 
-    lines = [points.copy() for points in lines]
+    lines = [points.copy() for points in drawn]
     ends = np.array([lines[k][e] for k in range(n) for e in (0, -1)])
-    near = np.array([shapely.LineString(lines[j]) for j in reach], dtype=object)
-    which, number = shapely.STRtree(shapely.points(ends)).query(near, "dwithin", [*reach.values()])
-    for j, i in zip(np.array([*reach], dtype=int)[which].tolist(), number.tolist(), strict=True):
-        if i // 2 != j:
+    near = np.array([shapely.LineString(lines[j]) for j in offs], dtype=object)
+    reach = np.array([*offs.values()]) + meets
+    which, number = shapely.STRtree(shapely.points(ends)).query(near, "dwithin", reach)
+    for j, i in zip(np.array([*offs], dtype=int)[which].tolist(), number.tolist(), strict=True):
+        if i // 2 != j and (offs[j] == 0.0 or _is_on_curve(drawn[j], ends[i], offs[j], meets)):
             lines[j] = _with_corner(lines[j], ends[i], apart)
     return lines
 
@@ -256,6 +259,22 @@ def _with_corner(points: np.ndarray, end: np.ndarray, apart: float) -> np.ndarra
     place = shapely.LineString(points).project(shapely.Point(end))
     within = 0.0 < place < along[-1]
     return np.insert(points, 1 + np.searchsorted(along, place), end, axis=0) if within else points
+
+
+def _is_on_curve(points: np.ndarray, end: np.ndarray, off: float, meets: float) -> bool:
+    """Whether an end near the chords of a curve, which are up to ``off`` from it, meets the curve itself."""
+    steps = np.diff(points, axis=0)
+    squared = np.maximum((steps**2).sum(axis=1), np.finfo(float).tiny)
+    places = np.clip(((end - points[:-1]) * steps).sum(axis=1) / squared, 0.0, 1.0)
+    distances = np.hypot(*(points[:-1] + places[:, None] * steps - end).T)
+    k = int(distances.argmin())
+    across = np.array([-steps[k, 1], steps[k, 0]])
+    beside = [float(across @ (points[i] - points[k])) for i in (k - 1, k + 2) if 0 <= i < len(points)]
+    side = float(across @ (end - points[k]))
+    # A curve bends away from where it comes from and goes to, and is at its ends as near to its chord as they are.
+    hollow = bool(beside) and all(side * one > 0.0 for one in beside)
+    height = 0.0 if hollow else 4.0 * off * places[k] * (1.0 - places[k])
+    return bool(distances[k] <= height + meets)
 
 
 def _nearest(lines: dict[int, Any], end: np.ndarray, reach: float) -> tuple[np.ndarray, float, int]:
