@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -71,7 +71,9 @@ class Faces:
     notes: list[str] = field(default_factory=list)
 
 
-def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: Sequence[float]) -> Faces:
+def faces_of_lines(
+    lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: Sequence[float], ignored: Set[int] = frozenset()
+) -> Faces:
     """Find the faces between lines, and the pieces into which they cut outlines.
 
     Parameters
@@ -81,6 +83,9 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: 
         Closed outlines of the same drawing.
     offs : sequence of float
         Largest distance of the chords of each outline from the curve for which they stand.
+    ignored : set of int, optional
+        Numbers of the outlines that will be left out: lines may end on them within another, as at openings; those that
+        lines cross are as if they were not there.
 
     Notes
     -----
@@ -95,38 +100,44 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: 
     if not flat:
         return found
     every = cKDTree(np.concatenate([*flat, *outlines]))
-    size = float(np.ptp(every.data, axis=0).max())
+    kept = [ring for i, ring in enumerate(outlines) if i not in ignored]
+    size = float(np.ptp(np.concatenate([*flat, *kept]), axis=0).max())
     usable = [i for i, ring in enumerate(outlines) if float(np.ptp(ring, axis=0).max()) > GRID * size]
     flat += [np.concatenate([outlines[i], outlines[i][:1]]) for i in usable]
     flat = _joined(flat, len(lines), [*(line.off for line in lines), *(offs[i] for i in usable)], size, found)
     segments = shapely.set_precision([shapely.LineString(points) for points in flat[: len(lines)]], GRID * size)
-    cutting = _cut_outlines(dict(zip(usable, flat[len(lines) :], strict=True)), segments, every, size, found)
+    cutting = _cut_outlines(dict(zip(usable, flat[len(lines) :], strict=True)), ignored, segments, every, size, found)
     rest = [k for k in range(len(lines)) if k not in cutting]
-    _add_faces([lines[k] for k in rest], [segments[k] for k in rest], outlines, every, size, found)
+    _add_faces([lines[k] for k in rest], [segments[k] for k in rest], kept, every, size, found)
     return found
 
 
-def _cut_outlines(outlines: dict[int, np.ndarray], segments: Any, every: Any, size: float, found: Faces) -> set[int]:
+def _cut_outlines(
+    outlines: dict[int, np.ndarray], ignored: Set[int], segments: Any, every: Any, size: float, found: Faces
+) -> set[int]:
     """Cut outlines, by their numbers, along the lines within them; numbers of the lines that cut one."""
     import shapely
 
-    cutting: set[int] = set()
+    cutting, openings = set[int](), set[int]()
     tree = shapely.STRtree(segments)
     areas = shapely.STRtree([shapely.Polygon(ring) for ring in outlines.values()])
-    openings = 0
+    numbers = [*outlines]
     for i, area in zip(outlines, areas.geometries, strict=True):
-        if area.is_empty or not area.is_valid:
+        if i in ignored or area.is_empty or not area.is_valid:
             continue
         inside = tree.query(area.buffer(2 * MEETS * size), "contains").tolist()
         if not inside:
             continue
         cuts = [segments[k] for k in inside]
         # Lines may end on an outline within this one, as between two circles.
-        within = areas.geometries[areas.query(area, "contains_properly")]
-        border, line = tree.query(shapely.get_exterior_ring(within), "dwithin", GRID * size)
+        within = areas.query(area, "contains_properly")
+        border, line = tree.query(shapely.get_exterior_ring(areas.geometries[within]), "dwithin", GRID * size)
         reached = within[np.unique(border[np.isin(line, inside)])].tolist()
-        pieces = _cut(area, cuts, reached, GRID * size) if reached else []
-        openings += len(reached) if pieces else 0
+        reached = [
+            k for k in reached if numbers[k] not in ignored or not _crossed(areas.geometries[k], cuts, 2 * MEETS * size)
+        ]
+        pieces = _cut(area, cuts, areas.geometries[reached].tolist(), GRID * size) if reached else []
+        openings |= {numbers[k] for k in reached} - ignored if pieces else set()
         pieces = pieces or _cut(area, cuts, [], GRID * size)
         if pieces:
             found.pieces[i] = [_sharpened(piece, every, GRID * size) for piece in pieces]
@@ -136,7 +147,8 @@ def _cut_outlines(outlines: dict[int, np.ndarray], segments: Any, every: Any, si
         around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
         said = f"cut: {counted(len(cutting), 'line')} within {around} into {counted(n, 'block')}"
         if openings:
-            said += f" around {counted(openings, 'outline')}, a block too: ignore it by its name if it is an opening"
+            around = counted(len(openings), "outline")
+            said += f" around {around}, a block too: ignore it by its name if it is an opening"
         found.notes.append(Note(CHANGED, f"{said}; leave their layer out (ignore) if they are no joints"))
     return cutting
 
@@ -249,18 +261,6 @@ def _with_corners(
     return lines
 
 
-def _with_corner(points: np.ndarray, end: np.ndarray, apart: float) -> np.ndarray:
-    """Make an end a corner of a line between its own ends, but for one near a corner."""
-    import shapely
-
-    if np.hypot(*(points - end).T).min() <= apart:
-        return points
-    along = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
-    place = shapely.LineString(points).project(shapely.Point(end))
-    within = 0.0 < place < along[-1]
-    return np.insert(points, 1 + np.searchsorted(along, place), end, axis=0) if within else points
-
-
 def _is_on_curve(points: np.ndarray, end: np.ndarray, off: float, meets: float) -> bool:
     """Whether an end near the chords of a curve, which are up to ``off`` from it, meets the curve itself."""
     steps = np.diff(points, axis=0)
@@ -275,6 +275,18 @@ def _is_on_curve(points: np.ndarray, end: np.ndarray, off: float, meets: float) 
     hollow = bool(beside) and all(side * one > 0.0 for one in beside)
     height = 0.0 if hollow else 4.0 * off * places[k] * (1.0 - places[k])
     return bool(distances[k] <= height + meets)
+
+
+def _with_corner(points: np.ndarray, end: np.ndarray, apart: float) -> np.ndarray:
+    """Make an end a corner of a line between its own ends, but for one near a corner."""
+    import shapely
+
+    if np.hypot(*(points - end).T).min() <= apart:
+        return points
+    along = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
+    place = shapely.LineString(points).project(shapely.Point(end))
+    within = 0.0 < place < along[-1]
+    return np.insert(points, 1 + np.searchsorted(along, place), end, axis=0) if within else points
 
 
 def _nearest(lines: dict[int, Any], end: np.ndarray, reach: float) -> tuple[np.ndarray, float, int]:
@@ -309,6 +321,14 @@ def _cut(area: Any, segments: list[Any], inner: list[Any], grid: float) -> list[
     if len(at_border) < 2 or any(len(face.interiors) for face in faces):
         return []
     return [np.array(shapely.orient_polygons(face).exterior.coords)[:-1] for face in faces]
+
+
+def _crossed(area: Any, lines: list[Any], reach: float) -> bool:
+    """Whether a line goes into an outline and out of it by more than a distance."""
+    import shapely
+
+    into = shapely.intersects(lines, area.buffer(-reach))
+    return bool((into & ~shapely.covers(area.buffer(reach), lines)).any())
 
 
 def _add_faces(
