@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
@@ -269,11 +270,14 @@ def _is_on_curve(points: np.ndarray, end: np.ndarray, off: float, meets: float) 
     distances = np.hypot(*(points[:-1] + places[:, None] * steps - end).T)
     k = int(distances.argmin())
     across = np.array([-steps[k, 1], steps[k, 0]])
-    beside = [float(across @ (points[i] - points[k])) for i in (k - 1, k + 2) if 0 <= i < len(points)]
     side = float(across @ (end - points[k]))
-    # A curve bends away from where it comes from and goes to, and is at its ends as near to its chord as they are.
-    hollow = bool(beside) and all(side * one > 0.0 for one in beside)
-    height = 0.0 if hollow else 4.0 * off * places[k] * (1.0 - places[k])
+    towards = [side * float(across @ (points[i] - points[k])) > 0.0 for i in (k - 1, k + 2) if 0 <= i < len(points)]
+    # A curve bends away from where it comes from and goes to; where these lie on both sides of a chord, it is no arc.
+    if any(towards):
+        return bool(distances[k] <= (0.0 if all(towards) else off) + meets)
+    half = math.sqrt(squared[k]) / 2.0
+    radius = (half**2 + off**2) / (2.0 * off)
+    height = math.sqrt(max(radius**2 - (half * (2.0 * places[k] - 1.0)) ** 2, 0.0)) - radius + off
     return bool(distances[k] <= height + meets)
 
 

@@ -3,8 +3,10 @@
 import math
 
 import ezdxf
+import numpy as np
 import pytest
 import shapely
+from ezdxf.math import BSpline
 
 from blockvis import read, read_layout
 
@@ -161,6 +163,26 @@ def test_lines_between_two_circles_cut_the_ring(tmp_path):
     areas = [shapely.Polygon(ring).area for ring in drawing.outlines]
     disc = drawing.names[areas.index(max(areas))]
     assert read_layout(path, ignore=[disc]).n_blocks == 18
+
+
+@pytest.mark.parametrize("n", [7, 13, 23])
+def test_joints_that_end_on_curves_of_coarse_chords_cut_them(tmp_path, n):
+    def ellipses(space):
+        for major in (3000, 3600):
+            space.add_ellipse((0, 0), major_axis=(major, 0), ratio=0.6, start_param=0, end_param=math.pi)
+        for a in (math.pi * k / n for k in range(n + 1)):
+            space.add_line(*((r * math.cos(a), 0.6 * r * math.sin(a)) for r in (3000, 3600)))
+
+    def wave(space):
+        corners = [(0, 0), (1000, 2000), (3000, 3000), (5000, -1000), (8000, 1000)]
+        for up in (0, 1500):
+            space.add_open_spline([(x, y + up) for x, y in corners])
+        for t in np.linspace(0, 1, n + 1):
+            x, y, _ = BSpline(corners).point(t * BSpline(corners).max_t)
+            space.add_line((x, y), (x, y + 1500))
+
+    assert read_layout(dxf(tmp_path, ellipses), chord_tolerance=0.3).n_blocks == n
+    assert read_layout(dxf(tmp_path, wave), chord_tolerance=0.1).n_blocks == n
 
 
 @pytest.mark.parametrize(("below", "n", "start"), [(12, 7, 2.5), (20, 20, 0)])
