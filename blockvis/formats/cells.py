@@ -154,7 +154,8 @@ def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, An
 
 def flat_beside(bodies: Sequence[np.ndarray], flat: Sequence[np.ndarray]) -> tuple[str, ...]:
     """Count in a note the flat cells that are no skin of those with a volume; given are the points of each cell."""
-    if not len(flat):
+    flat = [nodes for nodes in flat if len(nodes)]
+    if not flat:
         return ()
     lost = ~np.isin(np.concatenate(flat), np.concatenate([np.ravel(one) for one in bodies]))
     n = int(np.logical_or.reduceat(lost, np.cumsum([0, *map(len, flat)])[:-1]).sum())
@@ -179,6 +180,13 @@ def merged(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path |
     """
     if not found:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
+    joined = _joined(found, labels, path)
+    if isinstance(joined, Bodies):
+        return joined
+    return with_rows(joined, [with_role(row) for row in rows_of(joined)])
+
+
+def _joined(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path | str) -> Layout | Bodies:
     if len(found) == 1:
         return found[0]
     flat = [(part, label) for part, label in zip(found, labels, strict=True) if isinstance(part, Layout)]
@@ -243,7 +251,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
     )
     groups = [{"group": label} if label else {} for part, label in parts for _ in range(part.n_blocks)]
     rows = [row for part in named for row in rows_of(part)]
-    return with_rows(layout, [with_role(group | row) for group, row in zip(groups, rows, strict=True)])
+    return with_rows(layout, [group | row for group, row in zip(groups, rows, strict=True)])
 
 
 def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path | str) -> Layout | Bodies:
@@ -270,4 +278,5 @@ def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path
             part = replace(part, names=(file.stem,)) if alone else part
         parts.append(part)
         labels.append("" if alone else file.stem)
-    return merged(parts, labels, path)
+    # Each part has its roles by the rules of its own format, which may not go by how names begin.
+    return _joined(parts, labels, path)

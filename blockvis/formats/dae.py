@@ -50,15 +50,14 @@ def drawn_in(path: Path) -> Drawn:
     text = path.read_bytes()
     if re.search(rb"<!\s*(DOCTYPE|ENTITY)", text, re.IGNORECASE):
         raise ValueError("it defines XML entities")
-    if re.search(rb"<(?:\w+:)?float_array[^>]*>[^<]*\bnan\b", text, re.IGNORECASE):
-        # pycollada reads it as 0.
-        raise ValueError("it has NaN for a number; coordinates must be finite")
     # Faults of materials and cameras are no matter here; of geometry they are.
     document = collada.Collada(str(path), ignore=[collada.common.DaeError])
     announced = len(re.findall(rb"<(?:\w+:)?geometry\s", text))
     if len(document.geometries) < announced:
         damaged = f"{announced - len(document.geometries)} of {announced} geometries are damaged"
         raise ValueError(f"{damaged}: {document.errors[-1]}" if document.errors else damaged)
+    if any(map(_has_nan, document.geometries)):
+        raise ValueError("it has NaN for a number; coordinates must be finite")
     broken = (error.msg for error in document.errors if isinstance(error, collada.common.DaeBrokenRefError))
     lost = next((words for words in broken if re.match("Geometry|Controller|Node", words)), None)
     if lost is not None:
@@ -91,6 +90,14 @@ def _placed(nodes: Any, matrix: np.ndarray, name: str, depth: int) -> Iterator[t
         elif isinstance(node, Node):
             own = node.xmlnode.get("name") or node.xmlnode.get("id") or name
             yield from _placed(node.children, matrix @ np.asarray(node.matrix, dtype=float), own, depth + 1)
+
+
+def _has_nan(geometry: Any) -> bool:
+    """Whether a point has NaN for a coordinate, which pycollada reads as 0; normals and textures are no matter here."""
+    elements = [*geometry.xmlnode.iter()]
+    places = {one.get("source", "")[1:] for one in elements if one.get("semantic") == "POSITION"}
+    numbers = ("".join(one.itertext()) for one in elements if one.get("id") in places)
+    return any(re.search(r"\bnan\b", text, re.IGNORECASE) for text in numbers)
 
 
 def _mesh(geometry: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -508,12 +508,10 @@ def _drawn_already(ring: np.ndarray, found: _Outlines) -> bool:
 def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     """Add the faces between loose lines, and cut outlines along the lines within them."""
     unwanted, wanted = _chosen_lines(found, reading)
-    # Outlines that will be left out are not cut.
-    able = [i for i, layer in enumerate(found.layers) if not unwanted.takes([layer], found.looks[i])]
-    faces = faces_of_lines(wanted, [found.rings[i][:, :2] for i in able], [found.offs[i] for i in able])
+    ignored = {i for i, layer in enumerate(found.layers) if unwanted.takes([layer], found.looks[i])}
+    faces = faces_of_lines(wanted, [ring[:, :2] for ring in found.rings], found.offs, ignored)
     found.left_out += faces.left_out
-    for k, pieces in sorted(faces.pieces.items(), reverse=True):
-        i = able[k]
+    for i, pieces in sorted(faces.pieces.items(), reverse=True):
         level = float(found.rings[i][0, 2])
         for number, piece in enumerate(pieces):
             found.append(piece, level, found.layers[i], f"{found.names[i]}.{number}", found.looks[i])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -71,7 +72,9 @@ class Faces:
     notes: list[str] = field(default_factory=list)
 
 
-def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: Sequence[float]) -> Faces:
+def faces_of_lines(
+    lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: Sequence[float], ignored: Set[int] = frozenset()
+) -> Faces:
     """Find the faces between lines, and the pieces into which they cut outlines.
 
     Parameters
@@ -81,6 +84,9 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: 
         Closed outlines of the same drawing.
     offs : sequence of float
         Largest distance of the chords of each outline from the curve for which they stand.
+    ignored : set of int, optional
+        Numbers of the outlines that will be left out: lines may end on them within another, as at openings; those that
+        lines cross are as if they were not there.
 
     Notes
     -----
@@ -95,38 +101,44 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: 
     if not flat:
         return found
     every = cKDTree(np.concatenate([*flat, *outlines]))
-    size = float(np.ptp(every.data, axis=0).max())
+    kept = [ring for i, ring in enumerate(outlines) if i not in ignored]
+    size = float(np.ptp(np.concatenate([*flat, *kept]), axis=0).max())
     usable = [i for i, ring in enumerate(outlines) if float(np.ptp(ring, axis=0).max()) > GRID * size]
     flat += [np.concatenate([outlines[i], outlines[i][:1]]) for i in usable]
     flat = _joined(flat, len(lines), [*(line.off for line in lines), *(offs[i] for i in usable)], size, found)
     segments = shapely.set_precision([shapely.LineString(points) for points in flat[: len(lines)]], GRID * size)
-    cutting = _cut_outlines(dict(zip(usable, flat[len(lines) :], strict=True)), segments, every, size, found)
+    cutting = _cut_outlines(dict(zip(usable, flat[len(lines) :], strict=True)), ignored, segments, every, size, found)
     rest = [k for k in range(len(lines)) if k not in cutting]
-    _add_faces([lines[k] for k in rest], [segments[k] for k in rest], outlines, every, size, found)
+    _add_faces([lines[k] for k in rest], [segments[k] for k in rest], kept, every, size, found)
     return found
 
 
-def _cut_outlines(outlines: dict[int, np.ndarray], segments: Any, every: Any, size: float, found: Faces) -> set[int]:
+def _cut_outlines(
+    outlines: dict[int, np.ndarray], ignored: Set[int], segments: Any, every: Any, size: float, found: Faces
+) -> set[int]:
     """Cut outlines, by their numbers, along the lines within them; numbers of the lines that cut one."""
     import shapely
 
-    cutting: set[int] = set()
+    cutting, openings = set[int](), set[int]()
     tree = shapely.STRtree(segments)
     areas = shapely.STRtree([shapely.Polygon(ring) for ring in outlines.values()])
-    openings = 0
+    numbers = [*outlines]
     for i, area in zip(outlines, areas.geometries, strict=True):
-        if area.is_empty or not area.is_valid:
+        if i in ignored or area.is_empty or not area.is_valid:
             continue
         inside = tree.query(area.buffer(2 * MEETS * size), "contains").tolist()
         if not inside:
             continue
         cuts = [segments[k] for k in inside]
         # Lines may end on an outline within this one, as between two circles.
-        within = areas.geometries[areas.query(area, "contains_properly")]
-        border, line = tree.query(shapely.get_exterior_ring(within), "dwithin", GRID * size)
+        within = areas.query(area, "contains_properly")
+        border, line = tree.query(shapely.get_exterior_ring(areas.geometries[within]), "dwithin", GRID * size)
         reached = within[np.unique(border[np.isin(line, inside)])].tolist()
-        pieces = _cut(area, cuts, reached, GRID * size) if reached else []
-        openings += len(reached) if pieces else 0
+        reached = [
+            k for k in reached if numbers[k] not in ignored or not _crossed(areas.geometries[k], cuts, 2 * MEETS * size)
+        ]
+        pieces = _cut(area, cuts, areas.geometries[reached].tolist(), GRID * size) if reached else []
+        openings |= {numbers[k] for k in reached} - ignored if pieces else set()
         pieces = pieces or _cut(area, cuts, [], GRID * size)
         if pieces:
             found.pieces[i] = [_sharpened(piece, every, GRID * size) for piece in pieces]
@@ -136,7 +148,8 @@ def _cut_outlines(outlines: dict[int, np.ndarray], segments: Any, every: Any, si
         around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
         said = f"cut: {counted(len(cutting), 'line')} within {around} into {counted(n, 'block')}"
         if openings:
-            said += f" around {counted(openings, 'outline')}, a block too: ignore it by its name if it is an opening"
+            around = counted(len(openings), "outline")
+            said += f" around {around}, a block too: ignore it by its name if it is an opening"
         found.notes.append(Note(CHANGED, f"{said}; leave their layer out (ignore) if they are no joints"))
     return cutting
 
@@ -202,8 +215,8 @@ def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: flo
     import shapely
 
     # An end on a curve hangs between it and its chord: the curve gets a corner there.
-    curves = {j: off + MEETS * size for j, off in enumerate(offs) if off > 0.0}
-    flat = _with_corners(flat, n, curves, MEETS * size)
+    curves = {j: off for j, off in enumerate(offs) if off > 0.0}
+    flat = _with_corners(flat, n, curves, MEETS * size, MEETS * size)
     others = [shapely.LineString(points) for points in flat]
     tree = shapely.STRtree(others)
     ends = [(k, e) for k in range(n) for e in (0, -1)]
@@ -229,21 +242,43 @@ def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: flo
         said = f"joined: {len(far)} ends of lines that missed another by up to {max(far):.3g} units"
         found.notes.append(Note(CHANGED, said))
     # On the grid an end and a slanted line that it meets would be rounded apart.
-    return _with_corners(flat, n, dict.fromkeys(range(len(flat)), GRID * size), 0.0)
+    return _with_corners(flat, n, dict.fromkeys(range(len(flat)), 0.0), GRID * size, 0.0)
 
 
-def _with_corners(lines: Sequence[np.ndarray], n: int, reach: dict[int, float], apart: float) -> list[np.ndarray]:
-    """Make the ends of the first n lines corners of the others that they reach, but for those near a corner."""
+def _with_corners(
+    drawn: Sequence[np.ndarray], n: int, offs: dict[int, float], meets: float, apart: float
+) -> list[np.ndarray]:
+    """Make the ends of the first n lines corners of the others that they meet, but for those near a corner."""
     import shapely
 
-    lines = [points.copy() for points in lines]
+    lines = [points.copy() for points in drawn]
     ends = np.array([lines[k][e] for k in range(n) for e in (0, -1)])
-    near = np.array([shapely.LineString(lines[j]) for j in reach], dtype=object)
-    which, number = shapely.STRtree(shapely.points(ends)).query(near, "dwithin", [*reach.values()])
-    for j, i in zip(np.array([*reach], dtype=int)[which].tolist(), number.tolist(), strict=True):
-        if i // 2 != j:
+    near = np.array([shapely.LineString(lines[j]) for j in offs], dtype=object)
+    reach = np.array([*offs.values()]) + meets
+    which, number = shapely.STRtree(shapely.points(ends)).query(near, "dwithin", reach)
+    for j, i in zip(np.array([*offs], dtype=int)[which].tolist(), number.tolist(), strict=True):
+        if i // 2 != j and (offs[j] == 0.0 or _is_on_curve(drawn[j], ends[i], offs[j], meets)):
             lines[j] = _with_corner(lines[j], ends[i], apart)
     return lines
+
+
+def _is_on_curve(points: np.ndarray, end: np.ndarray, off: float, meets: float) -> bool:
+    """Whether an end near the chords of a curve, which are up to ``off`` from it, meets the curve itself."""
+    steps = np.diff(points, axis=0)
+    squared = np.maximum((steps**2).sum(axis=1), np.finfo(float).tiny)
+    places = np.clip(((end - points[:-1]) * steps).sum(axis=1) / squared, 0.0, 1.0)
+    distances = np.hypot(*(points[:-1] + places[:, None] * steps - end).T)
+    k = int(distances.argmin())
+    across = np.array([-steps[k, 1], steps[k, 0]])
+    side = float(across @ (end - points[k]))
+    towards = [side * float(across @ (points[i] - points[k])) > 0.0 for i in (k - 1, k + 2) if 0 <= i < len(points)]
+    # A curve bends away from where it comes from and goes to; where these lie on both sides of a chord, it is no arc.
+    if any(towards):
+        return bool(distances[k] <= (0.0 if all(towards) else off) + meets)
+    half = math.sqrt(squared[k]) / 2.0
+    radius = (half**2 + off**2) / (2.0 * off)
+    height = math.sqrt(max(radius**2 - (half * (2.0 * places[k] - 1.0)) ** 2, 0.0)) - radius + off
+    return bool(distances[k] <= height + meets)
 
 
 def _with_corner(points: np.ndarray, end: np.ndarray, apart: float) -> np.ndarray:
@@ -290,6 +325,14 @@ def _cut(area: Any, segments: list[Any], inner: list[Any], grid: float) -> list[
     if len(at_border) < 2 or any(len(face.interiors) for face in faces):
         return []
     return [np.array(shapely.orient_polygons(face).exterior.coords)[:-1] for face in faces]
+
+
+def _crossed(area: Any, lines: list[Any], reach: float) -> bool:
+    """Whether a line goes into an outline and out of it by more than a distance."""
+    import shapely
+
+    into = shapely.intersects(lines, area.buffer(-reach))
+    return bool((into & ~shapely.covers(area.buffer(reach), lines)).any())
 
 
 def _add_faces(

@@ -74,7 +74,8 @@ def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> En
 def _obj(path: Path) -> dae.Drawn:
     """Read the objects of an .obj file, or, where it has none, its groups, in the order of the file."""
     data = path.read_bytes()
-    if b"\0" in data:
+    # A name may have any character.
+    if b"\0" in data and not re.search(rb"^[ \t]*f[ \t]", data, re.MULTILINE):
         raise ValueError(f"'{path}' is no .obj file: it begins with {data[:16]!r}; give it the suffix that it has")
     try:
         text = data.decode("utf-8-sig")

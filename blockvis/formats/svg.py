@@ -151,13 +151,14 @@ def _root(path: Path) -> ElementTree.Element:
 
 def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     """Leave out what is not wanted, add the faces between loose lines, cut outlines along the lines within them."""
-    wanted = _wanted_lines(found, reading)
-    faces = faces_of_lines(wanted, found.rings, found.offs)
+    wanted, ignored = _wanted_lines(found, reading)
+    faces = faces_of_lines(wanted, found.rings, found.offs, ignored)
     found.left_out += faces.left_out
-    for k, pieces in sorted(faces.pieces.items(), reverse=True):
-        row, looks = found.rows[k], found.looks[k]
-        del found.rings[k], found.rows[k], found.looks[k]
-        for number, piece in enumerate(pieces):
+    for k in sorted({*faces.pieces, *ignored}, reverse=True):
+        ring, row, looks = found.rings.pop(k), found.rows.pop(k), found.looks.pop(k)
+        if k in ignored:
+            found.left_out.append(LeftOut("asked", ring, "", row.get("group", ""), row.get("name", ""), looks=looks))
+        for number, piece in enumerate(faces.pieces.get(k, ())):
             found.rings.append(piece)
             found.rows.append({**row, "name": f"{row.get('name', 'block')} {number + 1}"})
             found.looks.append(looks)
@@ -170,8 +171,8 @@ def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     return faces
 
 
-def _wanted_lines(found: _Outlines, reading: Reading) -> list[Line]:
-    """Leave out what is not wanted; give the loose lines that are."""
+def _wanted_lines(found: _Outlines, reading: Reading) -> tuple[list[Line], set[int]]:
+    """Leave out loose lines that are not wanted; give the others, and the numbers of the outlines not wanted."""
     every = [*zip(found.labels, found.looks, strict=True)]
     lines = [(labels, line.looks) for line, labels in zip(found.loose, found.loose_labels, strict=True)]
     names = {label for labels, _ in (*every, *lines) for label in labels}
@@ -182,11 +183,6 @@ def _wanted_lines(found: _Outlines, reading: Reading) -> list[Line]:
     def wants(labels: tuple[str, ...], looks: tuple[str, ...]) -> bool:
         return not unwanted.takes(labels, looks) and (not chosen or asked.takes(labels, looks))
 
-    for k in reversed([k for k, own in enumerate(every) if not wants(*own)]):
-        ring, row, looks = found.rings.pop(k), found.rows.pop(k), found.looks.pop(k)
-        del found.offs[k]
-        found.left_out.append(LeftOut("asked", ring, "", row.get("group", ""), row.get("name", ""), looks=looks))
-        del found.labels[k]
     wanted = []
     for line, own in zip(found.loose, lines, strict=True):
         if wants(*own):
@@ -194,7 +190,7 @@ def _wanted_lines(found: _Outlines, reading: Reading) -> list[Line]:
         else:
             left = LeftOut("asked line", line.points, "", line.layer, line.handle, closed=False, looks=line.looks)
             found.left_out.append(left)
-    return wanted
+    return wanted, {k for k, own in enumerate(every) if not wants(*own)}
 
 
 def _unit(root: ElementTree.Element) -> tuple[str, list[str]]:

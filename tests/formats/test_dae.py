@@ -83,6 +83,16 @@ def test_damaged_files_are_refused(tmp_path):
         assert "\n" not in str(caught.value)
 
 
+def test_normals_of_faces_without_area_may_be_nan(tmp_path):
+    path = document(tmp_path / "wall.dae", [("a", np.eye(4))])
+    text = path.read_text(encoding="utf-8")
+    corners = text[text.index("<source ") : text.index("</source>")] + "</source>"
+    normals = corners.replace("corners", "normals").replace(">0 0 0 ", ">NaN 0 0 ")
+    assert normals.count("NaN") == 1
+    path.write_text(text.replace(corners, normals + corners), encoding="utf-8")
+    np.testing.assert_allclose(blockvis.read_layout(path, dimension=3).volumes, 0.0254**3, rtol=1e-6)
+
+
 def test_without_its_package_the_command_is_named(tmp_path, monkeypatch):
     path = document(tmp_path / "wall.dae", [("a", np.eye(4))])
     monkeypatch.setitem(sys.modules, "collada", None)

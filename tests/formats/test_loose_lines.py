@@ -3,8 +3,10 @@
 import math
 
 import ezdxf
+import numpy as np
 import pytest
 import shapely
+from ezdxf.math import BSpline
 
 from blockvis import read, read_layout
 
@@ -161,6 +163,73 @@ def test_lines_between_two_circles_cut_the_ring(tmp_path):
     areas = [shapely.Polygon(ring).area for ring in drawing.outlines]
     disc = drawing.names[areas.index(max(areas))]
     assert read_layout(path, ignore=[disc]).n_blocks == 18
+
+
+@pytest.mark.parametrize("n", [7, 13, 23])
+def test_joints_that_end_on_curves_of_coarse_chords_cut_them(tmp_path, n):
+    def ellipses(space):
+        for major in (3000, 3600):
+            space.add_ellipse((0, 0), major_axis=(major, 0), ratio=0.6, start_param=0, end_param=math.pi)
+        for a in (math.pi * k / n for k in range(n + 1)):
+            space.add_line(*((r * math.cos(a), 0.6 * r * math.sin(a)) for r in (3000, 3600)))
+
+    def wave(space):
+        corners = [(0, 0), (1000, 2000), (3000, 3000), (5000, -1000), (8000, 1000)]
+        for up in (0, 1500):
+            space.add_open_spline([(x, y + up) for x, y in corners])
+        for t in np.linspace(0, 1, n + 1):
+            x, y, _ = BSpline(corners).point(t * BSpline(corners).max_t)
+            space.add_line((x, y), (x, y + 1500))
+
+    assert read_layout(dxf(tmp_path, ellipses), chord_tolerance=0.3).n_blocks == n
+    assert read_layout(dxf(tmp_path, wave), chord_tolerance=0.1).n_blocks == n
+
+
+@pytest.mark.parametrize(("below", "n", "start"), [(12, 7, 2.5), (20, 20, 0)])
+@pytest.mark.parametrize("bed", [6, 10])
+def test_rings_with_a_bed_of_mortar_between_them_do_not_touch(tmp_path, bed, below, n, start):
+    def draw(space):
+        rings = [(4500, 5000, below, 0), (5000 + bed, 5500, n, start)]
+        for inner, outer, stones, first in rings:
+            for radius in (inner, outer):
+                space.add_arc((0, 0), radius, first, 180 - first)
+            for k in range(stones + 1):
+                a = math.radians(first + (180 - 2 * first) * k / stones)
+                space.add_line(*((r * math.cos(a), r * math.sin(a)) for r in (inner, outer)))
+
+    drawing = read_layout(dxf(tmp_path, draw))
+    assert drawing.n_blocks == below + n
+    part = math.radians(180 - 2 * start)
+    mortar = part / 2 * ((5.0 + bed / 1000) ** 2 - 5.0**2)
+    drawn = sum(shapely.Polygon(ring).area for ring in drawing.outlines)
+    assert drawn == pytest.approx(math.pi / 2 * (5**2 - 4.5**2) + part / 2 * (5.5**2 - 5.0**2) - mortar, abs=0.02)
+
+
+WINDOW = [((0, 300), (400, 300)), ((600, 300), (1000, 300)), ((500, 0), (500, 200)), ((500, 400), (500, 600))]
+
+
+def windows(space, lines):
+    for layer, box in (("wall", (0, 0, 1000, 600)), ("open", (400, 200, 600, 400)), ("open", (-9e4, -9e4, 9e4, 9e4))):
+        x, y, u, v = box
+        space.add_lwpolyline([(x, y), (u, y), (u, v), (x, v)], close=True, dxfattribs={"layer": layer})
+    for a, b in lines:
+        space.add_line(a, b, dxfattribs={"layer": "joints"})
+
+
+def test_joints_that_end_on_an_ignored_opening_cut_what_is_around_it(tmp_path):
+    # A line within the opening, as of its bars, is no joint.
+    path = dxf(tmp_path, lambda space: windows(space, [*WINDOW, ((400, 200), (600, 400))]))
+    shapes = '<rect id="wall" width="1000" height="600"/><rect id="open" x="400" y="200" width="200" height="200"/>'
+    strokes = "".join(f'<path d="M{x} {y}L{u} {v}"/>' for (x, y), (u, v) in WINDOW)
+    for drawing in (read_layout(path, ignore=["open"]), read_layout(svg(tmp_path, shapes + strokes), ignore=["open"])):
+        assert [shapely.Polygon(ring).area for ring in drawing.outlines] == pytest.approx([0.14] * 4)
+        assert "4 blocks; leave" in next(note for note in drawing.notes if note.startswith("cut:"))
+
+
+def test_ignored_outlines_that_joints_cross_are_as_if_they_were_not_there(tmp_path):
+    joints = [((0, 300), (1000, 300)), ((500, 0), (500, 600))]
+    drawing = read_layout(dxf(tmp_path, lambda space: windows(space, joints)), ignore=["open"])
+    assert [shapely.Polygon(ring).area for ring in drawing.outlines] == pytest.approx([0.15] * 4)
 
 
 def test_joints_that_end_on_slanted_beds_cut_them(tmp_path):

@@ -36,6 +36,18 @@ def stones(folder, suffix=".stl", n=12):
     return folder
 
 
+def test_a_file_of_a_folder_has_the_roles_that_it_has_alone(tmp_path):
+    for k, layers in enumerate((["stones", "moving"], ["fixed bricks", "moving crane walls"])):
+        document = ezdxf.new("R2010")
+        for row, layer in enumerate(layers):
+            corners = [(2 * k + x, row + y) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+            document.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": layer})
+        document.saveas(tmp_path / f"part {k}.dxf")
+    alone = [read(tmp_path / f"part {k}.dxf").roles.tolist() for k in (0, 1)]
+    assert alone == [["free", "moving"], ["free", "free"]]
+    assert read(tmp_path).roles.tolist() == alone[0] + alone[1]
+
+
 @pytest.mark.parametrize("suffix", [".stl", ".ply", ".obj", ".glb"])
 def test_a_folder_of_one_stone_per_file(tmp_path, suffix):
     folder = stones(tmp_path / "stones", suffix)

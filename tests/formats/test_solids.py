@@ -2,13 +2,14 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 from structures import fans, layout_of
 
-from blockvis import generators, read, read_layout
+from blockvis import generators, read, read_layout, write_layout
 
 move = trimesh.transformations.translation_matrix
 
@@ -26,6 +27,13 @@ def test_separate_bodies_of_a_facade_that_stands_upright(tmp_path, suffix):
     assert drawing.thickness == pytest.approx([0.5] * 3, rel=1e-6)
     assert any("outlines in xz; their depth along y is the thickness" in note for note in drawing.notes)
     assert read(path).areas == pytest.approx([0.25] * 3, rel=1e-6)
+
+
+def test_names_of_obj_objects_may_have_any_character(tmp_path):
+    wall = layout_of(generators.arch(voussoirs=4))
+    names = ("a\0", *wall.names[1:])
+    write_layout(replace(wall, names=names), tmp_path / "a.obj")
+    assert read_layout(tmp_path / "a.obj").names == names
 
 
 def test_named_objects_may_touch(tmp_path):

@@ -133,6 +133,16 @@ def test_flat_cells_that_are_no_skin_are_counted(tmp_path, suffix):
     assert "left out: 1 flat cell beside bodies" in layout.notes
 
 
+def test_flat_cells_without_points_are_none(tmp_path):
+    points, cells, _ = bricks("hexahedron")
+    hexahedra = np.insert(cells, 0, 8, axis=1).ravel()
+    types = [pv.CellType.HEXAHEDRON] * len(cells) + [pv.CellType.POLYGON]
+    pv.UnstructuredGrid(np.append(hexahedra, 0), types, points).save(tmp_path / "a.vtu")
+    layout = read_layout(tmp_path / "a.vtu")
+    assert layout.n_blocks == 3
+    assert not any("flat cell" in note for note in layout.notes)
+
+
 def test_pieces_of_a_vtu_without_ids(tmp_path):
     points, cells, _ = bricks("tetra")
     pv.UnstructuredGrid({pv.CellType.TETRA: cells}, points).save(tmp_path / "a.vtu")
