@@ -98,16 +98,18 @@ def loads_of(
         that a block does not have.
     """
     loads = solver.self_weight(assembly)
+    # Loads of the drawing act on it before anything is taken away, but for a pressure, which meets what is left.
+    taken = gone if phase is not None else np.zeros_like(gone)
     if phase is not None:
         loads = replace(loads, dead=np.zeros_like(loads.dead))
     for number, load in enumerate(entries):
         if load.positions or load.phase != (phase or 1):
             continue
-        named = _named(load, assembly, gone, f"{source}: [loads {number + 1}] blocks")
-        chosen = named[~gone[named]]
+        named = _named(load, assembly, taken, f"{source}: [loads {number + 1}] blocks")
+        chosen = named[~taken[named]]
         if load.weight_fraction is not None:
             loads = _plus(loads, load.kind, solver.weight_fraction(assembly, load.weight_fraction, chosen))
-        for block in _loaded(load, named, gone, assembly, f"{source}: [loads {number + 1}]"):
+        for block in _loaded(load, named, taken, assembly, f"{source}: [loads {number + 1}]"):
             loads = _plus(loads, load.kind, solver.point_load(assembly, block, moment=load.moment))
             if load.has_force:
                 point = assembly.centroids[block] if load.point is None else load.point
