@@ -27,9 +27,9 @@ SHORTEST = 0.3
 #: Resultants, and arrows of a support, below this fraction of the largest are not drawn.
 SMALLEST_RESULTANT = 2e-3
 
-#: Where normal forces of a joint leave less than this part of what presses and pulls there, as of mortar that is bent
-#: or sheared, the resultant runs along the joint and crosses it far off: it is drawn at the middle.
-ALONG = 0.1
+#: Distance of a resultant from the middle of its joint, in those of the joint's ends, beyond which it is drawn at the
+#: middle: where mortar is bent or sheared, it crosses the line of the joint far off, or nowhere.
+BESIDE = 2.0
 
 #: Blocks of one part are grown by this fraction of the block size, merged and shrunk back: between faces that touch,
 #: the last digit leaves slivers otherwise.
@@ -207,9 +207,12 @@ def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.
     np.add.at(points, which, normal[:, None] * places)
     np.add.at(middles, which, places)
     middles /= np.bincount(which, minlength=len(pairs))[:, None]
-    weight, every = (np.bincount(which, weights=of, minlength=len(pairs)) for of in (normal, np.abs(normal)))
-    crosses = np.abs(weight) > ALONG * every
-    middles[crosses] = points[crosses] / weight[crosses, None]
+    weight = np.bincount(which, weights=normal, minlength=len(pairs))
+    reach = np.zeros(len(pairs))
+    np.maximum.at(reach, which, np.linalg.norm(places - middles[which], axis=1))
+    arms = points - weight[:, None] * middles
+    crosses = (weight != 0.0) & (np.linalg.norm(arms, axis=1) <= BESIDE * reach * np.abs(weight))
+    middles[crosses] += arms[crosses] / weight[crosses, None]
     return middles, forces, pairs
 
 
