@@ -86,4 +86,4 @@ def test_states_of_a_rotation_are_told_in_rad_with_their_moment(tmp_path, monkey
     rows = tables["States"][1]
     assert rows[1][0] == "1.00 mm, phase 1"
     assert rows[1][1].endswith(" kN")
-    assert rows[-1] == ("0.0010 rad, phase 2", f"{last:.4g} N·m", "")
+    assert rows[-1] == ("0.00100 rad, phase 2", f"{last:.4g} N·m", "")
