@@ -212,6 +212,7 @@ def test_runs_of_another_case_are_not_taken_for_its_own(tmp_path):
     assert set(again.runs) <= set(runs) == {*bare.runs, *fresh.runs}
 
 
+@pytest.mark.slow
 def test_a_point_that_no_candidate_moves_so_is_unexplained(tmp_path):
     (tmp_path / "case.toml").write_text(SINKING, encoding="utf-8")
     rows = [{"block": "right springer", "dx": 0, "dy": -0.02}, {"block": "left springer", "dx": 0, "dy": 0.02}]

@@ -42,6 +42,7 @@ def test_a_peer_that_is_missing_is_named():
     assert len(rows) == 4
 
 
+@pytest.mark.slow
 def test_every_benchmark_can_be_imported():
     """They are run by hand, long after a name that they take from the package has gone."""
     files = sorted(PEERS.parent.rglob("*.py"))

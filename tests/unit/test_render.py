@@ -241,6 +241,7 @@ def test_films_that_cannot_be(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_wrong_options_are_named(tmp_path):
     with pytest.raises(ValueError, match="colour_by is 'weight'; choose from material, mechanism, displacement"):
         draw_still(arch_response(), 0, tmp_path / "a.png", colour_by="weight")
