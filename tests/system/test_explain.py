@@ -81,6 +81,7 @@ def said(folder):
     return words.getvalue()
 
 
+@pytest.mark.slow
 def test_the_cause_comes_first_with_its_amount(folder, said):
     causes = json.loads((folder / "out" / "explain.json").read_text(encoding="utf-8"))["causes"]
     best = causes[0]
@@ -91,6 +92,7 @@ def test_the_cause_comes_first_with_its_amount(folder, said):
     assert "right springer moves right" in said.splitlines()[1]
 
 
+@pytest.mark.slow
 def test_the_page_needs_no_network_and_has_the_same_causes(folder, said):
     page = (folder / "out" / "explain.html").read_text(encoding="utf-8")
     assert not re.findall(r"(?:src|href)=\"(?!data:)", page)
@@ -103,6 +105,7 @@ def test_the_page_needs_no_network_and_has_the_same_causes(folder, said):
         assert one["place"] in page
 
 
+@pytest.mark.slow
 def test_the_picture_has_three_panels_of_blocks_with_cracks(folder, said):
     with Image.open(folder / "out" / "explain.png") as picture:
         pixels = np.asarray(picture.convert("RGB")).astype(int)
@@ -151,6 +154,7 @@ def test_runs_that_take_long_are_counted_by_their_causes(folder, tmp_path, monke
     assert re.search(r"^blockvis: run \d+ of \d+: left springer moves down, friction 0\.7, \d+\.\d s$", lines, re.M)
 
 
+@pytest.mark.slow
 def test_what_is_there_is_not_replaced_unless_asked(folder, said, capsys):
     command = ["explain", str(folder / "arch.toml"), "--observed", str(folder / "cracks.csv"), "-o"]
     assert cli.main([*command, str(folder / "out")]) == cli.BAD_INPUT
@@ -390,6 +394,7 @@ def test_an_analysis_of_another_kind_is_refused(folder, tmp_path, capsys):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("whose", ["processes", "a scheduler's"])
+@pytest.mark.slow
 def test_workers_give_the_same_answer(folder, said, scheduler, tmp_path, whose):
     workers = ["--workers", "2"] if whose == "processes" else ["--scheduler", scheduler]
     command = ["explain", str(folder / "arch.toml"), "--observed", str(folder / "cracks.csv"), *workers]
