@@ -27,15 +27,20 @@ def browser(test):
 NASTY = "</script><script>document.title='broken'</script>"
 
 
-def visited(page, tmp_path, *options, anchor="", quiet=True):
-    """Output of one headless visit; fails on anything the page writes to the console, if it should be quiet."""
+def visit(page, tmp_path, *options):
+    """Command of one headless visit, whose console is written to the standard error."""
     profile = tmp_path / f"profile {time.monotonic_ns()}"
-    command = [
+    return [
         *(CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
         *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars"),
         *("--host-resolver-rules=MAP * ~NOTFOUND", f"--user-data-dir={profile}", "--window-size=1200,900"),
-        *("--enable-logging=stderr", "--virtual-time-budget=5000", *options, page.as_uri() + anchor),
+        *("--enable-logging=stderr", *options, page),
     ]
+
+
+def visited(page, tmp_path, *options, anchor="", quiet=True):
+    """Output of one headless visit; fails on anything the page writes to the console, if it should be quiet."""
+    command = visit(page.as_uri() + anchor, tmp_path, "--virtual-time-budget=5000", *options)
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     assert not quiet or "CONSOLE" not in done.stderr, done.stderr[-2000:]
