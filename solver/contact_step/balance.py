@@ -230,6 +230,13 @@ def nearest_equilibrium(
         return reference
     most = np.full(len(reference), np.inf) if most is None else most
     cohesion = np.zeros(len(reference)) if cohesion is None else cohesion
+    loaded = most > BALANCED
+    if not loaded.all():
+        # Those that can carry nothing would leave the program without an interior.
+        forces, unit = np.zeros_like(reference), None if unit_reaction is None else unit_reaction[loaded]
+        given = (values[loaded] for values in (rows, reference, compliance, friction))
+        forces[loaded] = nearest_equilibrium(*given, load, unit, reaction, most[loaded], cohesion[loaded])
+        return forces
     point = _Iterate(rows, reference, compliance, friction, most, cohesion, load, unit_reaction, reaction)
     best, part = (point.residual, point.forces), 1.0
     for _ in range(ITERATIONS):

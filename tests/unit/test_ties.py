@@ -16,7 +16,7 @@ import solver
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly, case_ties
 from blockvis.cli import main
-from blockvis.generators import arch
+from blockvis.generators import arch, panel
 from blockvis.pictures import palette
 from blockvis.runs.plan import planned
 
@@ -396,3 +396,33 @@ def test_forces_within_joints_are_shared_alike_beside_a_tie_that_yields():
     of_springer = last.forces[joint == np.flatnonzero((pairs == [0, 12]).all(axis=1))[0]]
     assert len(of_springer) == 2
     assert np.ptp(of_springer[:, 1]) < 1e-3 * of_springer[:, 0].sum()
+
+
+def test_a_prop_that_carries_nothing_changes_no_force():
+    """A member without any force to choose has no place in the programs of the forces in the joints."""
+    wall = panel(nb=3, nc=4, block_height=0.4, depth=0.6)
+    top = int(np.flatnonzero(wall.free)[-1])
+    above = tuple(wall.centroids[top]), (float(wall.centroids[top, 0]), 9.0)
+    prop = solver.Tie("prop", (top, None), above, stiffness=1e5, kind="prop")
+    sinking = solver.Settlement((0.0, -1.0), increment=0.005, limit=0.01)
+    without, beside = (
+        solver.Structure(wall, friction_coefficient=0.8, ties=ties).settle(sinking).path for ties in ((), (prop,))
+    )
+    for increment, other in zip(without, beside, strict=True):
+        assert other.ties.forces == pytest.approx([0.0], abs=1.0)
+        forces, of_all = increment.forces, other.forces[: len(increment.forces)]
+        assert of_all == pytest.approx(forces, abs=1e-5 * np.abs(forces).max())
+
+
+def test_a_bar_in_tension_acts_as_a_tie_from_the_start():
+    """An arch with elastic joints, whose forces at rest decide its path; they were the mean of two limit states."""
+    stiff = solver.Interfaces(solver.InterfaceLaw(0.7, normal_stiffness=1e8, shear_stiffness=4e7))
+    bar, tie = (
+        solver.Tie(kind, (2, 9), ((-0.5, 0.4), (0.5, 0.4)), stiffness=1e6, prestress=50.0, kind=kind)
+        for kind in ("bar", "tie")
+    )
+    spreading = solver.Settlement((1.0, 0.0), increment=0.001, limit=0.001)
+    of_bar, of_tie = (solver.Structure(arch(), stiff, ties=[member]).settle(spreading) for member in (bar, tie))
+    assert of_bar.path[0].ties.forces[0] > 0.0
+    for increment, other in zip(of_tie.path, of_bar.path, strict=True):
+        assert other.reaction == pytest.approx(increment.reaction, rel=1e-6)
