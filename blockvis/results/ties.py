@@ -262,7 +262,9 @@ def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, s
     largest = f"{carried(course.largest_force)}{where}"
     fates = (("yields", course.yields_at, course.yields_in_phase), ("breaks", course.breaks_at, course.breaks_in_phase))
     told = ((word, place(at, phase)) for word, at, phase in fates if at is not None and phase is not None)
-    fate = [f"{word} at {where} or before" for word, where in told]
+    # A limit load is found anew at each settlement, the path goes on between two.
+    when = "under the limit load" if response.limits else "or before"
+    fate = [f"{word} at {where} {when}" for word, where in told]
     # What yields and breaks was told.
     said = {"yielding": course.yields_at, "broken": course.breaks_at}.get(course.last_state)
     if said is None:

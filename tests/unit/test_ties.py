@@ -367,6 +367,29 @@ def test_blocks_of_a_tie_are_two_numbers(blocks):
         solver.Tie("rod", blocks, ((0, 0), (1, 0)), 1e6)
 
 
+def test_a_tie_that_yields_under_a_limit_load_has_not_yielded_before(tmp_path, capsys):
+    """The settlement stretches the tie by a hundredth of its strength, the push at the limit by all of it."""
+    (tmp_path / "piers.json").write_text(BLOCKS, encoding="utf-8")
+    (tmp_path / "case.toml").write_text(
+        """geometry = { file = "piers.json" }
+        settlement = { direction = [1, 0], increment = 0.005, limit = 0.005 }
+        analysis = { kind = "limit load" }
+        [[loads]]
+        kind = "live"
+        blocks = "left"
+        force = [-1.0, 0.0]
+        [[ties]]
+        name = "iron"
+        from = [0.25, 1.5]
+        to = [2.75, 1.5]
+        stiffness = 100.0
+        strength = 100.0""",
+        encoding="utf-8",
+    )
+    main(["run", str(tmp_path / "case.toml"), "--output", str(tmp_path / "out"), "--no-pictures"])
+    assert ": yields at 0 m under the limit load" in capsys.readouterr().out
+
+
 def test_what_a_prop_presses_from_the_ground_alone_is_wedged():
     """The ground at the other end has no number of a block: no other one is named."""
     assembly = solver.Assembly.from_outlines(
