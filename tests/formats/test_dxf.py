@@ -100,7 +100,7 @@ def test_turned_blocks_in_a_stretched_one_are_sheared(tmp_path):
     half = math.sqrt(0.5)
     corners = np.array([(10, 0), (10 + 3 * half, half), (10, 2 * half), (10 - 3 * half, half)])
     assert first == pytest.approx(corners)
-    assert second == pytest.approx(corners + [9 * half, 3 * half])
+    assert second == pytest.approx(corners + np.array([9 * half, 3 * half]))
     assert tall == pytest.approx(np.array([(22, 0), (22, 2), (19, 2), (19, 0)]))
     assert np.ptp(round_, axis=0) == pytest.approx([6, 2], rel=1e-2)
 
