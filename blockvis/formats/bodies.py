@@ -65,13 +65,17 @@ ECCENTRIC = 1e-3
 
 @dataclass(frozen=True)
 class Body:
-    """A closed surface of triangles: name, (n, 3) points, (m, 3) faces, edges of closed holes, object it is part of."""
+    """A closed surface of triangles: name, (n, 3) points, (m, 3) faces, edges of closed holes, object it is part of.
+
+    ``volume`` is that of the body with its curved faces, where the file knows it; else 0.
+    """
 
     name: str
     points: np.ndarray
     faces: np.ndarray
     n_hole_edges: int = 0
     piece_of: str = ""
+    volume: float = 0.0
 
 
 def body_of_polygons(name: str, points: np.ndarray, faces: Sequence[Sequence[int]]) -> Body:
@@ -246,7 +250,7 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
         bend, corner = bend_of(points, faces)
         if bend:
             bent.append((bend, width_of(points, faces), body.name, corner))
-        drawn = abs(volume(body.points, body.faces))
+        drawn = body.volume or abs(volume(body.points, body.faces))
         changed.append((volume(points, faces) / drawn - 1.0, body.name))
         solids.append((points[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if lying else points, faces))
     said = _plane_faces_said(warped, changed)
@@ -284,8 +288,8 @@ def _plane_faces_said(
     if coarser:
         most, name = max(coarser, key=lambda one: abs(one[0]))
         said.append(
-            f"faces were joined to fewer plane ones: the volume of {len(coarser)} of {len(changed)} blocks is off by "
-            f"up to {100.0 * most:+.2g} %, of '{name}'; draw round stones with fewer sides"
+            f"faces were joined to fewer plane ones, or are curved: the volume of {len(coarser)} of {len(changed)} "
+            f"blocks is off by up to {100.0 * most:+.2g} %, of '{name}'; draw round stones with fewer sides"
         )
     return said
 

@@ -275,17 +275,49 @@ def _flat(
             continue
         copies = entity.multi_insert() if entity.mcount > 1 else [entity]
         for k, copy in enumerate(copies):
-            inner = _inserted(copy, path)
+            plain, stretch = _stretched(copy)
             number_of = f"{handle}.{k}" if entity.mcount > 1 else handle
             own = int(entity.dxf.get("color", BY_LAYER))
-            yield from _flat(inner, depth + 1, path, frozen, number_of, entity.dxf.layer, own)
+            inner = _flat(_inserted(plain, path), depth + 1, path, frozen, number_of, entity.dxf.layer, own)
+            yield from inner if stretch is None else _transformed(inner, stretch, frozen)
+
+
+def _stretched(insert: Any) -> tuple[Any, Any]:
+    """Split a stretched reference to a block that inserts others into one that only places it, and a matrix.
+
+    Inserted blocks that are turned are sheared by it, which ezdxf cannot say of a reference: it draws them turned.
+    """
+    # QCAD writes a zscale of 0 for plane drawings, with which no transformation can be made.
+    insert.dxf.zscale = insert.dxf.get("zscale", 1.0) or 1.0
+    scales = {abs(insert.dxf.get(f"{axis}scale", 1.0)) for axis in "xyz"}
+    block = insert.block()
+    if len(scales) == 1 or block is None or not block.query("INSERT"):
+        return insert, None
+    plain = insert.copy()
+    for key, value in (("insert", (0, 0, 0)), ("rotation", 0), ("extrusion", (0, 0, 1))):
+        plain.dxf.set(key, value)
+    for axis in "xyz":
+        plain.dxf.set(f"{axis}scale", 1.0)
+    placed = plain.matrix44()
+    placed.inverse()
+    return plain, placed * insert.matrix44()
+
+
+def _transformed(entities: Iterator[tuple[Any, str]], matrix: Any, frozen: Set[str]) -> Iterator[tuple[Any, str]]:
+    """Transform the entities of a block; arcs become those of ellipses, of which one outline may have several."""
+    from ezdxf import transform
+
+    for entity, handle in entities:
+        if entity.dxftype() == "INSERT":
+            yield entity, handle
+            continue
+        _, found = transform.copies([entity], matrix)
+        for k, one in enumerate(found):
+            yield one, f"{handle}.{k}" if len(found) > 1 else handle
 
 
 def _inserted(insert: Any, path: Path) -> Iterator[Any]:
     """Yield the entities of an inserted block at its place; ezdxf raises errors of any kind for a damaged one."""
-    if insert.dxf.get("zscale", 1.0) == 0.0:
-        # QCAD writes 0 for plane drawings, with which no transformation can be made.
-        insert.dxf.zscale = 1.0
     try:
         yield from insert.virtual_entities()
     except (TypeError, AttributeError, ValueError, KeyError, IndexError, ArithmeticError) as error:

@@ -95,8 +95,11 @@ def _failed(path: Path, said: str, target: Path) -> ValueError:
     if "alloc" in reason or "MemoryError" in reason:
         return ValueError(f"'{path}': gmsh needs more than {most} for it; {remedy}")
     if not reason:
-        # Where gmsh cannot have more memory, it mostly ends without a word.
-        return ValueError(f"'{path}': gmsh gave up without a reason, perhaps because it may take {most}; {remedy}")
+        # So it mostly ends, too, where it cannot have more memory.
+        return ValueError(
+            f"'{path}': gmsh crashed on it without a word, as on some closed round faces, or with no more than {most}; "
+            f"{remedy}"
+        )
     return ValueError(f"'{path}' cannot be read by gmsh: {reason}; repair it or give it as .msh")
 
 
@@ -126,7 +129,8 @@ def _bodies_of_volumes(found: list[dict[str, object]], path: Path, unit: str, pe
                 f"'{path}': '{part['name']}' is in {part['groups']} physical groups; keep it in one of them"
             )
         points, faces = np.array(part["points"], dtype=float), np.array(part["faces"], dtype=np.int64)
-        bodies.append(Body(str(part["name"]), per_mm * points.reshape(-1, 3), faces.reshape(-1, 3)))
+        drawn = per_mm**3 * float(str(part.get("volume", 0.0)))
+        bodies.append(Body(str(part["name"]), per_mm * points.reshape(-1, 3), faces.reshape(-1, 3), volume=drawn))
         row = {"name": str(part["name"])}
         if part["group"]:
             row |= {"group": str(part["group"]), "material": str(part["group"])}

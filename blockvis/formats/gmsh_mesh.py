@@ -240,7 +240,10 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
         raise ValueError(f"'{path}' is not a gmsh mesh: it has no section $MeshFormat; export it as .msh 4.1 or 2.2")
     version, binary, width = words[0].decode("ascii", "replace"), words[1] == b"1", words[2]
     if version not in ("2", "2.1", "2.2", "4.1"):
-        raise ValueError(f"'{path}' is version {version} of .msh; versions 1, 2 and 4.1 are read: gmsh -format msh41")
+        raise ValueError(
+            f"'{path}' is version {version} of .msh; versions 1, 2 and 4.1 are read: "
+            f"gmsh '{path}' -save -format msh41 -o new.msh"
+        )
     order = "<"
     if binary and head is not None:
         order = "<" if head.split(b"\n", 1)[1][:4] == b"\x01\x00\x00\x00" else ">"

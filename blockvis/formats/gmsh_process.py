@@ -15,6 +15,10 @@ from blockvis.system.worker import Say, end_with_caller, serve
 #: Points of a curve at which its direction is looked at.
 SAMPLES = 129
 
+#: Faces that are bent both ways are within such a part of the mean depth of their body (volume by surface) of it, but
+#: have no more than so many triangles of equal sides, of which the plane faces of a stone are joined.
+SAGITTA, MOST_TRIANGLES = 0.03, 400
+
 #: Chords of one curve: finer than any drawing.
 MOST_CHORDS = 4096
 
@@ -79,6 +83,7 @@ def _meshed(source: str, target: str, chords: int, memory: int) -> tuple[str, An
         gmsh.open(source)
         volumes = [tag for _, tag in gmsh.model.getEntities(3)]
         _only_outlines(gmsh, chords)
+        _points_within(gmsh)
         gmsh.model.mesh.generate(2)
         if volumes:
             return "bodies", [_body(gmsh, tag) for tag in volumes]
@@ -128,6 +133,39 @@ def _only_outlines(gmsh, chords: int) -> None:  # type: ignore[no-untyped-def]
         gmsh.model.mesh.setTransfiniteCurve(tag, 1 + _chords(gmsh, tag, 2.0 * math.pi / chords))
 
 
+def _points_within(gmsh) -> None:  # type: ignore[no-untyped-def]
+    """Have the faces that are bent both ways meshed with points within: their outlines say nothing of their bulge."""
+    size: dict[int, float] = {}
+    # The built-in kernel of .geo tells no volumes.
+    for _, volume in gmsh.model.occ.getEntities(3):
+        faces = [tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)]
+        bends = {face: bend for face in faces if (bend := _bend_both_ways(gmsh, face)) > 0.0}
+        if bends:
+            area = {face: gmsh.model.occ.getMass(2, face) for face in faces}
+            off = SAGITTA * gmsh.model.occ.getMass(3, volume) / sum(area.values())
+            # A triangle of the side h has an area of 0.43 h², and is off a face of the curvature k by k h² / 8.
+            off = max(off, sum(area[face] * bend for face, bend in bends.items()) / (0.43 * 8.0 * MOST_TRIANGLES))
+            size |= {face: math.sqrt(8.0 * off / bend) for face, bend in bends.items()}
+    if not size:
+        return
+    coarse = gmsh.option.getNumber("Mesh.MeshSizeMax")
+    gmsh.option.setNumber("Mesh.MeshSizeMin", 0)
+    gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, lc: size.get(tag, coarse) if dim == 2 else coarse)
+    for face in size:
+        gmsh.model.mesh.setAlgorithm(2, face, 5)
+
+
+def _bend_both_ways(gmsh, face: int) -> float:  # type: ignore[no-untyped-def]
+    """Mean of the larger curvature of a face; 0 for what is plane, or straight one way as a cylinder or cone."""
+    if gmsh.model.getType(2, face) in ("Plane", "Cylinder", "Cone"):
+        return 0.0
+    low, high = gmsh.model.getParametrizationBounds(2, face)
+    grid = np.meshgrid(*(np.linspace(a, b, 9)[1:-1] for a, b in zip(low, high, strict=True)))
+    found = gmsh.model.getPrincipalCurvatures(face, np.stack(grid, axis=-1).ravel())[:2]
+    less, more = np.sort(np.abs(found), axis=0)
+    return float(more.mean()) if less.max() > 1e-6 * more.max() else 0.0
+
+
 def _chords(gmsh, curve: int, widest: float) -> int:  # type: ignore[no-untyped-def]
     """Count the equal chords of a curve: none may turn by more than the widest angle [rad]."""
     first, last = (float(end[0]) for end in gmsh.model.getParametrizationBounds(1, curve))
@@ -164,7 +202,8 @@ def _body(gmsh, tag: int) -> dict[str, object]:  # type: ignore[no-untyped-def]
                 faces.append([number[int(node)] for node in face])
     # Where a STEP file names no solid, gmsh gives the name of the translator.
     name = "" if name.startswith("Open CASCADE STEP translator") else name
-    return {"name": name or f"volume {tag}", "group": group, "groups": len(groups), "points": points, "faces": faces}
+    found = {"name": name or f"volume {tag}", "group": group, "groups": len(groups), "points": points, "faces": faces}
+    return found | ({"volume": gmsh.model.occ.getMass(3, tag)} if (3, tag) in gmsh.model.occ.getEntities(3) else {})
 
 
 def _triangles(kind: int, nodes: np.ndarray) -> np.ndarray:

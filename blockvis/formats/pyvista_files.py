@@ -51,24 +51,28 @@ DEEPEST = 64
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a file of VTK, which states no unit."""
     import pyvista
-    from vtkmodules.vtkCommonCore import vtkObject
 
     _check_counts(path)
     if path.suffix.lower() in (".pvd", ".vtm", ".vtmb"):
         _check_parts(path)
     try:
-        # VTK would print every fault of a file to the terminal as well; the message below has the reason.
-        with warnings.catch_warnings(), pyvista.vtk_verbosity("off"):
+        # VTK would print every fault of a file to the terminal as well.
+        with (
+            warnings.catch_warnings(),
+            pyvista.vtk_verbosity("off"),
+            pyvista.VtkErrorCatcher(send_to_logging=False) as faults,
+        ):
             warnings.simplefilter("ignore")
-            vtkObject.GlobalWarningDisplayOff()
             if path.suffix.lower() == ".pvd":
                 data: Any = pyvista.PVDReader(str(path)).read()
             else:
                 data = pyvista.read(str(path))
     except (OSError, ValueError, RuntimeError, KeyError, TypeError, AttributeError, IndexError, SyntaxError) as error:
         raise ValueError(f"'{path}' cannot be read as {path.suffix} ({error}); export it again") from None
-    finally:
-        vtkObject.GlobalWarningDisplayOn()
+    if faults.error_events:
+        # At an array of a type that it does not know VTK leaves out all further ones and hands out the rest.
+        reason = " ".join(faults.error_events[0].alert.split())[:200]
+        raise ValueError(f"'{path}' cannot be read whole by VTK ({reason}); save it as .vtu")
     return found_in_dataset(data, path, reading.view)
 
 
@@ -92,7 +96,7 @@ def _check_legacy(path: Path) -> None:
     )
     counts = [int(number[:18]) for match in found for number in match.groups() if number]
     # An array of a FIELD: name, components, tuples, type.
-    for match in re.finditer(rb"(?im)^[ \t]*\S+[ \t]+(-?\d+)[ \t]+(-?\d+)[ \t]+[a-z_]+[ \t]*\r?$", data):
+    for match in re.finditer(rb"(?im)^[ \t]*\S+[ \t]+(-?\d+)[ \t]+(-?\d+)[ \t]+[a-z_]+\d*[ \t]*\r?$", data):
         components, tuples = (int(number[:18]) for number in match.groups())
         counts += [components, tuples, components * tuples]
     for match in re.finditer(rb"(?im)^[ \t]*DIMENSIONS((?:[ \t]+-?\d+)+)", data):

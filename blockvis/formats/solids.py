@@ -283,6 +283,10 @@ def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any) -> li
 def _flat(
     parts: list[tuple[str, np.ndarray, np.ndarray]], path: Path, rows: list[dict[str, Any]], view: str | None
 ) -> Layout:
+    if path.suffix.lower() == ".stl":
+        # Each triangle has corners of its own there, by which it would be a piece of its own.
+        same = [np.unique(points, axis=0, return_inverse=True) for _, points, _ in parts]
+        parts = [(name, own, index.ravel()[faces]) for (name, _, faces), (own, index) in zip(parts, same, strict=True)]
     layouts = [layout_of_cells(points, list(faces), {}, path, view) for _, points, faces in parts]
     layout = merged(layouts, [name for name, _, _ in parts], path)
     assert isinstance(layout, Layout)

@@ -1,6 +1,7 @@
 """DXF as drawing programs write it, R12 to R2018."""
 
 import itertools
+import math
 
 import ezdxf
 import numpy as np
@@ -83,6 +84,25 @@ def test_inserted_blocks(tmp_path):
     assembly = read(saved(tmp_path, draw))
     assert sorted(assembly.areas) == pytest.approx([1, 1, 1, 1, 2])
     assert set(assembly.materials) == {"brick"}
+
+
+def test_turned_blocks_in_a_stretched_one_are_sheared(tmp_path):
+    def draw(document, space):
+        document.blocks.new("stone").add_lwpolyline(SQUARE, close=True)
+        document.blocks.new("disc").add_circle((0, 0), 1)
+        group = document.blocks.new("group", base_point=(1, 1))
+        group.add_blockref("stone", (1, 1), dxfattribs={"rotation": 45, "column_count": 2, "column_spacing": 3})
+        group.add_blockref("stone", (5, 1), dxfattribs={"rotation": 90, "xscale": 2})
+        group.add_blockref("disc", (9, 1), dxfattribs={"rotation": 30})
+        space.add_blockref("group", (10, 0), dxfattribs={"xscale": 3, "yscale": 1})
+
+    first, second, tall, round_ = read_layout(saved(tmp_path, draw)).outlines
+    half = math.sqrt(0.5)
+    corners = np.array([(10, 0), (10 + 3 * half, half), (10, 2 * half), (10 - 3 * half, half)])
+    assert first == pytest.approx(corners)
+    assert second == pytest.approx(corners + np.array([9 * half, 3 * half]))
+    assert tall == pytest.approx(np.array([(22, 0), (22, 2), (19, 2), (19, 0)]))
+    assert np.ptp(round_, axis=0) == pytest.approx([6, 2], rel=1e-2)
 
 
 def test_loose_lines_enclose_blocks(tmp_path):

@@ -1,6 +1,7 @@
 """Geometry through gmsh: scripts and STEP, surfaces and volumes."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -115,6 +116,42 @@ def test_what_is_left_out_of_a_step_file_is_in_its_unit(tmp_path):
     assert np.ptp(face.points, axis=0) == pytest.approx([1.0, 0.5])
     assert np.ptp(face.holes[0], axis=0) == pytest.approx([0.2, 0.1])
     assert any("an outline of 0.5 m²" in note and "1 opening, 0.48 m²" in note for note in layout.notes)
+
+
+def test_faces_that_are_bent_both_ways_keep_their_bulge(tmp_path):
+    """By their outlines alone a hemisphere has lost a third of its volume, and a sphere crashed gmsh."""
+
+    def stones(occ):
+        occ.addSphere(0, 0, 0, 300, angle1=0.0)
+        occ.addSphere(2000, 0, 0, 300)
+
+    path = step(tmp_path, draw=stones)
+    layout = read_layout(path)
+    exact = np.array([2.0, 4.0]) / 3.0 * math.pi * 0.3**3
+    off = layout.volumes / exact - 1.0
+    assert ((off > -0.04) & (off < 0.0)).all()
+    assert read(path, only="volume 1").centroids[0] == pytest.approx([0.0, 0.0, 0.1125], abs=0.002)
+    (told,) = (
+        re.search(r"volume of 2 of 2 blocks is off by up to (-\S+) %", note)
+        for note in layout.notes
+        if "off by" in note
+    )
+    assert told is not None
+    assert float(told[1]) == pytest.approx(100.0 * off.min(), rel=0.05)
+
+
+def test_the_volume_of_a_round_stone_is_compared_with_that_of_the_file(tmp_path):
+    layout = read_layout(step(tmp_path, draw=lambda occ: occ.addCylinder(0, 0, 0, 0, 0, 400, 300)), dimension=3)
+    off = layout.volumes[0] / (math.pi * 0.3**2 * 0.4) - 1.0
+    assert any(f"off by up to {100.0 * off:+.2g} %" in note for note in layout.notes)
+
+
+def test_a_crash_of_gmsh_is_told_as_one(tmp_path, monkeypatch):
+    (tmp_path / "gmsh.py").write_text("import os; os.kill(os.getpid(), 9)", encoding="utf-8")
+    (tmp_path / "a.geo").write_text("x = 1;", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(ValueError, match=r"gmsh crashed on it without a word.*give the .msh"):
+        read(tmp_path / "a.geo")
 
 
 def test_a_closed_surface_without_a_volume_is_a_body(tmp_path):

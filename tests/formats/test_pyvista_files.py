@@ -101,6 +101,22 @@ def test_a_hostile_count_is_refused_before_memory_is_reserved(tmp_path):
         read(tmp_path / "b.vtk")
 
 
+def test_an_array_that_vtk_gives_up_is_not_left_out_in_silence(tmp_path):
+    """meshio names types of VTK's own, at which VTK leaves out all further arrays."""
+    mesh = pv.Plane(i_resolution=2, j_resolution=1).triangulate().cast_to_unstructured_grid()
+    mesh.cell_data["block_id"] = np.array([1, 1, 2, 2], dtype=np.int32)
+    mesh.save(tmp_path / "a.vtk", binary=False)
+    assert read(tmp_path / "a.vtk").n_blocks == 2
+    text = (tmp_path / "a.vtk").read_text(encoding="utf-8").replace("block_id 1 4 int", "block_id 1 4 vtktypeint32")
+    text = text.replace("SCALARS block_id int", "SCALARS block_id vtktypeint32")
+    assert "vtktypeint32" in text
+    (tmp_path / "a.vtk").write_text(text, encoding="utf-8")
+    with pytest.raises(
+        ValueError, match=r"cannot be read whole by VTK \(Unsupported .*vtktypeint32.*\); save it as .vtu"
+    ):
+        read(tmp_path / "a.vtk")
+
+
 def test_points_and_lines_are_no_blocks(tmp_path):
     pv.Line().save(tmp_path / "a.vtp")
     with pytest.raises(ValueError, match="has no surface cells"):

@@ -170,6 +170,13 @@ def test_a_flat_mesh_is_a_layout(tmp_path):
     assert assembly.areas.tolist() == [1, 1]
 
 
+def test_the_triangles_of_a_flat_stl_that_share_edges_are_one_block(tmp_path):
+    """There each triangle has corners of its own."""
+    mesh = trimesh.Trimesh([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)], process=False)
+    mesh.export(tmp_path / "a.stl")
+    assert read(tmp_path / "a.stl").areas.tolist() == [1]
+
+
 BOX = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
 
 
