@@ -14,7 +14,7 @@ from .words import make_plain
 _PLACES = {3: (1.0 + 3.0 * np.eye(3)) / 6.0, 2: np.array([[1.0, -1.0], [-1.0, 1.0]]) / np.sqrt(12.0) + 0.5}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Backfill:
     """Loose fill up to a level surface over pieces of the blocks, which looked upwards and saw it in the drawing.
 

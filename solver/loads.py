@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .assembly import Assembly
 from .backfill import Backfill
@@ -20,7 +21,7 @@ from .kinematics import (
     turned,
     turned_moments,
 )
-from .words import checked, make_plain, numbers_of
+from .words import checked, make_plain, numbers_of, plain
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
@@ -88,7 +89,7 @@ def self_weight(assembly: Assembly) -> Loads:
     return Loads(dead, np.zeros_like(dead))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PointForces:
     """Forces at points of blocks, which go with them.
 
@@ -111,7 +112,7 @@ class PointForces:
     @classmethod
     def at(cls, block: int, force: Sequence[float] | np.ndarray, point: Sequence[float] | np.ndarray) -> PointForces:
         """Return one force."""
-        return cls(np.array([block]), numbers_of([force], "force"), numbers_of([point], "point"))
+        return cls(np.array([plain(block, "int", "block")]), numbers_of([force], "force"), numbers_of([point], "point"))
 
     def arms(self, assembly: Assembly) -> np.ndarray:
         """(n_blocks, d, d) array [N·m]: sums of arm from the centroid ⊗ force."""
@@ -180,8 +181,8 @@ class Settlement:
     increment: float = 0.01
     limit: float = 1.0
     tolerance: float | None = None
-    blocks: tuple[str, ...] | None = None
-    stops: tuple[float, ...] = ()
+    blocks: Sequence[str] | None = None
+    stops: Sequence[float] = ()
     rotation_axis: Sequence[float] | None = None
     radial_from: Sequence[float] | None = None
     profile: Mapping[str, Sequence[float]] | None = None
@@ -381,7 +382,7 @@ def chosen_blocks(assembly: Assembly, blocks: Any) -> np.ndarray:
     """(n_blocks,) bool array: blocks that are given by their numbers, or as such an array."""
     chosen = np.zeros(assembly.n_blocks, dtype=bool)
     try:
-        chosen[blocks] = True
+        chosen[list(blocks) if isinstance(blocks, tuple) else blocks] = True
     except IndexError:
         last = assembly.n_blocks - 1
         raise ValueError(
@@ -390,7 +391,7 @@ def chosen_blocks(assembly: Assembly, blocks: Any) -> np.ndarray:
     return chosen
 
 
-def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.ndarray | None = None) -> np.ndarray:
+def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: ArrayLike | None = None) -> np.ndarray:
     """Load each block with a fraction of its weight, as an earthquake's static stand-in.
 
     Parameters
@@ -442,9 +443,12 @@ def point_load(
     """
     load, d = _no_load(assembly), assembly.dimension
     chosen_blocks(assembly, block)
-    if d == 3 and np.ndim(moment) == 0 and moment != 0.0:
-        raise ValueError(f"a moment in space is {moment!r}; give three numbers, about x, y and z")
-    load[block, d:] = numbers_of(moment, "moment")
+    turn = numbers_of(moment, "moment")
+    fits = turn.shape == (rotation_count(d),) or (turn.ndim == 0 and (d == 2 or turn == 0.0))
+    if not (fits and np.isfinite(turn).all()):
+        where, wanted = ("in the plane", "one number") if d == 2 else ("in space", "three numbers, about x, y and z")
+        raise ValueError(f"a moment {where} is {moment!r}; give {wanted}")
+    load[block, d:] = turn
     acts, at = np.zeros(d) if force is None else force, assembly.centroids[block] if point is None else point
     return load + PointForces.at(block, acts, at).load(assembly)
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .loads import Loads, added
+from .words import numbers_of, plain
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PhaseChange:
     """What changes before a settlement begins; joints keep the forces that they have, and blocks come to rest first.
 
@@ -34,6 +35,13 @@ class PhaseChange:
     ties: tuple[str, ...] = ()
     dead_arms: np.ndarray | None = None
 
+    def __post_init__(self) -> None:
+        """Make arrays of its own of what is given: the caller may fill theirs again."""
+        object.__setattr__(self, "ties", plain(self.ties, "Sequence[str]", "ties of a change"))
+        for name, kind in (("removed", bool), ("dead", float), ("dead_arms", float)):
+            if (given := getattr(self, name)) is not None:
+                object.__setattr__(self, name, numbers_of(given, f"{name} of a change").astype(kind))
+
 
 def removed_before(changes: Sequence[PhaseChange], phase: int, n_blocks: int) -> np.ndarray:
     """(n_blocks,) bool array: blocks that are taken away before a settlement, and have not been before."""
@@ -41,7 +49,7 @@ def removed_before(changes: Sequence[PhaseChange], phase: int, n_blocks: int) ->
     for change in changes:
         if change.phase <= phase and change.removed is not None:
             of = now if change.phase == phase else earlier
-            of |= np.asarray(change.removed, dtype=bool)
+            of |= change.removed
     return now & ~earlier
 
 

@@ -107,7 +107,7 @@ class Structure(Shown):
 
     def settle(
         self,
-        settlement: Settlement | Sequence[Settlement] | Sequence[float],
+        settlement: Settlement | Sequence[Settlement] | Sequence[float] | np.ndarray,
         *,
         controls: Controls | None = None,
         changes: Sequence[PhaseChange] = (),
@@ -214,8 +214,8 @@ class Structure(Shown):
             controls=controls,
             pose=pose,
             ties=self.ties,
-            ties_at=ties_at,
-            bonds_at=bonds_at,
+            ties_at=ties_at and checked(ties_at, TieForces, "ties_at"),
+            bonds_at=bonds_at and checked(bonds_at, Bonds, "bonds_at"),
             fallen=fallen,
         )
         found = increments.all(on_increment)
@@ -300,8 +300,8 @@ class Structure(Shown):
             overlap_tolerance=overlap_tolerance,
             torsion=torsion,
             ties=self.ties,
-            ties_at=ties_at,
-            bonds_at=bonds_at,
+            ties_at=ties_at and checked(ties_at, TieForces, "ties_at"),
+            bonds_at=bonds_at and checked(bonds_at, Bonds, "bonds_at"),
             fallen=fallen,
         )
         return replace(found, analysed=(self.assembly, self.interfaces, under.loads, self.ties))
@@ -364,7 +364,7 @@ class Structure(Shown):
         )
 
 
-def _phases(settlement: Settlement | Sequence[Settlement] | Sequence[float]) -> tuple[Settlement, ...]:
+def _phases(settlement: Settlement | Sequence[Settlement] | Sequence[float] | np.ndarray) -> tuple[Settlement, ...]:
     if isinstance(settlement, Settlement):
         return (settlement,)
     phases = tuple(part for part in settlement if isinstance(part, Settlement))
@@ -375,7 +375,7 @@ def _phases(settlement: Settlement | Sequence[Settlement] | Sequence[float]) -> 
 
 def settle(
     assembly: Assembly,
-    settlement: Settlement | Sequence[Settlement],
+    settlement: Settlement | Sequence[Settlement] | Sequence[float] | np.ndarray,
     *,
     friction_coefficient: float = InterfaceLaw.friction_coefficient,
     interfaces: Interfaces | None = None,

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .assembly import Assembly
 from .loads import PointForces, chosen_blocks
-from .words import numbers_of
+from .words import numbers_of, plain
 
 
 def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) -> np.ndarray:
@@ -40,7 +41,7 @@ def edge_force(assembly: Assembly, block: int, edge: int, pressure: float) -> Po
     start, stop = ring[edge], ring[(edge + 1) % len(ring)]
     along = stop - start
     inward = np.array([-along[1], along[0]])
-    force = numbers_of(pressure, "pressure") * float(assembly.thickness[block]) * inward
+    force = plain(pressure, "float", "pressure") * float(assembly.thickness[block]) * inward
     return PointForces.at(block, force, (start + stop) / 2.0)
 
 
@@ -49,7 +50,7 @@ def surface_pressure(
     pressure: float,
     direction: Sequence[float] = (0.0, -1.0),
     *,
-    blocks: np.ndarray | None = None,
+    blocks: ArrayLike | None = None,
 ) -> np.ndarray:
     """Load the faces that a direction meets first with a uniform pressure: :func:`surface_forces` as drawn.
 
@@ -75,7 +76,7 @@ def surface_forces(
     pressure: float,
     direction: Sequence[float] = (0.0, -1.0),
     *,
-    blocks: np.ndarray | None = None,
+    blocks: ArrayLike | None = None,
     removed: np.ndarray | None = None,
 ) -> PointForces:
     """Find the forces of a uniform pressure on what a direction meets first: snow on a top, wind on a flank.
@@ -86,7 +87,7 @@ def surface_forces(
     push = numbers_of(direction, "pressure direction")
     if push.shape != (2,) or not 0.0 < (size := float(np.hypot(*push))) < np.inf:
         raise ValueError(f"pressure direction is {push.tolist()}; give the direction in which it pushes, two numbers")
-    push = push / size
+    push, pressure = push / size, plain(pressure, "float", "pressure")
     across = np.array([-push[1], push[0]])
     chosen = assembly.free if blocks is None else chosen_blocks(assembly, blocks)
     strips, depth, block = _first_met(assembly, push, across, removed)
@@ -124,6 +125,7 @@ def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.
 def force_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.0)) -> PointForces:
     """Put a force on the topmost surface at a place, which goes with its block; as :func:`load_on_top`."""
     down = np.array([0.0, -1.0])
+    x = plain(x, "float", "x")
     strips, _, block = _first_met(assembly, down, np.array([1.0, 0.0]))
     k = int(np.clip(np.searchsorted(strips, x) - 1, 0, len(block) - 1))
     if not strips[0] <= x <= strips[-1] or block[k] < 0:

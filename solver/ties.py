@@ -80,6 +80,9 @@ class Tie:
             raise ValueError(f"{who} has no length: both ends are at {tuple(points[0].tolist())}; give two places")
         if len(self.blocks) != 2 or any(not isinstance(of, int | np.integer) for of in self.blocks if of is not None):
             raise TypeError(f"{who} has blocks {self.blocks}; give two numbers, assembly.index finds them, or None")
+        # As the annotations have it: the caller may fill arrays again, and files take only these.
+        object.__setattr__(self, "blocks", tuple(None if block is None else int(block) for block in self.blocks))
+        object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
         if self.blocks[0] == self.blocks[1]:
             held = "the ground" if self.blocks[0] is None else f"block {self.blocks[0]}"
             raise ValueError(f"{who} has both ends in {held}, where it carries nothing; join two blocks")
@@ -95,7 +98,7 @@ class Tie:
             raise ValueError(f"{who} has phase {self.phase}; settlements count from 1")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TieForces:
     """What the members do at an increment.
 

@@ -71,8 +71,8 @@ _PLAIN: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "float": ("a number", float),
     "int": ("a whole number", operator.index),
     "bool": ("True or False", lambda value: bool(value) if value in (False, True) else np.nan),
-    "tuple[str, ...]": ("a sequence of names", lambda names: tuple(map(str, names))),
-    "tuple[float, ...]": ("a sequence of numbers", lambda numbers: tuple(map(float, numbers))),
+    "Sequence[str]": ("a sequence of names", lambda names: tuple(map(str, names))),
+    "Sequence[float]": ("a sequence of numbers", lambda numbers: tuple(map(float, numbers))),
     "Mapping": ("a mapping, by names", dict),
-    "np.ndarray": ("an array of numbers", np.asarray),
+    "np.ndarray": ("an array of numbers", np.array),
 }

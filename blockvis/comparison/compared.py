@@ -48,7 +48,7 @@ class Side:
         With an increment in equilibrium at least.
     fall : Fall, optional
     case : dict
-        Values of its case by key, as "material.friction_coefficient".
+        Values of its case by key, as "material.friction_coefficient"; empty where it was written from Python.
     """
 
     label: str
@@ -146,8 +146,10 @@ class Comparison:
         return f"{response.parameter.name} {parameter_text(at, response)}{', all phases added' if several else ''}"
 
     def changed_keys(self) -> list[tuple[str, str, str]]:
-        """List the keys of the cases whose values differ, with both."""
+        """List the keys of the cases whose values differ, with both; none where a case is not known."""
         one, other = (side.case for side in self.sides)
+        if not (one and other):
+            return []
         found = []
         for key in dict.fromkeys([*one, *other]):
             values = one.get(key), other.get(key)

@@ -97,15 +97,18 @@ def comparison_html(found: Comparison, curves: bytes, stations: bytes, film: str
         for pair in found.cracks(found.common_end)
     ]
     where = found.place_text(found.common_end) if found.is_path else "the limit load"
-    keys = found.changed_keys()
+    keys, unknown = found.changed_keys(), " and ".join(side.label for side in found.sides if not side.case)
     table = '<div class="wide"><table id="{}">{}</table></div>'
+    differ = "<h2>What the cases differ in</h2>" + table.format("keys", _rows(heads, keys)) if keys else ""
+    if unknown:
+        differ = f"<p>No case in {html.escape(unknown)}, written from Python: what differs from it is not known.</p>"
     return Template((files("blockvis") / "comparison" / PAGE).read_text(encoding="utf-8")).substitute(
         title=html.escape(" and ".join(side.label for side in found.sides)),
         about=" · ".join(html.escape(f"{s.label}: {about(s.response).finished}") for s in found.sides),
         style=(report / "player.css").read_text(encoding="utf-8"),
         curves=base64.b64encode(curves).decode(),
         stations=base64.b64encode(stations).decode(),
-        differ="<h2>What the cases differ in</h2>" + table.format("keys", _rows(heads, keys)) if keys else "",
+        differ=differ,
         numbers=_rows(heads, found.rows()),
         cracks=f"<h2>Cracks at {html.escape(where)}</h2>" + table.format("cracks", _rows(heads, cracks))
         if cracks

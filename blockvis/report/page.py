@@ -55,6 +55,9 @@ from .frames import model_of_frames, surveyed
 from .packing import TURN_UNIT, deflated, hexadecimals, rounded
 from .space import model_in_space
 
+#: Endings of a report.
+PAGE_SUFFIXES = (".html", ".htm")
+
 #: Stands in a report for how exact it is, until that is known.
 ERROR_UNKNOWN = "<!-- error not known -->"
 
@@ -120,7 +123,17 @@ def write_report(
         What of and how large, "error of the steps: reaction ± 0.2 %"; :func:`add_error` may say it later.
     band : ReactionRange, optional
         Of the reaction, drawn behind the curve.
+
+    Raises
+    ------
+    ValueError
+        For an ending that is not that of a page.
     """
+    if Path(path).suffix.lower() not in PAGE_SUFFIXES:
+        raise ValueError(
+            f"'{path}' is no page; end its name in {' or '.join(PAGE_SUFFIXES)}, or let 'blockvis report --pdf' print "
+            "that of a results folder"
+        )
     return write_atomic(path, report_html(response, case_text, title=title, fall=fall, error=error, band=band))
 
 

@@ -6,8 +6,6 @@ import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 import solver
 from blockvis.system.atomic_files import write_atomic
 
@@ -34,16 +32,8 @@ def write_given(folder: Path, response: solver.Response) -> None:
     laws = response.interfaces
     pairs = tuple((first, second, law) for (first, second), law in laws.pairs.items())
     ground, scatters = tuple(laws.ground.items()), laws.scatter is not None
-    changes = tuple(_with_arrays(change) for change in response.changes)
-    given = _Given(laws.default, pairs, ground, scatters, response.loads, changes)
+    given = _Given(laws.default, pairs, ground, scatters, response.loads, response.changes)
     write_atomic(folder / GIVEN, packed(given))
-
-
-def _with_arrays(change: solver.PhaseChange) -> solver.PhaseChange:
-    """Make arrays of what may be lists."""
-    arrays = (change.removed, change.dead, change.dead_arms)
-    removed, dead, arms = (None if array is None else np.asarray(array) for array in arrays)
-    return replace(change, removed=removed, dead=dead, dead_arms=arms)
 
 
 def with_given(folder: Path, response: solver.Response) -> solver.Response:

@@ -74,7 +74,8 @@ class StoredIncrements:
     """
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        # What is read later is read from there, wherever the process stands then.
+        self.folder = folder.absolute()
         self._last: OrderedDict[int, solver.Increment] = OrderedDict()
         self._bytes = 0
 

@@ -204,7 +204,7 @@ def _check_changes(
 ) -> None:
     """Refuses changes before a phase, or of a tie, that is not there, and those that leave nothing to move."""
     for change in changes:
-        if change.phase not in range(len(phases)):
+        if checked(change, PhaseChange, "one of the changes").phase not in range(len(phases)):
             raise ValueError(f"phase of a change is {change.phase}; give a whole number, 0 to {len(phases) - 1}")
         if change.dead is not None:
             checked_loads(assembly, Loads(change.dead, change.dead, dead_arms=change.dead_arms))

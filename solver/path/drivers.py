@@ -23,7 +23,7 @@ class Driver(ABC):
     #: Largest displacement that it prescribes, per unit of it.
     lever = 1.0
     #: Values that are reported, too.
-    stops: tuple[float, ...] = ()
+    stops: Sequence[float] = ()
 
     def __init__(self, assembly: Assembly, given: Any, start: Pose) -> None:
         self.assembly, self.start = assembly, start

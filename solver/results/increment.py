@@ -77,7 +77,7 @@ def at_rest(velocity: np.ndarray, slow: float) -> np.ndarray:
     return np.abs(velocity) <= slow
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bonds:
     """The points of joints with mortar or stiffness that were closed at rest: a point that is not among them has none.
 

@@ -17,7 +17,7 @@ from .increment import Increment, at_rest, carries, slides
 NAMED = 8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mechanism:
     """The mechanism in the motion that follows an increment.
 

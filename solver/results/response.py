@@ -25,7 +25,7 @@ from .increment import HasState, Increment, State, Status, StoredState
 from .quantities import LOAD_MULTIPLIER, LOAD_POSITION, REACTION, SETTLEMENT, Quantity
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Collapse(Shown):
     """Where the structure loses equilibrium.
 
@@ -477,7 +477,7 @@ class LimitLoad(HasState, Shown):
         return f"{text}; {self.caveat}" if self.caveat else text
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Envelope:
     """Limit loads for several positions of a live load.
 

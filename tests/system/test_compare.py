@@ -1,6 +1,7 @@
 """Two runs side by side, by ``blockvis compare`` and its files."""
 
 import re
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
@@ -39,6 +40,7 @@ def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_p
     assert main(["compare", str(arch_results), str(other), "-o", str(out), "--animation", "none"]) == 0
     assert f"compared in {out}/: compare.html, curves.png, side_by_side.png" in capsys.readouterr().out
     page = (out / "compare.html").read_text(encoding="utf-8")
+    assert "No case in out and sinking, written from Python" in page
     numbers = table(page, "numbers")
     assert numbers[""] == ["out", "sinking"]
     assert numbers["status"] == ["collapsed", "limit reached"]
@@ -139,6 +141,14 @@ def test_what_the_cases_differ_in_is_told(tmp_path):
         "material.density": ["1850.5 kg/m³", "2000 kg/m³"],
         "imperfections 1.seed": ["20260101", "20260102"],
     }
+    # Of a case that was changed in Python no key is known, and none of the other is a difference.
+    changed = replace(blockvis.read_case(CASE, changes=changes), friction_coefficient=1.0)
+    blockvis.run_case(changed, tmp_path / "changed", outputs=())
+    pair = str(folders[0]), str(tmp_path / "changed")
+    assert main(["compare", *pair, "-o", str(tmp_path / "one"), "--animation", "none"]) == 0
+    page = (tmp_path / "one" / "compare.html").read_text(encoding="utf-8")
+    assert "No case in changed, written from Python" in page
+    assert 'id="keys"' not in page
 
 
 @pytest.mark.slow

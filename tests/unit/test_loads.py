@@ -1,5 +1,7 @@
 """Loads at the centroids, and the motion of the supports."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -118,7 +120,7 @@ def test_direction_counts_as_a_direction_only():
         ({"direction": (1, 0), "increment": -0.1}, "increment"),
         ({"direction": (1, 0), "limit": np.nan}, "limit"),
         ({"direction": (1, 0), "tolerance": -1e-4}, "tolerance"),
-        ({"direction": "down"}, "settlement direction is 'down'; give numbers"),
+        ({"direction": (1, "down")}, r"direction is \(1, 'down'\); give a sequence of numbers"),
         ({"direction": (1, 0), "stops": 0.1}, "stops is 0.1; give a sequence of numbers"),
         ({"direction": (1, 0), "stops": ["a"]}, r"stops is \['a'\]; give a sequence of numbers"),
         ({"profile": [1.0]}, r"profile is \[1.0\]; give a mapping, by names"),
@@ -200,13 +202,25 @@ def test_friction_given_in_degrees_warns():
         (lambda: solver.Structure(ASSEMBLY, friction_coefficient=1, ties=["a"]), "one of the ties is 'a'; give solver"),
         (lambda: solver.Structure(ASSEMBLY, solver.Interfaces(), [1.0]), r"loads is \[1\.0\]; give solver\.Loads"),
         (lambda: solver.point_load(ASSEMBLY, 0, "x"), r"force is \['x'\]; give numbers"),
-        (lambda: solver.edge_pressure(ASSEMBLY, 0, 0, "x"), "pressure is 'x'; give numbers"),
+        (lambda: solver.edge_pressure(ASSEMBLY, 0, 0, "x"), "pressure is the text 'x'; give a number"),
         (lambda: solver.settle(ASSEMBLY, PUSH, controls={"local_loss": 0}), r"controls is {.*}; give solver\.Controls"),
         (lambda: solver.settle(ASSEMBLY, PUSH, controls=0), r"controls is 0; give solver\.Controls"),
         (lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), closed_gap="x"), "closed_gap is the text 'x'"),
         (
             lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), displacement=[]),
             r"displacement is \[\]; give a",
+        ),
+        (
+            lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), ties_at=(1,)),
+            r"ties_at is \(1,\); give solver\.TieForces",
+        ),
+        (lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), bonds_at=1), r"bonds_at is 1; give solver\.Bonds"),
+        (lambda: solver.surface_pressure(ASSEMBLY, (1, 0, 0)), r"pressure is \(1, 0, 0\); give a number"),
+        (lambda: solver.edge_pressure(ASSEMBLY, 0, 0, np.nan), "pressure is nan; give a number"),
+        (lambda: solver.force_on_top(ASSEMBLY, "a"), "x is the text 'a'; give a number"),
+        (
+            lambda: solver.Structure(ASSEMBLY, friction_coefficient=1).settle(PUSH, changes=[1]),
+            r"one of the changes is 1; give solver\.PhaseChange",
         ),
         (
             lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), pose=ASSEMBLY),
@@ -232,6 +246,21 @@ def test_a_moment_in_space_is_three_numbers():
     cube = solver.Assembly.from_solids([(corners, faces)])
     with pytest.raises(ValueError, match=r"moment in space is 5\.0; give three numbers"):
         solver.point_load(cube, 0, moment=5.0)
+    assert solver.point_load(cube, 0, moment=(1, 2, 3))[0].tolist() == [0, 0, 0, 1, 2, 3]
+    for moment in (None, np.inf, (1, 0)):
+        with pytest.raises(ValueError, match=r"a moment in the plane is .*; give one number"):
+            solver.point_load(ASSEMBLY, 0, moment=moment)
+
+
+def test_blocks_may_be_any_sequence_of_their_numbers():
+    """A tuple was an index per axis: its blocks were not there, and an empty one was all of them."""
+    for load in (partial(solver.weight_fraction, ASSEMBLY, (1, 0)), partial(solver.surface_pressure, ASSEMBLY, 1.0)):
+        one, two = load(blocks=[1]), load(blocks=[1, 2])
+        assert np.array_equal(load(blocks=(1, 2)), two)
+        assert np.array_equal(load(blocks=(1,)), one)
+        assert not load(blocks=()).any()
+    with pytest.raises(ValueError, match=r"block is \(1,\); give a whole number"):
+        solver.point_load(ASSEMBLY, (1,), (0, -1))
 
 
 @pytest.mark.parametrize(

@@ -191,6 +191,9 @@ def test_a_case_changed_in_python_reopens_as_it_ran(tmp_path):
     run = blockvis.run_case(case, tmp_path / "out", pictures=False)
     assert blockvis.open_results(run.folder).interfaces == run.response.interfaces == solver.Interfaces(case.law)
     assert case.law.friction_coefficient == 0.5
+    with pytest.raises(ValueError, match=r"case\.toml: no settlement was given; give one Settlement"):
+        blockvis.run_case(replace(case, settlements=()), tmp_path / "none", pictures=False)
+    assert not (tmp_path / "none").exists()
     (run.folder / "summary.json").unlink()
     assert blockvis.open_results(run.folder).interfaces == run.response.interfaces, "as of a run that was killed"
 
@@ -199,9 +202,42 @@ def test_no_name_is_no_folder(response, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ValueError, match="name the folder of the results"):
         blockvis.write(response, "")
-    with pytest.raises(ValueError, match=r"'\.' names no file"):
+    with pytest.raises(ValueError, match="'' is no page"):
         blockvis.write_report(response, "")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["report.pdf", "report.png", "report"])
+def test_a_report_is_a_page_by_its_name(response, tmp_path, name):
+    with pytest.raises(ValueError, match=r"is no page; end its name in \.html or \.htm, or let 'blockvis"):
+        blockvis.write_report(response, tmp_path / name)
+
+
+def test_results_opened_by_a_relative_path_are_read_from_another_folder(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr("blockvis.results.increments.CACHED", 0)
+    monkeypatch.chdir(folder.parent)
+    again = blockvis.open_results(folder.name)
+    monkeypatch.chdir(tmp_path)
+    assert all(len(increment.forces) for increment in again.path)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "points"),
+    [
+        ((1, None), (np.array([2, 1.5]), (9, 1.5))),
+        ([1, None], [[2, 1.5], [9, 1.5]]),
+        (np.array([1, 2]), np.array([[2, 1.5], [2, 2.5]])),
+    ],
+)
+def test_ties_of_arrays_and_lists_come_back(blocks, points, tmp_path):
+    """Analyses took them, and the folder that was written in the end could not be read."""
+    rod = solver.Tie("rod", blocks, points, 1e6)
+    phase = solver.Settlement(rotation_centre=(0, 0), rotation=1, increment=0.005, limit=0.005)
+    change = solver.PhaseChange(1, ties=["rod"])
+    response = solver.Structure(_stack(), friction_coefficient=0.5, ties=[rod]).settle([phase] * 2, changes=[change])
+    again = blockvis.open_results(blockvis.write(response, tmp_path / "out"))
+    assert again.ties == (rod,)
+    assert again.changes[0].ties == ("rod",)
 
 
 @pytest.mark.parametrize("seconds", [-1, 0, np.nan])

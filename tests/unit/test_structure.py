@@ -45,6 +45,20 @@ def test_a_structure_keeps_the_loads_that_it_was_made_of(block):
     assert structure.limit_load().multiplier == pytest.approx(0.5, rel=1e-6)
 
 
+def test_ties_changes_fills_and_forces_keep_what_they_were_made_of(block):
+    """Of two ties made in one array both were at the second, and a finished response changed its loads."""
+    removed, dead, arms, ends = np.zeros(2), np.zeros((2, 3)), np.zeros((2, 2, 2)), np.array([[0.5, 1.0], [5.0, 1.0]])
+    change = solver.PhaseChange(0, removed=removed, dead=dead, dead_arms=arms, ties=["rod"])
+    fill = solver.Backfill(pieces=arms, block=np.zeros(2, dtype=int), surface=1.0, unit_weight=1.0, thickness=removed)
+    rod, forces = solver.Tie("rod", (1, None), ends, 1e6), solver.PointForces([0, 0], removed, ends)
+    for array in (removed, dead, arms, ends):
+        array[:] = 7.0
+    for kept in (change.removed, change.dead, change.dead_arms, fill.pieces, fill.thickness, forces.force):
+        assert not kept.any()
+    assert rod.points == ((0.5, 1.0), (5.0, 1.0)) == tuple(map(tuple, forces.point.tolist()))
+    assert (change.removed.dtype, change.ties) == (bool, ("rod",))
+
+
 def test_a_settlement_tells_that_it_leaves_live_loads_out(block):
     moving = block.with_roles(["moving", "free"])
     structure = solver.Structure(moving, friction_coefficient=0.7).with_live(acceleration=(9, 0))
@@ -77,9 +91,12 @@ def test_what_holds_arrays_is_equal_to_itself_alone(block):
     """Comparing arrays ended in words of numpy; now a structure is found in a list, and is a key."""
     structure = solver.Structure(block, friction_coefficient=0.7)
     response = structure.limit_load(acceleration=(1, 0)).response
-    for one in (block, structure, response, structure.loads, solver.Pose.initial(block)):
+    force, limit = solver.PointForces.at(1, (0, -1), (0.5, 2)), structure.limit_load(acceleration=(1, 0))
+    values = [block, structure, response, structure.loads, solver.Pose.initial(block), force, limit, limit.ties]
+    values += [structure.envelope([0.5], lambda x: force), solver.PhaseChange(0, removed=[False] * 2), limit.increment]
+    for one in values:
         assert {one: [one].index(one)}[one] == 0
-    assert block != replace(block)
+        assert one != replace(one) or one in (structure, limit, limit.increment)
 
 
 def test_blocks_are_counted_from_the_end_too(block):
