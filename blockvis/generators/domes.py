@@ -62,8 +62,8 @@ def dome(
     radius, thickness = above_zero("radius", radius), thickness_over_radius(thickness_ratio) * radius
     if thickness > radius:
         raise ValueError(
-            f"thickness_ratio is {thickness_ratio:g}; give at most 1: the springers, twice as thick as the dome, end at "
-            "its axis"
+            f"thickness_ratio is {thickness_ratio:g}; give at most 1: the springers, twice as thick as the dome, end "
+            "at its axis"
         )
     cap, springing = above_zero("cap", cap, "degrees"), above_zero("springing", springing, "degrees")
     n, rings = whole("lunes", lunes, 3, MOST_LUNES), whole("courses", courses, 1)
