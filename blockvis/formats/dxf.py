@@ -541,7 +541,7 @@ def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     """Add the faces between loose lines, and cut outlines along the lines within them."""
     unwanted, wanted = _chosen_lines(found, reading)
     ignored = {i for i, layer in enumerate(found.layers) if unwanted.takes([layer], found.looks[i])}
-    faces = faces_of_lines(wanted, [ring[:, :2] for ring in found.rings], found.offs, ignored)
+    faces = faces_of_lines(wanted, [ring[:, :2] for ring in found.rings], found.offs, ignored, reading.only)
     found.left_out += faces.left_out
     for i, pieces in sorted(faces.pieces.items(), reverse=True):
         level = float(found.rings[i][0, 2])

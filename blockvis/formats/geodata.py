@@ -304,7 +304,7 @@ def layout_of_features(
         notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
     kinds = _parts(rows, found.of)
     wanted, unwanted = _lines(found, rows, order, reading)
-    faces = faces_of_lines(wanted, rings, [0.0] * len(rings))
+    faces = faces_of_lines(wanted, rings, [0.0] * len(rings), only=reading.only)
     _replace_cut(rings, kinds, faces)
     holes = [_hole(*(ring[:, order] for ring in holed), row=rows[k]) for holed, k in found.holed]
     left_out = [*holes, *unwanted, *faces.left_out]

@@ -249,11 +249,15 @@ def _of_values(values: np.ndarray, image: Image.Image) -> _Found:
     known, inverse = np.unique(values, return_inverse=True)
     place = inverse.reshape(values.shape).astype(np.int32)
     share = np.bincount(place.ravel(), minlength=len(known)) / place.size
+    several = image.mode in ("P", "RGB") and (image.mode == "P" or known[-1] > 255)
+    shown = np.asarray(image.convert("RGB")).astype(float) if several else values[..., None].astype(float)
     label = np.ones(len(known), dtype=bool)
     if len(known) > 2:
         core = ndimage.minimum_filter(place, 3) == ndimage.maximum_filter(place, 3)
         label = np.bincount(place[core], minlength=len(known)) > 0
         thin = ~label & (share >= THIN)
+        if label.sum() == 2 and thin.any():
+            thin &= ~_half_covered(place, label, shown)
         # Many values of some share each are a blur, not lines between stones.
         label |= thin & (thin.sum() <= max(2, label.sum()))
         white = known[label & (known > 255)]
@@ -270,17 +274,41 @@ def _of_values(values: np.ndarray, image: Image.Image) -> _Found:
         # Lines of many values on one ground: the commonest of what is unlike the ground stands for them.
         label[np.flatnonzero(unlike)[share[unlike].argmax()]] = True
     numbers = np.where(label[place], (np.cumsum(label) - 1)[place], -1).astype(np.int32)
-    several = image.mode in ("P", "RGB") and (image.mode == "P" or known[-1] > 255)
-    shown = np.asarray(image.convert("RGB")).astype(float) if several else values[..., None].astype(float)
     first = np.unique(numbers.ravel(), return_index=True)[1][-int(label.sum()) :]
     colours = shown.reshape(-1, shown.shape[2])[first]
     return _Found(numbers, tuple(map(int, known[label])), colours, shown, np.zeros((0, 0), dtype=int))
+
+
+def _half_covered(place: np.ndarray, label: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """(n,) bool array: which values are mixed of two labels, and lie beside both, as at an antialiased border.
+
+    Parameters
+    ----------
+    place : (height, width) int array
+        The value of each pixel by its number.
+    label : (n,) bool array
+        Which two values are labels.
+    shown : (height, width, 1 or 3) array
+    """
+    from scipy import ndimage
+
+    colours = shown.reshape(-1, shown.shape[2])[np.unique(place.ravel(), return_index=True)[1]]
+    one, other = colours[label]
+    mixed = np.abs(colours - one).sum(axis=1) + np.abs(colours - other).sum(axis=1) <= np.abs(one - other).sum()
+    beside = [ndimage.maximum_filter(place == k, 5) for k in np.flatnonzero(label)]
+    both = np.bincount(place[beside[0] & beside[1]], minlength=len(label))
+    result: np.ndarray = mixed & (both > 0.5 * np.bincount(place.ravel(), minlength=len(label)))
+    return result
 
 
 def _of_noise(image: Image.Image) -> _Found:
     """Find the colours of a noisy image."""
     from scipy import ndimage
 
+    if image.mode in ("I", "F") or image.mode.startswith("I;16"):
+        # As 8 bits Pillow takes what is above 255 for white.
+        deep = np.asarray(image).astype(float)
+        image = Image.fromarray(np.round(255.0 * (deep - deep.min()) / max(np.ptp(deep), 1.0)).astype(np.uint8))
     rgb = np.asarray(image.convert("RGB")).astype(np.int16)
     flat = (ndimage.maximum_filter(rgb, (3, 3, 1)) - ndimage.minimum_filter(rgb, (3, 3, 1))).max(axis=2) <= FLAT
     pieces, n = ndimage.label(flat)

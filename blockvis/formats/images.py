@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +70,8 @@ def opened(path: Path) -> tuple[Image.Image, Mapping[int, Any]]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(path)
+            # Of files by name Pillow maps TIFFs into memory, and shears those that lie on their side.
+            image = Image.open(BytesIO(path.read_bytes()))
         width, height = image.size
         if width * height > MOST_PIXELS:
             raise ValueError(

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.layout.left_out import LeftOut
+from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, Note
+from blockvis.layout.outlines import ring_width
 from solver.mechanics import counted
 
 #: Lines are intersected on a grid of this fraction of the size of the drawing.
@@ -23,6 +24,13 @@ MEETS = 1e-4
 
 #: An end moves at most by this fraction of the length of its line.
 SHORTENED = 0.05
+
+#: A face is a strip of mortar if it is narrower than this fraction of the typical stone, by area, and has stones along
+#: this share of its border: along both long sides.
+STRIP, BETWEEN = 0.25, 0.7
+
+#: From this number and share of the faces on, strips are joints drawn as pairs of lines.
+LEAST_STRIPS, MOSTLY = 3, 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -73,7 +81,11 @@ class Faces:
 
 
 def faces_of_lines(
-    lines: Sequence[Line], outlines: Sequence[np.ndarray], offs: Sequence[float], ignored: Set[int] = frozenset()
+    lines: Sequence[Line],
+    outlines: Sequence[np.ndarray],
+    offs: Sequence[float],
+    ignored: Set[int] = frozenset(),
+    only: Sequence[str] = (),
 ) -> Faces:
     """Find the faces between lines, and the pieces into which they cut outlines.
 
@@ -87,11 +99,14 @@ def faces_of_lines(
     ignored : set of int, optional
         Numbers of the outlines that will be left out: lines may end on them within another, as at openings; those that
         lines cross are as if they were not there.
+    only : sequence of str
+        What the caller asks for: where that is faces, strips of mortar stay.
 
     Notes
     -----
     Lines cut an outline if they lie within it and it has two or more pieces along its border then; a line that reaches
     beyond, as an axis or a dimension does, cuts nothing. An outline around lines that do not reach it stays whole.
+    Joints may be drawn as pairs of lines: the strips between them are left out as mortar.
     """
     import shapely
     from scipy.spatial import cKDTree
@@ -107,16 +122,19 @@ def faces_of_lines(
     flat += [np.concatenate([outlines[i], outlines[i][:1]]) for i in usable]
     flat = _joined(flat, len(lines), [*(line.off for line in lines), *(offs[i] for i in usable)], size, found)
     segments = shapely.set_precision([shapely.LineString(points) for points in flat[: len(lines)]], GRID * size)
-    cutting = _cut_outlines(dict(zip(usable, flat[len(lines) :], strict=True)), ignored, segments, every, size, found)
+    outlined = dict(zip(usable, flat[len(lines) :], strict=True))
+    cutting, openings = _cut_outlines(outlined, ignored, segments, every, size, found)
     rest = [k for k in range(len(lines)) if k not in cutting]
     _add_faces([lines[k] for k in rest], [segments[k] for k in rest], kept, every, size, found)
+    mortar = [] if matches(["face"], only) else _without_mortar(found, 4 * GRID * size)
+    found.notes += [*_cut_notes(found, len(cutting), openings), *mortar]
     return found
 
 
 def _cut_outlines(
     outlines: dict[int, np.ndarray], ignored: Set[int], segments: Any, every: Any, size: float, found: Faces
-) -> set[int]:
-    """Cut outlines, by their numbers, along the lines within them; numbers of the lines that cut one."""
+) -> tuple[set[int], set[int]]:
+    """Cut outlines, by their numbers, along the lines within them; numbers of these lines, and of outlines cut out."""
     import shapely
 
     cutting, openings = set[int](), set[int]()
@@ -143,15 +161,59 @@ def _cut_outlines(
         if pieces:
             found.pieces[i] = [_sharpened(piece, every, GRID * size) for piece in pieces]
             cutting |= set(inside)
-    if found.pieces:
-        n = sum(map(len, found.pieces.values()))
-        around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
-        said = f"cut: {counted(len(cutting), 'line')} within {around} into {counted(n, 'block')}"
-        if openings:
-            around = counted(len(openings), "outline")
-            said += f" around {around}, a block too: ignore it by its name if it is an opening"
-        found.notes.append(Note(CHANGED, f"{said}; leave their layer out (ignore) if they are no joints"))
-    return cutting
+    return cutting, openings
+
+
+def _cut_notes(found: Faces, n_lines: int, openings: Set[int]) -> list[Note]:
+    """Say how many lines cut outlines, into how many blocks, and around which that may be openings."""
+    if not found.pieces:
+        return []
+    n = sum(map(len, found.pieces.values()))
+    around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
+    said = f"cut: {counted(n_lines, 'line')} within {around} into {counted(n, 'block')}"
+    if openings:
+        around = counted(len(openings), "outline")
+        said += f" around {around}, a block too: ignore it by its name if it is an opening"
+    return [Note(CHANGED, f"{said}; leave their layer out (ignore) if they are no joints")]
+
+
+def _without_mortar(found: Faces, reach: float) -> list[Note]:
+    """Leave out the strips between pairs of lines, if they are as many as joints are, and say so; else doubt them."""
+    import shapely
+
+    every = [*((-1, ring) for ring in found.rings), *((i, ring) for i, own in found.pieces.items() for ring in own)]
+    if not every:
+        return []
+    shapes = np.array([shapely.Polygon(ring) for _, ring in every], dtype=object)
+    widths, areas = np.array([ring_width(ring) for _, ring in every]), shapely.area(shapes)
+    order = np.argsort(widths)
+    thin = widths < STRIP * widths[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())]
+    i, j = shapely.STRtree(shapes).query(shapes[thin], "dwithin", reach)
+    i = np.flatnonzero(thin)[i]
+    beside, borders = shapely.buffer(shapes, reach), shapely.get_exterior_ring(shapes)
+    along = shapely.length(shapely.intersection(borders[i], beside[j])) * (i != j)
+    length, strip = shapely.length(borders), np.zeros(len(every), dtype=bool)
+    # Where strips cross, what they share lies between strips.
+    for _ in range(2):
+        strip = np.bincount(i, along * (~thin | strip)[j], len(every)) > BETWEEN * length
+    if not strip.any():
+        return []
+    half = length[strip] / 2.0
+    across = float(np.median(half - np.sqrt(np.maximum(half**2 - 4.0 * areas[strip], 0.0)))) / 2.0
+    x, y = every[int(strip.argmax())][1].mean(axis=0)
+    words = f"mortar: {counted(int(strip.sum()), 'strip')} {across:.3g} units wide between larger faces"
+    if strip.sum() < max(LEAST_STRIPS, MOSTLY * len(every)):
+        said = "count as blocks; if they are mortar, draw each joint as one line or leave them out (ignore)"
+        return [Note(CHANGED, f"{words}, the first around ({x:.6g}, {y:.6g}), {said}")]
+    for k in np.flatnonzero(strip):
+        found.left_out.append(LeftOut("mortar", every[k][1], "the faces between pairs of lines are mortar"))
+    kept = [one for k, one in enumerate(every) if not strip[k]]
+    layers = found.layers
+    found.layers = [layers[k] for k in range(len(found.rings)) if not strip[k]]
+    found.rings = [ring for i, ring in kept if i < 0]
+    found.pieces = {i: [ring for k, ring in kept if k == i] for i in found.pieces}
+    said = 'are taken for joints drawn as pairs of lines; joint_thickness = "auto" closes them, only = "*" keeps them'
+    return [Note(CHANGED, f"{words} {said} as blocks")]
 
 
 def joined_ends(points: np.ndarray) -> tuple[np.ndarray, float] | None:

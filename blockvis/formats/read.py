@@ -74,9 +74,10 @@ def read_layout(
         Coordinates that become x and y, of drawings in space; by default those in which the blocks lie side by side.
     ignore, only : str or sequence of str, optional
         Layers, groups, materials and names, or patterns of them (``"dim*"``), that are left out, and beside which all
-        others are left out. What ``only`` names is not left out for looking like a frame, a title block or mortar. Of
-        drawings also kinds of entities (``"circle"``, ``"hatch"``) and colours (``"#ff0000"``; of .dxf also a number of
-        AutoCAD's), where no layer or name is called so.
+        others are left out. What ``only`` names is not left out for looking like a frame, a title block or mortar, but
+        strips between pairs of lines stay for ``"*"`` alone. Of drawings also kinds of entities (``"circle"``,
+        ``"hatch"``) and colours (``"#ff0000"``; of .dxf also a number of AutoCAD's), where no layer or name is called
+        so.
     window : sequence of float, optional [m]
         x0, y0, x1, y1 of what is read of a drawing in the plane, in the coordinates of the layout. What crosses its
         edge is left out.

@@ -152,7 +152,7 @@ def _root(path: Path) -> ElementTree.Element:
 def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     """Leave out what is not wanted, add the faces between loose lines, cut outlines along the lines within them."""
     wanted, ignored = _wanted_lines(found, reading)
-    faces = faces_of_lines(wanted, found.rings, found.offs, ignored)
+    faces = faces_of_lines(wanted, found.rings, found.offs, ignored, reading.only)
     found.left_out += faces.left_out
     for k in sorted({*faces.pieces, *ignored}, reverse=True):
         ring, row, looks = found.rings.pop(k), found.rows.pop(k), found.looks.pop(k)

@@ -60,6 +60,11 @@ def dome(
     57
     """
     radius, thickness = above_zero("radius", radius), thickness_over_radius(thickness_ratio) * radius
+    if thickness > radius:
+        raise ValueError(
+            f"thickness_ratio is {thickness_ratio:g}; give at most 1: the springers, twice as thick as the dome, end "
+            "at its axis"
+        )
     cap, springing = above_zero("cap", cap, "degrees"), above_zero("springing", springing, "degrees")
     n, rings = whole("lunes", lunes, 3, MOST_LUNES), whole("courses", courses, 1)
     if not cap < springing <= 90.0:

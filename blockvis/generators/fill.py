@@ -26,7 +26,7 @@ CLOSER = 0.3
 #: What is smaller than this fraction of a brick and has no brick beside it is joined to a head.
 CRUMB = 0.1
 
-#: Corners lie on a grid of this fraction of the size of the wall.
+#: Corners lie on a grid of this fraction of the size of the wall, or of the last digit of its place.
 GRID = 1e-12
 
 #: An opening has wall over it where a strip of this fraction of a course over its top is wall at all.
@@ -218,7 +218,7 @@ def filled(
             f"opening {outside + 1} around ({x:.6g}, {y:.6g}) lies outside its wall; move it, or leave it out"
         )
     length, height = pattern.module
-    grid = GRID * max(*wall.bounds[2:], length)
+    grid = max(GRID * max(*wall.bounds[2:], length), float(np.spacing(np.abs(corner)).max()))
     solid = shapely.Polygon(wall.exterior)
     holes = _apart([*holes, *map(shapely.Polygon, wall.interiors), *_notches(solid, grid)])
     rest = wall if taken is None else shapely.difference(wall, _shifted(taken, -corner), grid_size=grid)
@@ -452,7 +452,9 @@ def _with_mortar(stones: list[tuple[str, shapely.Polygon]], joint: float) -> lis
     tree = shapely.STRtree(shapes)
     reduced = []
     for i, (name, shape) in enumerate(stones):
-        beside = shapely.union_all([shapes[j] for j in tree.query(shape, "intersects").tolist() if j != i])
+        # Neighbours along an oblique edge are a rounding error apart.
+        near = tree.query(shape, "dwithin", distance=1e-6 * joint).tolist()
+        beside = shapely.union_all([shapes[j] for j in near if j != i])
         reach = shape.buffer(joint, join_style="mitre")
         free = shapely.difference(reach, beside)
         drawn = shapely.intersection(free.buffer(-joint / 2.0, join_style="mitre"), shape)

@@ -188,6 +188,13 @@ def facade(
             f"bricks is {n}, too few for {windows} windows of {span:g} bricks with a brick between them; give at least "
             f"{int(np.ceil(windows * span + windows + 1))}"
         )
+    # A storey up to the crown of its arches, in courses.
+    storey_high = sill + high + (rise + length) / course
+    if windows and (storeys - 1) * (rows // storeys) + storey_high > rows * (1.0 + 1e-9):
+        raise ValueError(
+            f"courses is {rows}, too few for {storeys} storeys of {storey_high:.4g} courses to the crown of their "
+            f"arches; give at least {storeys * int(np.ceil(storey_high))}"
+        )
     openings = [
         {
             "x": length * round(2.0 * (pier + i * (pier + span))) / 2.0,

@@ -138,6 +138,60 @@ def test_antialiased_and_lossy_labels_are_those_of_the_exact_image(tmp_path, los
     assert "have no label's value, as at antialiased or lossy borders" in out
 
 
+@pytest.mark.parametrize(("stone", "joint"), [(255, 0), (0, 255), ("#a03020", "#f0e0d0")])
+@pytest.mark.parametrize("gap", [9, 11, 14])
+def test_borders_parallel_to_the_pixels_are_of_no_label_when_half_covered(tmp_path, stone, joint, gap):
+    mode = "L" if isinstance(stone, int) else "RGB"
+    drawn, n = drawn_wall()
+    # Four times as fine, with joints of gap / 4 pixels, and averaged.
+    large = Image.new(mode, (1200, 640), joint)
+    draw = ImageDraw.Draw(large)
+    for left, low, right, high in _boxes(drawn):
+        draw.rectangle((4 * left - gap // 2, 4 * low, 4 * right + 8 - gap, 4 * high + 15 - gap), fill=stone)
+    image = large.resize(drawn.size, Image.Resampling.BOX)
+    image.save(tmp_path / "wall.png")
+    layout = read_layout(tmp_path / "wall.png", width=3.0)
+    assert layout.n_blocks == n
+    assert "a mask of stones" in layout.notes[0]
+
+
+def _boxes(image):
+    from scipy import ndimage
+
+    labels, _ = ndimage.label(np.asarray(image) > 0)
+    return [(x.start, y.start, x.stop, y.stop) for y, x in ndimage.find_objects(labels)]
+
+
+def test_lines_of_grey_between_stones_of_a_mask_stay_lines(tmp_path):
+    image = Image.new("L", (120, 80), 0)
+    draw = ImageDraw.Draw(image)
+    draw.rectangle((20, 20, 99, 59), fill=255)
+    for x in (40, 60, 80):
+        draw.rectangle((x, 20, x + 1, 59), fill=128)
+    image.save(tmp_path / "wall.png")
+    assert read_layout(tmp_path / "wall.png", width=1.2, background=0).groups.count("label 255") == 4
+
+
+@pytest.mark.parametrize("ending", ["png", "tif"])
+def test_a_noisy_mask_of_16_bits_is_that_of_8(tmp_path, ending):
+    image, n = drawn_wall(gap=6)
+    turned = np.asarray(image.rotate(3, Image.Resampling.BICUBIC, expand=True)).astype(float)
+    values = 3000 + 200 * turned + np.random.default_rng(1).normal(0, 600, turned.shape)
+    Image.fromarray(values.clip(0, 65535).astype(np.uint16)).save(tmp_path / f"wall.{ending}")
+    layout = read_layout(tmp_path / f"wall.{ending}", pixel=0.01)
+    assert layout.n_blocks == n
+    assert float((layout.sizes**2).sum()) == pytest.approx((turned > 127).sum() * 1e-4, rel=0.02)
+
+
+def test_a_tiff_on_its_side_is_turned(tmp_path):
+    image, n = drawn_wall()
+    turned = image.transpose(Image.Transpose.ROTATE_90)
+    turned.save(tmp_path / "wall.tif", tiffinfo={274: 6})
+    layout = read_layout(tmp_path / "wall.tif", width=3.0)
+    assert layout.n_blocks == n
+    assert float((layout.sizes**2).sum()) == pytest.approx((np.asarray(image) > 0).sum() * 1e-4)
+
+
 def test_a_noisy_mask_is_that_of_the_exact_image(tmp_path):
     image, n = drawn_wall(gap=4)
     image.save(tmp_path / "wall.jpg", quality=50)

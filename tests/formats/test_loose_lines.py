@@ -1,6 +1,7 @@
 """Outlines cut by joint lines, ends that miss by little, and what is said where nothing closes."""
 
 import math
+from contextlib import nullcontext
 
 import ezdxf
 import numpy as np
@@ -242,6 +243,57 @@ def test_joints_that_end_on_slanted_beds_cut_them(tmp_path):
     drawing = read_layout(dxf(tmp_path, lambda space: [space.add_line(a, b) for a, b in lines]))
     assert drawing.n_blocks == len(cuts) - 1
     assert not any("joined" in note for note in drawing.notes)
+
+
+def pairs_of_lines(space, half, framed):
+    """A wall of 6 courses with joints of twice ``half``; without a frame the beds are open at their ends."""
+    if framed:
+        space.add_lwpolyline([(0, 0), (3200, 0), (3200, 1200), (0, 1200)], close=True)
+    else:
+        for y in (0, 1200):
+            space.add_line((0, y), (3200, y))
+    sides = sorted({-half, half})
+    for c in range(6):
+        low, high = 200 * c + (half if c else 0), 200 * c + 200 - (half if c < 5 else 0)
+        for x in range(200 if c % 2 else 400, 3200, 400):
+            for side in sides:
+                space.add_line((x + side, low), (x + side, high))
+        for side in sides if c else ():
+            space.add_line((0, 200 * c + side), (3200, 200 * c + side))
+        if not framed:
+            for x in (0, 3200):
+                space.add_line((x, low), (x, high))
+
+
+@pytest.mark.parametrize("framed", [True, False])
+@pytest.mark.parametrize("half", [0, 5, 10])
+def test_mortar_drawn_as_pairs_of_lines_is_no_block(tmp_path, framed, half):
+    path = dxf(tmp_path, lambda space: pairs_of_lines(space, half, framed))
+    drawing = read_layout(path)
+    assert drawing.n_blocks == 51
+    mortar = [note for note in drawing.notes if note.startswith("mortar:")]
+    strips = 50 if framed else 45
+    assert [note[:34] for note in mortar] == [f"mortar: {strips} strips {2 * half} units wide be"[:34]] * (half > 0)
+    assert [item.kind for item in drawing.left_out] == ["mortar"] * strips * (half > 0)
+    with pytest.warns(UserWarning, match="mortar: ") if half else nullcontext():
+        assembly = read(path, joint_thickness="auto")
+    # The outermost courses are half a joint thicker where no frame closes the ends of the beds.
+    assert assembly.areas.sum() == pytest.approx(3.84, rel=1e-3)
+    if half:
+        for only, n in (("*", 51 + strips), ("0", 51)):
+            assert read_layout(path, only=only).n_blocks == n
+
+
+def test_few_strips_between_lines_stay_blocks_and_are_told(tmp_path):
+    levels = (0, 200, 400, 410, 610)
+    lines = [((0, y), (1000, y)) for y in levels] + [((x, 0), (x, 610)) for x in (0, 1000)]
+    lines += [((500, y), (500, y + 200)) for y in (0, 200, 410)]
+    drawing = read_layout(dxf(tmp_path, lambda space: [space.add_line(a, b) for a, b in lines]))
+    assert drawing.n_blocks == 7
+    assert any(
+        "mortar: 1 strip 10 units wide between larger faces, the first around (500, 405)" in note
+        for note in drawing.notes
+    )
 
 
 def test_an_outline_whose_ends_miss_by_little_is_closed_with_a_note(tmp_path):

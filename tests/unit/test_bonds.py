@@ -172,6 +172,33 @@ def test_mortar_is_left_open_between_stones_and_not_along_the_rim():
     assert shapely.union_all(shapes_of(layout)).bounds == pytest.approx(WALL.bounds)
 
 
+@pytest.mark.parametrize(("bond", "heads"), [("ashlar", "auto"), ("flemish", "arch")])
+def test_mortar_is_left_open_between_stones_and_voussoirs(bond, heads):
+    # A round head, whose voussoirs have oblique faces that no stone beside them meets to the last digit.
+    turn = np.linspace(0.0, np.pi, 25)
+    head = np.column_stack([2.0 + 0.5 * np.cos(turn), 1.6 + 0.5 * np.sin(turn)])
+    window = shapely.Polygon([(1.5, 0.8), (2.5, 0.8), *head])
+    quoins, brick = ((0.6, 0.3), (0.5, 0.3)) if bond == "ashlar" else (None, (0.25, 0.075))
+    layout = generators.bond(
+        shapely.box(0, 0, 4, 3), [window], bond=bond, heads=heads, brick=brick, quoins=quoins, joint=0.008
+    )
+    shapes = shapes_of(layout)
+    pairs = shapely.STRtree(shapes).query(shapes, "dwithin", 0.02).T
+    # Where corners of three stones meet they may be nearer than their faces.
+    assert min(shapes[i].distance(shapes[j]) for i, j in pairs if i < j) > 0.7 * 0.008
+
+
+@pytest.mark.parametrize(("bond", "heads"), [("running", "auto"), ("flemish", "arch")])
+def test_stones_far_from_the_origin_have_no_corner_twice(bond, heads):
+    window = arched(1.5, 0.8, 1.0, 0.8, 0.5)
+    wall, opening = (
+        shapely.transform(shape, lambda xy: xy + np.array([123456.7, 5e6]))
+        for shape in (shapely.box(0, 0, 4, 3), window)
+    )
+    layout = generators.bond(wall, [opening], bond=bond, heads=heads, brick=(0.25, 0.1))
+    assert all(shape.is_valid for shape in shapes_of(layout))
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [

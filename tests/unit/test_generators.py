@@ -296,6 +296,7 @@ WALL = {"bricks": 12, "courses": 12}
         ("wal", {}, "there is no layout 'wal' .did you mean 'wall'"),
         ("portal", {"spam": 1}, "layout 'portal' has no 'spam' .did you mean 'span'"),
         ("portal", {"span": "wide"}, "span is 'wide'; give a finite number in m"),
+        ("facade", {"storeys": 3}, "courses is 48, too few for 3 storeys of 21.5 courses .*; give at least 66"),
         ("portal", {"span": -2}, "span is -2 m; give a number above 0"),
         ("column", {"blocks": 2.5}, "blocks is 2.5; give a whole number of at least 1"),
         ("arch", {"embrace": 200}, "embrace is 200 degrees"),

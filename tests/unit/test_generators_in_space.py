@@ -64,6 +64,7 @@ def test_the_dome_is_what_the_reference_values_are_for():
         ({"oculus": "no"}, "oculus is 'no'; give true or false"),
         ({"cap": 95.0}, "cap is 95 and springing 90 degrees"),
         ({"thickness_ratio": 0.0}, "thickness_ratio is 0"),
+        ({"thickness_ratio": 1.2}, "thickness_ratio is 1.2; give at most 1"),
         ({"radius": -1.0}, "radius is -1 m; give a number above 0"),
     ],
 )
