@@ -10,6 +10,7 @@ import io
 import json
 import math
 import os
+import signal
 import sys
 import time
 import warnings
@@ -30,7 +31,7 @@ from .layout.sights import SIGHTS
 from .layout.views import VIEWS
 from .system.extras import MissingExtra
 from .system.processes import is_broken_pipe
-from .text import nearest
+from .text import nearest, resume_command
 
 if TYPE_CHECKING:
     from .cases.contents import Case
@@ -149,6 +150,9 @@ def entry() -> None:
         code = 0
     # Python looks through all that is left as it ends, for a quarter of a second; nothing of it needs that.
     gc.freeze()
+    if code == INTERRUPTED:
+        # Workers of a study end with the process; a second Ctrl-C would break off their ending, with a traceback.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.exit(code)
 
 
@@ -737,7 +741,7 @@ def _report_ending(options: argparse.Namespace, run: Run, checking: StepChecking
         print(f"blockvis: everything but the pictures is written: {problem}", file=sys.stderr)
     stop = run.response.stop
     if stop is solver.Status.INTERRUPTED:
-        print(f"blockvis: go on with it by blockvis run --resume {run.folder}", file=sys.stderr)
+        print(f"blockvis: go on with it by {resume_command(run.folder)}", file=sys.stderr)
         return INTERRUPTED
     _say_error(options, run, checking, max(PATIENCE * (time.perf_counter() - started), LEAST_PATIENCE))
     _say_range(options, run)
@@ -804,7 +808,7 @@ def _say_range(options: argparse.Namespace, run: Run) -> None:
         about = math.ceil(runs / at_once) * seconds
         print(
             f"blockvis: range: {runs} more runs, {at_once} at a time, about {about:.0f} s; Ctrl-C leaves them, "
-            f"blockvis run --resume {run.folder} --range makes them later",
+            f"{resume_command(run.folder)} --range makes them later",
             file=sys.stderr,
         )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -213,6 +214,17 @@ def files_like(path: Path, pattern: str = "*", *, or_any: bool = False) -> list[
     beside = sorted(entry.name for entry in path.parent.glob(pattern)) if path.parent.is_dir() else []
     near = difflib.get_close_matches(path.name, beside, n=3, cutoff=0.4 if or_any else 0.6)
     return near or (beside[:3] if or_any else [])
+
+
+def resume_command(folder: str | Path) -> str:
+    """Write the command by which a run goes on, as a shell takes it.
+
+    Examples
+    --------
+    >>> resume_command("bridge 2")
+    "blockvis run --resume 'bridge 2'"
+    """
+    return shlex.join(["blockvis", "run", "--resume", str(folder)])
 
 
 def refuse_unknown(given: Iterable[str], known: Sequence[str], where: str) -> None:

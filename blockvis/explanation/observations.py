@@ -16,6 +16,7 @@ import shapely
 from scipy.optimize import linear_sum_assignment
 
 import solver
+from blockvis.cases.block_at import distances_to
 from blockvis.cases.toml_table import Table, shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
@@ -24,7 +25,7 @@ from blockvis.text import files_like, nearest, place_text
 from solver.mechanics import counted
 
 from .observation_keys import COLUMNS, LENGTHS, OBSERVATION
-from .places import corners_of, nearest_block, on_faces
+from .places import corners_of, on_faces
 
 #: Uncertainty of a width, as a fraction of it, and the least [m], where the observations give none.
 WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4
@@ -32,7 +33,7 @@ WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4
 #: Uncertainty of a displaced point [m] where the observations give none.
 POINT_UNCERTAINTY = 1e-3
 
-#: A crack farther than this from any joint, in block sizes, is a mistake in its coordinates or their unit.
+#: A place farther than this from its joint or block, in block sizes, is a mistake in its coordinates or their unit.
 FARTHEST = 2.0
 
 #: A width of more than this, in block sizes, is a mistake in its unit.
@@ -43,6 +44,9 @@ FARTHEST_POINT = 0.3
 
 #: Blocks of a drawing of the damaged state have moved by less than this, in block sizes, or are others.
 FARTHEST_BLOCK = 1.5
+
+#: A width [m] below this nobody can measure.
+LEAST_WIDTH = 5e-5
 
 #: Metres per unit of a column.
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
@@ -395,6 +399,7 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
             place = np.array([cells.number(axis) for axis in axes], dtype=float)
             away, weights = on_faces(place[None], joints)
             joint = int(np.argmin(np.where(between, away[0], np.inf)))
+            _check_place(place, float(away[0, joint]), f"'{label}'", cells, assembly)
             nearest_place = weights[0, joint] @ joints.rings.points[corners_of(joints)[joint]]
             return nearest_place, True, False, f"{label} at {place_text(place)}"
         sizes = joints.sizes[between]
@@ -403,15 +408,19 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
     if missing is not None:
         raise cells.error(missing, "is missing; give the place of the crack, or the joint")
     place = np.array([cells.number(axis) for axis in axes], dtype=float)
-    away = on_faces(place[None], joints)[0].min(initial=np.inf)
+    _check_place(place, float(on_faces(place[None], joints)[0].min(initial=np.inf)), "any joint", cells, assembly)
+    return place, False, False, place_text(place)
+
+
+def _check_place(place: np.ndarray, away: float, what: str, cells: _Cells, assembly: solver.Assembly) -> None:
+    """Refuse a place that is so far away [m] from what it is of that it is a mistake."""
     if away > FARTHEST * assembly.block_size:
         low, high = assembly.vertices.min(axis=0), assembly.vertices.max(axis=0)
         raise cells.error(
             "x",
-            f"and {' and '.join(axes[1:])} are {place_text(place, 6)} m, {away:.3g} m from any joint; the blocks lie "
-            f"between {place_text(low)} and {place_text(high)} m: check the unit",
+            f"and {' and '.join('yz'[: len(place) - 1])} are {place_text(place, 6)} m, {away:.3g} m from {what}; the "
+            f"blocks lie between {place_text(low)} and {place_text(high)} m: check the unit",
         )
-    return place, False, False, place_text(place)
 
 
 def _block(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> int:
@@ -429,14 +438,16 @@ def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray,
     if all(value is None for value in (*moved, *there)):
         return None
     place, name = [cells.number(axis) for axis in axes], cells.text("block")
-    if name:
-        block = _block(name, "block", cells, assembly)
-        point = assembly.centroids[block] if None in place else np.array(place, dtype=float)
-    elif None not in place:
-        point = np.array(place, dtype=float)
-        block = nearest_block(assembly, point)
-    else:
+    if not name and None in place:
         raise cells.error("block", f"is missing; give the block, or {_listed(axes)}, of the displaced point")
+    block = _block(name, "block", cells, assembly) if name else -1
+    if None in place:
+        point = assembly.centroids[block]
+    else:
+        point = np.array(place, dtype=float)
+        away = distances_to(assembly, point)
+        block = block if name else int(np.argmin(away))
+        _check_place(point, float(away[block]), f"'{name}'" if name else "any block", cells, assembly)
     if None not in there:
         displaced = np.array(there, dtype=float) - point
     elif None not in moved:
@@ -468,6 +479,7 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
     pose = solver.Pose.initial(assembly)
     for block, drawn in partner.items():
         pose.positions[block], pose.rotations[block] = _moved(assembly, block, np.asarray(layout.outlines[drawn]))
+    _check_moved(pose.positions - assembly.centroids, sorted(partner), assembly, path)
     lost = [name for i, name in enumerate(assembly.names) if i not in partner and assembly.free[i]]
     if lost:
         shown = ", ".join(f"'{name}'" for name in lost[:6]) + (" ..." if len(lost) > 6 else "")
@@ -476,7 +488,9 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
         )
         warnings.warn(f"{path}: {missing} nothing ({shown})", stacklevel=4)
     joints = initial_joints(assembly)
-    opening = np.maximum(opening_and_slip(assembly, joints, pose)[:, 0], 0.0)
+    opening = opening_and_slip(assembly, joints, pose)[:, 0]
+    # Joints that are closed but for the rounding of the drawing's numbers would be told and drawn as cracks.
+    opening[opening < LEAST_WIDTH] = 0.0
     known = np.zeros(assembly.n_blocks, dtype=bool)
     known[list(partner)] = True
     sigma = POINT_UNCERTAINTY
@@ -496,6 +510,25 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
         for i in sorted(partner)
     ]
     return _observations(widths, points, str(path), 2)
+
+
+def _check_moved(moved: np.ndarray, known: list[int], assembly: solver.Assembly, path: Path) -> None:
+    """Refuse a drawing with another origin, or with blocks that are not those of their names."""
+    far, shift = np.linalg.norm(moved, axis=1), moved[known].mean(axis=0)
+    apart = np.linalg.norm(moved[known] - shift, axis=1).max()
+    # Without all of its supports, a drawing of a part may have moved nearly as one.
+    supported = set(np.flatnonzero(~assembly.free)) <= set(known)
+    if supported and far[known].min() > max(apart, POINT_UNCERTAINTY):
+        raise ValueError(
+            f"{path}: its blocks, supports too, lie about {place_text(shift, 3)} m beside those of the case, and what "
+            "all have in common opens no joint; move it: a support that stands still lies where the case draws it"
+        )
+    lost = [block for block in known if far[block] > FARTHEST_BLOCK * assembly.block_size]
+    if lost:
+        shown = ", ".join(f"'{assembly.names[k]}' {far[k]:.3g} m" for k in lost[:6]) + (" ..." if len(lost) > 6 else "")
+        raise ValueError(
+            f"{path}: puts {shown} from where the case draws it; check names that are swapped, the origin and the unit"
+        )
 
 
 def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: solver.Assembly) -> dict[int, int]:

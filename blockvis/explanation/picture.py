@@ -14,6 +14,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.text import Annotation
+from matplotlib.transforms import BboxBase
 
 import solver
 from blockvis.pictures import palette
@@ -86,16 +88,20 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     FigureCanvasAgg(figure)
     axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False).ravel())
     canvases = [_Canvas(panel, assembly, frame, view) for panel in axes]
-    _observed(canvases[0], found)
+    labels = [_observed(canvases[0], found)]
     for number, (canvas, cause, pose, there, factor) in enumerate(
         zip(canvases[1:], causes, poses, shown, factors, strict=True), start=1
     ):
-        _computed(canvas, found, cause, pose, there, number, factor)
+        labels.append(_computed(canvas, found, cause, pose, there, number, factor))
     for panel in axes:
         panel.set_xlim(frame.low[0], frame.high[0])
         panel.set_ylim(frame.low[1], frame.high[1])
         panel.set_aspect("equal")
         panel.set_axis_off()
+    # How wide a text is in the drawing, is known when the panels have their sizes.
+    figure.draw_without_rendering()
+    for own in labels:
+        _uncover(own)
     path = Path(path)
     with atomic_file(path) as partial:
         figure.savefig(partial, dpi=DPI, facecolor="white")
@@ -196,7 +202,8 @@ class _Canvas:
         self.panel.imshow(np.asarray(picture), extent=extent, zorder=2)
 
 
-def _observed(canvas: _Canvas, found: Explanation) -> None:
+def _observed(canvas: _Canvas, found: Explanation) -> list[Annotation]:
+    """Draw what was observed; gives the labels of widths."""
     given, assembly, panel = found.observations, found.assembly, canvas.panel
     rings, opened = found.comparison.joints.rings, given.widths > 0.0
     lines, thick = [], []
@@ -210,7 +217,7 @@ def _observed(canvas: _Canvas, found: Explanation) -> None:
     canvas.compass()
     places = canvas.placed(given.places)
     panel.plot(*places[~opened].T, "o", ms=4.5, mfc="white", mec=palette.hexadecimal(palette.FAINT), zorder=4)
-    _labels(panel, places, given.widths, found, sizes=given.widths)
+    labels = _labels(panel, places, given.widths, found, sizes=given.widths)
     points = canvas.placed(given.points)
     strange = np.concatenate([places[list(found.unexplained)], points[list(found.unexplained_points)]])
     panel.plot(*strange.T, "o", ms=17, mfc="none", mec=palette.hexadecimal(palette.WARNING), mew=1.6, zorder=6)
@@ -226,6 +233,7 @@ def _observed(canvas: _Canvas, found: Explanation) -> None:
             fontsize=TEXT,
             color=palette.hexadecimal(palette.WARNING),
         )
+    return labels
 
 
 def _computed(
@@ -236,7 +244,8 @@ def _computed(
     shown: solver.Pose,
     number: int,
     factor: float,
-) -> None:
+) -> list[Annotation]:
+    """Draw what a cause makes; gives the labels, that of the next measurement first."""
     assembly, compared, given, panel = found.assembly, found.comparison, found.observations, canvas.panel
     rings = compared.joints.rings
     opening = compared.largest_openings(cause.best.openings(np.array([cause.at])))[0]
@@ -248,16 +257,17 @@ def _computed(
     filled = np.stack([faces.on_a[start], faces.on_a[stop], faces.on_b[stop], faces.on_b[start]], axis=1)
     canvas.blocks(shown, [], [], filled)
     between = rings.at((faces.on_a + faces.on_b) / 2.0)
+    labels: list[Annotation] = []
     if len(given.widths):
         pairs = cause.best.pairs[cause.at]
         corners = between.points[compared.corners[compared.joint[pairs]]]
         places = canvas.placed((corners * compared.weights[pairs][..., None]).sum(axis=1))
-        _labels(panel, places, cause.best.widths[cause.at], found, sizes=given.widths)
+        labels = _labels(panel, places, cause.best.widths[cause.at], found, sizes=given.widths)
     measurement = found.next_measurement
     if measurement is not None:
         x, y = canvas.placed(between.middles()[[measurement.joint]])[0]
         panel.plot(x, y, "D", ms=8, mfc="white", mec=palette.hexadecimal(palette.FORCE), mew=1.8, zorder=7)
-        panel.annotate(
+        here = panel.annotate(
             f"measure here: {width_text(float(opening[measurement.joint]))}",
             (x, y),
             xytext=(7, 7),
@@ -267,6 +277,7 @@ def _computed(
             bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none"},
             zorder=8,
         )
+        labels.insert(0, here)
     moving = [assembly.index(name) for name in cause.best.candidate.motions]
     moved = canvas.placed((pose.positions - assembly.centroids)[moving])
     if np.hypot(*moved.T).max(initial=0.0) > 0.0 and not cause.best.candidate.turns:
@@ -279,6 +290,7 @@ def _computed(
         fontsize=TEXT + 1,
         color=palette.hexadecimal(palette.INK),
     )
+    return labels
 
 
 def _tops(assembly: solver.Assembly, blocks: Sequence[int], pose: solver.Pose) -> np.ndarray:
@@ -319,18 +331,11 @@ def _labels(
     found: Explanation,
     *,
     sizes: np.ndarray,
-) -> None:
+) -> list[Annotation]:
     """Write widths in mm at places (n, 2) of open joints, the widest first, and where one opens that was closed."""
     least = 0.05 * found.observations.largest
     order = np.argsort(-np.maximum(sizes, widths), kind="stable")
-    written: list[np.ndarray] = []
-    apart = 0.35 * found.assembly.block_size
-    for k in order.tolist():
-        if max(sizes[k], widths[k]) <= least or len(written) == MOST_LABELS:
-            continue
-        if any(np.hypot(*(places[k] - other)) < apart for other in written):
-            continue
-        written.append(places[k])
+    return [
         panel.annotate(
             width_text(float(widths[k])),
             places[k],
@@ -343,3 +348,19 @@ def _labels(
             bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": palette.hexadecimal(palette.OPEN), "lw": 0.7},
             zorder=5,
         )
+        for k in order.tolist()
+        if max(sizes[k], widths[k]) > least
+    ]
+
+
+def _uncover(labels: Sequence[Annotation]) -> None:
+    """Remove each label that covers one written before it, and what is beyond the most."""
+    written: list[BboxBase] = []
+    for label in labels:
+        patch = label.get_bbox_patch()
+        assert patch is not None
+        box = patch.get_window_extent()
+        if len(written) == MOST_LABELS or box.count_overlaps(written):
+            label.remove()
+        else:
+            written.append(box)

@@ -224,7 +224,7 @@ def unexplained(comparison: Comparison, causes: Sequence[Cause], trials: Sequenc
 
 
 def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measurement | None:
-    """Find the joint whose width tells most about which cause it is; None where none tells them apart.
+    """Find the joint whose width tells most about which cause it is; None where no other than those measured does.
 
     Parameters
     ----------

@@ -11,8 +11,9 @@ import numpy as np
 from blockvis.text import place_text
 from solver.mechanics import counted
 
+from .observations import LEAST_WIDTH, Observations
+
 if TYPE_CHECKING:
-    from .observations import Observations
     from .ranking import Cause, Measurement
     from .result import Explanation
 
@@ -45,7 +46,7 @@ def width_text(width: float) -> str:
     >>> width_text(0.00412), width_text(0.0123), width_text(1e-12)
     ('4.1', '12.3', '0')
     """
-    return "0" if width < 5e-5 else f"{1e3 * width:.1f}"
+    return "0" if width < LEAST_WIDTH else f"{1e3 * width:.1f}"
 
 
 def range_text(cause: Cause) -> str:
@@ -83,10 +84,13 @@ def cause_text(cause: Cause) -> str:
     return f"{cause.name}{f', {cause.detail}' if cause.detail else ''}"
 
 
-def measurement_text(measurement: Measurement | None) -> str:
-    """Say which joint to measure next, and what each cause has there, or that none tells the causes apart."""
+def measurement_text(found: Explanation) -> str:
+    """Say which joint to measure next, and what each cause has there, or why there is none."""
+    measurement = found.next_measurement
+    if measurement is None and len(found.alike) < 2:
+        return "nothing; no two causes are left to tell apart"
     if measurement is None:
-        return "no joint of the model tells the first causes apart; measure how the supports themselves have moved"
+        return "no joint is left that tells the first causes apart; measure how the supports themselves have moved"
     there = "; ".join(f"{width_text(width)} mm if {name}" for name, width in measurement.widths)
     return f"the joint {measurement.name} at {place_text(measurement.place, 3)} m: {there}"
 
@@ -126,7 +130,7 @@ def in_words(found: Explanation) -> str:
         lines.append(f"and {len(found.causes) - LISTED} less probable causes")
     lines += [*fall_texts(found), *unexplained_texts(found)]
     if len(found.causes) > 1:
-        lines.append(f"measure next: {measurement_text(found.next_measurement)}")
+        lines.append(f"measure next: {measurement_text(found)}")
     return "\n".join(lines)
 
 

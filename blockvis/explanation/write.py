@@ -78,7 +78,7 @@ def explanation_html(found: Explanation, picture: bytes) -> str:
         alike=" ".join([_alike(found), *(f"{html.escape(text.capitalize())}." for text in fall_texts(found))]),
         problems="".join(f"<li>{html.escape(text)}</li>" for text in problems)
         or "<li>The first cause makes all open joints and points, within what observations and model leave open.</li>",
-        measurement=html.escape(measurement_text(found.next_measurement)),
+        measurement=html.escape(measurement_text(found)),
         observations=_observations(found),
         points=_points(found),
         assumed="".join(f"<li>{html.escape(text)}</li>" for text in _assumed(found)),

@@ -19,6 +19,7 @@ import numpy as np
 
 import solver
 from blockvis.system.atomic_files import PARTIAL, WINDOWS, flush, make_folder, remove, write_atomic
+from blockvis.text import resume_command
 from solver import mechanics
 
 from .cracks import MOST_LISTED, cracks_of
@@ -81,7 +82,7 @@ def refuse_results(path: str | Path, overwrite: bool = False) -> None:
         raise ValueError("the folder is '': -o is empty; name the folder of the results")
     path = Path(path)
     unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
-    go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
+    go_on = f"go on with it by {resume_command(path)}, " if unfinished else ""
     refuse_files(path, RUN_FILES, "results", overwrite, go_on + CHOOSE)
 
 
@@ -147,7 +148,7 @@ class ResultsFolder:
         self._files = StoredIncrements(self.path)
         refuse_results(path, overwrite)
         make_folder(self.path / "increments")
-        self._release = _locked(self, self.path)
+        self._release = locked(self, self.path)
         # Lists of files go first, so that none ever names a file that is gone.
         for name in (*_LISTS, *_PICTURES, *_STARTED):
             (self.path / name).unlink(missing_ok=True)
@@ -190,7 +191,7 @@ class ResultsFolder:
         results.path, results.parameter, results.vtu = Path(path), parameter, vtu
         results.record = read_record(results.path)
         results.assembly = stored_assembly(results.path)
-        results._release = _locked(results, results.path)
+        results._release = locked(results, results.path)
         results._files = StoredIncrements(results.path)
         results.increments, checkpoint, count = [], None, 0
         stored = results.path / CHECKPOINT
@@ -340,8 +341,8 @@ class ResultsFolder:
             remove(half)
 
 
-def _locked(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
-    """Lock the folder for one run, until the returned function is called or the process ends, however it ends."""
+def locked(owner: object, folder: Path, what: str = "run") -> Callable[[], None]:
+    """Lock the folder for one run or study, until the returned function is called or the process ends in any way."""
     handle = None
     try:
         handle = _opened_lock(folder)
@@ -350,7 +351,7 @@ def _locked(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
         if handle is not None:
             os.close(handle)
         raise ResultsExist(
-            f"another run is writing to '{folder}'; wait for it, end it, or choose another folder with -o"
+            f"another {what} is writing to '{folder}'; wait for it, end it, or choose another folder with -o"
         ) from None
     except OSError:
         # A file system without locks: two runs into one folder are not noticed.
@@ -461,7 +462,7 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
     """
     assembly = stored_assembly(folder)
     files = StoredIncrements(folder)
-    nothing = f"the run in '{folder}' has found nothing yet; go on with it by blockvis run --resume {folder}"
+    nothing = f"the run in '{folder}' has found nothing yet; go on with it by {resume_command(folder)}"
     summary: dict[str, Any] = {}
     if (folder / "summary.json").is_file():
         summary = read_json(folder / "summary.json")

@@ -22,6 +22,7 @@ from blockvis.results.folder import RESULTS, ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_json, read_record, versions
 from blockvis.results.viewer_files import restore_grids, write_end
 from blockvis.system.atomic_files import PARTIAL
+from blockvis.text import resume_command
 from solver import mechanics
 
 from .outputs import Clock, Drawing, Output, viewer_format
@@ -215,7 +216,7 @@ def _made(
     except KeyboardInterrupt:
         raise DrawingInterrupted(
             f"interrupted while drawing; the results are complete, what is not drawn yet is by: "
-            f"blockvis run --resume {folder}"
+            f"{resume_command(folder)}"
         ) from None
 
 
@@ -313,7 +314,7 @@ def _write_error(folder: Path, error: OSError) -> OSError:
         half.unlink(missing_ok=True)
     return OSError(
         f"could not write to '{folder}': {_reason(error)}; what is there stays as it is: make room and go on with "
-        f"blockvis run --resume {folder}"
+        f"{resume_command(folder)}"
     )
 
 

@@ -12,7 +12,7 @@ import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -98,21 +98,22 @@ def study(
         if not 0 <= run < plan.n_runs:
             raise ValueError(f"run {run} is to be kept, but runs are numbered from 0 to {plan.n_runs - 1}")
     folder = Path(f"{plan.source.stem}-study") if folder is None else Path(folder)
-    if scheduler is None:
-        records = StudyFolder(folder, plan, force=force)
-        todo = records.missing(retry_failed=retry_failed)
-        if todo:
-            with local_cluster(min(workers or cores(), len(todo))) as client:
-                carry_out(records, todo, client, progress)
-    else:
-        from blockvis.case_files.read import case_of
+    with ExitStack() as ends:
+        if scheduler is None:
+            records = ends.enter_context(closing(StudyFolder(folder, plan, force=force)))
+            todo = records.missing(retry_failed=retry_failed)
+            if todo:
+                with local_cluster(min(workers or cores(), len(todo))) as client:
+                    carry_out(records, todo, client, progress)
+        else:
+            from blockvis.case_files.read import case_of
 
-        # The folder is not changed unless the scheduler answers.
-        file = case_of(plan.values, plan.case_source).file
-        with existing_cluster(scheduler, "" if file is None else str(file)) as client:
-            records = StudyFolder(folder, plan, force=force)
-            carry_out(records, records.missing(retry_failed=retry_failed), client, progress)
-    return _finish(records)
+            # The folder is not changed unless the scheduler answers.
+            file = case_of(plan.values, plan.case_source).file
+            with existing_cluster(scheduler, "" if file is None else str(file)) as client:
+                records = ends.enter_context(closing(StudyFolder(folder, plan, force=force)))
+                carry_out(records, records.missing(retry_failed=retry_failed), client, progress)
+        return _finish(records)
 
 
 def _finish(records: StudyFolder) -> pd.DataFrame:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solver
+from blockvis.results.folder import locked
 from blockvis.results.npz import compressed
 from blockvis.system.atomic_files import atomic_file, flush, make_folder, write_atomic
 
@@ -63,6 +64,8 @@ class StudyFolder:
     ------
     StudyExists
         If the folder holds rows of another study, or something that is no study.
+    ResultsExist
+        If another study is writing to it.
     """
 
     def __init__(self, folder: str | Path, study: Study, *, force: bool = False) -> None:
@@ -83,11 +86,13 @@ class StudyFolder:
                     f"{'has' if len(changed) == 1 else 'have'} changed; choose another folder with -o, or throw these "
                     "runs away with --force"
                 )
-            if force:
-                self._clear()
         elif self.folder.is_dir() and any(self.folder.iterdir()):
             raise StudyExists(f"'{self.folder}' holds something that is no study; choose another folder with -o")
         make_folder(self.folder / "mechanisms")
+        # Lets another study write to the folder.
+        self.close = locked(self, self.folder, "study")
+        if force:
+            self._clear()
         write_atomic(
             record,
             _json(

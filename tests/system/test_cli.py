@@ -333,3 +333,15 @@ def test_a_note_is_printed_once(case, capsys):
     case.write_text(case.read_text(encoding="utf-8") + '[[loads]]\nkind = "live"\nforce = [0, -1]\n', encoding="utf-8")
     assert run_command(case, "-o", case.parent / "out") in (0, 4)
     assert capsys.readouterr().err.count("leaves the live loads out") == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no process sends itself Ctrl-C there")
+def test_a_second_ctrl_c_does_not_break_off_the_ending():
+    """What ends with the process, as the workers of a study, is not told as a traceback."""
+    ending = (
+        "import atexit, os, signal\nfrom blockvis import cli\n"
+        "atexit.register(os.kill, os.getpid(), signal.SIGINT)\n"
+        "cli.main = lambda: cli.INTERRUPTED\ncli.entry()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", ending], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (cli.INTERRUPTED, "")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from PIL import Image
 from structures import posed
 
@@ -112,6 +113,26 @@ def test_the_picture_has_three_panels_of_blocks_with_cracks(folder, said):
     orange = np.abs(pixels - [226, 78, 27]).sum(axis=2) < 40
     thirds = np.array_split(orange, 3, axis=1)
     assert all(third.sum() > 100 for third in thirds)
+
+
+@pytest.mark.slow
+def test_no_label_of_the_picture_covers_another(folder, tmp_path, monkeypatch):
+    boxes = []
+    savefig = Figure.savefig
+
+    def noted(figure, *given, **options):
+        figure.draw_without_rendering()
+        for panel in figure.axes:
+            written = [text for text in panel.texts if text.get_text() and text.get_bbox_patch()]
+            boxes.append([text.get_window_extent() for text in written])
+        return savefig(figure, *given, **options)
+
+    monkeypatch.setattr(Figure, "savefig", noted)
+    rows = [{"x": x, "y": 0.56, "width [mm]": width} for x, width in ((-0.1, 3.0), (0.0, 3.1), (0.1, 2.9), (1.0, 2.0))]
+    blockvis.explain(folder / "arch.toml", rows, tmp_path / "labels")
+    assert len(boxes[0]) >= 2
+    for own in boxes:
+        assert not any(box.count_overlaps(own[:k]) for k, box in enumerate(own))
 
 
 @pytest.mark.slow
@@ -281,7 +302,9 @@ def test_a_drawing_of_the_damaged_arch_is_explained(folder, tmp_path):
     found = blockvis.explain(folder / "arch.toml", tmp_path / "damaged.svg", tmp_path / "out")
     assert found.causes[0].name == "right springer moves down"
     assert found.causes[0].amount[1] == pytest.approx(SPREAD, rel=0.1)
-    assert (tmp_path / "out" / "explain.html").is_file()
+    # All joints are in the drawing, and tell the first cause from the others.
+    assert "measure next: nothing; no two causes are left to tell apart" in str(found)
+    assert "nothing; no two causes" in (tmp_path / "out" / "explain.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -271,6 +271,16 @@ def test_a_folder_that_is_no_study_is_refused(arches, tmp_path, capsys):
     assert (tmp_path / "out" / "thesis.tex").read_text(encoding="utf-8") == "precious"
 
 
+def test_a_study_holds_its_folder(arches, tmp_path, capsys):
+    out = tmp_path / "out"
+    records = StudyFolder(out, read_study(arches))
+    for more in ([], ["--force"]):
+        assert main(["sweep", str(arches), "-o", str(out), *more]) == 2
+        assert f"another study is writing to '{out}'; wait for it" in capsys.readouterr().err
+    records.close()
+    assert len(StudyFolder(out, read_study(arches)).missing()) == 24
+
+
 @pytest.mark.thorough
 def test_a_row_half_written_is_made_again(arches, tmp_path):
     study = read_study(arches)
@@ -280,6 +290,7 @@ def test_a_row_half_written_is_made_again(arches, tmp_path):
     records = StudyFolder(tmp_path / "out", study)
     assert records.missing() == list(range(1, 24))
     records.add([run_once(study.values, str(study.case_source), study.order(1), study.n_seeded)])
+    records.close()
     assert StudyFolder(tmp_path / "out", study).missing() == list(range(2, 24)), "half a line spoils none after it"
 
 

@@ -96,6 +96,9 @@ def test_rows_of_a_table_in_python():
         ("joint,width\nvousoir 3 | voussoir 4,0.004\n", r"'vousoir 3' is no block \(did you mean 'voussoir \d'\?\)"),
         ("joint,width\nvoussoir 1 | voussoir 4,0.004\n", "do not touch; 'voussoir 1' touches"),
         ("x,y,width\n1000,1,0.004\n", "m from any joint"),
+        (f"joint,x,y,width\n{CROWN},100,300,0.001\n", r"m from 'voussoir 3 \| voussoir 4'; the blocks lie"),
+        ("block,x,y,dx [mm],dy [mm]\nvoussoir 4,130,990,1,2\n", r"x and y are \(130, 990\) m, .* m from 'voussoir 4'"),
+        ("x,y,dx [mm],dy [mm]\n30,2,1,2\n", "m from any block; the blocks lie between .* check the unit"),
         ("x,y,width\n,1,0.004\n", "line 2: x is missing"),
         ("block,dx,dy\nvoussoir 1,0.1,\n", "dy is missing; give both"),
         ("block,x,y,dx,dy\n,,,0.1,0.1\n", "block is missing"),
@@ -130,7 +133,7 @@ def lifted():
 def test_a_drawing_of_the_damaged_state_gives_widths_and_displacements(tmp_path, renamed):
     path = tmp_path / "damaged.json"
     if renamed:
-        corners = np.split(mechanics.moved_vertices(ARCH, lifted()), ARCH.offsets[1:-1])
+        corners = corners_of(lifted())
         drawn(path, corners[::-1], [f"stone {k}" for k in range(len(corners))[::-1]])
     else:
         save_layout(ARCH, path, pose=lifted())
@@ -142,6 +145,44 @@ def test_a_drawing_of_the_damaged_state_gives_widths_and_displacements(tmp_path,
     assert moved["voussoir 4"] == pytest.approx([0.004, 0.0], abs=2e-5)
     assert moved["voussoir 3"] == pytest.approx([0.0, 0.0], abs=2e-5)
     assert found.widths[[k for k, label in enumerate(found.labels) if "voussoir 6" in label]].max() > 1e-3
+
+
+def corners_of(pose):
+    return np.split(mechanics.moved_vertices(ARCH, pose), ARCH.offsets[1:-1])
+
+
+def test_joints_of_a_drawing_that_are_closed_but_for_rounding_are_closed(tmp_path):
+    rounded = [np.round(ring, 5) for ring in corners_of(lifted())]
+    found = read_observations(drawn(tmp_path / "damaged.json", rounded, ARCH.names), ARCH)
+    open_ones = [label for label, width in zip(found.labels, found.widths, strict=True) if width > 0.0]
+    assert len(open_ones) == 3
+    assert all({"voussoir 4", "voussoir 6"} & {*label.split(" | ")} for label in open_ones)
+
+
+@pytest.mark.parametrize("shift", [(100.0, 5.0), (0.3, 0.0)])
+def test_a_drawing_with_another_origin_is_refused(tmp_path, shift):
+    path = drawn(tmp_path / "damaged.json", [ring + shift for ring in corners_of(lifted())], ARCH.names)
+    with pytest.raises(ValueError, match=r"its blocks, supports too, lie about \(.*\) m beside those of the case"):
+        read_observations(path, ARCH)
+
+
+def test_a_drawing_of_what_moved_nearly_as_one_beside_a_support_is_taken(tmp_path):
+    """The support that stands has moved by rounding."""
+    pose = solver.Pose.initial(ARCH)
+    pose.positions[:] += [0.02, 0.0]
+    pose.positions[ARCH.index("left springer")] -= [0.0199, 0.0]
+    found = read_observations(drawn(tmp_path / "damaged.json", corners_of(pose), ARCH.names), ARCH)
+    assert found.largest == pytest.approx(0.02)
+
+
+def test_a_drawing_whose_names_are_swapped_is_refused(tmp_path):
+    swapped = {"voussoir 1": "voussoir 5", "voussoir 5": "voussoir 1"}
+    names = [swapped.get(name, name) for name in ARCH.names]
+    path = drawn(tmp_path / "damaged.json", corners_of(lifted()), names)
+    with pytest.raises(
+        ValueError, match=r"puts 'voussoir 1' 1.\d+ m, 'voussoir 5' 1.\d+ m from where the case draws it"
+    ):
+        read_observations(path, ARCH)
 
 
 def test_a_drawing_of_something_else_is_refused(tmp_path):
