@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 from structures import arch_response, box, brick, case_from, dropped_brick, pixels, posed, rectangle
 
+import blockvis
 import solver
 from blockvis import animate
 from blockvis.pictures import video
@@ -297,3 +298,25 @@ def test_frames_are_written_as_pictures_into_a_folder(tmp_path):
     with pytest.raises(ValueError, match="holds what is no frame of a film"):
         write_film(frames(), folder, size=SMALL, fps=10.0)
     assert (folder / "notes.txt").read_text(encoding="utf-8") == "kept"
+
+
+def test_loads_in_space_are_drawn_where_they_act(tmp_path):
+    """Not over the middle of the stone, as long as the vault."""
+    text = '''
+[geometry]
+layout = "barrel vault"
+parameters = {voussoirs = 5, length = 4.0, stones = 1, thickness_ratio = 0.3}
+[material]
+friction_coefficient = 0.7
+[analysis]
+kind = "limit load"
+[[loads]]
+kind = "live"
+force = [0.0, 0.0, -1000.0]
+positions = [-0.5, 0.5, 3]
+y = 1.8
+'''
+    response = blockvis.run_case(case_from(text), tmp_path / "out", outputs=()).response
+    loads = LiveLoads(response, response.path, 4.0)
+    tips = [loads.arrows(one, one.pose)[1][0, :2] for one in response.path]
+    np.testing.assert_allclose(tips, [[-0.5, 1.8], [0.0, 1.8], [0.5, 1.8]], atol=1e-6)
