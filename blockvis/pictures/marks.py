@@ -402,20 +402,20 @@ def evenly(numbers: np.ndarray, most: int) -> np.ndarray:
 def leaving(
     assembly: solver.Assembly, pose: solver.Pose, blocks: np.ndarray, places: np.ndarray, directions: np.ndarray
 ) -> np.ndarray:
-    """(n, 3) array [m]: from places (n, 3) [m] in blocks along unit vectors (n, 3) to where the blocks end at most.
+    """(n, 3) array [m]: where lines through places (n, 3) [m] along unit vectors (n, 3) leave the blocks at most.
 
-    A place outside the box around its block is taken at the side of that.
+    Of a line that passes beside the box around its block the nearest of that.
     """
     corners, offsets = mechanics.moved_vertices(assembly, pose), assembly.polyhedra.offsets
     places = places.copy()
     for k, block in enumerate(blocks.tolist()):
         own, direction = corners[offsets[block] : offsets[block + 1]], directions[k]
-        places[k] = np.clip(places[k], own.min(axis=0), own.max(axis=0))
         around = own - places[k]
         # Of a wide slab that tilts the corners are far off, the sides of the box around it are not.
         along = direction != 0.0
         box = (np.where(direction > 0.0, around.max(axis=0), around.min(axis=0))[along] / direction[along]).min()
-        places[k] += max(min(float((around @ direction).max()), float(box)), 0.0) * direction
+        end = places[k] + min(float((around @ direction).max()), float(box)) * direction
+        places[k] = np.clip(end, own.min(axis=0), own.max(axis=0))
     return places
 
 

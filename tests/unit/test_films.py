@@ -300,9 +300,16 @@ def test_frames_are_written_as_pictures_into_a_folder(tmp_path):
     assert (folder / "notes.txt").read_text(encoding="utf-8") == "kept"
 
 
-def test_loads_in_space_are_drawn_where_they_act(tmp_path):
-    """Not over the middle of the stone, as long as the vault."""
-    text = '''
+@pytest.mark.parametrize(
+    ("load", "point", "places"),
+    [
+        ("force = [0, 0, -1000]\npositions = [-0.5, 0.5, 2]\ny = 1.8", (0.0, 1.8), (-0.5, 0.5)),
+        ("force = [0, 1000, -1000]\nblocks = 'stone 3-1'\npoint = [0.1, -1.7, 1.0]", (0.1, -0.7), (0.1,)),
+    ],
+)
+def test_loads_in_space_are_drawn_where_they_act(load, point, places, tmp_path):
+    """Not over the middle of the stone, as long as the vault, and a slanted one on its line."""
+    text = """
 [geometry]
 layout = "barrel vault"
 parameters = {voussoirs = 5, length = 4.0, stones = 1, thickness_ratio = 0.3}
@@ -312,11 +319,12 @@ friction_coefficient = 0.7
 kind = "limit load"
 [[loads]]
 kind = "live"
-force = [0.0, 0.0, -1000.0]
-positions = [-0.5, 0.5, 3]
-y = 1.8
-'''
-    response = blockvis.run_case(case_from(text), tmp_path / "out", outputs=()).response
+"""
+    response = blockvis.run_case(case_from(text + load), tmp_path / "out", outputs=()).response
     loads = LiveLoads(response, response.path, 4.0)
-    tips = [loads.arrows(one, one.pose)[1][0, :2] for one in response.path]
-    np.testing.assert_allclose(tips, [[-0.5, 1.8], [0.0, 1.8], [0.5, 1.8]], atol=1e-6)
+    for one, x in zip(response.path, places, strict=True):
+        (tail,), (tip,) = loads.arrows(one, one.pose)
+        along = (tip - tail) / np.linalg.norm(tip - tail)
+        y = point[1] if abs(along[1]) < 1e-6 else point[1] - tip[2]
+        np.testing.assert_allclose(tip[:2], [x, y], atol=1e-6)
+        assert tip[2] > 0.9
