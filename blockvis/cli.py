@@ -582,7 +582,7 @@ def _new(options: argparse.Namespace) -> int:
     choice = _choice(options)
     filled = _filled_walls(options, choice)
     found, walls = filled or (inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice), ())
-    unit, unit_says = ("", "") if options.unit or walls else unit_instead(found)
+    unit, unit_says = ("", "") if walls else unit_instead(found)
     if unit:
         if choice["window"]:
             # It is in metres of the drawing as it was read.

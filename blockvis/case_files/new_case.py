@@ -153,7 +153,7 @@ def relative_to(folder: Path, drawing: str | Path) -> str:
 def unit_instead(found: Inspection) -> tuple[str, str]:
     """Find the unit in which a drawing is masonry, where its own is in doubt, and why; both "" where it is not."""
     unit = better_unit(found.layout.unit, float(np.median(found.layout.sizes)))
-    if not unit:
+    if not unit or found.layout.unit_by:
         return "", ""
     doubted = _note(found, UNIT).partition(": say so")[0]
     return unit, f"{doubted}; the file is read in {unit} here"

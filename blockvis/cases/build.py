@@ -141,9 +141,8 @@ def _refuse_idle_settlements(case: Case, assembly: solver.Assembly) -> None:
 
 
 def _refuse_doubted_unit(case: Case, sketch: layout.Layout) -> None:
-    """Refuse blocks far from the size of masonry where another unit would make them masonry and the case gives none."""
-    given = case.unit is not None or any(case.image.get(key) for key in ("width", "height", "pixel"))
-    if case.file is None or given or case.bonds:
+    """Refuse blocks far from the size of masonry where another unit would make them masonry and nobody gives theirs."""
+    if case.file is None or sketch.unit_by or case.bonds:
         return
     size = float(np.median(sketch.sizes))
     better = better_unit(sketch.unit, size)

@@ -245,6 +245,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
         blocks=joined("blocks"),
         names=joined("names"),
         unit=named[0].unit,
+        unit_by=named[0].unit_by,
         notes=_joined_notes(named),
         left_out=joined("left_out"),
         looks=joined("looks"),

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     if version != 1:
         raise ValueError(f"'{path}' is a layout of version {version!r}; version 1 is read: update blockvis")
     in_space = any(isinstance(block, dict) and "points" in block for block in content["blocks"])
-    return (_read_solids if in_space else _read_outlines)(content, path)
+    layout = (_read_solids if in_space else _read_outlines)(content, path)
+    return replace(layout, unit_by="layout" if layout.unit else "")
 
 
 def _read_outlines(content: dict[str, Any], path: Path) -> Layout:

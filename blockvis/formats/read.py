@@ -220,7 +220,8 @@ def _apart(content: Layout | Bodies, path: Path) -> Layout | Bodies:
 def _in_metres(layout: Layout, unit: str | None) -> Layout:
     """Choose the unit of a layout, and check its coordinates."""
     stated = unit or layout.unit or "m"
-    chosen, note = chosen_unit(unit, layout.unit, layout.sizes) if layout.n_blocks else (stated, "")
+    by = "user" if unit else layout.unit_by
+    chosen, note = chosen_unit(stated if by else None, layout.unit, layout.sizes) if layout.n_blocks else (stated, "")
     factor = metres_per(chosen)
     layout = replace(
         layout,
@@ -229,6 +230,7 @@ def _in_metres(layout: Layout, unit: str | None) -> Layout:
         else tuple(without_collinear(ring * factor) for ring in layout.outlines),
         thickness=None if layout.thickness is None else layout.thickness * factor,
         unit=chosen,
+        unit_by=by,
         notes=layout.notes + ((note,) if note else ()),
         left_out=tuple(item.mapped(factor) for item in layout.left_out),
     )

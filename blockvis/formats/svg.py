@@ -107,7 +107,8 @@ def read(path: Path, reading: Reading) -> Layout:
     if reading.view not in (None, "xy"):
         raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
     root = _root(path)
-    stated, doubts = (root.get("data-blockvis-unit", ""), []) if root.get("data-blockvis-unit") else _unit(root)
+    own = root.get("data-blockvis-unit", "")
+    stated, doubts = (own, []) if own else _unit(root)
     tolerance = None
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
@@ -130,7 +131,7 @@ def read(path: Path, reading: Reading) -> Layout:
     notes = tuple(dict.fromkeys(found.notes))
     looks = tuple(found.looks)
     layout = Layout(blocks=turned, names=names, unit=stated, notes=notes, left_out=left_out, looks=looks)
-    return with_rows(layout, found.rows)
+    return with_rows(replace(layout, unit_by="layout" if own else ""), found.rows)
 
 
 def _root(path: Path) -> ElementTree.Element:

@@ -50,6 +50,9 @@ class Layout:
         Out of plane; NaN for a block of which the file says nothing. Blocks in space have none.
     unit : str
         Unit of length in which the file was read; inside a format's reader the unit that the file states, "" for none.
+    unit_by : {"", "layout", "user"}
+        Whose word the unit is: the size of the blocks casts no doubt on a user's, and a note on that of a layout of
+        our own; any other it may overrule.
     notes : tuple of str
         What the reader assumed or dropped; see :class:`blockvis.layout.notes.Note`.
     source : str
@@ -70,6 +73,7 @@ class Layout:
     density: np.ndarray | None = None
     thickness: np.ndarray | None = None
     unit: str = "m"
+    unit_by: str = ""
     notes: tuple[str, ...] = ()
     source: str = ""
     left_out: tuple[LeftOut, ...] = ()

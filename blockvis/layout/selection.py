@@ -103,7 +103,7 @@ def sorted_out(
 def noted(layout: Layout) -> Layout:
     """Note what is left out, and the doubt that the sizes of the blocks cast on the unit."""
     notes = [*layout.notes, *unfilled(layout), *in_words(layout.left_out)]
-    doubted = doubt(layout.unit, float(np.median(layout.sizes)))
+    doubted = "" if layout.unit_by == "user" else doubt(layout.unit, float(np.median(layout.sizes)))
     return replace(layout, notes=(*notes, Note(UNIT, doubted)) if doubted else tuple(notes))
 
 

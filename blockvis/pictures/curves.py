@@ -211,6 +211,9 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
     """Draw the forces of ties, tension positive, where they yield and where they break."""
     total = response.parameters * parameter_unit(response)[0]
     factor, unit = unit_for(float(np.nanmax(np.abs(ties.forces), initial=0.0)))
+    columns = min(3, len(ties.names))
+    # One that is wider finds no place beside the lines.
+    letters = 80 // (columns + 1)
     for name, forces, states, shade in zip(ties.names, ties.forces.T, ties.states.T, palette.TIE_SHADES, strict=False):
         colour = palette.hexadecimal(shade)
         axes.plot(
@@ -220,7 +223,7 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
             color=colour,
             linewidth=2.0,
             # Labels that begin with "_" matplotlib leaves out.
-            label=f" {name}{', slack' * bool((states == mechanics.SLACK).all())}",
+            label=" " + "\n ".join(wrap(f"{name}{', slack' * bool((states == mechanics.SLACK).all())}", letters)),
         )
         for state, mark, word in ((mechanics.YIELDING, "o", "yields"), (mechanics.BROKEN, "X", "broken")):
             first = np.flatnonzero(states == state)[:1]
@@ -235,7 +238,7 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
     axes.set_xlabel(parameter_label(response), fontsize=TEXT)
     _style(axes, TEXT)
     axes.margins(x=0.02, y=0.16)
-    axes.legend(loc="best", fontsize=0.9 * TEXT, frameon=False, ncols=min(3, len(ties.names)))
+    axes.legend(loc="best", fontsize=0.9 * TEXT, edgecolor="none", ncols=columns)
 
 
 def _mark_phases(axes: Axes, response: solver.Response, letters: int) -> float:

@@ -82,7 +82,10 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     blocks = np.flatnonzero(size > ROUNDING * np.abs(live).max(initial=0.0))
     if assembly.dimension == 3:
         blocks = evenly(blocks, MOST_ARROWS)
-        points = leaving(assembly, pose, blocks, pose.positions[blocks], -forces[blocks] / size[blocks, None])
+        # The moment about the centroid tells the line on which a load acts, all but its place along that.
+        units = forces[blocks] / size[blocks, None]
+        arms = np.cross(units, live[blocks, 3:] / size[blocks, None])
+        points = leaving(assembly, pose, blocks, pose.positions[blocks] + arms, -units)
     else:
         points = np.array([_entry(assembly, pose, int(block), live[block]) for block in blocks]).reshape(-1, 2)
     if len(blocks) > MOST_ARROWS:

@@ -335,7 +335,7 @@ def settlement_arrows(
         extents = np.array([np.ptp(assembly.vertices[chosen], axis=0) for chosen in corners])
         # Of a slab that goes on beyond the structure nobody sees the ends.
         extents = np.minimum(extents[1:], extents[0].max())
-    blocks, places = _with_ends(blocks, places, extents, rate[:, d:])
+    blocks, places = _with_ends(blocks, places, extents, rate[:, d:], pose)
     speeds, largest = mechanics.point_velocities(places, blocks, pose, rate), np.zeros(assembly.n_blocks)
     sizes = np.linalg.norm(speeds, axis=1)
     np.maximum.at(largest, blocks, sizes)
@@ -347,36 +347,45 @@ def settlement_arrows(
 
 
 def _with_ends(
-    blocks: np.ndarray, places: np.ndarray, extents: np.ndarray, spins: np.ndarray
+    blocks: np.ndarray, places: np.ndarray, extents: np.ndarray, spins: np.ndarray, pose: solver.Pose
 ) -> tuple[np.ndarray, np.ndarray]:
     """Blocks and places with the two ends of each support that turns: one arrow would show it as pushed.
 
-    They lie apart along the axis on which the speeds differ most.
+    They lie apart along the axis on which the speeds differ most, of those that turn with the support.
     """
     turning = spins[blocks].any(axis=1)
-    axes, spin = np.eye(extents.shape[1]), spins[blocks[turning]]
-    differ = np.abs(spin) if len(axes) == 2 else np.linalg.norm(np.cross(spin[:, None], axes), axis=2)
+    axes, spin = _own_axes(pose, blocks[turning]), spins[blocks[turning]]
+    differ = np.abs(spin) if extents.shape[1] == 2 else np.linalg.norm(np.cross(spin[:, None], axes), axis=2)
     differ = differ * extents[turning]
     # As many digits as do not tell the sides of a square apart, which turns.
     axis = np.round(differ / differ.max(axis=1, keepdims=True), 2).argmax(axis=1)
-    end = END * extents[turning] * axes[axis]
+    row = np.arange(len(axis))
+    end = END * extents[turning][row, axis, None] * axes[row, axis]
     twice = [blocks[~turning], blocks[turning], blocks[turning]]
     return np.concatenate(twice), np.concatenate([places[~turning], places[turning] - end, places[turning] + end])
+
+
+def _own_axes(pose: solver.Pose, blocks: np.ndarray) -> np.ndarray:
+    """(n, d, d) array: unit vectors that were the axes of the layout, row by row, and have turned with blocks."""
+    return mechanics.rotation_matrices(pose.rotations[blocks]).transpose(0, 2, 1)
 
 
 def _seen_places(
     assembly: solver.Assembly, blocks: np.ndarray, pose: solver.Pose, seen: Frame | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Blocks of the plane that are seen, of many the one in the middle; place inside and extent (n, 2) [m] of that."""
+    """Blocks of the plane that are seen, of many the one in the middle; place inside and extent (n, 2) [m] of that.
+
+    Extents are along the axes of the layout that turn with the block.
+    """
     corners = mechanics.moved_vertices(assembly, pose)
     outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in blocks]
     shown = outlines if seen is None else shapely.intersection(outlines, shapely.box(*seen.low, *seen.high))
     rows = [k for k, outline in enumerate(shown) if not outline.is_empty]
     if len(rows) > MOST_IN_PLANE:
         rows = [rows[len(rows) // 2]]
-    places, extents = np.zeros((2, len(rows), 2))
+    (places, extents), axes = np.zeros((2, len(rows), 2)), _own_axes(pose, blocks[rows])
     for row, k in enumerate(rows):
-        extents[row] = np.ptp(shapely.get_coordinates(shown[k]), axis=0)
+        extents[row] = np.ptp(shapely.get_coordinates(shown[k]) @ axes[row].T, axis=0)
         # A bent support may have its centroid outside.
         inside = shown[k].centroid if shown[k].contains(shown[k].centroid) else shown[k].point_on_surface()
         places[row] = inside.coords[0]
@@ -393,15 +402,20 @@ def evenly(numbers: np.ndarray, most: int) -> np.ndarray:
 def leaving(
     assembly: solver.Assembly, pose: solver.Pose, blocks: np.ndarray, places: np.ndarray, directions: np.ndarray
 ) -> np.ndarray:
-    """(n, 3) array [m]: from places (n, 3) [m] in blocks along unit vectors (n, 3) to where the blocks end at most."""
+    """(n, 3) array [m]: where lines through places (n, 3) [m] along unit vectors (n, 3) leave the blocks at most.
+
+    Of a line that passes beside the box around its block the nearest of that.
+    """
     corners, offsets = mechanics.moved_vertices(assembly, pose), assembly.polyhedra.offsets
     places = places.copy()
     for k, block in enumerate(blocks.tolist()):
-        around, direction = corners[offsets[block] : offsets[block + 1]] - places[k], directions[k]
+        own, direction = corners[offsets[block] : offsets[block + 1]], directions[k]
+        around = own - places[k]
         # Of a wide slab that tilts the corners are far off, the sides of the box around it are not.
         along = direction != 0.0
         box = (np.where(direction > 0.0, around.max(axis=0), around.min(axis=0))[along] / direction[along]).min()
-        places[k] += max(min(float((around @ direction).max()), float(box)), 0.0) * direction
+        end = places[k] + min(float((around @ direction).max()), float(box)) * direction
+        places[k] = np.clip(end, own.min(axis=0), own.max(axis=0))
     return places
 
 

@@ -18,7 +18,7 @@ from blockvis.results.increments import numbered
 from blockvis.system.atomic_files import atomic_file
 from solver import mechanics
 
-from .captions import phase_words
+from .captions import in_one_unit, parameter_unit, phase_words
 from .drawer import Drawer, Look
 from .film import film_of, poster_of
 from .swing import MOST_PARTS, shown_increments, swing_of
@@ -226,7 +226,8 @@ def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
             return f"no equilibrium {when}   ·   {bodies}"
         return f"{response.stop}: the motion that would follow   ·   {bodies}"
     collapse = response.collapse
-    low, high = (f"{end:.{_digits(collapse.bracket)}g} {collapse.unit}" for end in collapse.bracket)
+    factor, unit = parameter_unit(in_one_unit(response))
+    low, high = (f"{factor * end:.{_digits(collapse.bracket)}g} {unit}" for end in collapse.bracket)
     loss = loss_of(response)
     what = "collapse mechanism" if loss is None or not loss.local else "local loss"
     falls = "" if loss is None else f"   ·   {100.0 * loss.share:.3g} % of W fall"

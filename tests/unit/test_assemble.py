@@ -115,12 +115,6 @@ def test_units(tmp_path):
     assert "it was read in cm because that was asked for" in read_layout(path, unit="cm").notes[0]
     path.write_text(json.dumps({"blocks": [{"outline": UNIT.tolist()}]}), encoding="utf-8")
     assert read_layout(path).notes == ("the file does not say its unit; m was assumed",)
-    path.write_text(json.dumps({"unit": "in", "blocks": [{"outline": (UNIT * 0.2).tolist()}]}), encoding="utf-8")
-    clash = read_layout(path)
-    assert clash.unit == "m"
-    assert "unit clash: the file says its unit is in" in clash.notes[0]
-    with pytest.warns(UserWarning, match="unit clash: the file says its unit is in"):
-        read(path)
     with pytest.raises(ValueError, match="unit 'furlong' is not known"):
         read(path, unit="furlong")
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import arch_response, parted, pixels, report_of, wall
+from structures import arch_response, case_from, parted, pixels, report_of, wall
 
 import blockvis
 import solver
@@ -83,6 +83,20 @@ def test_a_name_is_text_whatever_it_holds(tmp_path):
     told = said(run.response, tmp_path / "named.svg")
     assert "$\\foo$ 5" in told
     assert " _1 $x_1$" in told
+
+
+def test_a_long_name_of_a_tie_is_broken(tmp_path):
+    """One across the whole curve hid where the lines are."""
+    name = "tie in the middle of the northern arcade, 24 mm across, installed in 1897"
+    case = case_from(
+        '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.001\nlimit = 0.001\n'
+        f'[[ties]]\nname = "{name}"\nfrom = [-1.0, 0.2]\nto = [1.0, 0.2]\nstiffness = 1e5\n'
+    )
+    told = said(blockvis.run_case(case, tmp_path / "out", outputs=()).response, tmp_path / "named.svg")
+    assert [line.strip() for line in told if line.strip() and line.strip() in name] == [
+        "tie in the middle of the northern",
+        "arcade, 24 mm across, installed in 1897",
+    ]
 
 
 def test_a_collapse_is_counted_once(tmp_path):

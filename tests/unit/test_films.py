@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 from structures import arch_response, box, brick, case_from, dropped_brick, pixels, posed, rectangle
 
+import blockvis
 import solver
 from blockvis import animate
 from blockvis.pictures import video
@@ -297,3 +298,33 @@ def test_frames_are_written_as_pictures_into_a_folder(tmp_path):
     with pytest.raises(ValueError, match="holds what is no frame of a film"):
         write_film(frames(), folder, size=SMALL, fps=10.0)
     assert (folder / "notes.txt").read_text(encoding="utf-8") == "kept"
+
+
+@pytest.mark.parametrize(
+    ("load", "point", "places"),
+    [
+        ("force = [0, 0, -1000]\npositions = [-0.5, 0.5, 2]\ny = 1.8", (0.0, 1.8), (-0.5, 0.5)),
+        ("force = [0, 1000, -1000]\nblocks = 'stone 3-1'\npoint = [0.1, -1.7, 1.0]", (0.1, -0.7), (0.1,)),
+    ],
+)
+def test_loads_in_space_are_drawn_where_they_act(load, point, places, tmp_path):
+    """Not over the middle of the stone, as long as the vault, and a slanted one on its line."""
+    text = """
+[geometry]
+layout = "barrel vault"
+parameters = {voussoirs = 5, length = 4.0, stones = 1, thickness_ratio = 0.3}
+[material]
+friction_coefficient = 0.7
+[analysis]
+kind = "limit load"
+[[loads]]
+kind = "live"
+"""
+    response = blockvis.run_case(case_from(text + load), tmp_path / "out", outputs=()).response
+    loads = LiveLoads(response, response.path, 4.0)
+    for one, x in zip(response.path, places, strict=True):
+        (tail,), (tip,) = loads.arrows(one, one.pose)
+        along = (tip - tail) / np.linalg.norm(tip - tail)
+        y = point[1] if abs(along[1]) < 1e-6 else point[1] - tip[2]
+        np.testing.assert_allclose(tip[:2], [x, y], atol=1e-6)
+        assert tip[2] > 0.9

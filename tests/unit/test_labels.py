@@ -307,3 +307,16 @@ def test_what_lies_still_has_no_badge_of_falling(words):
     assert badges[-2:] == ["", ""]
     pixels = np.asarray(last).astype(int)
     assert not (np.abs(pixels - palette.WARNING) <= 8).all(axis=2).any()
+
+
+@pytest.mark.slow
+def test_a_mechanism_has_one_unit_of_length(words, tmp_path):
+    """A collapse at some millimetres."""
+    arch = generators.arch(voussoirs=5, radius=0.05)
+    spread = solver.Settlement((1, 0), increment=2e-3, limit=0.05, tolerance=1e-5)
+    response = solver.Structure(arch, friction_coefficient=0.7).settle(spread)
+    low, high = (1e3 * end for end in response.collapse.bracket)
+    draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL)
+    (told,) = words
+    assert " mm" in told["title"]
+    assert f"equilibrium at {low:.5g} mm, none at {high:.5g} mm" in told["detail"]

@@ -68,6 +68,19 @@ def test_a_support_that_turns_has_an_arrow_at_both_ends(foot, tmp_path):
     assert columns[middle:].sum() > 3
 
 
+def test_the_arrows_of_a_support_turn_with_it(tmp_path):
+    """One end of ground that tilts has sunk, and the other has risen."""
+    stones = [rectangle(-0.6, -0.1, 0.6, 0.0), rectangle(-0.3, 0.0, 0.3, 0.2)]
+    block = solver.Assembly.from_outlines(stones, roles=["moving", "free"])
+    tilts = solver.Settlement(rotation=-1.0, rotation_centre=(0.0, -0.05), increment=0.3, limit=0.3)
+    response = solver.Structure(block, friction_coefficient=0.7).settle(tilts)
+    picture = pixels(draw_still(response, -1, tmp_path / "tilt.png", size=SMALL, forces="none"))
+    rows, columns = np.nonzero(alike(picture, palette.SETTLEMENT, 30))
+    right = columns > SMALL[0] // 2
+    apart = columns[right].mean() - columns[~right].mean()
+    assert rows[right].mean() - rows[~right].mean() == pytest.approx(apart * np.tan(0.3), rel=0.1)
+
+
 @pytest.mark.parametrize("space", [False, True], ids=["of shallow ground", "magnified in space"])
 def test_arrows_of_supports_are_drawn_whole(space, tmp_path):
     if space:

@@ -126,9 +126,7 @@ def test_numbers_beyond_what_is_solved_are_named(tmp_path, scale, density, words
     ]
     for block in blocks:
         block["outline"] = (np.array(block["outline"]) * scale).tolist()
-    (tmp_path / "a.json").write_text(
-        json.dumps({"format": "blockvis layout", "unit": "m", "blocks": blocks}), encoding="utf-8"
-    )
+    (tmp_path / "a.json").write_text(json.dumps({"format": "blockvis layout", "blocks": blocks}), encoding="utf-8")
     (tmp_path / "case.toml").write_text(
         '[geometry]\nfile = "a.json"\n[settlement]\ndirection = [0, -1]\n', encoding="utf-8"
     )

@@ -1,8 +1,6 @@
 """Units of drawings."""
 
-import json
-
-import numpy as np
+import ezdxf
 import pytest
 
 from blockvis import read, read_layout
@@ -10,10 +8,11 @@ from blockvis import read, read_layout
 
 def square(folder, size, stated=""):
     """A file of one square block that states a unit, or none."""
-    outline = (size * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])).tolist()
-    content = {"unit": stated, "blocks": [{"outline": outline}]}
-    (folder / "a.json").write_text(json.dumps(content), encoding="utf-8")
-    return folder / "a.json"
+    drawing = ezdxf.new("R2000")
+    drawing.header["$INSUNITS"] = {"": 0, "in": 1, "ft": 2, "mm": 4, "cm": 5}[stated]
+    drawing.modelspace().add_lwpolyline([(0, 0), (size, 0), (size, size), (0, size)], close=True)
+    drawing.saveas(folder / "a.dxf")
+    return folder / "a.dxf"
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("mm", 1e-3), ("Inches", 0.0254), (" m ", 1.0)])

@@ -29,7 +29,7 @@ def test_metres_are_doubted_too(tmp_path, factor, unit):
 
 
 @pytest.mark.parametrize(
-    ("size", "doubt"), [(0.05, ""), (0.3, ""), (2.0, ""), (9.0, ""), (35.0, "cm was assumed, which makes it 0.35 m")]
+    ("size", "doubt"), [(0.05, ""), (0.3, ""), (2.0, ""), (9.0, ""), (35.0, "cm would make it 0.35 m")]
 )
 def test_masonry_is_not_doubted(tmp_path, size, doubt):
     square = size * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -79,6 +79,22 @@ def test_a_unit_in_doubt_stops_a_run_until_the_case_gives_one(tmp_path, capsys):
     for unit, width in (("mm", 0.72), ("m", 720.0)):
         assembly = assembled(tmp_path, f"[geometry]\nfile = 'a.msh'\nunit = '{unit}'\n")
         assert np.ptp(assembly.vertices[assembly.vertices[:, 1] > -1.0, 0]) == pytest.approx(width)
+
+
+def test_the_unit_of_a_layout_of_our_own_holds(tmp_path):
+    """A model of stones of 13 mm, which cm would make common masonry: the doubt is a note until `unit` is given."""
+    bricks(tmp_path / "a.json", 100.0)
+    content = (tmp_path / "a.json").read_text().replace('"unit": "m"', '"unit": "mm"')
+    (tmp_path / "a.json").write_text(content)
+    layout = read_layout(tmp_path / "a.json")
+    assert (layout.unit, np.ptp(layout.outlines[0][:, 0])) == ("mm", pytest.approx(0.024))
+    assert [note[:16] for note in layout.notes] == ["unit mm in doubt"]
+    with pytest.warns(UserWarning, match="unit mm in doubt"):
+        assembly = assembled(tmp_path, "[geometry]\nfile = 'a.json'\n")
+    assert np.ptp(assembly.vertices[assembly.vertices[:, 1] > -1.0, 0]) == pytest.approx(0.072)
+    assert not read_layout(tmp_path / "a.json", unit="mm").notes
+    assert main(["new", str(tmp_path / "a.json"), "-o", str(tmp_path / "new.toml")]) == 0
+    assert '\nunit = "mm"\n' in (tmp_path / "new.toml").read_text()
 
 
 def test_density_of_the_file_wins_with_a_note(tmp_path):
