@@ -392,17 +392,14 @@ def _refuse_half_characters(words: Sequence[str], what: str) -> None:
 
 
 def _unique_names(names: list[str]) -> tuple[str, ...]:
-    if len(set(names)) == len(names):
-        return tuple(names)
     taken, unique = set(names), []
-    seen: dict[str, int] = {}
+    following: dict[str, int] = {}
     for name in names:
-        count = seen[name] = seen.get(name, 0) + 1
-        candidate = name if count == 1 else f"{name} #{count}"
-        while count > 1 and candidate in taken:
-            count += 1
-            candidate = f"{name} #{count}"
-        seen[name] = count
+        candidate = name
+        while name in following and candidate in taken:
+            candidate = f"{name} #{following[name]}"
+            following[name] += 1
+        following.setdefault(name, 2)
         taken.add(candidate)
         unique.append(candidate)
     return tuple(unique)

@@ -203,8 +203,6 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
     count : int
         Number of polygons.
     """
-    if len(owner) == 0:
-        return np.zeros(0), np.zeros(count), np.zeros(count)
     number = np.bincount(owner, minlength=count)
     total = np.stack([np.bincount(owner, points[:, k], minlength=count) for k in (0, 1)], axis=1)
     middle = total / np.maximum(number, 1)[:, None]

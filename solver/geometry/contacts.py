@@ -112,13 +112,12 @@ def matched_contacts(contacts: Named, before: Named) -> tuple[np.ndarray, np.nda
     return place, earlier_keys[place] == keys
 
 
-def are_known(contacts: Contacts, known: Contacts, same_normal: bool = True) -> np.ndarray:
-    """(n,) bool array: whether contact points are among those known, by their names and normals or names alone."""
-    if len(known) == 0 or len(contacts) == 0:
-        return np.zeros(len(contacts), dtype=bool)
+def are_known(contacts: Contacts, known: Contacts) -> np.ndarray:
+    """(n,) bool array: whether contact points are among those known, by their names and normals."""
     number, same = matched_contacts(contacts, known)
-    along = np.einsum("ni,ni->n", contacts.frames[:, 0], known.frames[number, 0])
-    return same & ((along > SAME_NORMAL) | (not same_normal))
+    k = np.flatnonzero(same)
+    same[k] = np.einsum("ni,ni->n", contacts.frames[k, 0], known.frames[number[k], 0]) > SAME_NORMAL
+    return same
 
 
 def successors(

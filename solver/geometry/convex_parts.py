@@ -135,10 +135,6 @@ class PlacedParts:
 class NoParts(ValueError):
     """A block cannot be cut into convex parts: its number, and why."""
 
-    def __init__(self, block: int, why: str) -> None:
-        super().__init__(f"block {block} {why}")
-        self.block, self.why = block, why
-
 
 def convex_parts(solids: Solids) -> ConvexParts:
     """Cut solids that are not convex into convex parts.

@@ -107,10 +107,8 @@ def entered(movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, 
         faces.append(face[owner])
     k = np.flatnonzero(best == 2)
     own, other = kinds[2].first[k], kinds[2].second[k]
-    at_edges = edge_corner = k
-    if len(k):
-        normals = _ridden(movement, across(movement.before, own, other), other)
-        at_edges, edge_corner = _behind(movement.after, i[k], movement.after.starts(other), normals, kinds[2].after[k])
+    normals = _ridden(movement, across(movement.before, own, other), other)
+    at_edges, edge_corner = _behind(movement.after, i[k], movement.after.starts(other), normals, kinds[2].after[k])
     return Entered(np.concatenate(corners), np.concatenate(faces), own, other, at_edges, edge_corner)
 
 
@@ -167,8 +165,6 @@ def _of_edges(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
     first, second = np.zeros((2, len(i)), dtype=np.int64)
     for k, own, other, *corners in alike((edges_of, i), (edges_of, j), (offsets, i), (offsets, j)):
         own, other = np.repeat(once[own], other.shape[1], axis=1), np.tile(once[other], (1, own.shape[1]))
-        if own.size == 0:
-            continue
         normals = across(placed_before, own, other)
         gaps, foremost = _gaps(placed_before, normals, own, other, corners)
         ridden, _ = _gaps(placed_after, _ridden(movement, normals, other), own, other, corners)

@@ -174,9 +174,7 @@ def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np
     vertex, edge = _vertex_edge_candidates(shapes, vertices, pair_a, pair_b, reach)
     vertex, edge, corner = _classified_ends(shapes, vertices, vertex, edge)
     kept = _closest_faces(shapes, vertices, vertex, edge, corner)
-    vertex, edge, corner = vertex[kept], edge[kept], corner[kept]
-    order = np.lexsort((edge, vertex))
-    return measured_points(shapes, vertices, features_of(vertex[order], edge[order], corner[order]))
+    return measured_points(shapes, vertices, features_of(vertex[kept], edge[kept], corner[kept]))
 
 
 def passed_edges(
@@ -337,24 +335,22 @@ def _closest_faces(
     """
     kept = np.ones(len(vertex), dtype=bool)
     k = np.flatnonzero(corner >= 0)
-    if len(k) < 2:
-        return kept
     facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
     following = shapes.next_vertex
     along = _unit(vertices[following[edge[k]]] - vertices[edge[k]])
     back = -_unit(vertices[following[facing]] - vertices[facing])
     closeness = _dot(along, back)
-    _, pair = np.unique(np.stack([vertex[k], corner[k]], axis=1), axis=0, return_inverse=True)
-    closest = np.full(int(pair.max()) + 1, -np.inf)
-    np.maximum.at(closest, pair.ravel(), closeness)
-    kept[k] = closeness >= closest[pair.ravel()] - 1e-9
+    _, pair = np.unique(vertex[k] * np.int64(len(vertices)) + corner[k], return_inverse=True)
+    closest = np.full(len(k), -np.inf)
+    np.maximum.at(closest, pair, closeness)
+    kept[k] = closeness >= closest[pair] - 1e-9
     return kept
 
 
 def _without_duplicates(
     shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Keep each pair of corners once, seen from the lower numbered vertex."""
+    """Keep each pair of corners once, seen from the lower numbered vertex, and sort the pairs by vertex and edge."""
     k = np.flatnonzero(corner >= 0)
     facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
     swap = vertex[k] > corner[k]

@@ -13,7 +13,7 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import expand_ranges
 from .clipping import ClippedCorners, clipped_faces
-from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts
+from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
 from .convex_parts import PlacedParts
 from .cut_points import without_points_of_cuts
 from .entering import Movement, across, entered
@@ -242,8 +242,7 @@ def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
     corner = start[owner] + position
     inward = cross(faces.normals[face[owner]], unit(placed.along(corner)))
     inside = dot(vertices[vertex[owner]] - placed.starts(corner), inward)
-    if len(owner):
-        inside = np.minimum.reduceat(inside, np.flatnonzero(position == 0))
+    inside = np.minimum.reduceat(inside, np.flatnonzero(position == 0))
     over = inside >= -CORNER_TOLERANCE * solids.shortest_edges[face]
     return feature_rows(ON_FACE, vertex[over], face[over], -1)
 
@@ -293,7 +292,7 @@ def entered_points(
     crossings = places_of(*_crossings(after, found.own, found.other))
     on_face = measured_points(before, feature_rows(ON_FACE, found.corner, found.face, -1))
     crossed = measured_points(before, feature_rows(ACROSS, found.own, found.other, crossings))
-    known = are_known(crossed, contacts, same_normal=False)
+    _, known = matched_contacts(crossed, contacts)
     k = np.flatnonzero(known[found.at_edges])
     corner, pair = found.edge_corner[k], found.at_edges[k]
     own, other = found.own[pair], found.other[pair]

@@ -69,7 +69,8 @@ def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
     try:
         _ = shapes.parts
     except NoParts as error:
-        raise ValueError(f"block {error.block} ('{names[error.block]}') {error.why}") from None
+        block, why = error.args
+        raise ValueError(f"block {block} ('{names[block]}') {why}") from None
     return shapes
 
 
