@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from solver.words import counted, numbers_of, plain
 
 from .geometry.contacts import Contacts
-from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
+from .geometry.outlines import Outlines, self_crossings
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
 from .geometry.surfaces import SMALLEST_SHAPE_FACTOR, polyhedra_of, refuse_infinite
@@ -91,10 +91,8 @@ class Assembly(Shown):
         names, roles_array, materials = _labels(len(outlines), "outlines", names, roles, materials)
         rings = [_checked_ring(outline, name) for outline, name in zip(outlines, names, strict=True)]
         offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
-        vertices = np.concatenate(rings)
-        areas, _ = polygon_integrals(vertices, offsets)
-        lengths = np.hypot(*(vertices[next_vertices(offsets)] - vertices).T)
-        perimeter = np.add.reduceat(lengths, offsets[:-1])
+        drawn = Outlines(np.concatenate(rings), offsets, np.ones(len(rings)))
+        areas, perimeter = drawn.areas, np.add.reduceat(drawn.edge_lengths, offsets[:-1])
         for i in np.flatnonzero(np.abs(areas) <= SMALLEST_SHAPE_FACTOR * perimeter**2).tolist():
             raise ValueError(
                 f"block {i} ('{names[i]}') has an area of {abs(areas[i]):.3g} m² for a perimeter of "
@@ -110,10 +108,10 @@ class Assembly(Shown):
                 f"({b[0]:.6g}, {b[1]:.6g}) meet; order its corners around the outline"
             )
         return cls(
-            shapes=Polygons(vertices, offsets, _positive(thickness, len(names), "thickness", "m", names)),
+            shapes=Polygons(vertices, offsets, _positive(thickness, "thickness", "m", names)),
             names=names,
             roles=roles_array,
-            density=_positive(density, len(names), "density", "kg/m³", names),
+            density=_positive(density, "density", "kg/m³", names),
             materials=materials,
         )
 
@@ -161,7 +159,7 @@ class Assembly(Shown):
             shapes=polyhedra_of(solids, names),
             names=names,
             roles=roles_array,
-            density=_positive(density, len(names), "density", "kg/m³", names),
+            density=_positive(density, "density", "kg/m³", names),
             materials=materials,
         )
 
@@ -405,8 +403,8 @@ def _unique_names(names: list[str]) -> tuple[str, ...]:
     return tuple(unique)
 
 
-def _positive(value: ArrayLike, n: int, what: str, unit: str, names: Sequence[str]) -> np.ndarray:
-    array = numbers_of(value, what)
+def _positive(value: ArrayLike, what: str, unit: str, names: Sequence[str]) -> np.ndarray:
+    array, n = numbers_of(value, what), len(names)
     if array.ndim and array.shape != (n,):
         raise ValueError(f"{what} has shape {array.shape}; give one number or {n}, one per block")
     array = np.broadcast_to(array, (n,)).copy()

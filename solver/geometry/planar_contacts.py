@@ -11,6 +11,7 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .contacts import STEEPEST_LANDING, Contacts
 from .outlines import Outlines
+from .solids import dot
 
 #: Sine of the angle by which the flanks of a corner may tilt into the edge it faces, as those of an open joint.
 LARGEST_TILT = 0.5
@@ -88,8 +89,8 @@ def measured_points(
         block_b=shapes.block_of_vertex[edge],
         points=np.where(on_corner[:, None], (v + base) / 2.0, v),
         frames=np.stack([normal, tangent], axis=1),
-        gaps=_dot(offset, normal),
-        slip=_dot(offset, tangent)[:, None],
+        gaps=dot(offset, normal),
+        slip=dot(offset, tangent)[:, None],
         areas=np.zeros(len(features)) if areas is None else areas,
     )
     return replace(contacts, areas=_areas(shapes, contacts)) if areas is None else contacts
@@ -112,7 +113,7 @@ def _areas(shapes: Outlines, contacts: Contacts) -> np.ndarray:
     point = np.repeat(np.arange(len(contacts)), 2)
     tangent = np.where(side[edge][point] == low.ravel(), 1.0, -1.0)[:, None] * contacts.frames[point, 1]
     direction = np.stack([np.bincount(face, tangent[:, axis]) for axis in (0, 1)], axis=1)[face]
-    along = _dot(contacts.points[point], _unit(direction))
+    along = dot(contacts.points[point], _unit(direction))
     order = np.lexsort((along, face))
     step = np.where(np.diff(face[order]) == 0, np.diff(along[order]), 0.0)
     length = np.zeros(len(point))
@@ -134,7 +135,7 @@ def _side_of_edge(shapes: Outlines) -> np.ndarray:
     along = _unit(shapes.vertices[shapes.next_vertex] - shapes.vertices)
     before = along[shapes.previous_vertex]
     turn = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
-    ends = shapes.convex_vertex | (turn < -LARGEST_TILT) | (_dot(before, along) < 0.0)
+    ends = shapes.convex_vertex | (turn < -LARGEST_TILT) | (dot(before, along) < 0.0)
     number = np.arange(len(ends))
     side = np.maximum.accumulate(np.where(ends, number, first[shapes.block_of_vertex]))
     # The side at the first corner may begin before it.
@@ -237,10 +238,10 @@ def _vertex_edge_candidates(
     length, width = shapes.edge_lengths, shapes.widths
     tangents = (vertices[following] - vertices) / length[:, None]
     normals = np.stack([tangents[:, 1], -tangents[:, 0]], axis=1)
-    gap = _dot(vertices[vertex] - vertices[edge], normals[edge])
+    gap = dot(vertices[vertex] - vertices[edge], normals[edge])
     near = np.flatnonzero((gap >= -PENETRATION_FRACTION * width.max()) & (gap <= reach))
     vertex, edge, gap = vertex[near], edge[near], gap[near]
-    along = _dot(vertices[vertex] - vertices[edge], tangents[edge])
+    along = dot(vertices[vertex] - vertices[edge], tangents[edge])
     a_block, b_block = shapes.block_of_vertex[vertex], shapes.block_of_vertex[edge]
     deepest = PENETRATION_FRACTION * np.minimum(width[a_block], width[b_block])
     end = end_zone(shapes, vertex, edge)
@@ -251,9 +252,9 @@ def _vertex_edge_candidates(
     to_next, to_previous = _flanks(shapes, vertices, vertex)
     normal = normals[edge]
     outside = (
-        (_dot(to_next, normal) >= -LARGEST_TILT)
-        & (_dot(to_previous, normal) >= -LARGEST_TILT)
-        & (_dot(_inward(to_next, to_previous), normal) > 0.0)
+        (dot(to_next, normal) >= -LARGEST_TILT)
+        & (dot(to_previous, normal) >= -LARGEST_TILT)
+        & (dot(_inward(to_next, to_previous), normal) > 0.0)
     )
     return vertex[outside], edge[outside]
 
@@ -280,7 +281,7 @@ def _seen_from_edges(
     """Directions of edges, (n, 2), and how far corners are along and before them, (n,) arrays [m]."""
     tangent = _unit(vertices[shapes.next_vertex[edge]] - vertices[edge])
     offset = vertices[vertex] - vertices[edge]
-    return tangent, _dot(offset, tangent), offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
+    return tangent, dot(offset, tangent), offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
 
 
 def _flanks(shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -311,14 +312,14 @@ def _classified_ends(
     facing = _facing_edge(shapes, vertex, edge, other)
     along_edge = sense * tangent
     along_facing = -sense * _unit(vertices[following[facing]] - vertices[facing])
-    parallel = _dot(along_edge, along_facing) > FACING_COSINE
+    parallel = dot(along_edge, along_facing) > FACING_COSINE
     # At a re-entrant corner there is no corner to touch.
     at_end = (overlap <= end) & shapes.convex_vertex[other]
     # The corner of a face that opens slides past the end of the edge before it would touch it.
     is_past = ~parallel & shapes.convex_vertex[other] & ((overlap <= end) | (gap > STEEPEST_LANDING * overlap))
     # Both corners lie within the end zone of the other's face, along the bisector.
     halfway = _unit(along_edge + along_facing + 1e-300)
-    distance = np.abs(_dot(vertices[vertex] - vertices[other], halfway))
+    distance = np.abs(dot(vertices[vertex] - vertices[other], halfway))
     corner = np.where(at_end & parallel & (distance <= end), other, -1)
     chosen = ~is_past
     vertex, edge, corner = vertex[chosen], edge[chosen], corner[chosen]
@@ -339,7 +340,7 @@ def _closest_faces(
     following = shapes.next_vertex
     along = _unit(vertices[following[edge[k]]] - vertices[edge[k]])
     back = -_unit(vertices[following[facing]] - vertices[facing])
-    closeness = _dot(along, back)
+    closeness = dot(along, back)
     _, pair = np.unique(vertex[k] * np.int64(len(vertices)) + corner[k], return_inverse=True)
     closest = np.full(len(k), -np.inf)
     np.maximum.at(closest, pair, closeness)
@@ -377,11 +378,6 @@ def end_zone(shapes: Outlines, vertex: np.ndarray, edge: np.ndarray) -> np.ndarr
     length = shapes.edge_lengths
     shortest = np.minimum(length[vertex], length[shapes.previous_vertex[vertex]])
     return CORNER_TOLERANCE * np.minimum(shortest, length[edge])
-
-
-def _dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(n,) array: dot products of two (n, 2) arrays; a sum over an axis of two takes ten times as long."""
-    return first[:, 0] * second[:, 0] + first[:, 1] * second[:, 1]
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -138,9 +138,10 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
         deepest = PENETRATION_FRACTION * np.minimum(widths[contacts.block_a], widths[contacts.block_b])
         return (contacts.gaps <= reach) & (contacts.gaps >= -deepest)
 
-    tried = np.flatnonzero(pairs.shallow & pairs.face_each_other)
-    alone = pairs.shallow & ~pairs.face_each_other
-    tips = measured_points(placed, _tips(placed, pairs[alone], reach))
+    shallow = pairs.apart >= -PENETRATION_FRACTION * pairs.width
+    # Flanks of steep tips hardly face each other.
+    face_each_other = pairs.cosine <= -0.05
+    tips = measured_points(placed, _tips(placed, pairs[shallow & ~face_each_other], reach))
     tips = tips[near(tips) & ~parts.made[tips.features[:, 1]]]
     # No edges fit between faces that oppose each other better.
     crossed = measured_points(placed, _crossed_edges(placed, pairs[pairs.cosine > -0.94], reach))
@@ -149,11 +150,11 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
     # The planes of both faces, and whether the point is near.
     labels = [np.tile([-1, -1, 1], (len(contacts), 1)) for contacts in found]
     # Other faces are tried where those that oppose each other best do not cover each other.
-    facing = pairs[tried]
-    resolved = np.zeros(len(facing), dtype=bool)
+    facing = pairs[shallow & face_each_other]
+    every = np.arange(len(facing.i))
+    resolved, largest = np.zeros(len(every), dtype=bool), np.zeros(len(every))
     _, joint = np.unique(block_of_part[facing.i] * len(widths) + block_of_part[facing.j], return_inverse=True)
-    largest = np.zeros(len(facing))
-    rounds = chain([(np.arange(len(facing)), facing.face_i, facing.face_j)], facing.other_faces(placed))
+    rounds = chain([(every, facing.face_i, facing.face_j)], facing.other_faces(placed))
     for pair, face_i, face_j in rounds:
         unresolved = ~resolved[pair]
         pair, face_i, face_j = pair[unresolved], face_i[unresolved], face_j[unresolved]

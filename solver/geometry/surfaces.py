@@ -114,10 +114,8 @@ def _blocks_of_open_edges(solids: Solids) -> list[int]:
     """Blocks with an edge that is not run through once in each sense."""
     n = np.int64(len(solids.vertices))
     start, end = solids.corners, solids.corners[solids.next_corner]
-    keys, counts = np.unique(start * n + end, return_counts=True)
-    there = np.searchsorted(keys, end * n + start)
-    closed = keys[np.minimum(there, len(keys) - 1)] == end * n + start
-    closed &= counts[np.searchsorted(keys, start * n + end)] == 1
+    _, number, counts = np.unique(start * n + end, return_inverse=True, return_counts=True)
+    closed = np.isin(end * n + start, start * n + end) & (counts[number] == 1)
     return np.unique(solids.block_of_face[solids.face_of_corner[~closed]]).tolist()
 
 
