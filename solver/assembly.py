@@ -297,17 +297,9 @@ class Assembly(Shown):
 
 
 def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> None:
-    """Refuse an assembly without free blocks, or with blocks that overlap, before anything is solved.
+    """Raise ``ValueError`` where no block is free or two overlap, by their names and the depth, before all is solved.
 
-    Parameters
-    ----------
-    overlap_tolerance : float, optional [m]
-        Overlap that is accepted; a thousandth of the width of the thinnest block by default.
-
-    Raises
-    ------
-    ValueError
-        Names both blocks and the depth.
+    An overlap up to the tolerance [m] is accepted, a thousandth of the width of the thinnest block by default.
     """
     if not assembly.free.any():
         raise ValueError(f"{counted(assembly.n_blocks, 'block')}, all supports; at least one must be free")

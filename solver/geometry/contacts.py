@@ -126,19 +126,8 @@ def successors(
     """Find the contact points that stand where others of the same two blocks have vanished, with the nearest normals.
 
     A force that went over to another face of the two blocks would lose there what that one's friction does not hold.
-
-    Parameters
-    ----------
-    vanished : (k,) int array
-        Numbers of those that are not among the contact points any more.
-    size : float [m]
-        Of the blocks.
-
-    Returns
-    -------
-    row : (m,) int array
-        Numbers in ``vanished``; one that is near to several is there several times.
-    successor : (m,) int array
+    Of the ``vanished``, (k,) int, rows (m,) are given with the successor of each, (m,) int: one that is near to several
+    is there several times. The size is that of the blocks [m].
     """
     old, new = before.pair_keys()[vanished], contacts.pair_keys()
     order = np.argsort(new, kind="stable")

@@ -19,21 +19,9 @@ def without_points_of_cuts(
 ) -> tuple[Contacts, np.ndarray]:
     """Leave out points at cuts that lie between others in the same two faces.
 
-    Parameters
-    ----------
-    near : float [m]
-        Distance up to which points are at one place.
-    planes : (n, 2) int array
-        The planes of the two faces in which each point was found; -1 where it was not found between faces.
+    With the numbers that the remaining points had, (n_remaining,) int. Points up to ``near`` [m] apart are at one
+    place; ``planes``, (n, 2) int, are those of the two faces between which each was found, -1 where it was not.
 
-    Returns
-    -------
-    contacts : Contacts
-    remaining_points : (n_remaining,) int array
-        Their numbers before.
-
-    Notes
-    -----
     Blocks are rigid and both faces plane: the gap at a point between others follows from theirs, and what it carries
     they can carry as well. Its area goes to them.
     """

@@ -75,15 +75,9 @@ class _Axes(NamedTuple):
 def entered(movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, deepest: np.ndarray) -> Entered:
     """Find parts that overlap by more than a tolerance [m] after a movement, and what would keep them apart.
 
-    Parameters
-    ----------
-    i, j : (n_pairs,) int arrays
-        Parts that are near each other after it.
-    deepest : (n_pairs,) array [m]
-        Overlap before the movement beyond which an axis is none of a contact.
+    Parts i and j, (n_pairs,) int arrays, are near each other after it. Overlaps before it beyond the ``deepest``,
+    (n_pairs,) [m], are those of axes of no contact.
 
-    Notes
-    -----
     Convex parts are apart where a face of one, or two edges across each other, separate them. Among the planes that
     separated them before, and ride on one of them, the one is taken behind which the other has come least. A movement
     in which no corner comes behind it cannot end in an overlap.
@@ -189,14 +183,9 @@ def _ridden(movement: Movement, normals: np.ndarray, other: np.ndarray) -> np.nd
 def _gaps(
     placed: PlacedParts, normals: np.ndarray, own: np.ndarray, other: np.ndarray, corners: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Separations of parts along normals to two edges.
+    """Separations of parts along normals to two edges, (n_pairs, n_axes) [m], minus infinity where there is no normal.
 
-    Returns
-    -------
-    gaps : (n_pairs, n_axes) array [m]
-        Minus infinity where there is no normal.
-    foremost : (n_pairs, n_axes) bool array
-        Whether both edges would be the first to meet.
+    And whether both edges would be the first to meet, a bool array of this shape.
     """
     origin, along = placed.vertices[corners[0][:, :1]], placed.along(own)
     at_own, at_other = (dot(normals, placed.starts(k) - origin) for k in (own, other))

@@ -53,19 +53,10 @@ def corners_and_edges(features: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
 def measured_points(
     shapes: Outlines, vertices: np.ndarray, features: np.ndarray, areas: np.ndarray | None = None
 ) -> Contacts:
-    """Frames and gaps of given pairs of features where the corners now are.
+    """Frames and gaps of given pairs of features, (n, 4) int, where the corners, (n_vertices, 2) [m], now are.
 
-    Parameters
-    ----------
-    vertices : (n_vertices, 2) array [m]
-        Current corners of all blocks.
-    features : (n, 4) int array
-        As in :class:`Contacts`.
-    areas : (n,) array, optional [m²]
-        Tributary areas, where they are known; measured by default.
+    Tributary areas, (n,) [m²], are measured where they are not given.
 
-    Notes
-    -----
     A corner on an edge has the normal of the edge. A corner on a corner has the normal that halves the angle
     between the two faces that meet there, so that neither block is preferred, and the point half-way.
     """
@@ -144,24 +135,11 @@ def _side_of_edge(shapes: Outlines) -> np.ndarray:
 
 
 def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
-    """Find the points at which blocks touch or may touch within one increment.
+    """Find the points at which blocks touch or may touch within one increment, with gaps up to ``reach`` [m].
 
-    Parameters
-    ----------
-    vertices : (n_vertices, 2) array [m]
-        Current corners of all blocks.
-    reach : float [m]
-        Largest gap of a contact point that is kept.
-    useful : (n_blocks,) bool array
-        One of two blocks that touch must be of these: those that are free to move.
+    Where the corners, (n_vertices, 2) [m], now are. One of two blocks that touch must be of the ``useful``, (n_blocks,)
+    bool, those that are free to move. Sorted by their features, so that the same geometry gives the same order.
 
-    Returns
-    -------
-    Contacts
-        Sorted by their features, so that the same geometry gives the same order.
-
-    Notes
-    -----
     Candidates are all pairs of a convex corner and an edge of another block, not both of supports, with the
     corner in front of the edge (gap at most ``reach``), its block on the outward side and above the edge over
     some length. Near an end of the edge the corner there and the face that leaves it decide: where the two
@@ -181,18 +159,10 @@ def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np
 def passed_edges(
     shapes: Outlines, before: np.ndarray, after: np.ndarray, i: np.ndarray, j: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the corners of blocks that have gone through edges of others in a movement.
+    """Corners of blocks that have gone through edges of others in a movement, and these edges, (n,) int arrays.
 
-    Parameters
-    ----------
-    before, after : (n_vertices, 2) arrays [m]
-    i, j : (n_pairs,) int arrays
-        Blocks that overlap after it.
-
-    Returns
-    -------
-    vertex, edge : (n,) int arrays
-        Of several edges the one that the corner went through last, seen from the block that has the edge.
+    Of corners (n_vertices, 2) [m] before and after, of blocks i and j, (n_pairs,) int, that overlap after it. Of
+    several edges it is the one that the corner went through last, seen from the block that has the edge.
     """
     offsets, following, counts = shapes.offsets, shapes.next_vertex, np.diff(shapes.offsets)
     a, b = np.concatenate([i, j]), np.concatenate([j, i])

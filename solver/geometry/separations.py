@@ -17,23 +17,11 @@ SMALLEST_SINE = 0.05
 def face_separations(
     placed: PlacedParts, i: np.ndarray, j: np.ndarray, inner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Largest separation of two convex parts by a face of one.
+    """Largest separations of convex parts i and j, (n,) int arrays, by a face of part i.
 
-    Parameters
-    ----------
-    i, j : (n,) int arrays
-        Parts.
-    inner : (n_faces,) bool array
-        Faces inside a block.
-
-    Returns
-    -------
-    apart : (n,) array [m]
-        How far part j is in front of the face of part i from which it is farthest; negative behind it.
-    leading : (n,) int array
-        That face.
-    behind : (n,) array [m]
-        How far it is in front of a face of part i inside its block; minus infinity where there is none.
+    How far, (n,) [m], part j is in front of the face from which it is farthest, negative behind it; that face, (n,)
+    int; and how far it is in front of one inside the block, by ``inner``, (n_faces,) bool: minus infinity where there
+    is none.
     """
     solids, vertices, faces = placed.solids, placed.vertices, placed.faces
     apart, leading, behind = np.empty(len(i)), np.empty(len(i), dtype=np.int64), np.full(len(i), -np.inf)
@@ -56,22 +44,10 @@ def face_separations(
 def edge_separations(
     placed: PlacedParts, i: np.ndarray, j: np.ndarray, smallest_sine: float = SMALLEST_SINE
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Largest separation of two convex parts by two edges.
+    """Largest separations of convex parts i and j, (n,) int arrays, by an edge of each, and these edges, (n,) int.
 
-    Parameters
-    ----------
-    i, j : (n,) int arrays
-        Parts.
-    smallest_sine : float
-        Of the angle between the edges.
-
-    Returns
-    -------
-    apart : (n,) array [m]
-        Largest separation along the cross product of an edge of i and an edge of j between which both parts lie on the
-        two sides; minus infinity where there are none.
-    own, other : (n,) int arrays
-        The edges.
+    Along the cross product, (n,) [m], of edges with at least the sine between them, on the two sides of which both
+    parts lie; minus infinity where there are none.
     """
     solids, normals = placed.solids, placed.faces.normals
     once, first = solids.whole_edges
@@ -102,23 +78,10 @@ def edge_separations(
 
 
 def overlap_depths_in_space(placed: PlacedParts, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs of blocks that overlap by more than a tolerance, and by how much.
+    """Pairs of blocks that overlap by more than a tolerance [m], (n,) int, the lower first, and their depths, (n,) [m].
 
-    Parameters
-    ----------
-    tolerance : float [m]
-
-    Returns
-    -------
-    i, j : (n_pairs,) int arrays
-        Blocks, the lower number first.
-    depth : (n_pairs,) array [m]
-        Smallest movement that separates their deepest two parts.
-
-    Notes
-    -----
-    Convex parts are separated by a face of one of them or by two edges across each other: the largest separation of
-    these, negative, is the depth.
+    A depth is the smallest movement that separates their deepest two parts. Convex parts are separated by a face of one
+    of them or by two edges across each other: the largest separation of these, negative, is the depth.
     """
     block_of_part = placed.parts.block_of_part
     i, j = box_pairs(placed.vertices, placed.solids.offsets, -tolerance)

@@ -27,17 +27,10 @@ SLIVER = 0.005
 
 
 def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray | None = None) -> Contacts:
-    """Frames, gaps and slips of given pairs of features where the corners now are.
+    """Frames, gaps and slips of given pairs of features, (n, 4) int, where the corners now are.
 
-    Parameters
-    ----------
-    features : (n, 4) int array
-        As in :class:`Contacts`.
-    areas : (n,) array, optional [m²]
-        Carried on; zero by default.
+    Areas, (n,) [m²], are carried on, or zero.
 
-    Notes
-    -----
     A corner inside a face has the normal of the face. On the boundary of a face its normal is half-way between that of
     the face and that of the edges that cross there, so that the normal of a corner that enters the face changes in two
     equal steps. A corner on a corner, and edges that are nearly parallel, have the normal half-way
@@ -107,25 +100,11 @@ def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray
 
 
 def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray) -> Contacts:
-    """Find the points at which blocks touch or may touch within one increment.
+    """Find the points at which blocks touch or may touch within one increment, with gaps up to ``reach`` [m].
 
-    Parameters
-    ----------
-    placed : PlacedParts
-        Those of one block and the faces inside it have no contact points.
-    reach : float [m]
-        Largest gap of a contact point that is kept.
-    useful : (n_blocks,) bool array
-        One of two blocks that touch must be of these: those that are free to move.
-    widths : (n_blocks,) array [m]
+    One of two blocks that touch must be of the ``useful``, (n_blocks,) bool, those that are free to move; the widths,
+    (n_blocks,) [m], are of all. Sorted by their features, so that the same geometry gives the same order.
 
-    Returns
-    -------
-    Contacts
-        Sorted by their features, so that the same geometry gives the same order.
-
-    Notes
-    -----
     Of two near parts, the face from which the other part is farthest leads, and the face of the other that opposes it
     best answers. Both are projected into the plane half-way between and clipped. A corner of the clipped polygon is a
     corner of one part in the face of the other, or an edge across an edge. Where they do not cover each other, the next
@@ -195,11 +174,7 @@ def _slivers(
 ) -> np.ndarray:
     """Whether corners are those of a sliver at a cut, (n,) bool, beside the area in which their blocks touch.
 
-    Parameters
-    ----------
-    face_i, face_j : (n_pairs,) int arrays
-    largest : (n_pairs,) array [m²]
-        Of all polygons in which the same two blocks cover each other.
+    This is the largest, (n_pairs,) [m²], of all polygons in which the same two blocks cover each other.
     """
     solids = placed.solids
     area = np.bincount(corners.owner, corners.areas, minlength=len(face_i))
@@ -272,18 +247,9 @@ def entered_points(
 ) -> Contacts:
     """Find the points that would have kept apart blocks that overlap after a movement, measured before it.
 
-    Parameters
-    ----------
-    widths : (n_blocks,) array [m]
-    useful : (n_blocks,) bool array
-        One of two blocks that overlap must be of these.
-    tolerance : float [m]
-        Least overlap.
-    contacts : Contacts
-        What is known.
+    One of two blocks, of widths (n_blocks,) [m], must be of the ``useful``, (n_blocks,) bool; overlaps are of more than
+    the tolerance [m]. Contacts are those that are known.
 
-    Notes
-    -----
     Edges touch where they cross. Where that is known and does not help, as one turns, corners are to stay before the
     plane that separated the two.
     """
