@@ -194,8 +194,6 @@ def _without_duplicates(contacts: Contacts, duplicates: np.ndarray, near: float)
     sense = np.where(contacts.block_a[first] == contacts.block_a[second], 1.0, -1.0)
     same = pairs[first] == pairs[second]
     same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > 1.0 - 1e-4
-    if not same.any():
-        return contacts
     n = len(contacts)
     links = coo_array((np.ones(np.count_nonzero(same)), (first[same], second[same])), shape=(n, n))
     count, group = connected_components(links, directed=False)
