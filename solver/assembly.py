@@ -142,9 +142,9 @@ class Assembly(Shown):
         Raises
         ------
         ValueError
-            For a surface that is not closed, in several pieces or without volume, faces that run in different senses,
-            a face that is not plane to a thousandth of the width of its block, coordinates that are not finite, an
-            unknown role, or a density that is not positive.
+            For a surface that is not closed, in several pieces, without volume or crossing itself, faces that run in
+            different senses, a face that is not plane to a thousandth of the width of its block, coordinates that are
+            not finite, an unknown role, or a density that is not positive.
 
         Examples
         --------

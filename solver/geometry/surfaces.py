@@ -25,22 +25,9 @@ Surface = tuple[ArrayLike, Sequence[Sequence[int]]]
 
 
 def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
-    """Make polyhedra of closed surfaces, with one face in each plane.
+    """Make polyhedra of the closed surfaces of blocks, with one face in each plane.
 
-    Parameters
-    ----------
-    solids : sequence of (vertices, faces)
-        Corners (n, 3) [m] of each block, no two at one place, and the numbers of the corners around each face, all in
-        the same sense seen from outside.
-    names : sequence of str
-        Of the blocks, for messages.
-
-    Raises
-    ------
-    ValueError
-        Names the block and the place: coordinates that are not finite, a surface that is not closed, in several pieces
-        or without volume, faces in different senses, a face that is not plane to a thousandth of the width of its
-        block, a surface that crosses itself.
+    Raises ``ValueError`` that names the block and the place, as :meth:`Assembly.from_solids`.
     """
     surfaces = [_checked(solid, name) for solid, name in zip(solids, names, strict=True)]
     joined = Polyhedra.of_surfaces(surfaces)
