@@ -31,27 +31,6 @@ class Movement(NamedTuple):
     after: PlacedParts
 
 
-class Entered(NamedTuple):
-    """What would have kept parts apart.
-
-    Attributes
-    ----------
-    corner, face : (n,) int arrays
-        Corners that are to stay before faces.
-    own, other : (m,) int arrays
-        Edges that are to stay before each other, the first of the first part.
-    at_edges, edge_corner : (k,) int arrays
-        Numbers of such edges, and corners of the first part that have come behind the plane across them.
-    """
-
-    corner: np.ndarray
-    face: np.ndarray
-    own: np.ndarray
-    other: np.ndarray
-    at_edges: np.ndarray
-    edge_corner: np.ndarray
-
-
 class _Axes(NamedTuple):
     """The best axis of one kind for each pair of parts.
 
@@ -72,11 +51,17 @@ class _Axes(NamedTuple):
     apart: np.ndarray
 
 
-def entered(movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, deepest: np.ndarray) -> Entered:
+def entered(
+    movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, deepest: np.ndarray
+) -> tuple[np.ndarray, ...]:
     """Find parts that overlap by more than a tolerance [m] after a movement, and what would keep them apart.
 
     Parts i and j, (n_pairs,) int arrays, are near each other after it. Overlaps before it beyond the ``deepest``,
     (n_pairs,) [m], are those of axes of no contact.
+
+    Gives corners and the faces before which they are to stay, (n,) int; edges of parts i and of parts j that are to
+    stay before each other, (m,) int; numbers of such edges and corners of parts i that have come behind the plane
+    across them, (k,) int.
 
     Convex parts are apart where a face of one, or two edges across each other, separate them. Among the planes that
     separated them before, and ride on one of them, the one is taken behind which the other has come least. A movement
@@ -103,7 +88,7 @@ def entered(movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, 
     own, other = kinds[2].first[k], kinds[2].second[k]
     normals = _ridden(movement, across(movement.before, own, other), other)
     at_edges, edge_corner = _behind(movement.after, i[k], movement.after.starts(other), normals, kinds[2].after[k])
-    return Entered(np.concatenate(corners), np.concatenate(faces), own, other, at_edges, edge_corner)
+    return np.concatenate(corners), np.concatenate(faces), own, other, at_edges, edge_corner
 
 
 def across(placed: PlacedParts, own: np.ndarray, other: np.ndarray) -> np.ndarray:

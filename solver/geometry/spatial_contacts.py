@@ -253,14 +253,14 @@ def entered_points(
     """
     before, after = movement
     i, j, width = near_parts(after, -tolerance, useful, widths)
-    found = entered(movement, i, j, tolerance, PENETRATION_FRACTION * width)
-    crossings = places_of(*_crossings(after, found.own, found.other))
-    on_face = measured_points(before, feature_rows(ON_FACE, found.corner, found.face, -1))
-    crossed = measured_points(before, feature_rows(ACROSS, found.own, found.other, crossings))
+    deepest = PENETRATION_FRACTION * width
+    face_corner, face, own, other, pair, corner = entered(movement, i, j, tolerance, deepest)
+    on_face = measured_points(before, feature_rows(ON_FACE, face_corner, face, -1))
+    crossings = places_of(*_crossings(after, own, other))
+    crossed = measured_points(before, feature_rows(ACROSS, own, other, crossings))
     _, known = matched_contacts(crossed, contacts)
-    k = np.flatnonzero(known[found.at_edges])
-    corner, pair = found.edge_corner[k], found.at_edges[k]
-    own, other = found.own[pair], found.other[pair]
+    corner, pair = corner[known[pair]], pair[known[pair]]
+    own, other = own[pair], other[pair]
     normals, along = across(before, own, other), unit(before.along(other))
     apart = before.vertices[corner] - before.starts(other)
     planes = Contacts(
