@@ -141,15 +141,14 @@ def _refuse_pieces(solids: Solids, names: Sequence[str]) -> None:
     links = coo_array(
         (np.ones(len(solids.corners)), (solids.corners, solids.corners[solids.next_corner])), shape=(n, n)
     )
-    count, which = connected_components(links, directed=False)
-    if count == len(solids):
-        return
+    _, which = connected_components(links, directed=False)
     pieces = np.bincount(solids.block_of_vertex[np.unique(which, return_index=True)[1]], minlength=len(solids))
     i = int(pieces.argmax())
-    raise ValueError(
-        f"block {i} ('{names[i]}') consists of {pieces[i]} separate surfaces; give each its own "
-        "block, and fill cavities"
-    )
+    if pieces[i] > 1:
+        raise ValueError(
+            f"block {i} ('{names[i]}') consists of {pieces[i]} separate surfaces; give each its own "
+            "block, and fill cavities"
+        )
 
 
 def _refuse_warped(solids: Solids, names: Sequence[str]) -> None:
