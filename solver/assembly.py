@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from solver.words import counted, numbers_of, plain
 
 from .geometry.contacts import Contacts
-from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
+from .geometry.outlines import Outlines, self_crossings
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
 from .geometry.surfaces import SMALLEST_SHAPE_FACTOR, polyhedra_of, refuse_infinite
@@ -91,10 +91,8 @@ class Assembly(Shown):
         names, roles_array, materials = _labels(len(outlines), "outlines", names, roles, materials)
         rings = [_checked_ring(outline, name) for outline, name in zip(outlines, names, strict=True)]
         offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
-        vertices = np.concatenate(rings)
-        areas, _ = polygon_integrals(vertices, offsets)
-        lengths = np.hypot(*(vertices[next_vertices(offsets)] - vertices).T)
-        perimeter = np.add.reduceat(lengths, offsets[:-1])
+        drawn = Outlines(np.concatenate(rings), offsets, np.ones(len(rings)))
+        areas, perimeter = drawn.areas, np.add.reduceat(drawn.edge_lengths, offsets[:-1])
         for i in np.flatnonzero(np.abs(areas) <= SMALLEST_SHAPE_FACTOR * perimeter**2).tolist():
             raise ValueError(
                 f"block {i} ('{names[i]}') has an area of {abs(areas[i]):.3g} m² for a perimeter of "
@@ -110,10 +108,10 @@ class Assembly(Shown):
                 f"({b[0]:.6g}, {b[1]:.6g}) meet; order its corners around the outline"
             )
         return cls(
-            shapes=Polygons(vertices, offsets, _positive(thickness, len(names), "thickness", "m", names)),
+            shapes=Polygons(vertices, offsets, _positive(thickness, "thickness", "m", names)),
             names=names,
             roles=roles_array,
-            density=_positive(density, len(names), "density", "kg/m³", names),
+            density=_positive(density, "density", "kg/m³", names),
             materials=materials,
         )
 
@@ -144,9 +142,9 @@ class Assembly(Shown):
         Raises
         ------
         ValueError
-            For a surface that is not closed, in several pieces or without volume, faces that run in different senses,
-            a face that is not plane to a thousandth of the width of its block, coordinates that are not finite, an
-            unknown role, or a density that is not positive.
+            For a surface that is not closed, in several pieces, without volume or crossing itself, faces that run in
+            different senses, a face that is not plane to a thousandth of the width of its block, coordinates that are
+            not finite, an unknown role, or a density that is not positive.
 
         Examples
         --------
@@ -161,7 +159,7 @@ class Assembly(Shown):
             shapes=polyhedra_of(solids, names),
             names=names,
             roles=roles_array,
-            density=_positive(density, len(names), "density", "kg/m³", names),
+            density=_positive(density, "density", "kg/m³", names),
             materials=materials,
         )
 
@@ -299,17 +297,9 @@ class Assembly(Shown):
 
 
 def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> None:
-    """Refuse an assembly without free blocks, or with blocks that overlap, before anything is solved.
+    """Raise ``ValueError`` where no block is free or two overlap, by their names and the depth, before all is solved.
 
-    Parameters
-    ----------
-    overlap_tolerance : float, optional [m]
-        Overlap that is accepted; a thousandth of the width of the thinnest block by default.
-
-    Raises
-    ------
-    ValueError
-        Names both blocks and the depth.
+    An overlap up to the tolerance [m] is accepted, a thousandth of the width of the thinnest block by default.
     """
     if not assembly.free.any():
         raise ValueError(f"{counted(assembly.n_blocks, 'block')}, all supports; at least one must be free")
@@ -392,24 +382,21 @@ def _refuse_half_characters(words: Sequence[str], what: str) -> None:
 
 
 def _unique_names(names: list[str]) -> tuple[str, ...]:
-    if len(set(names)) == len(names):
-        return tuple(names)
     taken, unique = set(names), []
-    seen: dict[str, int] = {}
+    following: dict[str, int] = {}
     for name in names:
-        count = seen[name] = seen.get(name, 0) + 1
-        candidate = name if count == 1 else f"{name} #{count}"
-        while count > 1 and candidate in taken:
-            count += 1
-            candidate = f"{name} #{count}"
-        seen[name] = count
+        candidate = name
+        while name in following and candidate in taken:
+            candidate = f"{name} #{following[name]}"
+            following[name] += 1
+        following.setdefault(name, 2)
         taken.add(candidate)
         unique.append(candidate)
     return tuple(unique)
 
 
-def _positive(value: ArrayLike, n: int, what: str, unit: str, names: Sequence[str]) -> np.ndarray:
-    array = numbers_of(value, what)
+def _positive(value: ArrayLike, what: str, unit: str, names: Sequence[str]) -> np.ndarray:
+    array, n = numbers_of(value, what), len(names)
     if array.ndim and array.shape != (n,):
         raise ValueError(f"{what} has shape {array.shape}; give one number or {n}, one per block")
     array = np.broadcast_to(array, (n,)).copy()

@@ -69,8 +69,6 @@ class Backfill:
         load = np.zeros((assembly.n_blocks, d + pose.rotations.shape[1]))
         places = _PLACES[d]
         for level, unit_weight in ((self.surface, self.unit_weight), (self.base, -self.unit_weight)):
-            if (given[:, :, -1] >= level).all():
-                continue
             corners, depth, piece = _below(level, given)
             block, first = self.block[piece], corners[:, 1] - corners[:, 0]
             if self.thickness is not None:
@@ -107,8 +105,6 @@ def _below(level: float, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     """Corners, depth at each and number of pieces that sum up to the given ones, (n, d, d) [m], below a level."""
     depth = level - corners[:, :, -1]
     below, least = depth > 0.0, depth.min(axis=1)
-    if (least >= 0.0).all():
-        return corners, depth, np.arange(len(corners))
     # Of a triangle with one corner above, the depth of the whole is too small by that of the part at this corner.
     whole = (2 * below.sum(axis=1) > depth.shape[1]) | (least >= 0.0)
     cut = below.any(axis=1) & (least < 0.0)

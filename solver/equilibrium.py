@@ -48,18 +48,10 @@ def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc
 
 
 def friction_rays(friction: np.ndarray) -> sp.csc_array:
-    """Combine normal and shear forces to the two rays of each friction cone in the plane.
+    """(2 n, 2 n) sparse array: normal and shear forces of the two rays of each friction cone in the plane.
 
-    Parameters
-    ----------
-    friction : (n,) array
-        Friction coefficients.
-
-    Returns
-    -------
-    (2 n, 2 n) sparse array
-        Column 2i is n - μ t and column 2i + 1 is n + μ t of contact i, divided by √(1 + μ²) so that a large coefficient
-        does not unbalance the program.
+    Column 2i is n - μ t and column 2i + 1 is n + μ t of contact i, divided by √(1 + μ²) so that a large coefficient
+    does not unbalance the program.
     """
     n = len(friction)
     scale = 1.0 / np.hypot(1.0, friction)

@@ -17,22 +17,10 @@ WHOLE = 20
 
 
 def narrowest(joined: sp.csr_array, places: np.ndarray | None) -> tuple[np.ndarray, int]:
-    """Choose an order of rows.
+    """Order the rows of a symmetric pattern, (m, m) with its diagonal: (m,) int array, and the width of the band.
 
-    Parameters
-    ----------
-    joined : (m, m) sparse array, by rows
-        Its pattern, which is symmetric and has its diagonal.
-    places : (m, d) array, optional
-        Orders along each axis are tried beside that of Cuthill & McKee: those of walls are two thirds as wide, those of
-        domes half.
-
-    Returns
-    -------
-    (m,) int array
-        The rows in their order.
-    int
-        Width of the band.
+    With places, (m, d), orders along each axis are tried beside that of Cuthill & McKee: those of walls are two thirds
+    as wide, those of domes half.
     """
     row, starts = np.repeat(np.arange(joined.shape[0]), np.diff(joined.indptr)), joined.indptr[:-1]
     orders, best = [reverse_cuthill_mckee(sp.csr_matrix(joined), symmetric_mode=True)], (joined.shape[0] + 1, starts)
@@ -68,19 +56,8 @@ def positions_in(order: np.ndarray) -> np.ndarray:
 def dissected(joined: sp.csr_array, places: np.ndarray | None) -> list[tuple[np.ndarray, int]]:
     """Cut what is joined into parts, until they are small, by the fewest rows near the middle of an order.
 
-    Parameters
-    ----------
-    joined, places
-        As of :func:`narrowest`.
-
-    Returns
-    -------
-    list of ((m,) int array, int)
-        Rows of each part, or of each cut, and the cut around it, -1 for the last. Parts come before what cuts them.
-
-    Notes
-    -----
-    Nested dissection, George (1973), https://doi.org/10.1137/0710032.
+    Gives the rows, (m,) int, of each part or cut and the cut around it, -1 for the last; parts come before what cuts
+    them. Nested dissection, George (1973), https://doi.org/10.1137/0710032.
     """
     orders = [positions_in(reverse_cuthill_mckee(sp.csr_matrix(joined), symmetric_mode=True)).astype(float)]
     return _cut(joined, np.array([*orders, *_along(places)]), np.arange(joined.shape[0]))

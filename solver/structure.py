@@ -23,8 +23,8 @@ from .path.controls import Controls
 from .path.drivers import ControlDisplacement
 from .phases import PhaseChange
 from .results.increment import Bonds, Increment
-from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, Quantity, reaction_to, settlement_in
-from .results.response import Control, Envelope, LimitLoad, Response
+from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, reaction_to, settlement_in
+from .results.response import Envelope, LimitLoad, Response
 from .ties import Tie, TieForces
 from .views import Shown
 
@@ -152,10 +152,8 @@ class Structure(Shown):
             ties=self.ties,
             changes=changes,
         )
-        found = increments.all(on_increment)
-        unit = phases[0].unit
-        response = self._response(increments, found, "settlement", settlement_in(unit), reaction_to(unit), phases)
-        return replace(response, changes=tuple(changes))
+        measures = {"parameter": settlement_in(phases[0].unit), "measured": reaction_to(phases[0].unit)}
+        return self._response(increments, on_increment, settlements=phases, changes=tuple(changes), **measures)
 
     def pushover(
         self,
@@ -218,8 +216,8 @@ class Structure(Shown):
             bonds_at=bonds_at and checked(bonds_at, Bonds, "bonds_at"),
             fallen=fallen,
         )
-        found = increments.all(on_increment)
-        return self._response(increments, found, "pushover", CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, control=control)
+        kind = {"analysis": "pushover", "parameter": CONTROL_DISPLACEMENT, "measured": LOAD_MULTIPLIER}
+        return self._response(increments, on_increment, settlements=(), control=control, **kind)
 
     def limit_load(
         self,
@@ -337,30 +335,19 @@ class Structure(Shown):
         return Envelope(positions, tuple(limits))
 
     def _response(
-        self,
-        increments: Increments,
-        found: tuple[Increment, ...],
-        analysis: str,
-        parameter: Quantity,
-        measured: Quantity,
-        settlements: tuple[Settlement, ...] = (),
-        control: Control | None = None,
+        self, increments: Increments, on_increment: Callable[[Increment], None] | None, **analysed: Any
     ) -> Response:
-        ending = increments.ending
+        found, ending = increments.all(on_increment), increments.ending
         return Response(
             assembly=self.assembly,
-            settlements=settlements,
             interfaces=self.interfaces,
             loads=self.loads,
             increments=found,
             stop=ending.stop,
             message=ending.message,
             collapse=ending.collapse,
-            analysis=analysis,
-            parameter=parameter,
-            measured=measured,
-            control=control,
             ties=self.ties,
+            **analysed,
         )
 
 

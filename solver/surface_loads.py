@@ -92,8 +92,7 @@ def surface_forces(
     chosen = assembly.free if blocks is None else chosen_blocks(assembly, blocks)
     strips, depth, block = _first_met(assembly, push, across, removed)
     centre = (strips[:-1] + strips[1:]) / 2.0
-    loaded = np.isfinite(depth)
-    loaded[loaded] = chosen[block[loaded]]
+    loaded = (block >= 0) & chosen[block]
     points = centre[loaded, None] * across + depth[loaded, None] * push
     owner = block[loaded]
     forces = (pressure * np.diff(strips)[loaded] * assembly.thickness[owner])[:, None] * push

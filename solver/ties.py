@@ -128,13 +128,7 @@ def held_ties(ties: Sequence[Tie], gone: np.ndarray) -> np.ndarray:
 
 
 def check_ties(ties: Sequence[Tie], assembly: Assembly, n_phases: int) -> None:
-    """Refuse ties that do not belong to an assembly.
-
-    Raises
-    ------
-    ValueError
-        For a block or a phase that is not there, a name used twice, or points of the wrong dimension.
-    """
+    """Raise ``ValueError`` for blocks or phases that are not there, names used twice, or points of other dimensions."""
     names = [tie.name for tie in ties]
     for tie in ties:
         for block in tie.blocks:
@@ -228,13 +222,9 @@ def member_contacts(
 def plastic_forces(
     ties: Sequence[Tie], assembly: Assembly, pose: Pose, contacts: Contacts, forces: np.ndarray, before: np.ndarray
 ) -> TieForces:
-    """Return what members do at a limit load, where their elongation has no meaning.
+    """Return what members do under forces (n_contacts, d) [N] at a limit load, where their elongation has no meaning.
 
-    Parameters
-    ----------
-    forces : (n_contacts, d) array [N]
-    before : (n_ties,) int array
-        Numbers as in :class:`TieForces`: what is absent or broken stays it.
+    What is absent or broken ``before``, (n_ties,) int as in :class:`TieForces`, stays it.
     """
     if not ties:
         return TieForces()

@@ -194,17 +194,8 @@ def _on_face(
 def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Tributary area of each corner in its convex polygon, (n,) [m²], and widths and lengths of these, (count,) [m].
 
-    Parameters
-    ----------
-    owner : (n,) int array
-        The polygon of each corner.
-    points : (n, 2) array [m]
-        Corners in any order.
-    count : int
-        Number of polygons.
+    Corners (n, 2) [m] in any order, of the polygons (n,) that own them.
     """
-    if len(owner) == 0:
-        return np.zeros(0), np.zeros(count), np.zeros(count)
     number = np.bincount(owner, minlength=count)
     total = np.stack([np.bincount(owner, points[:, k], minlength=count) for k in (0, 1)], axis=1)
     middle = total / np.maximum(number, 1)[:, None]

@@ -112,13 +112,12 @@ def matched_contacts(contacts: Named, before: Named) -> tuple[np.ndarray, np.nda
     return place, earlier_keys[place] == keys
 
 
-def are_known(contacts: Contacts, known: Contacts, same_normal: bool = True) -> np.ndarray:
-    """(n,) bool array: whether contact points are among those known, by their names and normals or names alone."""
-    if len(known) == 0 or len(contacts) == 0:
-        return np.zeros(len(contacts), dtype=bool)
+def are_known(contacts: Contacts, known: Contacts) -> np.ndarray:
+    """(n,) bool array: whether contact points are among those known, by their names and normals."""
     number, same = matched_contacts(contacts, known)
-    along = np.einsum("ni,ni->n", contacts.frames[:, 0], known.frames[number, 0])
-    return same & ((along > SAME_NORMAL) | (not same_normal))
+    k = np.flatnonzero(same)
+    same[k] = np.einsum("ni,ni->n", contacts.frames[k, 0], known.frames[number[k], 0]) > SAME_NORMAL
+    return same
 
 
 def successors(
@@ -127,19 +126,8 @@ def successors(
     """Find the contact points that stand where others of the same two blocks have vanished, with the nearest normals.
 
     A force that went over to another face of the two blocks would lose there what that one's friction does not hold.
-
-    Parameters
-    ----------
-    vanished : (k,) int array
-        Numbers of those that are not among the contact points any more.
-    size : float [m]
-        Of the blocks.
-
-    Returns
-    -------
-    row : (m,) int array
-        Numbers in ``vanished``; one that is near to several is there several times.
-    successor : (m,) int array
+    Of the ``vanished``, (k,) int, rows (m,) are given with the successor of each, (m,) int: one that is near to several
+    is there several times. The size is that of the blocks [m].
     """
     old, new = before.pair_keys()[vanished], contacts.pair_keys()
     order = np.argsort(new, kind="stable")

@@ -135,21 +135,12 @@ class PlacedParts:
 class NoParts(ValueError):
     """A block cannot be cut into convex parts: its number, and why."""
 
-    def __init__(self, block: int, why: str) -> None:
-        super().__init__(f"block {block} {why}")
-        self.block, self.why = block, why
-
 
 def convex_parts(solids: Solids) -> ConvexParts:
     """Cut solids that are not convex into convex parts.
 
-    Raises
-    ------
-    NoParts
-        For a surface that crosses itself, or has more parts than stones have.
+    Raises :class:`NoParts` for a surface that crosses itself, or has more parts than stones have.
 
-    Notes
-    -----
     A solid is convex where no corner is in front of any of its faces by more than a thousandth of its width. Others are
     cut through a re-entrant edge and the third corner that leave two pieces whose convex hulls hold the least volume,
     until each piece is convex.

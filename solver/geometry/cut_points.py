@@ -19,21 +19,9 @@ def without_points_of_cuts(
 ) -> tuple[Contacts, np.ndarray]:
     """Leave out points at cuts that lie between others in the same two faces.
 
-    Parameters
-    ----------
-    near : float [m]
-        Distance up to which points are at one place.
-    planes : (n, 2) int array
-        The planes of the two faces in which each point was found; -1 where it was not found between faces.
+    With the numbers that the remaining points had, (n_remaining,) int. Points up to ``near`` [m] apart are at one
+    place; ``planes``, (n, 2) int, are those of the two faces between which each was found, -1 where it was not.
 
-    Returns
-    -------
-    contacts : Contacts
-    remaining_points : (n_remaining,) int array
-        Their numbers before.
-
-    Notes
-    -----
     Blocks are rigid and both faces plane: the gap at a point between others follows from theirs, and what it carries
     they can carry as well. Its area goes to them.
     """
@@ -49,13 +37,9 @@ def without_points_of_cuts(
     )
     of_cut &= planes[:, 0] >= 0
     _, group = np.unique(planes, axis=0, return_inverse=True)
-    group = group.ravel()
-    at_cut = np.zeros(group.max(initial=-1) + 1, dtype=bool)
-    at_cut[group[of_cut]] = True
-    chosen = np.flatnonzero(at_cut[group])
+    chosen = np.flatnonzero(np.isin(group, group[of_cut]))
     chosen = chosen[np.argsort(group[chosen], kind="stable")]
     _, start, group_of = np.unique(group[chosen], return_index=True, return_inverse=True)
-    group_of = group_of.ravel()
     # A part that has a face of its block in the plane of the cut has no edge at it; the part beyond the cut has.
     pairs = cKDTree(contacts.points[chosen]).query_pairs(near, output_type="ndarray")
     pairs = pairs[group_of[pairs[:, 0]] == group_of[pairs[:, 1]]]

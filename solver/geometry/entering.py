@@ -31,27 +31,6 @@ class Movement(NamedTuple):
     after: PlacedParts
 
 
-class Entered(NamedTuple):
-    """What would have kept parts apart.
-
-    Attributes
-    ----------
-    corner, face : (n,) int arrays
-        Corners that are to stay before faces.
-    own, other : (m,) int arrays
-        Edges that are to stay before each other, the first of the first part.
-    at_edges, edge_corner : (k,) int arrays
-        Numbers of such edges, and corners of the first part that have come behind the plane across them.
-    """
-
-    corner: np.ndarray
-    face: np.ndarray
-    own: np.ndarray
-    other: np.ndarray
-    at_edges: np.ndarray
-    edge_corner: np.ndarray
-
-
 class _Axes(NamedTuple):
     """The best axis of one kind for each pair of parts.
 
@@ -72,18 +51,18 @@ class _Axes(NamedTuple):
     apart: np.ndarray
 
 
-def entered(movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, deepest: np.ndarray) -> Entered:
+def entered(
+    movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, deepest: np.ndarray
+) -> tuple[np.ndarray, ...]:
     """Find parts that overlap by more than a tolerance [m] after a movement, and what would keep them apart.
 
-    Parameters
-    ----------
-    i, j : (n_pairs,) int arrays
-        Parts that are near each other after it.
-    deepest : (n_pairs,) array [m]
-        Overlap before the movement beyond which an axis is none of a contact.
+    Parts i and j, (n_pairs,) int arrays, are near each other after it. Overlaps before it beyond the ``deepest``,
+    (n_pairs,) [m], are those of axes of no contact.
 
-    Notes
-    -----
+    Gives corners and the faces before which they are to stay, (n,) int; edges of parts i and of parts j that are to
+    stay before each other, (m,) int; numbers of such edges and corners of parts i that have come behind the plane
+    across them, (k,) int.
+
     Convex parts are apart where a face of one, or two edges across each other, separate them. Among the planes that
     separated them before, and ride on one of them, the one is taken behind which the other has come least. A movement
     in which no corner comes behind it cannot end in an overlap.
@@ -107,11 +86,9 @@ def entered(movement: Movement, i: np.ndarray, j: np.ndarray, tolerance: float, 
         faces.append(face[owner])
     k = np.flatnonzero(best == 2)
     own, other = kinds[2].first[k], kinds[2].second[k]
-    at_edges = edge_corner = k
-    if len(k):
-        normals = _ridden(movement, across(movement.before, own, other), other)
-        at_edges, edge_corner = _behind(movement.after, i[k], movement.after.starts(other), normals, kinds[2].after[k])
-    return Entered(np.concatenate(corners), np.concatenate(faces), own, other, at_edges, edge_corner)
+    normals = _ridden(movement, across(movement.before, own, other), other)
+    at_edges, edge_corner = _behind(movement.after, i[k], movement.after.starts(other), normals, kinds[2].after[k])
+    return np.concatenate(corners), np.concatenate(faces), own, other, at_edges, edge_corner
 
 
 def across(placed: PlacedParts, own: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -167,8 +144,6 @@ def _of_edges(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
     first, second = np.zeros((2, len(i)), dtype=np.int64)
     for k, own, other, *corners in alike((edges_of, i), (edges_of, j), (offsets, i), (offsets, j)):
         own, other = np.repeat(once[own], other.shape[1], axis=1), np.tile(once[other], (1, own.shape[1]))
-        if own.size == 0:
-            continue
         normals = across(placed_before, own, other)
         gaps, foremost = _gaps(placed_before, normals, own, other, corners)
         ridden, _ = _gaps(placed_after, _ridden(movement, normals, other), own, other, corners)
@@ -193,14 +168,9 @@ def _ridden(movement: Movement, normals: np.ndarray, other: np.ndarray) -> np.nd
 def _gaps(
     placed: PlacedParts, normals: np.ndarray, own: np.ndarray, other: np.ndarray, corners: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Separations of parts along normals to two edges.
+    """Separations of parts along normals to two edges, (n_pairs, n_axes) [m], minus infinity where there is no normal.
 
-    Returns
-    -------
-    gaps : (n_pairs, n_axes) array [m]
-        Minus infinity where there is no normal.
-    foremost : (n_pairs, n_axes) bool array
-        Whether both edges would be the first to meet.
+    And whether both edges would be the first to meet, a bool array of this shape.
     """
     origin, along = placed.vertices[corners[0][:, :1]], placed.along(own)
     at_own, at_other = (dot(normals, placed.starts(k) - origin) for k in (own, other))

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.tolerances import PENETRATION_FRACTION
-
 from .broad_phase import box_pairs, expand_ranges
 from .convex_parts import PlacedParts
 from .portions import alike
@@ -50,10 +48,6 @@ class FacingParts:
     width: np.ndarray
     cosine: np.ndarray
 
-    def __len__(self) -> int:
-        """Count the pairs."""
-        return len(self.i)
-
     def __getitem__(self, chosen: np.ndarray) -> FacingParts:
         """Choose some of the pairs, by a mask or their numbers."""
         return FacingParts(*(value[chosen] for value in vars(self).values()))
@@ -62,17 +56,6 @@ class FacingParts:
     def apart(self) -> np.ndarray:
         """(n,) array [m]: separation of the parts by a face; negative where they overlap."""
         return np.maximum(self.apart_i, self.apart_j)
-
-    @property
-    def shallow(self) -> np.ndarray:
-        """(n,) bool array: whether the overlap is that of a contact."""
-        return self.apart >= -PENETRATION_FRACTION * self.width
-
-    @property
-    def face_each_other(self) -> np.ndarray:
-        """(n,) bool array: whether the two faces do."""
-        # Flanks of steep tips hardly do.
-        return self.cosine <= -0.05
 
     def other_faces(self, placed: PlacedParts) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Yield pairs and their other faces, round by round, (n_round,) int arrays, those that oppose better first."""

@@ -25,8 +25,6 @@ def edges_of(face: Sequence[int]) -> list[tuple[int, int]]:
 def renumbered(vertices: np.ndarray, faces: list[list[int]]) -> tuple[np.ndarray, list[list[int]]]:
     """Leave out the corners of no face."""
     used = sorted({corner for face in faces for corner in face})
-    if len(used) == len(vertices):
-        return vertices, faces
     place = {corner: k for k, corner in enumerate(used)}
     return vertices[used], [[place[corner] for corner in face] for face in faces]
 

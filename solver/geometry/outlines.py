@@ -177,8 +177,6 @@ def overlap_depths(
     of their ends from the other edge).
     """
     i, j = box_pairs(vertices, offsets, -tolerance)
-    if len(i) == 0:
-        return i, j, np.zeros(0)
     depth = np.maximum(_inside_depth(vertices, offsets, i, j), _inside_depth(vertices, offsets, j, i))
     depth = np.maximum(depth, _crossing_depth(vertices, offsets, i, j))
     deep = depth > tolerance
@@ -211,12 +209,8 @@ def _signed_distance(points: np.ndarray, block: np.ndarray, vertices: np.ndarray
     """Distance of each point to the outline of its polygon, positive inside, negative outside."""
     counts = np.diff(offsets)[block]
     owner, position = expand_ranges(counts)
-    if len(owner) == 0:
-        return np.zeros(0)
     start = offsets[block][owner] + position
-    last = position == counts[owner] - 1
-    end = np.where(last, offsets[block][owner], start + 1)
-    p, a, b = points[owner], vertices[start], vertices[end]
+    p, a, b = points[owner], vertices[start], vertices[next_vertices(offsets)[start]]
     along = b - a
     rest = p - a
     t = np.clip((rest * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300), 0.0, 1.0)

@@ -11,6 +11,7 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .contacts import STEEPEST_LANDING, Contacts
 from .outlines import Outlines
+from .solids import dot
 
 #: Sine of the angle by which the flanks of a corner may tilt into the edge it faces, as those of an open joint.
 LARGEST_TILT = 0.5
@@ -52,19 +53,10 @@ def corners_and_edges(features: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
 def measured_points(
     shapes: Outlines, vertices: np.ndarray, features: np.ndarray, areas: np.ndarray | None = None
 ) -> Contacts:
-    """Frames and gaps of given pairs of features where the corners now are.
+    """Frames and gaps of given pairs of features, (n, 4) int, where the corners, (n_vertices, 2) [m], now are.
 
-    Parameters
-    ----------
-    vertices : (n_vertices, 2) array [m]
-        Current corners of all blocks.
-    features : (n, 4) int array
-        As in :class:`Contacts`.
-    areas : (n,) array, optional [m²]
-        Tributary areas, where they are known; measured by default.
+    Tributary areas, (n,) [m²], are measured where they are not given.
 
-    Notes
-    -----
     A corner on an edge has the normal of the edge. A corner on a corner has the normal that halves the angle
     between the two faces that meet there, so that neither block is preferred, and the point half-way.
     """
@@ -88,8 +80,8 @@ def measured_points(
         block_b=shapes.block_of_vertex[edge],
         points=np.where(on_corner[:, None], (v + base) / 2.0, v),
         frames=np.stack([normal, tangent], axis=1),
-        gaps=_dot(offset, normal),
-        slip=_dot(offset, tangent)[:, None],
+        gaps=dot(offset, normal),
+        slip=dot(offset, tangent)[:, None],
         areas=np.zeros(len(features)) if areas is None else areas,
     )
     return replace(contacts, areas=_areas(shapes, contacts)) if areas is None else contacts
@@ -112,7 +104,7 @@ def _areas(shapes: Outlines, contacts: Contacts) -> np.ndarray:
     point = np.repeat(np.arange(len(contacts)), 2)
     tangent = np.where(side[edge][point] == low.ravel(), 1.0, -1.0)[:, None] * contacts.frames[point, 1]
     direction = np.stack([np.bincount(face, tangent[:, axis]) for axis in (0, 1)], axis=1)[face]
-    along = _dot(contacts.points[point], _unit(direction))
+    along = dot(contacts.points[point], _unit(direction))
     order = np.lexsort((along, face))
     step = np.where(np.diff(face[order]) == 0, np.diff(along[order]), 0.0)
     length = np.zeros(len(point))
@@ -134,7 +126,7 @@ def _side_of_edge(shapes: Outlines) -> np.ndarray:
     along = _unit(shapes.vertices[shapes.next_vertex] - shapes.vertices)
     before = along[shapes.previous_vertex]
     turn = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
-    ends = shapes.convex_vertex | (turn < -LARGEST_TILT) | (_dot(before, along) < 0.0)
+    ends = shapes.convex_vertex | (turn < -LARGEST_TILT) | (dot(before, along) < 0.0)
     number = np.arange(len(ends))
     side = np.maximum.accumulate(np.where(ends, number, first[shapes.block_of_vertex]))
     # The side at the first corner may begin before it.
@@ -143,24 +135,11 @@ def _side_of_edge(shapes: Outlines) -> np.ndarray:
 
 
 def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
-    """Find the points at which blocks touch or may touch within one increment.
+    """Find the points at which blocks touch or may touch within one increment, with gaps up to ``reach`` [m].
 
-    Parameters
-    ----------
-    vertices : (n_vertices, 2) array [m]
-        Current corners of all blocks.
-    reach : float [m]
-        Largest gap of a contact point that is kept.
-    useful : (n_blocks,) bool array
-        One of two blocks that touch must be of these: those that are free to move.
+    Where the corners, (n_vertices, 2) [m], now are. One of two blocks that touch must be of the ``useful``, (n_blocks,)
+    bool, those that are free to move. Sorted by their features, so that the same geometry gives the same order.
 
-    Returns
-    -------
-    Contacts
-        Sorted by their features, so that the same geometry gives the same order.
-
-    Notes
-    -----
     Candidates are all pairs of a convex corner and an edge of another block, not both of supports, with the
     corner in front of the edge (gap at most ``reach``), its block on the outward side and above the edge over
     some length. Near an end of the edge the corner there and the face that leaves it decide: where the two
@@ -174,26 +153,16 @@ def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np
     vertex, edge = _vertex_edge_candidates(shapes, vertices, pair_a, pair_b, reach)
     vertex, edge, corner = _classified_ends(shapes, vertices, vertex, edge)
     kept = _closest_faces(shapes, vertices, vertex, edge, corner)
-    vertex, edge, corner = vertex[kept], edge[kept], corner[kept]
-    order = np.lexsort((edge, vertex))
-    return measured_points(shapes, vertices, features_of(vertex[order], edge[order], corner[order]))
+    return measured_points(shapes, vertices, features_of(vertex[kept], edge[kept], corner[kept]))
 
 
 def passed_edges(
     shapes: Outlines, before: np.ndarray, after: np.ndarray, i: np.ndarray, j: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the corners of blocks that have gone through edges of others in a movement.
+    """Corners of blocks that have gone through edges of others in a movement, and these edges, (n,) int arrays.
 
-    Parameters
-    ----------
-    before, after : (n_vertices, 2) arrays [m]
-    i, j : (n_pairs,) int arrays
-        Blocks that overlap after it.
-
-    Returns
-    -------
-    vertex, edge : (n,) int arrays
-        Of several edges the one that the corner went through last, seen from the block that has the edge.
+    Of corners (n_vertices, 2) [m] before and after, of blocks i and j, (n_pairs,) int, that overlap after it. Of
+    several edges it is the one that the corner went through last, seen from the block that has the edge.
     """
     offsets, following, counts = shapes.offsets, shapes.next_vertex, np.diff(shapes.offsets)
     a, b = np.concatenate([i, j]), np.concatenate([j, i])
@@ -239,10 +208,10 @@ def _vertex_edge_candidates(
     length, width = shapes.edge_lengths, shapes.widths
     tangents = (vertices[following] - vertices) / length[:, None]
     normals = np.stack([tangents[:, 1], -tangents[:, 0]], axis=1)
-    gap = _dot(vertices[vertex] - vertices[edge], normals[edge])
+    gap = dot(vertices[vertex] - vertices[edge], normals[edge])
     near = np.flatnonzero((gap >= -PENETRATION_FRACTION * width.max()) & (gap <= reach))
     vertex, edge, gap = vertex[near], edge[near], gap[near]
-    along = _dot(vertices[vertex] - vertices[edge], tangents[edge])
+    along = dot(vertices[vertex] - vertices[edge], tangents[edge])
     a_block, b_block = shapes.block_of_vertex[vertex], shapes.block_of_vertex[edge]
     deepest = PENETRATION_FRACTION * np.minimum(width[a_block], width[b_block])
     end = end_zone(shapes, vertex, edge)
@@ -253,9 +222,9 @@ def _vertex_edge_candidates(
     to_next, to_previous = _flanks(shapes, vertices, vertex)
     normal = normals[edge]
     outside = (
-        (_dot(to_next, normal) >= -LARGEST_TILT)
-        & (_dot(to_previous, normal) >= -LARGEST_TILT)
-        & (_dot(_inward(to_next, to_previous), normal) > 0.0)
+        (dot(to_next, normal) >= -LARGEST_TILT)
+        & (dot(to_previous, normal) >= -LARGEST_TILT)
+        & (dot(_inward(to_next, to_previous), normal) > 0.0)
     )
     return vertex[outside], edge[outside]
 
@@ -282,7 +251,7 @@ def _seen_from_edges(
     """Directions of edges, (n, 2), and how far corners are along and before them, (n,) arrays [m]."""
     tangent = _unit(vertices[shapes.next_vertex[edge]] - vertices[edge])
     offset = vertices[vertex] - vertices[edge]
-    return tangent, _dot(offset, tangent), offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
+    return tangent, dot(offset, tangent), offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
 
 
 def _flanks(shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -313,14 +282,14 @@ def _classified_ends(
     facing = _facing_edge(shapes, vertex, edge, other)
     along_edge = sense * tangent
     along_facing = -sense * _unit(vertices[following[facing]] - vertices[facing])
-    parallel = _dot(along_edge, along_facing) > FACING_COSINE
+    parallel = dot(along_edge, along_facing) > FACING_COSINE
     # At a re-entrant corner there is no corner to touch.
     at_end = (overlap <= end) & shapes.convex_vertex[other]
     # The corner of a face that opens slides past the end of the edge before it would touch it.
     is_past = ~parallel & shapes.convex_vertex[other] & ((overlap <= end) | (gap > STEEPEST_LANDING * overlap))
     # Both corners lie within the end zone of the other's face, along the bisector.
     halfway = _unit(along_edge + along_facing + 1e-300)
-    distance = np.abs(_dot(vertices[vertex] - vertices[other], halfway))
+    distance = np.abs(dot(vertices[vertex] - vertices[other], halfway))
     corner = np.where(at_end & parallel & (distance <= end), other, -1)
     chosen = ~is_past
     vertex, edge, corner = vertex[chosen], edge[chosen], corner[chosen]
@@ -337,24 +306,22 @@ def _closest_faces(
     """
     kept = np.ones(len(vertex), dtype=bool)
     k = np.flatnonzero(corner >= 0)
-    if len(k) < 2:
-        return kept
     facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
     following = shapes.next_vertex
     along = _unit(vertices[following[edge[k]]] - vertices[edge[k]])
     back = -_unit(vertices[following[facing]] - vertices[facing])
-    closeness = _dot(along, back)
-    _, pair = np.unique(np.stack([vertex[k], corner[k]], axis=1), axis=0, return_inverse=True)
-    closest = np.full(int(pair.max()) + 1, -np.inf)
-    np.maximum.at(closest, pair.ravel(), closeness)
-    kept[k] = closeness >= closest[pair.ravel()] - 1e-9
+    closeness = dot(along, back)
+    _, pair = np.unique(vertex[k] * np.int64(len(vertices)) + corner[k], return_inverse=True)
+    closest = np.full(len(k), -np.inf)
+    np.maximum.at(closest, pair, closeness)
+    kept[k] = closeness >= closest[pair] - 1e-9
     return kept
 
 
 def _without_duplicates(
     shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Keep each pair of corners once, seen from the lower numbered vertex."""
+    """Keep each pair of corners once, seen from the lower numbered vertex, and sort the pairs by vertex and edge."""
     k = np.flatnonzero(corner >= 0)
     facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
     swap = vertex[k] > corner[k]
@@ -381,11 +348,6 @@ def end_zone(shapes: Outlines, vertex: np.ndarray, edge: np.ndarray) -> np.ndarr
     length = shapes.edge_lengths
     shortest = np.minimum(length[vertex], length[shapes.previous_vertex[vertex]])
     return CORNER_TOLERANCE * np.minimum(shortest, length[edge])
-
-
-def _dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(n,) array: dot products of two (n, 2) arrays; a sum over an axis of two takes ten times as long."""
-    return first[:, 0] * second[:, 0] + first[:, 1] * second[:, 1]
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

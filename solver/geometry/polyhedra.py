@@ -10,9 +10,9 @@ import numpy as np
 from .contacts import Contacts
 from .convex_parts import ConvexParts, convex_parts
 from .entering import Movement
+from .separations import overlap_depths_in_space
 from .solids import Solids
 from .spatial_contacts import entered_points, find_points, measured_points
-from .spatial_overlaps import overlap_depths_in_space
 
 
 @dataclass(frozen=True)

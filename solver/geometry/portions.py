@@ -14,16 +14,9 @@ PORTION = 2_000_000
 def alike(*groups: tuple[np.ndarray, np.ndarray]) -> Iterator[tuple[np.ndarray, ...]]:
     """Numbers of the items whose owners have as many members each, in portions, and these members.
 
-    Parameters
-    ----------
-    *groups : (n_owners + 1,) and (n,) int arrays
-        Owner ``i`` has the members from entry ``i`` to entry ``i + 1`` of the first, item ``k`` the owner in entry
-        ``k`` of the second. An item's array has the product of the numbers of its members as its size.
-
-    Yields
-    ------
-    items : (m,) int array
-    *members : (m, n_members) int arrays, one for each group
+    Of each group owner ``i`` has the members from entry ``i`` to entry ``i + 1`` of the first, (n_owners + 1,) int, and
+    item ``k`` the owner in entry ``k`` of the second, (n,) int. Yields items, (m,) int, and for each group their
+    members, (m, n_members) int. An item's array has the product of the numbers of its members as its size.
     """
     counts = [np.diff(offsets)[owner] for offsets, owner in groups]
     keys = np.zeros(len(counts[0]), dtype=np.int64)

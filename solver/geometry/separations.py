@@ -1,10 +1,12 @@
-"""Separations of convex parts by a face, or by two edges across each other."""
+"""Separations of convex parts by a face, or by two edges across each other, and overlaps of blocks."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from .broad_phase import box_pairs
 from .convex_parts import PlacedParts
+from .entering import PARALLEL
 from .portions import alike
 from .solids import cross, dot, unit
 
@@ -15,23 +17,11 @@ SMALLEST_SINE = 0.05
 def face_separations(
     placed: PlacedParts, i: np.ndarray, j: np.ndarray, inner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Largest separation of two convex parts by a face of one.
+    """Largest separations of convex parts i and j, (n,) int arrays, by a face of part i.
 
-    Parameters
-    ----------
-    i, j : (n,) int arrays
-        Parts.
-    inner : (n_faces,) bool array
-        Faces inside a block.
-
-    Returns
-    -------
-    apart : (n,) array [m]
-        How far part j is in front of the face of part i from which it is farthest; negative behind it.
-    leading : (n,) int array
-        That face.
-    behind : (n,) array [m]
-        How far it is in front of a face of part i inside its block; minus infinity where there is none.
+    How far, (n,) [m], part j is in front of the face from which it is farthest, negative behind it; that face, (n,)
+    int; and how far it is in front of one inside the block, by ``inner``, (n_faces,) bool: minus infinity where there
+    is none.
     """
     solids, vertices, faces = placed.solids, placed.vertices, placed.faces
     apart, leading, behind = np.empty(len(i)), np.empty(len(i), dtype=np.int64), np.full(len(i), -np.inf)
@@ -54,22 +44,10 @@ def face_separations(
 def edge_separations(
     placed: PlacedParts, i: np.ndarray, j: np.ndarray, smallest_sine: float = SMALLEST_SINE
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Largest separation of two convex parts by two edges.
+    """Largest separations of convex parts i and j, (n,) int arrays, by an edge of each, and these edges, (n,) int.
 
-    Parameters
-    ----------
-    i, j : (n,) int arrays
-        Parts.
-    smallest_sine : float
-        Of the angle between the edges.
-
-    Returns
-    -------
-    apart : (n,) array [m]
-        Largest separation along the cross product of an edge of i and an edge of j between which both parts lie on the
-        two sides; minus infinity where there are none.
-    own, other : (n,) int arrays
-        The edges.
+    Along the cross product, (n,) [m], of edges with at least the sine between them, on the two sides of which both
+    parts lie; minus infinity where there are none.
     """
     solids, normals = placed.solids, placed.faces.normals
     once, first = solids.whole_edges
@@ -97,3 +75,29 @@ def edge_separations(
         apart[k] = distance[row, farthest]
         edge_i[k], edge_j[k] = own[row, farthest // other.shape[1]], other[row, farthest % other.shape[1]]
     return apart, edge_i, edge_j
+
+
+def overlap_depths_in_space(placed: PlacedParts, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs of blocks that overlap by more than a tolerance [m], (n,) int, the lower first, and their depths, (n,) [m].
+
+    A depth is the smallest movement that separates their deepest two parts. Convex parts are separated by a face of one
+    of them or by two edges across each other: the largest separation of these, negative, is the depth.
+    """
+    block_of_part = placed.parts.block_of_part
+    i, j = box_pairs(placed.vertices, placed.solids.offsets, -tolerance)
+    other = block_of_part[i] != block_of_part[j]
+    i, j = i[other], j[other]
+    none = np.zeros(len(placed.solids.block_of_face), dtype=bool)
+    apart, _, _ = face_separations(placed, i, j, none)
+    deep = np.flatnonzero(apart < -tolerance)
+    i, j, apart = i[deep], j[deep], apart[deep]
+    apart = np.maximum(apart, face_separations(placed, j, i, none)[0])
+    deep = np.flatnonzero(apart < -tolerance)
+    i, j, apart = i[deep], j[deep], apart[deep]
+    apart = np.maximum(apart, edge_separations(placed, i, j, PARALLEL)[0])
+    deep = apart < -tolerance
+    blocks = np.sort(np.stack([block_of_part[i[deep]], block_of_part[j[deep]]], axis=1), axis=1)
+    pairs, pair_of = np.unique(blocks, axis=0, return_inverse=True)
+    depth = np.zeros(len(pairs))
+    np.maximum.at(depth, pair_of.ravel(), -apart[deep])
+    return pairs[:, 0], pairs[:, 1], depth

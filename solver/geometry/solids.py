@@ -27,8 +27,9 @@ def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(...) array: dot products along the last axis of three, coordinate by coordinate."""
-    return first[..., 0] * second[..., 0] + first[..., 1] * second[..., 1] + first[..., 2] * second[..., 2]
+    """(...) array: dot products along the last axis, coordinate by coordinate: its sum takes ten times as long."""
+    products = [first[..., k] * second[..., k] for k in range(first.shape[-1])]
+    return sum(products[1:], products[0])
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:

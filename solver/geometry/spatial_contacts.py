@@ -13,7 +13,7 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import expand_ranges
 from .clipping import ClippedCorners, clipped_faces
-from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts
+from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
 from .convex_parts import PlacedParts
 from .cut_points import without_points_of_cuts
 from .entering import Movement, across, entered
@@ -27,17 +27,10 @@ SLIVER = 0.005
 
 
 def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray | None = None) -> Contacts:
-    """Frames, gaps and slips of given pairs of features where the corners now are.
+    """Frames, gaps and slips of given pairs of features, (n, 4) int, where the corners now are.
 
-    Parameters
-    ----------
-    features : (n, 4) int array
-        As in :class:`Contacts`.
-    areas : (n,) array, optional [m²]
-        Carried on; zero by default.
+    Areas, (n,) [m²], are carried on, or zero.
 
-    Notes
-    -----
     A corner inside a face has the normal of the face. On the boundary of a face its normal is half-way between that of
     the face and that of the edges that cross there, so that the normal of a corner that enters the face changes in two
     equal steps. A corner on a corner, and edges that are nearly parallel, have the normal half-way
@@ -107,25 +100,11 @@ def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray
 
 
 def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray) -> Contacts:
-    """Find the points at which blocks touch or may touch within one increment.
+    """Find the points at which blocks touch or may touch within one increment, with gaps up to ``reach`` [m].
 
-    Parameters
-    ----------
-    placed : PlacedParts
-        Those of one block and the faces inside it have no contact points.
-    reach : float [m]
-        Largest gap of a contact point that is kept.
-    useful : (n_blocks,) bool array
-        One of two blocks that touch must be of these: those that are free to move.
-    widths : (n_blocks,) array [m]
+    One of two blocks that touch must be of the ``useful``, (n_blocks,) bool, those that are free to move; the widths,
+    (n_blocks,) [m], are of all. Sorted by their features, so that the same geometry gives the same order.
 
-    Returns
-    -------
-    Contacts
-        Sorted by their features, so that the same geometry gives the same order.
-
-    Notes
-    -----
     Of two near parts, the face from which the other part is farthest leads, and the face of the other that opposes it
     best answers. Both are projected into the plane half-way between and clipped. A corner of the clipped polygon is a
     corner of one part in the face of the other, or an edge across an edge. Where they do not cover each other, the next
@@ -138,9 +117,10 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
         deepest = PENETRATION_FRACTION * np.minimum(widths[contacts.block_a], widths[contacts.block_b])
         return (contacts.gaps <= reach) & (contacts.gaps >= -deepest)
 
-    tried = np.flatnonzero(pairs.shallow & pairs.face_each_other)
-    alone = pairs.shallow & ~pairs.face_each_other
-    tips = measured_points(placed, _tips(placed, pairs[alone], reach))
+    shallow = pairs.apart >= -PENETRATION_FRACTION * pairs.width
+    # Flanks of steep tips hardly face each other.
+    face_each_other = pairs.cosine <= -0.05
+    tips = measured_points(placed, _tips(placed, pairs[shallow & ~face_each_other], reach))
     tips = tips[near(tips) & ~parts.made[tips.features[:, 1]]]
     # No edges fit between faces that oppose each other better.
     crossed = measured_points(placed, _crossed_edges(placed, pairs[pairs.cosine > -0.94], reach))
@@ -149,11 +129,11 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
     # The planes of both faces, and whether the point is near.
     labels = [np.tile([-1, -1, 1], (len(contacts), 1)) for contacts in found]
     # Other faces are tried where those that oppose each other best do not cover each other.
-    facing = pairs[tried]
-    resolved = np.zeros(len(facing), dtype=bool)
+    facing = pairs[shallow & face_each_other]
+    every = np.arange(len(facing.i))
+    resolved, largest = np.zeros(len(every), dtype=bool), np.zeros(len(every))
     _, joint = np.unique(block_of_part[facing.i] * len(widths) + block_of_part[facing.j], return_inverse=True)
-    largest = np.zeros(len(facing))
-    rounds = chain([(np.arange(len(facing)), facing.face_i, facing.face_j)], facing.other_faces(placed))
+    rounds = chain([(every, facing.face_i, facing.face_j)], facing.other_faces(placed))
     for pair, face_i, face_j in rounds:
         unresolved = ~resolved[pair]
         pair, face_i, face_j = pair[unresolved], face_i[unresolved], face_j[unresolved]
@@ -194,11 +174,7 @@ def _slivers(
 ) -> np.ndarray:
     """Whether corners are those of a sliver at a cut, (n,) bool, beside the area in which their blocks touch.
 
-    Parameters
-    ----------
-    face_i, face_j : (n_pairs,) int arrays
-    largest : (n_pairs,) array [m²]
-        Of all polygons in which the same two blocks cover each other.
+    This is the largest, (n_pairs,) [m²], of all polygons in which the same two blocks cover each other.
     """
     solids = placed.solids
     area = np.bincount(corners.owner, corners.areas, minlength=len(face_i))
@@ -218,8 +194,6 @@ def _without_duplicates(contacts: Contacts, duplicates: np.ndarray, near: float)
     sense = np.where(contacts.block_a[first] == contacts.block_a[second], 1.0, -1.0)
     same = pairs[first] == pairs[second]
     same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > 1.0 - 1e-4
-    if not same.any():
-        return contacts
     n = len(contacts)
     links = coo_array((np.ones(np.count_nonzero(same)), (first[same], second[same])), shape=(n, n))
     count, group = connected_components(links, directed=False)
@@ -242,8 +216,7 @@ def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
     corner = start[owner] + position
     inward = cross(faces.normals[face[owner]], unit(placed.along(corner)))
     inside = dot(vertices[vertex[owner]] - placed.starts(corner), inward)
-    if len(owner):
-        inside = np.minimum.reduceat(inside, np.flatnonzero(position == 0))
+    inside = np.minimum.reduceat(inside, np.flatnonzero(position == 0))
     over = inside >= -CORNER_TOLERANCE * solids.shortest_edges[face]
     return feature_rows(ON_FACE, vertex[over], face[over], -1)
 
@@ -272,31 +245,22 @@ def entered_points(
 ) -> Contacts:
     """Find the points that would have kept apart blocks that overlap after a movement, measured before it.
 
-    Parameters
-    ----------
-    widths : (n_blocks,) array [m]
-    useful : (n_blocks,) bool array
-        One of two blocks that overlap must be of these.
-    tolerance : float [m]
-        Least overlap.
-    contacts : Contacts
-        What is known.
+    One of two blocks, of widths (n_blocks,) [m], must be of the ``useful``, (n_blocks,) bool; overlaps are of more than
+    the tolerance [m]. Contacts are those that are known.
 
-    Notes
-    -----
     Edges touch where they cross. Where that is known and does not help, as one turns, corners are to stay before the
     plane that separated the two.
     """
     before, after = movement
     i, j, width = near_parts(after, -tolerance, useful, widths)
-    found = entered(movement, i, j, tolerance, PENETRATION_FRACTION * width)
-    crossings = places_of(*_crossings(after, found.own, found.other))
-    on_face = measured_points(before, feature_rows(ON_FACE, found.corner, found.face, -1))
-    crossed = measured_points(before, feature_rows(ACROSS, found.own, found.other, crossings))
-    known = are_known(crossed, contacts, same_normal=False)
-    k = np.flatnonzero(known[found.at_edges])
-    corner, pair = found.edge_corner[k], found.at_edges[k]
-    own, other = found.own[pair], found.other[pair]
+    deepest = PENETRATION_FRACTION * width
+    face_corner, face, own, other, pair, corner = entered(movement, i, j, tolerance, deepest)
+    on_face = measured_points(before, feature_rows(ON_FACE, face_corner, face, -1))
+    crossings = places_of(*_crossings(after, own, other))
+    crossed = measured_points(before, feature_rows(ACROSS, own, other, crossings))
+    _, known = matched_contacts(crossed, contacts)
+    corner, pair = corner[known[pair]], pair[known[pair]]
+    own, other = own[pair], other[pair]
     normals, along = across(before, own, other), unit(before.along(other))
     apart = before.vertices[corner] - before.starts(other)
     planes = Contacts(

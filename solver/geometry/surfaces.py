@@ -25,22 +25,9 @@ Surface = tuple[ArrayLike, Sequence[Sequence[int]]]
 
 
 def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
-    """Make polyhedra of closed surfaces, with one face in each plane.
+    """Make polyhedra of the closed surfaces of blocks, with one face in each plane.
 
-    Parameters
-    ----------
-    solids : sequence of (vertices, faces)
-        Corners (n, 3) [m] of each block, no two at one place, and the numbers of the corners around each face, all in
-        the same sense seen from outside.
-    names : sequence of str
-        Of the blocks, for messages.
-
-    Raises
-    ------
-    ValueError
-        Names the block and the place: coordinates that are not finite, a surface that is not closed, in several pieces
-        or without volume, faces in different senses, a face that is not plane to a thousandth of the width of its
-        block, a surface that crosses itself.
+    Raises ``ValueError`` that names the block and the place, as :meth:`Assembly.from_solids`.
     """
     surfaces = [_checked(solid, name) for solid, name in zip(solids, names, strict=True)]
     joined = Polyhedra.of_surfaces(surfaces)
@@ -69,7 +56,8 @@ def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
     try:
         _ = shapes.parts
     except NoParts as error:
-        raise ValueError(f"block {error.block} ('{names[error.block]}') {error.why}") from None
+        block, why = error.args
+        raise ValueError(f"block {block} ('{names[block]}') {why}") from None
     return shapes
 
 
@@ -113,10 +101,8 @@ def _blocks_of_open_edges(solids: Solids) -> list[int]:
     """Blocks with an edge that is not run through once in each sense."""
     n = np.int64(len(solids.vertices))
     start, end = solids.corners, solids.corners[solids.next_corner]
-    keys, counts = np.unique(start * n + end, return_counts=True)
-    there = np.searchsorted(keys, end * n + start)
-    closed = keys[np.minimum(there, len(keys) - 1)] == end * n + start
-    closed &= counts[np.searchsorted(keys, start * n + end)] == 1
+    _, number, counts = np.unique(start * n + end, return_inverse=True, return_counts=True)
+    closed = np.isin(end * n + start, start * n + end) & (counts[number] == 1)
     return np.unique(solids.block_of_face[solids.face_of_corner[~closed]]).tolist()
 
 
@@ -155,15 +141,14 @@ def _refuse_pieces(solids: Solids, names: Sequence[str]) -> None:
     links = coo_array(
         (np.ones(len(solids.corners)), (solids.corners, solids.corners[solids.next_corner])), shape=(n, n)
     )
-    count, which = connected_components(links, directed=False)
-    if count == len(solids):
-        return
+    _, which = connected_components(links, directed=False)
     pieces = np.bincount(solids.block_of_vertex[np.unique(which, return_index=True)[1]], minlength=len(solids))
     i = int(pieces.argmax())
-    raise ValueError(
-        f"block {i} ('{names[i]}') consists of {pieces[i]} separate surfaces; give each its own "
-        "block, and fill cavities"
-    )
+    if pieces[i] > 1:
+        raise ValueError(
+            f"block {i} ('{names[i]}') consists of {pieces[i]} separate surfaces; give each its own "
+            "block, and fill cavities"
+        )
 
 
 def _refuse_warped(solids: Solids, names: Sequence[str]) -> None:
