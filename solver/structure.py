@@ -354,10 +354,10 @@ class Structure(Shown):
 def _phases(settlement: Settlement | Sequence[Settlement] | Sequence[float] | np.ndarray) -> tuple[Settlement, ...]:
     if isinstance(settlement, Settlement):
         return (settlement,)
-    phases = tuple(part for part in settlement if isinstance(part, Settlement))
-    if len(phases) == len(settlement):
-        return phases
-    return (Settlement(direction=[part for part in settlement if not isinstance(part, Settlement)]),)
+    direction = [part for part in settlement if not isinstance(part, Settlement)]
+    if len(direction) == len(settlement) > 0:
+        return (Settlement(direction=direction),)
+    return tuple(checked(part, Settlement, "one of the settlements") for part in settlement)
 
 
 def settle(

@@ -234,8 +234,10 @@ def nearest_equilibrium(
     if not loaded.all():
         # Those that can carry nothing would leave the program without an interior.
         forces, unit = np.zeros_like(reference), None if unit_reaction is None else unit_reaction[loaded]
-        given = (values[loaded] for values in (rows, reference, compliance, friction))
-        forces[loaded] = nearest_equilibrium(*given, load, unit, reaction, most[loaded], cohesion[loaded])
+        reference, compliance, friction = reference[loaded], compliance[loaded], friction[loaded]
+        forces[loaded] = nearest_equilibrium(
+            rows[loaded], reference, compliance, friction, load, unit, reaction, most[loaded], cohesion[loaded]
+        )
         return forces
     point = _Iterate(rows, reference, compliance, friction, most, cohesion, load, unit_reaction, reaction)
     best, part = (point.residual, point.forces), 1.0
