@@ -273,51 +273,43 @@ class _Problem:
         return found[~(self.gone[found.block_a] | self.gone[found.block_b])]
 
     @property
-    def admissible(self) -> Admissible:
-        """What the contact points can carry, associative."""
-        return Admissible.of(self.friction, self.cohesion, self.crushing, self.size)
-
-    @property
     def size(self) -> int:
         """Numbers of the force of a contact point: 2 in the plane, 3 in space, 4 with the torsion of its face."""
         return self.contacts.points.shape[1] + (self.faces is not None)
 
     def balanced(self, *, with_live: bool) -> _State:
         """The least unbalanced force that the dead load leaves, and how the blocks move where it is not nothing."""
-        carried, rows = self.admissible, len(self.dead)
-        columns = carried.columns
-        n = columns.shape[1]
+        rows = len(self.dead)
         identity = sp.identity(rows, format="csc")
         live = sp.csc_array(self.live[:, None] * float(with_live))
-        balance = [self.matrix @ columns, live, identity, -identity]
-        solution = solve_between(
-            cost=np.concatenate([np.zeros(n + 1), np.ones(2 * rows)]),
-            matrix=sp.csc_array(sp.block_array([balance, [carried.limits, None, None, None]], format="csc")),
-            lower=np.append(-self.dead, np.zeros(len(carried.most))),
-            upper=np.append(-self.dead, carried.most),
-            friction=carried.friction,
-            size=self.size,
-        )
-        forces, multiplier = columns @ solution.x[:n], float(solution.x[n]) * with_live
-        unbalanced = np.abs(self.matrix @ forces + self.dead + multiplier * self.live)
+        cost = np.append(0.0, np.ones(2 * rows))
+        found = self._carried(np.zeros(len(self.price)), [live, identity, -identity], cost, np.zeros(rows))
+        multiplier = found.multiplier * with_live
+        unbalanced = np.abs(self.matrix @ found.forces.ravel() + self.dead + multiplier * self.live)
         falls = float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * self.total
-        motion = -solution.row_dual[:rows]
-        return _State(forces.reshape(-1, self.size), multiplier, motion, unbalanced, solution.gap, falls)
+        return replace(found, multiplier=multiplier, unbalanced=unbalanced, falls=falls)
 
     def associative(self, balanced: _State) -> _State:
         """The program of the limit load; what the dead load leaves unbalanced by rounding it may leave too.
 
         In space it balances everything: round cones have no vertices that rounding could take away.
         """
-        carried, rows = self.admissible, len(self.dead)
-        columns = carried.columns
-        balance = [self.matrix @ columns, sp.csc_array(self.live[:, None])]
-        left = balanced.unbalanced if self.size == 2 else np.zeros(rows)
-        price = np.zeros((len(self.price), self.size))
-        price[:, 0] = self.price
+        left = balanced.unbalanced if self.size == 2 else np.zeros(len(self.dead))
+        found = self._carried(self.price, [sp.csc_array(self.live[:, None])], np.array([-1.0]), left)
+        return replace(found, unbalanced=balanced.unbalanced)
+
+    def _carried(self, price: np.ndarray, beside: list[sp.csc_array], cost: np.ndarray, left: np.ndarray) -> _State:
+        """The program over forces that points can carry, their normal forces at a price, and columns with a cost.
+
+        The first of the columns beside the forces is that of the multiplier; ``left`` is what rows may leave.
+        """
+        # Associative.
+        carried, rows = Admissible.of(self.friction, self.cohesion, self.crushing, self.size), len(self.dead)
+        columns, limits = carried.columns, [carried.limits, *[None] * len(beside)]
+        of_forces = columns.T @ (price[:, None] * np.eye(self.size)[0]).ravel()
         solution = solve_between(
-            cost=np.append(columns.T @ price.ravel(), -1.0),
-            matrix=sp.csc_array(sp.block_array([balance, [carried.limits, None]], format="csc")),
+            cost=np.append(of_forces, cost),
+            matrix=sp.csc_array(sp.block_array([[self.matrix @ columns, *beside], limits], format="csc")),
             lower=np.append(-self.dead - left, np.zeros(len(carried.most))),
             upper=np.append(-self.dead + left, carried.most),
             friction=carried.friction,
@@ -325,7 +317,7 @@ class _Problem:
         )
         n = columns.shape[1]
         forces = (columns @ solution.x[:n]).reshape(-1, self.size)
-        return _State(forces, float(solution.x[n]), -solution.row_dual[:rows], balanced.unbalanced, solution.gap)
+        return _State(forces, float(solution.x[n]), -solution.row_dual[:rows], left, solution.gap)
 
     def at_rest(self, balanced: _State) -> np.ndarray:
         """(n,) array: normal forces of the state of least elastic energy under the dead load, where there is one."""
@@ -335,7 +327,8 @@ class _Problem:
         load, near = self.dead + balanced.multiplier * self.live, np.zeros((len(self.contacts), d))
         try:
             compliance = Stepper.joint_compliance(self.contacts)
-            forces = nearest_equilibrium(rows, near, compliance, self.friction, load, most=self.crushing)
+            none = np.zeros(len(near))
+            forces = nearest_equilibrium(rows, near, compliance, self.friction, self.crushing, none, load)
         except NotSolved:
             forces = balanced.forces
         return np.asarray(forces[:, 0])

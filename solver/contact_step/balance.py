@@ -187,56 +187,29 @@ def nearest_equilibrium(
     reference: np.ndarray,
     compliance: np.ndarray,
     friction: np.ndarray,
+    most: np.ndarray,
+    cohesion: np.ndarray,
     load: np.ndarray,
     unit_reaction: np.ndarray | None = None,
     reaction: float = 0.0,
-    most: np.ndarray | None = None,
-    cohesion: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Find the forces in equilibrium within friction that are nearest to given ones.
+    """(n, d) array: forces of the closed contact points in equilibrium within friction nearest to the reference f⁰.
 
-    Parameters
-    ----------
-    rows : ContactRows
-        Of the closed contact points.
-    reference : (n, d) array
-        f⁰, in block weights.
-    compliance : (n, d) array
-        The metric; only ratios matter.
-    friction : (n,) array
-    load : (n_dof,) array
-        On the free blocks.
-    unit_reaction : (n, d) array, optional
-        r: the reaction of unit forces.
-    reaction : float
-        R.
-    most : (n,) array, optional
-        M; no limits by default.
-    cohesion : (n,) array, optional
-        C; none by default.
-
-    Returns
-    -------
-    (n, d) array
-
-    Raises
-    ------
-    NotSolved
-        Where there are none, or none were found.
+    Forces are in block weights; ``most`` is M and ``cohesion`` C, (n,) arrays, ``unit_reaction`` r, (n, d), and
+    ``reaction`` R. Of the compliance (n, d) only ratios matter. Raises ``NotSolved`` where there are none, or none were
+    found.
     """
     if len(reference) == 0:
         if np.abs(load).max(initial=0.0) > ACCEPTED:
             raise NotSolved("nothing touches the free blocks")
         return reference
-    most = np.full(len(reference), np.inf) if most is None else most
-    cohesion = np.zeros(len(reference)) if cohesion is None else cohesion
     loaded = most > BALANCED
     if not loaded.all():
         # Those that can carry nothing would leave the program without an interior.
         forces, unit = np.zeros_like(reference), None if unit_reaction is None else unit_reaction[loaded]
         reference, compliance, friction = reference[loaded], compliance[loaded], friction[loaded]
         forces[loaded] = nearest_equilibrium(
-            rows[loaded], reference, compliance, friction, load, unit, reaction, most[loaded], cohesion[loaded]
+            rows[loaded], reference, compliance, friction, most[loaded], cohesion[loaded], load, unit, reaction
         )
         return forces
     point = _Iterate(rows, reference, compliance, friction, most, cohesion, load, unit_reaction, reaction)

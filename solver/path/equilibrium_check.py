@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 
 from solver.contact_step.balance import nearest_equilibrium
 from solver.contact_step.problem import NotSolved
@@ -75,9 +74,11 @@ class EquilibriumChecks:
         base = np.zeros_like(reference)
         base[:, 0] = limits.least
         rows = ContactRows(matrix, free, model.assembly.centroids)[closed]
-        unit_reaction = None if reaction is None else self._reaction_rows(place, matrix, len(contacts))[closed]
-        beyond = 0.0
-        if unit_reaction is not None and reaction is not None:
+        unit_reaction, beyond = None, 0.0
+        if reaction is not None:
+            # Of unit forces, where the fastest support moves.
+            rate = np.where(free[:, None], 0.0, self.driver.rate(place.s)) / model.lengths * model.length
+            unit_reaction = ((matrix.T @ rate.ravel()).reshape(base.shape) / self.stepper.lever)[closed]
             beyond = reaction / (model.force * self.stepper.lever) - float((unit_reaction * base[closed]).sum())
         self.stepper.programs += 1
         forces = np.zeros_like(reference)
@@ -86,11 +87,11 @@ class EquilibriumChecks:
             (reference - base)[closed],
             self.stepper.compliance(contacts, self.stepper.mortar.points(place, contacts))[closed],
             friction[closed],
+            (limits.most - limits.least)[closed],
+            limits.cohesion[closed],
             load + rows.resultant(base[closed]),
             unit_reaction,
             beyond,
-            (limits.most - limits.least)[closed],
-            limits.cohesion[closed],
         )
         return forces
 
@@ -144,12 +145,6 @@ class EquilibriumChecks:
     def reaction(self, place: Place, contacts: Contacts, forces: np.ndarray) -> float:
         """Reaction of forces in units of the program [N or N·m]."""
         return float((on_supports(self.model, contacts, place.pose, forces) * self.driver.rate(place.s)).sum())
-
-    def _reaction_rows(self, place: Place, matrix: sp.csc_array, n: int) -> np.ndarray:
-        """(n, d) array: reaction of unit forces, in units of the program, where the fastest support moves."""
-        model = self.model
-        rate = np.where(model.assembly.free[:, None], 0.0, self.driver.rate(place.s)) / model.lengths * model.length
-        return np.asarray(matrix.T @ rate.ravel()).reshape(n, -1) / self.stepper.lever
 
     def bounds(self, place: Place, gap: float = COMPUTED_GAP) -> EquilibriumBounds:
         """Bounds of the reaction or multiplier in equilibrium at a place."""
