@@ -24,6 +24,9 @@ ALONE = 1e-14
 class NotSolved(Exception):
     """The minimum of a step's program was not found, or its matrix is not positive definite, by rounding."""
 
+    #: Movement in block sizes of a step that was too long; 0 where that is not why.
+    moved = 0.0
+
 
 def factorisation(pairs: np.ndarray, places: np.ndarray | None, n_blocks: int, dof: int) -> Band | Fronts:
     """Choose how to factorise what acts between pairs of blocks.

@@ -204,6 +204,4 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
             f"{point.factorisations} iterations"
         )
     forces = point.forces(point.at.normal, point.at.shear)
-    return StepSolution(
-        point.at.motion, forces, problem.trial(point.at.motion), point.at.multiplier, point.factorisations
-    )
+    return StepSolution(point.at.motion, forces, problem.trial(point.at.motion), point.at.multiplier)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from .factors import Solve
@@ -36,20 +34,17 @@ def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplie
     """
     if len(problem.gap) == 0:
         motion = problem.load / problem.viscosity - problem.motion_so_far
-        return StepSolution(motion, problem.forces, problem.forces, multiplier, 0)
-    solution, iterations = newton(problem, trial, multiplier)
-    if solution is None:
-        solution = interior_point(problem, multiplier)
-    return replace(solution, factorisations=iterations + solution.factorisations)
+        return StepSolution(motion, problem.forces, problem.forces, multiplier)
+    return newton(problem, trial, multiplier) or interior_point(problem, multiplier)
 
 
 @np.errstate(all="ignore")  # A live load that no joint resists moves nothing along the control.
-def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float) -> tuple[StepSolution | None, int]:
-    """Semismooth Newton steps from trial forces: the solution, None where they lead too far, and factorisations."""
+def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float) -> StepSolution | None:
+    """Semismooth Newton steps from trial forces: the solution, None where they lead too far."""
     motion = np.zeros_like(problem.load)
     start, from_start = problem.trial(motion), trial is None
     if not from_start and np.abs(problem.unbalanced(motion, problem.projected(start), multiplier)).max() > NEAR:
-        return None, 0
+        return None
     # The first linear problem is that of the given trial forces, at the start.
     trial = start if trial is None else trial
     stiffness = problem.stiffness(trial)
@@ -70,13 +65,13 @@ def newton(problem: ContactProblem, trial: np.ndarray | None, multiplier: float)
         missing = 0.0 if problem.control is None else problem.control_target - float(problem.control @ motion)
         imbalance = float(np.abs(unbalanced).max())
         if imbalance < BALANCED * max(1.0, abs(multiplier)) and abs(missing) <= 1e-12 + BALANCED * problem.size:
-            return StepSolution(motion, forces, trial, multiplier, 0), factorisations
+            return StepSolution(motion, forces, trial, multiplier)
         if not (imbalance <= NEAR or (from_start and imbalance < np.inf)):
             break
         before, status = status, problem.status(trial)
         # Where no point has changed, the factors serve once more.
         is_new = not is_new or bool((status != before).any())
-    return None, factorisations
+    return None
 
 
 def _part(problem: ContactProblem, trial: np.ndarray, motion: np.ndarray, change: np.ndarray) -> float:

@@ -128,4 +128,3 @@ class StepSolution:
     forces: np.ndarray
     trial: np.ndarray
     multiplier: float
-    factorisations: int
