@@ -151,6 +151,13 @@ def moved(pose: Pose, q: np.ndarray) -> Pose:
     return Pose(pose.positions + q[:, :d], composed_rotations(pose.rotations, q[:, d:]))
 
 
+def put_together(some: np.ndarray, pose: Pose, others: Pose) -> Pose:
+    """Make the pose in which some blocks, (n_blocks,) bool array, are where one pose has them, the others as others."""
+    chosen = some[:, None]
+    positions = np.where(chosen, pose.positions, others.positions)
+    return Pose(positions, np.where(chosen, pose.rotations, others.rotations))
+
+
 def moved_vertices(assembly: Assembly, pose: Pose) -> np.ndarray:
     """(n_vertices, d) array [m]: corners of all blocks at a pose."""
     if (given := pose.positions.shape) != (own := assembly.centroids.shape):

@@ -47,7 +47,7 @@ from solver.assembly import Assembly, find_contacts
 from solver.equilibrium import friction_rays, wrench_matrix
 from solver.geometry.contacts import Contacts, matched_contacts
 from solver.interfaces import Interfaces
-from solver.kinematics import Pose, motion_size, moved, moved_vertices, relative_velocities
+from solver.kinematics import Pose, motion_size, moved, moved_vertices, put_together, relative_velocities
 from solver.loads import Loads, Settlement
 from solver.path.controls import Ending
 from solver.path.drivers import SupportMotion
@@ -256,12 +256,10 @@ class _Phase:
 
     def step_to(self, current: _Equilibrium, s: float) -> _Equilibrium:
         """Step from an equilibrium to the settlement s; raises SupportsLocked and what ``close_joints`` raises."""
-        free, supports = self.assembly.free[:, None], self.driver.rate(current.s) * (s - current.s)
+        supports = self.driver.rate(current.s) * (s - current.s)
         solution = self.solve(current.pose, self.contacts(current.pose), supports=supports)
         pose = moved(current.pose, solution.state.velocity)
-        supported = self.driver.supports(s)
-        positions = np.where(free, pose.positions, supported.positions)
-        return self.close_joints(s, Pose(positions, np.where(free, pose.rotations, supported.rotations)), solution)
+        return self.close_joints(s, put_together(self.assembly.free, pose, self.driver.supports(s)), solution)
 
     def close_joints(self, s: float, first: Pose, solution: ProgramSolution) -> _Equilibrium:
         """Close what a program has left at the pose ``first``, with the supports fixed, until forces balance there.

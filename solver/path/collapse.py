@@ -54,7 +54,7 @@ class Fall:
                 new, motion, error = self.stepper.step(place, time, in_time=True)
                 moved = error.moved
             except NotSolved as failure:
-                new, moved = None, getattr(failure, "moved", 0.0)
+                new, moved = None, failure.moved
             if new is None or moved > largest:
                 time *= min(0.5, 0.8 * np.sqrt(largest / max(moved, largest)))
                 continue

@@ -78,6 +78,8 @@ class Mortar:
 
     def cast(self, place: Place, contacts: Contacts) -> Place:
         """The place with all of its closed joints whole."""
+        if not self.present:
+            return place
         closed = contacts[contacts.gaps <= COMPUTED_GAP * self.model.length]
         n = len(closed)
         return replace(place, bonds=Bonds(closed.features[:, :3], closed.areas, np.ones(n), np.zeros(n)))

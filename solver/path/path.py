@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.contact_step.problem import NotSolved
 from solver.equilibrium import wrench_matrix
-from solver.kinematics import Pose
+from solver.kinematics import Pose, put_together
 from solver.loads import GRAVITY
 from solver.program.model import Model
 from solver.results.increment import Bonds, Increment, Status
@@ -133,9 +133,9 @@ class Path:
                     if self.fall.movements(place, closed).max() > MECHANISM:
                         self.reports.notes = [Note(0.0, self.reports.settled(start, closed.pose))]
                     # Those that have mortar are the ones that are closed then, or a settlement before has left.
-                    closed = self.stepper.mortar.renamed(closed, self.stepper.contacts(closed.pose))
-                    closed = replace(closed, contacts=None, velocity=None)
-                    resting = self._at_rest(self.stepper.whole(closed) if drawn else closed, drawn)
+                    bonded = self.stepper.mortar.cast if drawn else self.stepper.mortar.renamed
+                    closed = bonded(closed, self.stepper.contacts(closed.pose))
+                    resting = self._at_rest(replace(closed, contacts=None, velocity=None), drawn)
             place = resting or place
         return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
 
@@ -474,11 +474,7 @@ class Path:
         words = self.reports.loss(leaving, weight, weight / float(weights.sum()))
         self._remove_blocks(fell_at)
         self.reports.notes, self.stepper.programs = [*notes, Note(state.place.s, words)], programs
-        fallen = leaving[:, None]
-        pose = Pose(
-            np.where(fallen, end.pose.positions, state.place.pose.positions),
-            np.where(fallen, end.pose.rotations, state.place.pose.rotations),
-        )
+        pose = put_together(leaving, end.pose, state.place.pose)
         remaining = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
         end, at_rest = remaining.place, self.checks.in_equilibrium(remaining.place)
         if not at_rest:

@@ -23,7 +23,7 @@ from solver.contact_step.problem import ContactProblem, NotSolved
 from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts, successors
-from solver.kinematics import Pose, moved, moved_vertices
+from solver.kinematics import Pose, moved, moved_vertices, put_together
 from solver.program.model import Model
 from solver.program.strength import ForceLimits
 from solver.results.increment import Bonds
@@ -60,14 +60,6 @@ OPEN = 1e-6
 
 #: Damping of steps in time, in units of mass · √(g / block size): critical for a block that rocks.
 DAMPING = 2.0
-
-
-class Penetration(NotSolved):
-    """A block penetrates another where the step has no contact point, in a movement of so many block sizes."""
-
-    def __init__(self, moved: float) -> None:
-        super().__init__("a corner comes into a block from the side")
-        self.moved = moved
 
 
 @dataclass(frozen=True)
@@ -123,8 +115,6 @@ class _StepPoints:
         Largest shear forces.
     kept : (n,) array
         Part of the give under the normal force that the next linearisation takes back.
-    pulled : (n, d) array
-        The tension: the program is that of the normal forces beyond it.
     """
 
     start: Contacts
@@ -138,7 +128,11 @@ class _StepPoints:
     joints: JointPoints
     bound: np.ndarray
     kept: np.ndarray
-    pulled: np.ndarray
+
+    @property
+    def pulled(self) -> np.ndarray:
+        """(n, d) array: the tension; the program is that of the normal forces beyond it."""
+        return self.joints.tension[:, None] * np.eye(self.forces.shape[1])[0]
 
     def moved(self, trial: np.ndarray) -> np.ndarray:
         """(n, 2) array: opening beyond the largest tension and slip beyond the bound that trial forces say."""
@@ -187,11 +181,9 @@ class Stepper:
     ) -> Place:
         """Return the place of a pose without forces, with the members of a phase, from 0, and all joints whole."""
         place = self.members.installed(Place.unloaded(pose), phase, ties_at)
-        return self.whole(place) if bonds_at is None else self.mortar.kept(place, self.contacts_at(place), bonds_at)
-
-    def whole(self, place: Place) -> Place:
-        """Return the place with mortar in all closed joints."""
-        return self.mortar.cast(place, self.contacts(place.pose)) if self.mortar.present else place
+        if bonds_at is None:
+            return self.mortar.cast(place, self.contacts(pose))
+        return self.mortar.kept(place, self.contacts_at(place), bonds_at)
 
     def contacts_at(self, place: Place) -> Contacts:
         """Return the contact points at a place, those of members last."""
@@ -390,7 +382,7 @@ class Stepper:
         # Linearised where blocks come to that go on as before: what that is wrong by, not all they move, is squared.
         # In time, what lands would be behind what it lands on.
         motion_so_far = before if loads > 0.0 else np.zeros_like(before)
-        pose = self._with_supports(moved(place.pose, self._of_blocks(motion_so_far)), supports)
+        pose = put_together(free, moved(place.pose, self._of_blocks(motion_so_far)), supports)
         contacts = self.measured(start, pose, place.tie_lengths)
         load, (live, live_size) = self._load(pose, loads), model.scaled_live(pose)
         multiplier, number = place.multiplier * live_size, 0
@@ -422,7 +414,7 @@ class Stepper:
             if number:
                 before_step[:, 0] = points.kept * forces[:, 0]
             motion_so_far = motion_so_far + solution.motion
-            pose = self._with_supports(moved(place.pose, self._of_blocks(motion_so_far)), supports)
+            pose = put_together(free, moved(place.pose, self._of_blocks(motion_so_far)), supports)
             predicted = problem.gap + rows.relative(solution.motion)[:, 0]
             contacts = self.measured(start, pose, place.tie_lengths)
             acting = load + multiplier * live[free].ravel()
@@ -491,20 +483,16 @@ class Stepper:
         kept = np.where(is_member(start), 0.0, 1.0 - joints.give[:, 0] / compliance[:, 0])
         # Not all of it in long steps, which would alternate sooner.
         expected = followed + max(0.0, 1.0 - 2.0 * share) * share * (forces[:, 0] - followed)
-        pulled = np.zeros_like(forces)
-        points = _StepPoints(
-            start, forces, trial, followed, expected, is_new, friction, compliance, joints, none, kept, pulled
-        )
+        points = _StepPoints(start, forces, trial, followed, expected, is_new, friction, compliance, joints, none, kept)
         return self._with_joints(points, joints)
 
     def _with_joints(self, points: _StepPoints, joints: JointPoints) -> _StepPoints:
         """The contact points of a step with what is left of their joints."""
-        bound, pulled = points.friction * points.expected, np.zeros_like(points.forces)
-        pulled[:, 0] = joints.tension
+        bound = points.friction * points.expected
         if self.mortar.present:
             # Lost strength takes with it the tension that friction still followed.
             bound = np.maximum(points.friction * np.maximum(points.expected, -joints.tension) + joints.cohesion, 0.0)
-        return replace(points, joints=joints, bound=bound, pulled=pulled)
+        return replace(points, joints=joints, bound=bound)
 
     @staticmethod
     def _largest(values: np.ndarray) -> float:
@@ -551,7 +539,7 @@ class Stepper:
     def _with_missed(self, stepped: Contacts, before: Place, pose: Pose, movement_size: float) -> Contacts:
         """Contact points of a step with those that it has missed, where they were: at its end a corner is in a block.
 
-        Raises ``Penetration`` where that corner was behind the edge already, or the step had its contact point.
+        Raises ``NotSolved`` where that corner was behind the edge already, or the step had its contact point.
         """
         if movement_size <= LARGEST_PENETRATION:
             return stepped
@@ -567,14 +555,10 @@ class Stepper:
             deep &= self.mortar.points(before, end).give[:, 0] == 0.0
         found = self.model.assembly.shapes.measure(moved_vertices(self.model.assembly, before.pose), end[deep])
         if is_stepped[deep].any() or (found.gaps < deepest).any():
-            raise Penetration(movement_size)
+            failure = NotSolved("a corner comes into a block from the side")
+            failure.moved = movement_size
+            raise failure
         if not len(found):
             return stepped
         members = is_member(stepped)
         return joined_contacts([stepped[~members], found, stepped[members]])
-
-    def _with_supports(self, pose: Pose, supports: Pose) -> Pose:
-        free = self.free[:, None]
-        return Pose(
-            np.where(free, pose.positions, supports.positions), np.where(free, pose.rotations, supports.rotations)
-        )
