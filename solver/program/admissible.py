@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from solver.equilibrium import friction_rays, wrench_matrix
+from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.programs.problem import LinearProgram, Solution, SolveError, Unbounded
@@ -82,19 +82,12 @@ class StaticProgram:
         least, most = limits.least, limits.most
         closed = np.flatnonzero((contacts.gaps <= gap * model.length) | limits.hold)
         matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
-        # In the plane the two rays of a cone are its forces; in space its three numbers are.
-        forces_of = friction_rays(friction) if d == 2 else sp.eye_array(3 * len(contacts), format="csc")
+        carried = Admissible.of(friction[closed], limits.cohesion[closed], np.full(len(closed), np.inf), d)
         of_closed = np.repeat(d * closed, d) + np.tile(np.arange(d), len(closed))
-        self.rays = forces_of[:, of_closed]
-        bonded = limits.cohesion[closed] > 0.0
-        if bonded.any():
-            carried = Admissible.of(friction[closed], limits.cohesion[closed], np.full(len(closed), np.inf), d)
-            everywhere = sp.eye_array(d * len(contacts), format="csc")[:, of_closed]
-            self.rays = sp.csc_array(everywhere @ carried.columns)
+        self.rays = sp.csc_array(sp.eye_array(d * len(contacts), format="csc")[:, of_closed] @ carried.columns)
         balance = sp.csc_array(matrix[free] @ self.rays)
         self.rows, self.n = balance.shape
-        slopes = np.append(friction[closed], np.ones(int(bonded.sum())))
-        self.d, self.friction, self.total, self.programs = d, slopes, model.total_load, 0
+        self.d, self.friction, self.total, self.programs = d, carried.friction, model.total_load, 0
         # The programs are those of the normal forces beyond the least ones.
         self.least = np.zeros((len(contacts), d))
         self.least[closed, 0] = least[closed]
@@ -118,18 +111,14 @@ class StaticProgram:
         self.objective, self.matrix = objective, sp.hstack(columns, format="csc")
         self.places = np.repeat(pose.positions[blocks], model.n_dof, axis=0)
         limited = np.flatnonzero(np.isfinite(most))
-        self.reserve = (most - least)[limited]
-        if len(limited) or bonded.any():
-            normal, places = sp.csc_array(sp.csr_array(self.rays)[d * limited]), contacts.points[limited]
-            if bonded.any():
-                normal = sp.vstack([normal, carried.limits], format="csc")
-                self.reserve = np.append(self.reserve, carried.most)
-                of_each = len(carried.most) // int(bonded.sum())
-                places = np.vstack([places, np.repeat(contacts.points[closed[bonded]], of_each, axis=0)])
-            beside = sp.csc_array((len(self.reserve), len(objective) - self.n))
-            limits_of = sp.hstack([normal, beside])
+        self.reserve = np.append((most - least)[limited], carried.most)
+        if len(self.reserve):
+            limits_of = sp.vstack([sp.csr_array(self.rays)[d * limited], carried.limits], format="csc")
+            limits_of.resize(len(self.reserve), len(objective))
             self.matrix = sp.csc_array(sp.vstack([self.matrix, limits_of], format="csc"))
-            self.places = np.vstack([self.places, places])
+            # Places are of programs in the plane, where cohesion has a row for either sign.
+            sticky = np.repeat(closed[limits.cohesion[closed] > 0.0], 2)
+            self.places = np.vstack([self.places, contacts.points[limited], contacts.points[sticky]])
 
     def in_equilibrium(self) -> bool:
         """Whether an equilibrium within friction exists, with some of the live load where there is one.
