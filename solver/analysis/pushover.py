@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -12,13 +12,12 @@ from solver.assembly import Assembly, check_blocks
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose
 from solver.loads import Loads
-from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
+from solver.path.controls import LINEAR_PROGRAM, Controls
 from solver.path.drivers import ControlDisplacement, ControlledLoad
 from solver.path.local_origin import at_origin, in_global_coordinates, without_origin
 from solver.path.path import Path
 from solver.path.state import PathState
-from solver.programs.problem import SolveError
-from solver.results.increment import Bonds, Increment, Status
+from solver.results.increment import Bonds
 from solver.ties import Tie, TieForces, check_ties
 from solver.words import checked, counted
 
@@ -89,21 +88,5 @@ def pushover_increments(
         start = resume.start
     model = model_of(near, loads, interfaces, controls, loads.live, ties)
     path = Path(model, ControlledLoad(near, control, start), 0, controls, on_step)
-    steps = _increments(path, start, ties_at, bonds_at, fallen, resume)
+    steps = path.increments(partial(path.begin, start, None, ties_at, bonds_at, fallen), resume)
     return Increments(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
-
-
-def _increments(
-    path: Path,
-    start: Pose,
-    ties_at: TieForces | None,
-    bonds_at: Bonds | None,
-    fallen: np.ndarray | None,
-    resume: PathState | None,
-) -> Generator[Increment, None, Ending]:
-    try:
-        state = path.begin(start, None, ties_at, bonds_at, fallen) if resume is None else resume
-        return (yield from path.follow(state, resume is not None))
-    except SolveError as error:
-        at = max(path.reported, 0.0)
-        return Ending(Status.SOLVER_FAILED, f"beyond a control displacement of {at:.6g} m: {error}")

@@ -20,7 +20,6 @@ from solver.path.path import Path
 from solver.path.state import PathState
 from solver.phases import PhaseChange, loads_in, removed_before
 from solver.program.model import Model
-from solver.programs.problem import SolveError
 from solver.results.increment import Increment, Status
 from solver.ties import Tie, check_ties
 from solver.words import checked, counted
@@ -117,19 +116,14 @@ def _increments(
         model = model_of(assembly, loads_in(loads, changes, number), interfaces, controls, ties=ties)
         model = replace(model, force=unit)
         path = Path(model, SupportMotion(assembly, phase, start), number, controls, on_step)
-        try:
-            state = path.begin(start, before) if resume is None else resume
-            now = [change for change in changes if change.phase == number]
-            if resume is None and (now or (number and any(tie.phase == number + 1 for tie in ties))):
-                gone = {name for change in now for name in change.ties}
-                state = path.changed(state, removed_before(changes, number, assembly.n_blocks), gone)
-            ending = yield from path.follow(state, resume is not None)
-        except SolveError as error:
-            at = max(path.reported, 0.0)
-            return Ending(Status.SOLVER_FAILED, f"beyond a settlement of {at:.6g} {phase.unit}: {error}")
-        resume, before = None, path.state
+        begin, now = partial(path.begin, start, before), [change for change in changes if change.phase == number]
+        if now or (number and any(tie.phase == number + 1 for tie in ties)):
+            gone = {name for change in now for name in change.ties}
+            begin = partial(path.changed, begin, removed_before(changes, number, assembly.n_blocks), gone)
+        ending = yield from path.increments(begin, resume)
         if ending.stop is not Status.LIMIT_REACHED:
             return ending
+        resume, before = None, path.state
     return ending
 
 

@@ -12,6 +12,7 @@ from solver.equilibrium import wrench_matrix
 from solver.kinematics import Pose, put_together
 from solver.loads import GRAVITY
 from solver.program.model import Model
+from solver.programs.problem import SolveError
 from solver.results.increment import Bonds, Increment, Status
 from solver.ties import TieForces, is_member
 from solver.tolerances import ACCEPTED_ERROR, CLOSING_GAP, COMPLIANCE, COMPUTED_GAP, FRICTION_MEMORY, JUMP
@@ -102,6 +103,17 @@ class Path:
         self.reports = Reports(self.stepper, self.number, fell_at)
         self.fall = Fall(self.stepper, self.checks, self.reports, self.frames)
 
+    def increments(
+        self, begin: Callable[[], PathState], resume: PathState | None
+    ) -> Generator[Increment, None, Ending]:
+        """The increments of the phase, from where it begins or a checkpoint; it ends where a program is not solved."""
+        try:
+            return (yield from self.follow(begin() if resume is None else resume, resume is not None))
+        except SolveError as error:
+            at = max(self.reported, 0.0)
+            message = f"beyond a {self.driver.what} of {at:.6g} {self.driver.unit}: {error}"
+            return Ending(Status.SOLVER_FAILED, message)
+
     # The start ---------------------------------------------------------------------------------------------------
 
     def begin(
@@ -139,11 +151,12 @@ class Path:
             place = resting or place
         return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
 
-    def changed(self, state: PathState, removed: np.ndarray, ties: Collection[str] = ()) -> PathState:
+    def changed(self, begin: Callable[[], PathState], removed: np.ndarray, ties: Collection[str]) -> PathState:
         """The state once blocks, (n_blocks,) bool array, and ties are taken away and the others have come to rest.
 
         Where they do not, it is that from which they fall; :meth:`follow` finds that.
         """
+        state = begin()
         if removed.any():
             fell_at = np.where(removed, -np.inf, state.fell_at if len(state.fell_at) else np.nan)
             self._remove_blocks(fell_at)
