@@ -118,7 +118,6 @@ def solve_program(
     ------
     SupportsLocked
         Where no displacements of the blocks are compatible with those of the supports.
-    SolveError
 
     Notes
     -----
@@ -373,11 +372,6 @@ def linear_program_increments(
     """Yield the increments of settlements in the plane by the paper's linear programs; return how they ended.
 
     From a ``resume``, the checkpoint of an increment with the same other arguments, those after it follow bit for bit.
-
-    Raises
-    ------
-    ValueError
-        If no load acts on any free block.
     """
     if not np.abs(loads.dead[assembly.free, :2]).any():
         raise ValueError("no load acts on any free block; give them a weight")

@@ -98,13 +98,7 @@ class _Iterate:
         self.residual = max(float(np.abs(self.unbalanced).max()), abs(self.reaction_error))
 
     def factorise(self) -> None:
-        """Factorise Newton's equations at this iterate.
-
-        Raises
-        ------
-        NotSolved, LinAlgError
-            Where rounding is all that is left.
-        """
+        """Factorise Newton's equations here; raises NotSolved or LinAlgError where rounding is all that is left."""
         self.scaling = Scaling(self.u, self.z)
         self.hessian = self.scaling.hessian()
         local = self.slope[:, :, None] * self.hessian * self.slope[:, None, :]

@@ -29,15 +29,7 @@ class NotSolved(Exception):
 
 
 def factorisation(pairs: np.ndarray, places: np.ndarray | None, n_blocks: int, dof: int) -> Band | Fronts:
-    """Choose how to factorise what acts between pairs of blocks.
-
-    Parameters
-    ----------
-    pairs : (n, 2) int array
-        Numbers of the two blocks; -1 for a support.
-    places : (n_blocks, d) array, optional
-        For the order of the blocks.
-    """
+    """Choose how to factorise what acts between pairs of blocks, (n, 2) int array with -1 for a support."""
     touching = pairs[(pairs >= 0).all(axis=1)]
     graph = sp.csr_array((np.ones(len(touching)), touching.T), shape=(n_blocks, n_blocks))
     joined = sp.csr_array(graph + graph.T + sp.eye_array(n_blocks))
@@ -60,12 +52,7 @@ class Band:
         self.entry = (j * self.shape[1] + i - j).ravel()[self.kept]
 
     def factorised(self, matrices: np.ndarray, diagonal: np.ndarray) -> Solve:
-        """Factorise the sum of the pairs' matrices, (n, (2 dof)²), and a diagonal; gives what solves with it.
-
-        Raises
-        ------
-        NotSolved
-        """
+        """Factorise the sum of the pairs' matrices, (n, (2 dof)²), and a diagonal; gives what solves with it."""
         size, width = self.shape
         band = np.bincount(self.entry, matrices.ravel()[self.kept], size * width).reshape(self.shape).T
         band[0] += diagonal[self.order] + ALONE * band[0].max()
@@ -114,8 +101,6 @@ class Front:
 class Fronts:
     """Cholesky's factorisation by dense matrices of parts of a structure, and of the cuts between them.
 
-    Notes
-    -----
     Multifrontal: Duff & Reid (1983), https://doi.org/10.1145/356044.356047.
     """
 

@@ -166,12 +166,7 @@ class _Iterate:
 
 @np.errstate(all="ignore")  # A step that overflows is seen by its result.
 def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolution:
-    """Follow the central path to the minimum of a step's program.
-
-    Raises
-    ------
-    NotSolved
-    """
+    """Follow the central path to the minimum of a step's program; raises ``NotSolved`` where it does not lead there."""
     point = _Iterate(problem, multiplier)
     for _ in range(ITERATIONS):
         size = max(point.size, float(np.abs(point.at.motion).max()))

@@ -51,16 +51,7 @@ class EquilibriumChecks:
     def nearest(self, place: Place, gap: float, reaction: float | None = None, at_rest: bool = False) -> np.ndarray:
         """(n_contacts, d) array: forces in equilibrium nearest to those of a place, in units of the program.
 
-        Parameters
-        ----------
-        reaction : float, optional [N or N·m]
-            Of the forces that are looked for.
-        at_rest : bool
-            Find those of least elastic energy.
-
-        Raises
-        ------
-        NotSolved
+        With a reaction [N or N·m] those that have it; ``at_rest`` those of least elastic energy. Raises ``NotSolved``.
         """
         model, free = self.model, self.stepper.free
         contacts, friction = self._contacts_at(place)

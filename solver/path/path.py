@@ -65,17 +65,7 @@ VANISHING = 0.05
 
 
 class Path:
-    """The path of one phase under a driver.
-
-    Parameters
-    ----------
-    model : Model
-        Units, loads, interfaces.
-    number : int
-        Of the phase.
-    on_step : callable, optional
-        Called with the :class:`PathState` after every step that was tried.
-    """
+    """The path of one phase, by its number, under a driver; ``on_step`` is called with each state that was tried."""
 
     def __init__(
         self,
@@ -239,10 +229,7 @@ class Path:
     def _report_start(self, state: PathState) -> Generator[Increment, None, Ending | None]:
         """Report the start; return the ending of a path that has no start, None otherwise.
 
-        Raises
-        ------
-        ValueError
-            Where the multiplier has to change its sign for the parameter to grow.
+        Raises ``ValueError`` where the multiplier has to change its sign for the parameter to grow.
         """
         place, model = state.place, self.model
         check = self._check(place)

@@ -23,17 +23,7 @@ from .stepping import Stepper
 
 
 class Reports:
-    """Increments of a phase, and messages.
-
-    Parameters
-    ----------
-    stepper : Stepper
-        Whose programs are counted.
-    number : int
-        Of the phase.
-    fell_at : (n_blocks,) array
-        As in :class:`solver.results.increment.State`.
-    """
+    """Increments of a phase, by its number, and messages; blocks have fallen as :class:`PathState` tells."""
 
     def __init__(self, stepper: Stepper, number: int, fell_at: np.ndarray) -> None:
         self.stepper, self.model, self.driver, self.number = stepper, stepper.model, stepper.driver, number

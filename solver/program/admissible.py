@@ -52,7 +52,7 @@ class EquilibriumBounds:
 
 
 class StaticProgram:
-    """The program over all contact forces at a pose.
+    """The program over all contact forces at a pose; what solves it raises ``SolveError``.
 
     Parameters
     ----------
@@ -121,12 +121,7 @@ class StaticProgram:
             self.places = np.vstack([self.places, contacts.points[limited], contacts.points[sticky]])
 
     def in_equilibrium(self) -> bool:
-        """Whether an equilibrium within friction exists, with some of the live load where there is one.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Whether an equilibrium within friction exists, with some of the live load where there is one."""
         balanced, unbalanced = self.most_balanced()
         if unbalanced > FALLING_FRACTION or self.live_size == 0.0:
             return unbalanced <= FALLING_FRACTION
@@ -136,12 +131,6 @@ class StaticProgram:
     def bounds(self) -> EquilibriumBounds:
         """Bound the reaction or the multiplier of all equilibria within friction.
 
-        Raises
-        ------
-        SolveError
-
-        Notes
-        -----
         Linear programs over the multipliers of the friction cones' rays, in space conic programs over the forces in
         round cones: the least sum of unbalanced forces; where that is none, the least and the largest reaction (or
         multiplier). The least is that of Portioli & Cascini (2017) at this geometry.
@@ -170,14 +159,7 @@ class StaticProgram:
     def bound(self, sign: float, balanced: Solution) -> Solution | None:
         """Least or, by sign, largest value in equilibrium; None without a bound.
 
-        Parameters
-        ----------
-        balanced : Solution
-            An equilibrium; the rounding that leaves it out of balance may do so here.
-
-        Raises
-        ------
-        SolveError
+        The rounding that leaves the balanced solution out of balance may do so here.
         """
         try:
             missing, beyond = self._imbalance(balanced)
@@ -186,12 +168,7 @@ class StaticProgram:
             return None
 
     def most_balanced(self) -> tuple[Solution, float]:
-        """Find forces of least imbalance, and their unbalanced forces over the total load, 0 where that is rounding.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Find forces of least imbalance, and their unbalanced forces over the total load, 0 where that is rounding."""
         unit = sp.eye_array(self.matrix.shape[0], self.rows)
         matrix = sp.hstack([self.matrix, unit, -unit], format="csc")
         cost = np.append(np.zeros(self.matrix.shape[1]), np.ones(2 * self.rows))

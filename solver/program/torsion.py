@@ -83,13 +83,7 @@ def face_wrench_matrix(contacts: Contacts, faces: Faces, pose: Pose, length: flo
 
 
 def point_forces(contacts: Contacts, faces: Faces, forces: np.ndarray) -> np.ndarray:
-    """(n_contacts, 3) array: forces at the contact points with the same resultants as those of faces.
-
-    Parameters
-    ----------
-    forces : (n_contacts, 4) array
-        As columns of :func:`face_wrench_matrix`; any unit of force.
-    """
+    """(n_contacts, 3) array: forces at the points with the same resultants as those (n_contacts, 4) of their faces."""
     face, count = faces.face, np.bincount(faces.face)
     frames = contacts.frames[faces.first]
     # On the block that is the first one of the face's first point.

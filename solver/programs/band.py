@@ -237,13 +237,8 @@ def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float
 def run_band(program: LinearProgram) -> tuple[Solution | None, str]:
     """Solve a program whose rows form a narrow band; what comes back is as of :func:`solver.programs.highs.run_highs`.
 
-    Parameters
-    ----------
-    program : LinearProgram
-        Its places are for orders of the rows to try, see :func:`solver.ordering.narrowest`.
+    Its places are for orders of the rows to try, see :func:`solver.ordering.narrowest`.
 
-    Notes
-    -----
     A primal-dual method: every iteration factorises A D Aᵀ, whose blocks of 3 × 3 are the blocks of the structure and
     their neighbours, as a band in the order given or that of Cuthill & McKee (1969). After Mehrotra
     (1992), https://doi.org/10.1137/0802028, with a proximal term (Friedlander & Orban 2012,

@@ -21,8 +21,6 @@ ROUTES = {
 def run_clarabel(program: ConicProgram, route: str) -> tuple[Solution | None, str]:
     """Solve a conic program by one of ``ROUTES``: all that is told of :func:`solver.programs.highs.run_highs` holds.
 
-    Notes
-    -----
     Stated as its dual, whose unknowns are the fewer ones: minimise - right · y with c - Aᵀ y in the dual cones; the
     multipliers of these are x. Goulart & Chen (2024), https://arxiv.org/abs/2405.12762.
     """

@@ -28,24 +28,9 @@ ROUTES: dict[str, dict[str, object]] = {
 
 
 def run_highs(program: LinearProgram, route: str) -> tuple[Solution | None, str]:
-    """Solve a program by one route.
+    """Solve a program by one of ``ROUTES``: the solution, None where HiGHS has none, and its status.
 
-    Parameters
-    ----------
-    route : str
-        One of ``ROUTES``.
-
-    Returns
-    -------
-    Solution or None
-        None where HiGHS has none; its check is up to the caller.
-    str
-        Its status.
-
-    Raises
-    ------
-    Unbounded
-        If a ray proves that the program has no minimum.
+    Its check is up to the caller. Raises ``Unbounded`` if a ray proves that the program has no minimum.
     """
     highs = highspy.Highs()
     options: dict[str, object] = {

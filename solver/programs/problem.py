@@ -21,13 +21,7 @@ class SolveError(RuntimeError):
 
 
 class Unbounded(Exception):
-    """The program has no minimum, as a checked ray proves.
-
-    Attributes
-    ----------
-    x : (n,) array
-        The ray: A x = 0, x ≥ 0 or in the cones, cost · x < 0.
-    """
+    """The program has no minimum, as a checked ray x, (n,), proves: A x = 0, x ≥ 0 or in the cones, cost · x < 0."""
 
     def __init__(self, x: np.ndarray) -> None:
         super().__init__("the program is unbounded")

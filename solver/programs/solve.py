@@ -35,19 +35,9 @@ CONIC_ROUTES = tuple(ROUTES)
 def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, vertex: bool = False) -> Solution:
     """Solve a linear program, trying one route after another until a solution passes its check.
 
-    Parameters
-    ----------
-    routes : tuple of str, optional
-        ``BAND`` or names out of ``ROUTES``, in the order to try; chosen by size by default.
-    vertex : bool
-        Find a vertex, up to ``CROSSOVER_ROWS`` rows.
-
-    Raises
-    ------
-    Unbounded
-        If the program has no minimum, proved by a ray.
-    SolveError
-        If no route gives a solution that passes; the message lists what each of them ended with.
+    Routes are ``BAND`` or names out of ``ROUTES``, chosen by size by default; with ``vertex`` those that find one, up
+    to ``CROSSOVER_ROWS`` rows. Raises ``Unbounded`` where a ray proves that there is no minimum, and where no solution
+    passes ``SolveError``, which lists what each route ended with.
     """
     rows, columns = program.matrix.shape
     if routes is None:
@@ -83,28 +73,9 @@ def solve_between(
 ) -> Solution:
     """Minimise cost · x with lower ≤ A x ≤ upper, the first columns in round cones: without any, a linear program.
 
-    Parameters
-    ----------
-    cost : (n,) array
-    matrix : (m, n) sparse array, by columns
-    lower, upper : (m,) arrays
-        Equations where they are equal.
-    friction : (k,) array
-    size : int
-        As of :class:`ConicProgram`.
-    routes : sequence of str
-        ``CONIC_ROUTES``, in the order in which they are tried.
-
-    Returns
-    -------
-    Solution
-        With cones, the first n numbers of x are those of the program, and the first multipliers those of the
-        equations; the slack of the other rows follows.
-
-    Raises
-    ------
-    Unbounded, SolveError
-        As of :func:`solve_lp`.
+    Cones are those of :class:`ConicProgram`, routes are ``CONIC_ROUTES`` in the order in which they are tried. With
+    cones, the first n numbers of x are those of the program, and the first multipliers those of the equations, where
+    the limits are equal; the slack of the other rows follows. Raises as :func:`solve_lp` does.
     """
     if len(friction) == 0:
         # A vertex is one mechanism; an interior point, a mean of several, lets fixed-point iterations drift.

@@ -39,15 +39,7 @@ class ContactState(IntEnum):
 
 
 def carries(forces: np.ndarray, fraction: float = SMALLEST_FORCE) -> np.ndarray:
-    """(n,) bool array: which contact points carry force.
-
-    Parameters
-    ----------
-    forces : (n, d) array
-        Normal (compression positive) and shear forces, in any unit.
-    fraction : float
-        Of the largest normal force, from which on it counts.
-    """
+    """(n,) bool array: which points, by their forces (n, d), carry more than this part of the largest one."""
     return np.asarray(forces[:, 0] > fraction * forces[:, 0].max(initial=0.0))
 
 
