@@ -119,24 +119,24 @@ class ControlDisplacement:
 
     def displacement(self, assembly: Assembly, pose: Pose) -> float:
         """Control displacement at a pose [m]."""
-        block, arm = self._place(assembly)
-        turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
+        block, arm, turned = self._place(assembly, pose)
         moved_by = pose.positions[block] + turned - assembly.centroids[block] - arm
         return float(moved_by @ self._along(assembly))
 
     def weights(self, assembly: Assembly, pose: Pose) -> np.ndarray:
         """(n_blocks, n_dof) array: gradient of the control displacement by movements of the blocks."""
-        block, arm = self._place(assembly)
-        turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
+        block, _, turned = self._place(assembly, pose)
         along = self._along(assembly)
         weights = np.zeros((assembly.n_blocks, len(along) + rotation_count(len(along))))
         weights[block] = np.concatenate([along, cross_rows(turned[None])[0] @ along])
         return weights
 
-    def _place(self, assembly: Assembly) -> tuple[int, np.ndarray]:
+    def _place(self, assembly: Assembly, pose: Pose) -> tuple[int, np.ndarray, np.ndarray]:
+        """The block, and the arm of the point from its centroid, as drawn and at a pose."""
         block = assembly.index(self.block)
         centroid = assembly.centroids[block]
-        return block, np.zeros_like(centroid) if self.point is None else np.asarray(self.point) - centroid
+        arm = np.zeros_like(centroid) if self.point is None else np.asarray(self.point) - centroid
+        return block, arm, rotation_matrices(pose.rotations[[block]])[0] @ arm
 
     def _along(self, assembly: Assembly) -> np.ndarray:
         return np.eye(assembly.dimension)[0] if self.direction is None else np.asarray(self.direction)

@@ -69,8 +69,8 @@ class EquilibriumChecks:
         if reaction is not None:
             # Of unit forces, where the fastest support moves.
             rate = np.where(free[:, None], 0.0, self.driver.rate(place.s)) / model.lengths * model.length
-            unit_reaction = ((matrix.T @ rate.ravel()).reshape(base.shape) / self.stepper.lever)[closed]
-            beyond = reaction / (model.force * self.stepper.lever) - float((unit_reaction * base[closed]).sum())
+            unit_reaction = ((matrix.T @ rate.ravel()).reshape(base.shape) / self.driver.lever)[closed]
+            beyond = reaction / (model.force * self.driver.lever) - float((unit_reaction * base[closed]).sum())
         self.stepper.programs += 1
         forces = np.zeros_like(reference)
         forces[closed] = base[closed] + nearest_equilibrium(
@@ -110,8 +110,8 @@ class EquilibriumChecks:
                 return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
         determined = bounds.high - bounds.low <= 1e-6 * max(abs(low), abs(high))
         try:
-            if self.model.live is None:
-                forces = self.nearest(place, gap, None if determined else measured)
+            if self.model.live is None and not determined:
+                forces = self.nearest(place, gap, measured)
             else:
                 forces = self.nearest(replace(place, multiplier=measured), gap)
         except NotSolved:

@@ -22,7 +22,7 @@ from .controls import Controls, Ending
 from .drivers import Driver
 from .equilibrium_check import EquilibriumChecks
 from .reports import Reports, no_equilibrium
-from .state import EquilibriumCheck, Note, PathState, Place
+from .state import EquilibriumCheck, PathState, Place
 from .stepping import CARRIES, StepError, Stepper
 
 #: First, longest and shortest step, as movements of the supports in block sizes; the first is accepted at any error.
@@ -133,7 +133,7 @@ class Path:
                 closed = self.fall.relaxed(place, JUMP)
                 if closed is not None:
                     if self.fall.movements(place, closed).max() > MECHANISM:
-                        self.reports.notes = [Note(0.0, self.reports.settled(start, closed.pose))]
+                        self.reports.notes = [(0.0, self.reports.settled(start, closed.pose))]
                     # Those that have mortar are the ones that are closed then, or a settlement before has left.
                     bonded = self.stepper.mortar.cast if drawn else self.stepper.mortar.renamed
                     closed = bonded(closed, self.stepper.contacts(closed.pose))
@@ -151,7 +151,7 @@ class Path:
             fell_at = np.where(removed, -np.inf, state.fell_at if len(state.fell_at) else np.nan)
             self._remove_blocks(fell_at)
             state = replace(state, fell_at=fell_at)
-            self.reports.notes = [Note(0.0, self.reports.taken_away(removed))]
+            self.reports.notes = [(0.0, self.reports.taken_away(removed))]
         if ties:
             lengths = state.place.tie_lengths.copy()
             lengths[[tie.name in ties for tie in self.model.ties]] = np.nan
@@ -235,7 +235,7 @@ class Path:
         check = self._check(place)
         bounds = check.bounds
         if not bounds.in_equilibrium and self.disturbed:
-            words = [note.words for note in self.reports.notes]
+            words = [text for _, text in self.reports.notes]
             ending = yield from self.fall.collapse(check, place, place.s, None)
             return replace(ending, message="; ".join([*words, ending.message]))
         if not bounds.in_equilibrium:
@@ -454,7 +454,7 @@ class Path:
     def _continue_from(self, state: PathState, resting: Place) -> PathState:
         """Continue from the place where blocks came to rest."""
         if self.fall.movements(state.place, resting).max() > JUMP:
-            self.reports.notes.append(Note(resting.s, self.reports.jump(state.place.pose, resting.pose)))
+            self.reports.notes.append((resting.s, self.reports.jump(state.place.pose, resting.pose)))
         place = replace(resting, velocity=None, works=state.place.works)
         step = FIRST_STEP * self.stepper.unit
         return replace(state, place=place, step=step, upper_bound=np.inf, refined=False, history=(place,))
@@ -473,7 +473,7 @@ class Path:
         weight = float(weights[leaving].sum())
         words = self.reports.loss(leaving, weight, weight / float(weights.sum()))
         self._remove_blocks(fell_at)
-        self.reports.notes, self.stepper.programs = [*notes, Note(state.place.s, words)], programs
+        self.reports.notes, self.stepper.programs = [*notes, (state.place.s, words)], programs
         pose = put_together(leaving, end.pose, state.place.pose)
         remaining = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
         end, at_rest = remaining.place, self.checks.in_equilibrium(remaining.place)

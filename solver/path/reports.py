@@ -18,7 +18,7 @@ from solver.words import REMEDY, counted
 
 from .controls import Ending
 from .equilibrium_check import on_supports
-from .state import EquilibriumCheck, Note, Place
+from .state import EquilibriumCheck, Place
 from .stepping import Stepper
 
 
@@ -27,7 +27,8 @@ class Reports:
 
     def __init__(self, stepper: Stepper, number: int, fell_at: np.ndarray) -> None:
         self.stepper, self.model, self.driver, self.number = stepper, stepper.model, stepper.driver, number
-        self.notes: list[Note] = []
+        # Events on the path: parameter [m or rad], and words.
+        self.notes: list[tuple[float, str]] = []
         self.fell_at = fell_at
 
     def increment(
@@ -56,7 +57,7 @@ class Reports:
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
         where = f"{self.driver.unit}{f' in phase {self.number + 1}' if self.number else ''}"
-        notes = tuple(f"at {note.s:.6g} {where}: {note.words}" for note in self.notes)
+        notes = tuple(f"at {s:.6g} {where}: {words}" for s, words in self.notes)
         self.notes = []
         state = self.stepper.mortar.told(state, place)
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)

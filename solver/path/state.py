@@ -114,11 +114,3 @@ class EquilibriumCheck:
     forces: np.ndarray
     measured: float
     bounds: EquilibriumBounds
-
-
-@dataclass(frozen=True)
-class Note:
-    """An event on the path: parameter s [m or rad], and words."""
-
-    s: float
-    words: str

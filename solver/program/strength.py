@@ -32,9 +32,7 @@ def point_strength(
     area = np.where(same, around.areas[place], contacts.areas)
     names = ("cohesion", "compressive_strength", "tensile_strength")
     cohesion, strength, tension = interfaces.values(assembly, contacts.block_a, contacts.block_b, *names)
-    crushing = np.full(n, np.inf)
-    finite = np.isfinite(strength)
-    crushing[finite] = strength[finite] * area[finite]
+    crushing = np.multiply(strength, area, out=np.full(n, np.inf), where=np.isfinite(strength))
     friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
     bonded = area if bonded is None else bonded
     return cohesion * bonded, crushing, largest_tension(tension, cohesion, friction) * bonded

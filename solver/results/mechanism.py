@@ -85,15 +85,6 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
 def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
     """Find the mechanism in the motion that follows an increment: macro-blocks, hinges, sliding joints.
 
-    Parameters
-    ----------
-    assembly : Assembly
-    increment : Increment
-
-    Returns
-    -------
-    Mechanism
-
     Notes
     -----
     The motion distinguishes joints: one slides where a closed contact point moves along it (and carries force,
@@ -104,11 +95,9 @@ def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
     contacts, velocity = increment.contacts, increment.velocity
     d = contacts.points.shape[1]
     count = int(parts.max(initial=-1)) + 1
-    mass = np.bincount(parts[parts >= 0], weights=assembly.masses[parts >= 0], minlength=count)
-    motions = np.zeros((count, velocity.shape[1]))
-    for axis in range(velocity.shape[1]):
-        momentum = (assembly.masses * velocity[:, axis])[parts >= 0]
-        motions[:, axis] = np.bincount(parts[parts >= 0], weights=momentum, minlength=count) / mass
+    moves, motions = parts >= 0, np.zeros((count, velocity.shape[1]))
+    np.add.at(motions, parts[moves], (assembly.masses[:, None] * velocity)[moves])
+    motions /= np.bincount(parts[moves], assembly.masses[moves], count)[:, None]
     slow = NOTICEABLE * float(np.abs(velocity[:, :d]).max(initial=0.0))
     between = parts[contacts.block_a] != parts[contacts.block_b]
     closed = between & (contacts.gaps < CLOSED * assembly.block_size)
