@@ -54,33 +54,33 @@ class EquilibriumChecks:
         With a reaction [N or N·m] those that have it; ``at_rest`` those of least elastic energy. Raises ``NotSolved``.
         """
         model, free = self.model, self.stepper.free
-        contacts, friction = self._contacts_at(place)
-        beyond_give, limits = self.stepper.force_limits(place, contacts, gap)
-        closed = (beyond_give.gaps <= gap * model.length) | limits.hold | is_member(contacts)
-        matrix = wrench_matrix(contacts, place.pose, model.length)
+        every, friction = self._contacts_at(place)
+        beyond_give, limits = self.stepper.force_limits(place, every, gap)
+        closed = (beyond_give.gaps <= gap * model.length) | limits.hold | is_member(every)
+        matrix = wrench_matrix(every[closed], place.pose, model.length)
         live, live_size = model.scaled_live(place.pose)
         load = (model.scaled_load_at(place.pose) + place.multiplier * live_size * live)[free].ravel()
-        reference = np.zeros_like(contacts.points) if at_rest else self.stepper.transferred(place, contacts)[0]
+        forces = np.zeros_like(every.points)
+        reference = (forces if at_rest else self.stepper.transferred(place, every)[0])[closed]
         # The program is that of the normal forces beyond the least ones.
         base = np.zeros_like(reference)
-        base[:, 0] = limits.least
-        rows = ContactRows(matrix, free, model.assembly.centroids)[closed]
+        base[:, 0] = limits.least[closed]
+        rows = ContactRows(matrix, free, model.assembly.centroids)
         unit_reaction, beyond = None, 0.0
         if reaction is not None:
             # Of unit forces, where the fastest support moves.
             rate = np.where(free[:, None], 0.0, self.driver.rate(place.s)) / model.lengths * model.length
-            unit_reaction = ((matrix.T @ rate.ravel()).reshape(base.shape) / self.driver.lever)[closed]
-            beyond = reaction / (model.force * self.driver.lever) - float((unit_reaction * base[closed]).sum())
+            unit_reaction = (matrix.T @ rate.ravel()).reshape(base.shape) / self.driver.lever
+            beyond = reaction / (model.force * self.driver.lever) - float((unit_reaction * base).sum())
         self.stepper.programs += 1
-        forces = np.zeros_like(reference)
-        forces[closed] = base[closed] + nearest_equilibrium(
+        forces[closed] = base + nearest_equilibrium(
             rows,
-            (reference - base)[closed],
-            self.stepper.compliance(contacts, self.stepper.mortar.points(place, contacts))[closed],
+            reference - base,
+            self.stepper.compliance(every, self.stepper.mortar.points(place, every))[closed],
             friction[closed],
             (limits.most - limits.least)[closed],
             limits.cohesion[closed],
-            load + rows.resultant(base[closed]),
+            load + rows.resultant(base),
             unit_reaction,
             beyond,
         )

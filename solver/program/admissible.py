@@ -79,18 +79,18 @@ class StaticProgram:
     ) -> None:
         d, blocks = model.dimension, model.assembly.free
         free = np.repeat(blocks, model.n_dof)
-        least, most = limits.least, limits.most
-        closed = np.flatnonzero((contacts.gaps <= gap * model.length) | limits.hold)
+        self.closed = (contacts.gaps <= gap * model.length) | limits.hold
+        contacts, friction = contacts[self.closed], friction[self.closed]
+        least, most, cohesion = (of[self.closed] for of in (limits.least, limits.most, limits.cohesion))
         matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
-        carried = Admissible.of(friction[closed], limits.cohesion[closed], np.full(len(closed), np.inf), d)
-        of_closed = np.repeat(d * closed, d) + np.tile(np.arange(d), len(closed))
-        self.rays = sp.csc_array(sp.eye_array(d * len(contacts), format="csc")[:, of_closed] @ carried.columns)
+        carried = Admissible.of(friction, cohesion, np.full(len(contacts), np.inf), d)
+        self.rays = carried.columns
         balance = sp.csc_array(matrix[free] @ self.rays)
         self.rows, self.n = balance.shape
         self.d, self.friction, self.total, self.programs = d, carried.friction, model.total_load, 0
         # The programs are those of the normal forces beyond the least ones.
         self.least = np.zeros((len(contacts), d))
-        self.least[closed, 0] = least[closed]
+        self.least[:, 0] = least
         given = matrix @ self.least.ravel()
         self.load = model.scaled_load_at(pose).ravel()[free] + given[free]
         self.tolerance = BALANCE_TOLERANCE * model.total_load
@@ -117,8 +117,8 @@ class StaticProgram:
             limits_of.resize(len(self.reserve), len(objective))
             self.matrix = sp.csc_array(sp.vstack([self.matrix, limits_of], format="csc"))
             # Places are of programs in the plane, where cohesion has a row for either sign.
-            sticky = np.repeat(closed[limits.cohesion[closed] > 0.0], 2)
-            self.places = np.vstack([self.places, contacts.points[limited], contacts.points[sticky]])
+            sticky = np.repeat(contacts.points[cohesion > 0.0], 2, axis=0)
+            self.places = np.vstack([self.places, contacts.points[limited], sticky])
 
     def in_equilibrium(self) -> bool:
         """Whether an equilibrium within friction exists, with some of the live load where there is one."""
@@ -212,4 +212,6 @@ class StaticProgram:
 
     def forces(self, solution: Solution) -> np.ndarray:
         """(n_contacts, d) array: contact forces of a solution, in units of the program."""
-        return np.asarray(self.rays @ solution.x[: self.n]).reshape(-1, self.d) + self.least
+        forces = np.zeros((len(self.closed), self.d))
+        forces[self.closed] = (self.rays @ solution.x[: self.n]).reshape(-1, self.d) + self.least
+        return forces
