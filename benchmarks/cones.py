@@ -69,8 +69,9 @@ def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
         raise StopIteration
 
     friction, limits = np.full(len(contacts), FRICTION), ForceLimits.dry(len(contacts))
+    closed = contacts.gaps <= COMPUTED_GAP * length
     with patch.object(solve, "run_clarabel", kept), suppress(StopIteration):
-        StaticProgram(model, Pose.initial(assembly), contacts, friction, sinks, COMPUTED_GAP, limits).bounds()
+        StaticProgram(model, Pose.initial(assembly), contacts, friction, sinks, closed, limits).bounds()
     return stated[0], len(contacts)
 
 

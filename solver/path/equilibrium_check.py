@@ -14,7 +14,6 @@ from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.program.admissible import EquilibriumBounds, StaticProgram
 from solver.program.model import Model
-from solver.ties import is_member
 from solver.tolerances import COMPUTED_GAP
 
 from .state import EquilibriumCheck, Place
@@ -55,8 +54,7 @@ class EquilibriumChecks:
         """
         model, free = self.model, self.stepper.free
         every, friction = self._contacts_at(place)
-        beyond_give, limits = self.stepper.force_limits(place, every, gap)
-        closed = (beyond_give.gaps <= gap * model.length) | limits.hold | is_member(every)
+        closed, limits = self.stepper.force_limits(place, every, gap)
         matrix = wrench_matrix(every[closed], place.pose, model.length)
         live, live_size = model.scaled_live(place.pose)
         load = (model.scaled_load_at(place.pose) + place.multiplier * live_size * live)[free].ravel()
@@ -147,8 +145,8 @@ class EquilibriumChecks:
 
     def _program(self, place: Place, gap: float, rate: np.ndarray | None = None) -> StaticProgram:
         contacts, friction = self._contacts_at(place)
-        beyond, limits = self.stepper.force_limits(place, contacts, gap)
-        return StaticProgram(self.model, place.pose, beyond, friction, rate, gap, limits)
+        closed, limits = self.stepper.force_limits(place, contacts, gap)
+        return StaticProgram(self.model, place.pose, contacts, friction, rate, closed, limits)
 
     def _contacts_at(self, place: Place) -> tuple[Contacts, np.ndarray]:
         contacts = self.stepper.contacts_at(place)

@@ -9,7 +9,6 @@ import numpy as np
 from solver.geometry.contacts import Contacts, joined_contacts
 from solver.kinematics import Pose
 from solver.program.model import Model
-from solver.program.strength import ForceLimits
 from solver.ties import (
     ABSENT,
     BROKEN,
@@ -77,17 +76,14 @@ class Members:
         largest[members] = self.strength[contacts.features[members, 1]]
         return largest
 
-    def force_limits(self, contacts: Contacts, gap: float) -> ForceLimits:
-        """Limits of the forces of contact points at a pose.
+    def force_range(self, contacts: Contacts, gap: float) -> np.ndarray:
+        """(2, n) array: least and largest forces of contact points of members at a pose.
 
         A member may carry what it carries anywhere within a part of the gap of contact points, in block sizes.
         """
-        members, limits = is_member(contacts), ForceLimits.dry(len(contacts))
-        number = contacts.features[members, 1]
-        give = GIVE * gap * np.array([-1.0, 1.0])
-        forces = (give - contacts.gaps[members, None] / self.model.length) / self.compliance[number, None]
-        limits.least[members], limits.most[members] = np.clip(forces, 0.0, self.strength[number, None]).T
-        return limits
+        number, give = contacts.features[:, 1], GIVE * gap * np.array([[-1.0], [1.0]])
+        forces = (give - contacts.gaps / self.model.length) / self.compliance[number]
+        return np.clip(forces, 0.0, self.strength[number])
 
     def after(self, contacts: Contacts, forces: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """(n_ties, 2) array: lengths after a step to contact points with these forces: what yields gives for good."""

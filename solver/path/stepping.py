@@ -220,23 +220,18 @@ class Stepper:
         compliance[members, 0] = self.members.compliance[contacts.features[members, 1]]
         return compliance
 
-    def force_limits(self, place: Place, contacts: Contacts, gap: float) -> tuple[Contacts, ForceLimits]:
-        """Contact points with gaps beyond the give of their joints, and the limits of their forces.
+    def force_limits(self, place: Place, contacts: Contacts, gap: float) -> tuple[np.ndarray, ForceLimits]:
+        """Which contact points at its pose may carry, (n,) bool array, and the limits of their forces.
 
-        Parameters
-        ----------
-        place : Place
-        contacts : Contacts
-            At its pose.
-        gap : float
-            Of contact points that may carry, in block sizes.
+        Those between blocks do up to a gap, in block sizes, beyond the give of their joints.
         """
         gaps, limits = self.joint_limits(place, contacts)
-        of_members = self.members.force_limits(contacts, gap)
-        least = np.where(is_member(contacts), of_members.least, limits.least)
+        members, is_open = is_member(contacts), gaps > gap * self.model.length
         # An open joint with a rest of its strength holds, and does not push.
-        pulls = (limits.least < 0.0) & (gaps > gap * self.model.length)
-        return replace(contacts, gaps=gaps), replace(limits, least=least, most=np.where(pulls, 0.0, of_members.most))
+        least, most = limits.least.copy(), np.where((limits.least < 0.0) & is_open, 0.0, np.inf)
+        least[members], most[members] = self.members.force_range(contacts[members], gap)
+        carries = ~is_open | (least != 0.0) | np.isfinite(most)
+        return carries, replace(limits, least=least, most=most)
 
     def joint_limits(
         self, place: Place, contacts: Contacts, forces: np.ndarray | None = None

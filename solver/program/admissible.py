@@ -59,12 +59,12 @@ class StaticProgram:
     model : Model
         Where it has a live load, its multiplier is bounded.
     contacts : Contacts
-        At the pose; open ones carry no force.
+        At the pose.
     friction : (n_contacts,) array
     rate : (n_blocks, n_dof) array, optional
         Movement of the supports along which the reaction is bounded.
-    gap : float
-        Largest one of a contact point that carries force, in block sizes.
+    closed : (n_contacts,) bool array
+        Which carry force.
     """
 
     def __init__(
@@ -74,14 +74,13 @@ class StaticProgram:
         contacts: Contacts,
         friction: np.ndarray,
         rate: np.ndarray | None,
-        gap: float,
+        closed: np.ndarray,
         limits: ForceLimits,
     ) -> None:
         d, blocks = model.dimension, model.assembly.free
         free = np.repeat(blocks, model.n_dof)
-        self.closed = (contacts.gaps <= gap * model.length) | limits.hold
-        contacts, friction = contacts[self.closed], friction[self.closed]
-        least, most, cohesion = (of[self.closed] for of in (limits.least, limits.most, limits.cohesion))
+        self.closed, contacts, friction = closed, contacts[closed], friction[closed]
+        least, most, cohesion = (of[closed] for of in (limits.least, limits.most, limits.cohesion))
         matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
         carried = Admissible.of(friction, cohesion, np.full(len(contacts), np.inf), d)
         self.rays = carried.columns

@@ -62,11 +62,6 @@ class ForceLimits:
         """Make the limits of contact points that push only."""
         return cls(np.zeros(n), np.full(n, np.inf), np.zeros(n))
 
-    @property
-    def hold(self) -> np.ndarray:
-        """(n,) bool array: which contact points carry at any gap: those with another least or largest normal force."""
-        return np.asarray((self.least != 0.0) | np.isfinite(self.most))
-
 
 @dataclass(frozen=True)
 class Admissible:
