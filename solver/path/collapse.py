@@ -145,6 +145,6 @@ class Fall:
                 place, total = moved, total + motion
                 if np.abs(total).max() > least:
                     break
-            yield self.reports.falling_increment(start, total * self.model.lengths, start.s)
+            yield self.reports.falling_increment(start, total * self.model.lengths)
             if np.abs(total).max() <= least:
                 return

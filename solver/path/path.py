@@ -248,7 +248,7 @@ class Path:
             if bounds.high > least:
                 message = "at a control displacement of 0 m no live load of this pattern moves the structure"
                 return Ending(Status.LOCKED, message)
-            yield self.reports.falling_increment(place, np.zeros_like(model.load), place.s)
+            yield self.reports.falling_increment(place, np.zeros_like(model.load))
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
         if model.live is not None:
             first_state, _ = self.advance(state, self._onset())

@@ -63,13 +63,13 @@ class Reports:
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
         return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
 
-    def falling_increment(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
+    def falling_increment(self, place: Place, velocity: np.ndarray) -> Increment:
         """The increment of a place that is not in equilibrium."""
         contacts = self.stepper.contacts_at(place)
         forces, friction = self.stepper.transferred(place, contacts)[0], self.stepper.friction(contacts)
         state = self._state(place, contacts, forces, friction, velocity, np.zeros_like(self.model.load))
         certificate = Certificate(largest_penetration=largest_penetration(state.contacts))
-        return self._increment(s, state, 0.0, certificate, Status.FALLING)
+        return self._increment(place.s, state, 0.0, certificate, Status.FALLING)
 
     def _state(
         self,

@@ -111,8 +111,6 @@ class _StepPoints:
     friction : (n,) array
     compliance : (n, d) array
     joints : JointPoints
-    bound : (n,) array
-        Largest shear forces.
     kept : (n,) array
         Part of the give under the normal force that the next linearisation takes back.
     """
@@ -126,8 +124,13 @@ class _StepPoints:
     friction: np.ndarray
     compliance: np.ndarray
     joints: JointPoints
-    bound: np.ndarray
     kept: np.ndarray
+
+    @property
+    def bound(self) -> np.ndarray:
+        """(n,) array: largest shear forces; lost strength takes with it the tension that friction still followed."""
+        followed = np.maximum(self.expected, -self.joints.tension)
+        return np.asarray(np.maximum(self.friction * followed + self.joints.cohesion, 0.0))
 
     @property
     def pulled(self) -> np.ndarray:
@@ -426,7 +429,7 @@ class Stepper:
             if not ((left.left == 0.0) & (points.joints.left > 0.0)).any():
                 new = Place(s, pose, contacts, forces, trial, points.followed, multiplier / (live_size or 1.0))
                 return new, points, left, motion_so_far
-            points, guess, number = self._with_joints(points, left), None, 0
+            points, guess, number = replace(points, joints=left), None, 0
 
     def _of_blocks(self, motion: np.ndarray) -> np.ndarray:
         """(n_blocks, n_dof) array [m or rad]: a movement (n_dof,) of the free blocks in units of the program."""
@@ -472,21 +475,12 @@ class Stepper:
         """The contact points of a step from a place."""
         forces, trial, followed, is_new = self.transferred(place, start)
         joints, friction = self.mortar.points(place, start), self.friction(start)
-        compliance, none = self.compliance(start, joints), np.zeros(len(start))
+        compliance = self.compliance(start, joints)
         # The give of elastic joints and members stays.
         kept = np.where(is_member(start), 0.0, 1.0 - joints.give[:, 0] / compliance[:, 0])
         # Not all of it in long steps, which would alternate sooner.
         expected = followed + max(0.0, 1.0 - 2.0 * share) * share * (forces[:, 0] - followed)
-        points = _StepPoints(start, forces, trial, followed, expected, is_new, friction, compliance, joints, none, kept)
-        return self._with_joints(points, joints)
-
-    def _with_joints(self, points: _StepPoints, joints: JointPoints) -> _StepPoints:
-        """The contact points of a step with what is left of their joints."""
-        bound = points.friction * points.expected
-        if self.mortar.present:
-            # Lost strength takes with it the tension that friction still followed.
-            bound = np.maximum(points.friction * np.maximum(points.expected, -joints.tension) + joints.cohesion, 0.0)
-        return replace(points, joints=joints, bound=bound)
+        return _StepPoints(start, forces, trial, followed, expected, is_new, friction, compliance, joints, kept)
 
     @staticmethod
     def _largest(values: np.ndarray) -> float:

@@ -49,16 +49,9 @@ def used_up(forces: np.ndarray, friction: np.ndarray) -> np.ndarray:
 
 
 def slides(slip: np.ndarray, opening: np.ndarray, friction: np.ndarray, slow: float) -> np.ndarray:
-    """(n,) bool array: which points slide along their joint, and do not only open.
+    """(n,) bool array: which points slide along their joint, and do not only open, by their relative velocities.
 
-    Parameters
-    ----------
-    slip, opening : (n,) arrays
-        Relative velocity along the joint, and normal to it: up to friction times slip is the dilatancy of associative
-        friction.
-    friction : (n,) array
-    slow : float
-        Velocity up to which something is at rest.
+    An opening of up to friction times slip is the dilatancy of associative friction.
     """
     lift = np.maximum(slow, friction * np.abs(slip) * (1.0 + DILATANCY_SLACK))
     return ~at_rest(slip, slow) & (opening <= lift)
