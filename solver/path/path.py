@@ -83,7 +83,7 @@ class Path:
         self.closed_gap = max(COMPUTED_GAP, min(CLOSING_GAP, driver.tolerance / self.stepper.unit))
         self.tolerance = controls.step_tolerance
         self.disturbed = False
-        self.reported, self.failure, self.wedged = -np.inf, "", Place.unloaded(driver.supports(0.0))
+        self.reported = -np.inf
 
     def _remove_blocks(self, fell_at: np.ndarray) -> None:
         """Follow the structure without blocks that have left; (n_blocks,) array as in ``PathState.fell_at``."""
@@ -207,15 +207,15 @@ class Path:
             # What blocks that drop come to may be at a stop that has not been reported.
             state, outcome = self.advance(self.state, self.driver.next_stop(self.reported))
             self.state = state
-            if outcome is Status.LIMIT_REACHED:
+            if outcome.stop is Status.LIMIT_REACHED:
                 yield from self._report_reached(state)
                 continue
-            if outcome is Status.LOCKED:
+            if outcome.stop is Status.LOCKED:
                 # Forces grew from the last report on, and friction bounds with them.
-                return Ending(Status.LOCKED, self.reports.locked(self.wedged))
-            if outcome is Status.SOLVER_FAILED:
+                return outcome
+            if outcome.stop is Status.SOLVER_FAILED:
                 yield from self._report_last(state)
-                return Ending(Status.SOLVER_FAILED, self.reports.no_step(self.failure))
+                return outcome
             beyond = self._place_beyond(state)
             end, at_rest = self.fall.relax(beyond)
             continued = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
@@ -312,7 +312,7 @@ class Path:
 
     # Advancing ---------------------------------------------------------------------------------------------------
 
-    def advance(self, state: PathState, target: float) -> tuple[PathState, Status]:
+    def advance(self, state: PathState, target: float) -> tuple[PathState, Ending]:
         """Advance to a parameter in steps whose length follows from their error.
 
         Where a place has no equilibrium, shorter steps of reduced viscosity, from the last place that has one, enclose
@@ -320,19 +320,18 @@ class Path:
         """
         for _ in range(MOST_STEPS):
             if state.place.s >= target * (1.0 - 1e-12):
-                return state, Status.LIMIT_REACHED
+                return state, Ending(Status.LIMIT_REACHED)
             width = state.upper_bound - state.place.s
             if state.refined and width <= self.driver.tolerance * (1.0 + 1e-9):
-                return state, Status.FALLING
+                return state, Ending(Status.FALLING)
             state, outcome = self._step(state, target)
             if self.on_step is not None:
                 self.on_step(state)
             if outcome is not None:
                 return state, outcome
-        self.failure = f"at {state.place.s:.6g} {self.driver.unit}: {MOST_STEPS} were tried"
-        return state, Status.SOLVER_FAILED
+        return state, self.reports.no_step(state.place.s, f"{MOST_STEPS} were tried")
 
-    def _step(self, state: PathState, target: float) -> tuple[PathState, Status | None]:
+    def _step(self, state: PathState, target: float) -> tuple[PathState, Ending | None]:
         """Try one step towards a parameter; with an outcome where it was the last one to try."""
         place, unit = state.place, self.stepper.unit
         enclosing = np.isfinite(state.upper_bound)
@@ -348,8 +347,7 @@ class Path:
             return replace(state, step=length / 3.0), None
         presses = error.penetration > WEDGED or new.forces[:, 0].max(initial=0.0) > 100.0 * self.model.total_load
         if presses and self._supports_locked(place):
-            self.wedged = new
-            return state, Status.LOCKED
+            return state, self.reports.locked(new)
         works = self._works(place, new, motion)
         # Beside the work of the supports or the live load, unless that is next to nothing, or so beside the others.
         driven = max(abs(works[1] + works[2]), self.tolerance * sum(map(abs, works)), CARRIES * length / unit)
@@ -373,15 +371,13 @@ class Path:
             state = replace(state, upper_bound=np.inf, refined=False, refine_until=until)
         return state, None
 
-    def _shorten(self, state: PathState, length: float, failure: str) -> tuple[PathState, Status | None]:
+    def _shorten(self, state: PathState, length: float, failure: str) -> tuple[PathState, Ending | None]:
         """Shorten a step that was not solved, or end where it is the shortest."""
         if length / 3.0 >= SHORTEST_STEP * self.stepper.unit:
             return replace(state, step=length / 3.0), None
         if self._supports_locked(state.place):
-            self.wedged = state.place
-            return state, Status.LOCKED
-        self.failure = f"at {state.place.s:.6g} {self.driver.unit}: {failure}"
-        return state, Status.SOLVER_FAILED
+            return state, self.reports.locked(state.place)
+        return state, self.reports.no_step(state.place.s, failure)
 
     def _length(self, state: PathState, target: float) -> float:
         """Length of the step to take [m or rad]."""

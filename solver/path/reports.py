@@ -111,8 +111,8 @@ class Reports:
         driver = self.driver
         return Ending(Status.LIMIT_REACHED, f"the {driver.what} reached its limit of {driver.limit:g} {driver.unit}")
 
-    def locked(self, place: Place) -> str:
-        """Message that names the wedged blocks."""
+    def locked(self, place: Place) -> Ending:
+        """The ending that names the wedged blocks."""
         assembly, contacts, normal = self.model.assembly, place.contacts, place.forces[:, 0]
         assert contacts is not None
         pressed = normal > 0.1 * normal.max()
@@ -120,15 +120,16 @@ class Reports:
         # The ground at an end of a member is -1.
         blocks = blocks[(blocks >= 0) & assembly.free[blocks]]
         wedged = counted(len(blocks), "block is", "blocks are")
-        return f"the supports cannot move on: {wedged} wedged ({self._named(blocks)})"
+        return Ending(Status.LOCKED, f"the supports cannot move on: {wedged} wedged ({self._named(blocks)})")
 
-    def no_step(self, reason: str) -> str:
-        """Message of a step that was not solved."""
+    def no_step(self, s: float, reason: str) -> Ending:
+        """The ending at a step that was not solved, from a parameter s [m or rad]."""
         live = self.model.live is not None
         turns = "it may have its largest value there: control another point or direction, or " if live else ""
-        return (
-            f"steps of the {self.driver.what}, however small, lead no further {reason}; {turns}repeat the analysis "
-            "with another increment, and send the case to the developers if it stays"
+        return Ending(
+            Status.SOLVER_FAILED,
+            f"steps of the {self.driver.what}, however small, lead no further at {s:.6g} {self.driver.unit}: {reason}; "
+            f"{turns}repeat the analysis with another increment, and send the case to the developers if it stays",
         )
 
     def settled(self, start: Pose, end: Pose) -> str:
