@@ -77,12 +77,10 @@ def pushover_increments(
     # There are no settlements that a tie could wait for.
     ties = tuple(replace(tie, phase=1) for tie in ties)
     check_ties(ties, assembly, 1)
-    origin, near = at_origin(assembly), assembly
-    if origin.any():
-        near, _, ties = without_origin(origin, assembly, (), ties)
-        loads = replace(loads, fills=tuple(fill.shifted(-origin) for fill in loads.fills))
-        if control.point is not None:
-            control = replace(control, point=tuple((np.asarray(control.point) - origin).tolist()))
+    origin = at_origin(assembly)
+    near, loads, ties = without_origin(origin, assembly, loads, ties)
+    if origin.any() and control.point is not None:
+        control = replace(control, point=tuple((np.asarray(control.point) - origin).tolist()))
     start = Pose.initial(near) if pose is None else Pose(checked(pose, Pose, "pose").positions - origin, pose.rotations)
     if resume is not None:
         start = resume.start

@@ -15,7 +15,7 @@ from solver.loads import Loads, Settlement, checked_loads
 from solver.paper_method import linear_program_increments
 from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
 from solver.path.drivers import SupportMotion
-from solver.path.local_origin import at_origin, in_global_coordinates, without_origin
+from solver.path.local_origin import at_origin, in_global_coordinates, nearer, without_origin
 from solver.path.path import Path
 from solver.path.state import PathState
 from solver.phases import PhaseChange, loads_in, removed_before
@@ -65,10 +65,8 @@ def settlement_increments(
             "it belongs to another run"
         )
     origin = at_origin(assembly)
-    near, local, near_ties = assembly, tuple(phases), tuple(ties)
-    if origin.any():
-        near, local, near_ties = without_origin(origin, assembly, phases, ties)
-    loads = replace(loads, fills=tuple(fill.shifted(-origin) for fill in loads.fills))
+    near, loads, near_ties = without_origin(origin, assembly, loads, ties)
+    local = tuple(nearer(phase, origin) for phase in phases) if origin.any() else tuple(phases)
     if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
     if by_program:

@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.assembly import Assembly
 from solver.kinematics import Pose
-from solver.loads import Settlement
+from solver.loads import Loads, Settlement
 from solver.results.increment import Increment
 from solver.ties import Tie
 
@@ -32,12 +32,14 @@ def at_origin(assembly: Assembly) -> np.ndarray:
 
 
 def without_origin(
-    origin: np.ndarray, assembly: Assembly, settlements: Sequence[Settlement], ties: Sequence[Tie]
-) -> tuple[Assembly, tuple[Settlement, ...], tuple[Tie, ...]]:
-    """The blocks, what moves their supports and ties in coordinates that count from a local origin."""
-    local = tuple(_nearer(phase, origin) for phase in settlements)
+    origin: np.ndarray, assembly: Assembly, loads: Loads, ties: Sequence[Tie]
+) -> tuple[Assembly, Loads, tuple[Tie, ...]]:
+    """The blocks, their loads and ties in coordinates that count from a local origin."""
+    if not origin.any():
+        return assembly, loads, tuple(ties)
     near_ties = tuple(replace(tie, points=_shifted(tie, -origin)) for tie in ties)
-    return replace(assembly, shapes=assembly.shapes.shifted(-origin)), local, near_ties
+    loads = replace(loads, fills=tuple(fill.shifted(-origin) for fill in loads.fills))
+    return replace(assembly, shapes=assembly.shapes.shifted(-origin)), loads, near_ties
 
 
 def _shifted(tie: Tie, by: np.ndarray) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -45,7 +47,7 @@ def _shifted(tie: Tie, by: np.ndarray) -> tuple[tuple[float, ...], tuple[float, 
     return tuple(first), tuple(second)
 
 
-def _nearer(phase: Settlement, origin: np.ndarray) -> Settlement:
+def nearer(phase: Settlement, origin: np.ndarray) -> Settlement:
     """The settlement with the points it is given by in coordinates that count from the origin."""
     centre, axis = (
         None if point is None else tuple((np.asarray(point) - origin[: len(point)]).tolist())
