@@ -66,7 +66,7 @@ def planned(
             "of the drawing: leave it out"
         )
     given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly), changes, members)
-    if case.settlements or kind.name == "settlement":
+    if case.settlements or kind.has_phases:
         try:
             mechanics.check_settlement(assembly, case.settlements, case.controls, changes, members)
         except ValueError as error:
