@@ -74,7 +74,6 @@ STRUCTURES: dict[str, Callable[[], solver.Response]] = {
     "wall": lambda: example("wall_with_arch"),
     "corner": lambda: example("corner_of_walls"),
     "barrel": barrel,
-    "cross vault": lambda: example("cross_vault_corner"),
     "dome": lambda: dome(8, 6),
     "dome of 281": lambda: dome(20, 14),
 }

@@ -44,7 +44,7 @@ FORCE = 1e-3
 EXACT, LINEARISATIONS = 1e-4, 6
 
 #: Change of the acceleration of a block from step to step, in its weight, up to which nothing has struck it.
-SMOOTH = 0.3
+SMOOTH = 0.1
 
 #: Part of that error that the length of a tie may have: nothing pushes it out later, and stiff ones store energy by it.
 EXACT_TIES = 1e-2
@@ -129,7 +129,7 @@ class Engine:
         self.forces = self.trial = np.zeros((0, self.d))
         self.corners = mechanics.moved_vertices(assembly, pose)
         self.acceleration = np.zeros_like(self.velocity)
-        self.is_smooth = np.zeros(assembly.n_blocks, dtype=bool)
+        self.is_smooth = self.was_calm = np.zeros(assembly.n_blocks, dtype=bool)
         #: Length of the last step. The first are short, so that they follow the push: implicit steps fall too far.
         self.step_length = 0.05 * LONGEST_STEP
         self.steps = self.programs = 0
@@ -213,7 +213,9 @@ class Engine:
                 # As if closed: open ones would be found in each other by forces too large for Newton's method.
                 trial = np.concatenate([trial, np.tile(np.eye(self.d)[0], (len(entered), 1))])
         deeper = ~members & (gaps < np.minimum(contacts.gaps, 0.0) - DEEP * self.length)
-        if (len(entered) or deeper.any()) and h > SHORTEST_STEP:
+        # What a tie carries that comes taut late in a step would act for all of it.
+        late = members & (contacts.gaps > 0.0) & (forces[:, 0] > FORCE)
+        if (len(entered) or deeper.any() or late.any()) and h > SHORTEST_STEP:
             return False
         energies = self.energies
         self.contacts, self.forces, self.trial = contacts, forces, trial
@@ -221,7 +223,9 @@ class Engine:
         self.pose, self.corners = pose, corners
         before_it, self.acceleration = self.acceleration, (motion - flight) / h**2
         jump = (self.weights * (self.acceleration - before_it) ** 2).sum(axis=1)
-        self.is_smooth = self.free & (jump <= SMOOTH**2 * (self.loads**2 / self.weights).sum(axis=1))
+        # A blow may take two steps, of much the same acceleration.
+        calm = self.free & (jump <= SMOOTH**2 * (self.loads**2 / self.weights).sum(axis=1))
+        self.is_smooth, self.was_calm = calm & self.was_calm, calm
         self._yield()
         self._lose(energies)
         self.steps += 1

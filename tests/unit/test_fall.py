@@ -135,6 +135,22 @@ def test_what_tips_turns_as_the_equation_of_motion_says():
     np.testing.assert_allclose(beyond, exact, rtol=0.05)
 
 
+@pytest.mark.parametrize("gap", [0.1, 0.23, 0.31])
+def test_a_block_that_strikes_another_goes_on_with_it_at_half_its_speed(gap):
+    """On a floor without friction: no restitution, and all of the momentum."""
+    blocks = [rectangle(0.0, 0.0, 1.0, 0.4), rectangle(1.0 + gap, 0.0, 2.0 + gap, 0.4), rectangle(-3.0, -0.5, 9.0, 0.0)]
+    assembly = solver.Assembly.from_outlines(blocks, roles=["free", "free", "fixed"])
+    velocity = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    laws, pose = solver.Interfaces(solver.InterfaceLaw(0.0)), solver.Pose.initial(assembly)
+    engine = Engine(assembly, solver.self_weight(assembly).dead, laws, pose, velocity)
+    start = engine.velocity[0, 0]
+    while engine.velocity[1, 0] == pytest.approx(0.0, abs=1e-6):
+        engine.advance(0.04)
+    engine.advance(0.12)
+    assert engine.velocity[:2, 0] == pytest.approx(engine.velocity[:2, 0].mean(), rel=0.02)
+    assert engine.velocity[:2, 0].sum() == pytest.approx(start, rel=1e-4)
+
+
 @pytest.mark.slow
 def test_a_lintel_falls_between_its_piers_to_their_feet():
     blocks = [rectangle(0.0, 0.0, 0.5, 1.0), rectangle(1.5, 0.0, 2.0, 1.0), rectangle(0.3, 1.0, 1.7, 1.3)]
@@ -345,6 +361,13 @@ def test_a_block_falls_freely_from_a_tie_that_breaks_and_slower_from_one_that_yi
         assert engine.rest[0] == pytest.approx(length_of(engine) - 0.6 * WEIGHT / 1e7, abs=1e-9)
         assert engine.rest[0] > fallen
         assert engine.tensions[0] == pytest.approx(0.6 * WEIGHT, rel=1e-9)
+
+
+def test_a_tie_that_yields_stops_a_block_by_its_work():
+    """It comes taut after a fall of 1 m: by hand it gives (its elastic stretch aside) W · 1 m / (S - W)."""
+    engine = hung(tie_of(((0.0, 8.0), (0.0, 5.0)), strength=3.0 * WEIGHT), 4.0)
+    engine.advance(2.0)
+    assert engine.rest[0] - 4.0 == pytest.approx(0.5, rel=0.02)
 
 
 def test_a_block_on_a_stiff_tie_swings_at_its_length_and_energy_only_falls():
