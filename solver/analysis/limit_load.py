@@ -20,7 +20,7 @@ from solver.loads import Loads, checked_loads
 from solver.path.stepping import Stepper
 from solver.program.strength import Admissible, point_strength
 from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces, face_wrench_matrix, point_forces
-from solver.programs.problem import Unbounded
+from solver.programs.problem import SolveError, Unbounded
 from solver.programs.solve import solve_between
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Bonds, State
@@ -129,7 +129,8 @@ def find_limit_load(
     the power of the loads is what friction takes: a complete solution for friction without dilatancy, never above the
     associative value. It is not proved to be the least: such a structure may have several limit loads, depending on how
     it was loaded, and may fall below this one. Its two values agree where it has converged, but are no bounds.
-    Convergence is not proved either; "not converged" says so and gives the program that came nearest.
+    Convergence is not proved either; "not converged" says so and gives the program that came nearest. Where it finds no
+    limit, forces that a program adds are within friction and the associative program is unbounded, so is this one.
     """
     _check_options(assembly, flow, torsion, ties)
     check_blocks(assembly, overlap_tolerance)
@@ -325,11 +326,12 @@ class _Problem:
         matrix = wrench_matrix(self.contacts, self.pose, self.length)
         rows = ContactRows(matrix, free, self.assembly.centroids)
         load, near = self.dead + balanced.multiplier * self.live, np.zeros((len(self.contacts), d))
+        near[:, 0] = self.tension
         try:
             compliance = Stepper.joint_compliance(self.contacts)
-            none = np.zeros(len(near))
-            forces = nearest_equilibrium(rows, near, compliance, self.friction, self.crushing, none, load)
+            forces = nearest_equilibrium(rows, near, compliance, self.friction, self.crushing, self.cohesion, load)
         except NotSolved:
+            # In balance to rounding only: there is hardly a choice of forces.
             forces = balanced.forces
         return np.asarray(forces[:, 0])
 
@@ -343,12 +345,16 @@ class _Problem:
         change_cost = (CHANGE_COST if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
         normals: list[np.ndarray] = []
         answers: list[np.ndarray] = []
-        nearest, least, used, programs, best_at = balanced, np.inf, normal, 1, 0
+        nearest, least, used, programs, best_at, locks = balanced, np.inf, normal, 1, 0, False
         for _ in range(PROGRAMS):
-            state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
+            try:
+                state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
+            except SolveError:
+                if nearest is balanced:
+                    raise
+                break
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
-            beyond = np.linalg.norm(state.forces[:, 1:], axis=1) - self.friction * state.forces[:, 0] - self.cohesion
-            excess = float(beyond.max(initial=0.0)) / largest
+            excess = friction_excess(state.forces, self.friction, self.cohesion) / largest
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
             error = np.inf if state.falls else max(excess, change)
             settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
@@ -356,11 +362,17 @@ class _Problem:
                 nearest, least, used, best_at = state, error, normal, programs
             if settled or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
                 break
+            if before is not balanced and state.multiplier > before.multiplier:
+                added = state.forces - before.forces
+                locks |= friction_excess(added, self.friction) <= FRICTION_EXCESS * float(np.abs(added).max())
             normals = [*normals[-REMEMBERED:], normal]
             answers = [*answers[-REMEMBERED:], state.forces[:, 0]]
             normal, before = _next_normal(normals, answers, programs), state
         if least <= FRICTION_EXCESS:
             status = found
+        elif locks:
+            # What a program adds is within friction: it may be added without end, unless crushing ends it (raises).
+            self.associative(balanced)
         if status is found and not plane:
             free = self._sliding(used, balanced.unbalanced, 0.0 * change_cost)
             nearest, programs = replace(nearest, velocity=free.velocity, gap=free.gap), programs + 1

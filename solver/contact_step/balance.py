@@ -87,6 +87,10 @@ class _Iterate:
         """(k,) array: what is missing from limited normal forces to their limit."""
         return np.asarray(self.limit - self.sense * self.forces[self.limited, 0])
 
+    def of_points(self, limits: np.ndarray) -> np.ndarray:
+        """(n,) array: sums of numbers of the limits over each point, which may have both."""
+        return np.bincount(self.limited, limits, len(self.forces))
+
     def measure(self) -> None:
         """Compute the forces out of balance and the mean product."""
         self.u = (self.slope * self.forces + self.offset).T
@@ -102,12 +106,12 @@ class _Iterate:
         self.scaling = Scaling(self.u, self.z)
         self.hessian = self.scaling.hessian()
         local = self.slope[:, :, None] * self.hessian * self.slope[:, None, :]
-        local[self.limited, 0, 0] += self.yielding / self.reserve
+        local[:, 0, 0] += self.of_points(self.yielding / self.reserve)
         self.stiffness = np.linalg.inv(self.weight[:, :, None] * np.eye(self.d) + local)
         self.solve = self.rows.factorised(self.stiffness, np.zeros_like(self.load))
         metric = self.weight * (self.forces - self.reference)
         self.error = metric + self.rows.relative(self.motion) - self.slope * self.z.T
-        self.error[self.limited, 0] += self.sense * self.yielding
+        self.error[:, 0] += self.of_points(self.sense * self.yielding)
         if self.unit_reaction is not None:
             self.error = self.error + self.rho * self.unit_reaction
             self.unit_forces = self._forces_by(self.unit_reaction)
@@ -125,7 +129,7 @@ class _Iterate:
         """Newton's direction with what the products, those of cones in the scaling, are to change by."""
         target = self.scaling.scaled(quotient(products, self.scaling.scaled_point))
         distances = self.slope * target.T - self.error
-        distances[self.limited, 0] -= self.sense * yielding_products / self.reserve
+        distances[:, 0] -= self.of_points(self.sense * yielding_products / self.reserve)
         forces = self._forces_by(distances)
         motion, rho = self.solve(self.unbalanced + self.rows.resultant(forces)), 0.0
         if self.unit_reaction is not None:
@@ -158,7 +162,7 @@ class _Iterate:
         Farkas: what the load gains in a movement, points have to take at which it leaves the duals of their cones.
         """
         outside = self.rows.relative(self.motion) - self.slope * self.z.T
-        outside[self.limited, 0] += self.sense * self.yielding
+        outside[:, 0] += self.of_points(self.sense * self.yielding)
         gain = float(self.motion @ self.load) - float((self.offset * self.z.T).sum() + self.limit @ self.yielding)
         if self.unit_reaction is not None:
             outside = outside + self.rho * self.unit_reaction

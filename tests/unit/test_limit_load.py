@@ -2,6 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from structures import prism, rectangle
 
 import solver
 from blockvis import generators
@@ -56,6 +57,24 @@ def test_a_load_that_presses_on_the_ground_has_no_limit():
     assert limit.multiplier == np.inf
     assert str(limit).startswith("unbounded")
     assert not limit.mechanism.any()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("friction", [pytest.param(0.37, marks=pytest.mark.slow), 0.6, 3.0])
+def test_without_dilatancy_a_block_on_a_slope_carries_any_weight_below_its_angle_of_friction(dimension, friction):
+    """W tan 20° = 0.364 W slides at any W or at none: what locks itself has no limit in either flow."""
+    angle = np.radians(20.0)
+    along, out = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    shapes = [[along * x + out * y for x, y in corners] for corners in (rectangle(0.0, 0.0, 1.0, 0.4), GROUND)]
+    if dimension == 3:
+        assembly = solver.Assembly.from_solids([prism(shape) for shape in shapes], roles=["free", "fixed"])
+    else:
+        assembly = solver.Assembly.from_outlines(shapes, roles=["free", "fixed"])
+    down = solver.weight_fraction(assembly, (0.0, -1.0, 0.0)[:dimension], np.array([0]))
+    for flow in ("associative", "non-associative"):
+        limit = limit_load(assembly, loads=solver.Loads(down, down), friction_coefficient=friction, flow=flow)
+        assert limit.status is solver.LimitStatus.UNBOUNDED
+        assert limit.multiplier == np.inf
 
 
 def test_what_the_dead_load_brings_down_carries_nothing():

@@ -46,6 +46,43 @@ def test_a_block_slides_at_friction_and_cohesion(flow, cohesion):
     assert lifts == pytest.approx(0.3 if flow == "associative" else 0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(
+    "more", [{}, {"tensile_strength": 1e4}, {"tensile_strength": 1e4, "compressive_strength": 1e6}]
+)
+def test_a_block_glued_between_two_walls_slips_at_its_cohesion(dimension, more):
+    """Its mortar holds it without pressing, so that friction adds nothing: α = 2 c A / W - 1."""
+    cohesion, shapes = 2e4, [rectangle(*at) for at in ((0, 0, 1, 0.5), (-1, -1, 0, 2), (1, -1, 2, 2))]
+    roles = ["free", "fixed", "fixed"]
+    if dimension == 3:
+        assembly = solver.Assembly.from_solids([prism(shape, 0.0, THICKNESS) for shape in shapes], roles=roles)
+    else:
+        assembly = solver.Assembly.from_outlines(shapes, roles=roles, thickness=THICKNESS)
+    weight = mechanics.total_weight(assembly)
+    dead = solver.weight_fraction(assembly, (0.0, -1.0, 0.0)[:dimension], np.array([0]))
+    interfaces = solver.Interfaces(solver.InterfaceLaw(0.6, cohesion, **more))
+    found = solver.limit_load(assembly, loads=solver.Loads(dead, dead), interfaces=interfaces, flow="non-associative")
+    assert found.status is solver.LimitStatus.FOUND
+    assert found.multiplier == pytest.approx(2.0 * cohesion * 0.5 * THICKNESS / weight - 1.0, rel=2e-5)
+    assert found.forces[:, 0] == pytest.approx(0.0, abs=1e-5 * weight)
+
+
+def test_a_flat_arch_whose_corners_have_cohesion_and_crush_begins_with_its_forces_at_rest():
+    """Three blocks of weight w between walls, P = σ A / 2 at each corner: associative α = P h / (w l) - 1.
+
+    At rest they stand with corners that crush and slip; told by one vertex of the program of equilibrium, α was 0.
+    """
+    strength, height = 1e5, 0.5
+    shapes = [*(rectangle(i, 0, i + 1, height) for i in range(3)), rectangle(-1, -1, 0, 2), rectangle(3, -1, 4, 2)]
+    assembly = solver.Assembly.from_outlines(shapes, roles=["free"] * 3 + ["fixed"] * 2, thickness=THICKNESS)
+    dead = solver.weight_fraction(assembly, (0.0, -1.0))
+    law = solver.InterfaceLaw(0.6, 1e3, compressive_strength=strength)
+    structure = solver.Structure(assembly, solver.Interfaces(law), solver.Loads(dead, dead))
+    most = strength * height * THICKNESS / 2.0 * height / (mechanics.total_weight(assembly) / 3.0) - 1.0
+    assert structure.limit_load().multiplier <= most + 1e-9
+    assert 0.05 < structure.limit_load(flow="non-associative").multiplier < most
+
+
 @pytest.mark.parametrize("flow", ["associative", "non-associative"])
 @pytest.mark.parametrize("strength_over_weight", [1.2, 1.5, 1.9, 2.0, 5.0])
 def test_a_block_overturns_where_its_toe_crushes(flow, strength_over_weight):
