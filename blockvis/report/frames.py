@@ -119,9 +119,10 @@ def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list
 
 
 class FrameTables:
-    """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding joints (2).
+    """What changes from frame to frame, as integers: motion, resultants of the joints, and marks.
 
-    A hinge has the ends of its line, in the plane its place twice; a sliding joint has its ends in the plane, and in
+    Marks are hinges (1), sliding joints (2) and points that crush (3). A hinge has the ends of its line, in the plane
+    its place twice, as what crushes has; a sliding joint has its ends in the plane, and in
     space its number. Each resultant names its two blocks.
 
     Parameters
@@ -196,7 +197,7 @@ class FrameTables:
 def _marks(
     assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment
 ) -> tuple[np.ndarray, np.ndarray]:
-    """List ends (n, 2, d) [m] of hinges and sliding joints, and (n, 2): 1 and -1, or 2 and in space the joint."""
+    """List ends (n, 2, d) [m] of marks, and (n, 2): 1 or 3 and -1 of hinges or crushing, 2 and in space the joint."""
     mechanism, contacts = mechanics.mechanism_of(assembly, increment), increment.contacts
     points = contacts.points
     hinges = points[hinge_ends(assembly, increment, mechanism)]
@@ -207,8 +208,9 @@ def _marks(
         pairs = {pair: k for k, pair in enumerate(zip(joints.block_a.tolist(), joints.block_b.tolist(), strict=True))}
         numbers = [pairs.get((a, b), -1) for a, b in mechanism.sliding.tolist()]
         sliding = np.broadcast_to(points[:1], (len(numbers), 2, 3)) if numbers else np.zeros((0, 2, 3))
-    marks = [(1, -1)] * len(hinges) + [(2, number) for number in numbers]
-    return np.concatenate([hinges, sliding]), np.array(marks, dtype=np.int32).reshape(-1, 2)
+    crushing = points[mechanism.crushing_points][:, None].repeat(2, axis=1)
+    marks = [*[(1, -1)] * len(hinges), *[(2, number) for number in numbers], *[(3, -1)] * len(crushing)]
+    return np.concatenate([hinges, sliding, crushing]), np.array(marks, dtype=np.int32).reshape(-1, 2)
 
 
 def _nothing(columns: int) -> list[np.ndarray]:

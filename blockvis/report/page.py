@@ -283,6 +283,9 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
     else:
         own = _model_in_plane(response, shown, None if fall is None else fall.ground)
     roles = {role: number for number, role in enumerate(mechanics.ROLES)}
+    if not response.settlements:
+        # Supports for moving hold the others where nothing settles.
+        roles[mechanics.MOVING] = roles[mechanics.FIXED]
     fills = palette.block_colours(assembly.materials, assembly.free)
     return own | {
         "space": assembly.dimension == 3,
@@ -303,7 +306,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
             name: palette.hexadecimal(getattr(palette, name.upper()))
             for name in (
                 "ink", "outline", "support", "moving", "hatch", "open", "sliding", "force", "hinge", "settlement",
-                "warning", "live",
+                "crushing", "warning", "live",
             )
         },
         "frames": _frames(response, frames),

@@ -196,7 +196,8 @@
       if (layers.sliding) drawSliding(pen, near);
       if (!falling) drawForces(pen, near);
       if (layers.forces && model.fill && !falling) drawFillLoad(pen, near);
-      if (layers.hinges) drawHinges(pen, near);
+      if (layers.hinges) drawDots(pen, near, 1, model.colours.hinge, "#fff");
+      drawDots(pen, near, 3, model.colours.crushing, model.colours.hinge);
       drawLive(pen, near);
     }
     drawTies(pen, near, colours, ([x, y]) => [px(x), py(y)]);
@@ -238,12 +239,11 @@
     return met.filter((of) => of.length === 2).map(([i, j]) => [forces.place[2 * i], forces.place[2 * i + 1], forces.place[2 * j], forces.place[2 * j + 1]]);
   }
 
-  function drawHinges(pen, k) {
+  function drawDots(pen, k, kind, fill, rim) {
     const radius = Math.max(2.2, Math.min(6.5, 0.09 * model.block_size * state.view.scale));
     for (let i = marks.first[k]; i < marks.first[k + 1]; i++) {
-      if (marks.kind[i] !== 1) continue;
-      pen.beginPath(); pen.arc(px(marks.place[4 * i]), py(marks.place[4 * i + 1]), radius, 0, 2 * Math.PI);
-      pen.fillStyle = model.colours.hinge; pen.strokeStyle = "#fff"; pen.lineWidth = 1.5; pen.stroke(); pen.fill();
+      if (marks.kind[i] !== kind) continue;
+      spot(pen, px(marks.place[4 * i]), py(marks.place[4 * i + 1]), radius, fill, rim);
     }
   }
 
