@@ -9,6 +9,7 @@ import numpy as np
 
 import solver
 from blockvis.pictures.frame import Frame, framed
+from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.marks import (
     SMALLEST_RESULTANT,
     hinge_ends,
@@ -60,7 +61,12 @@ def surveyed(
 
 
 def model_of_frames(
-    response: solver.Response, joints: InitialJoints, shown: list[solver.Increment], frame: Frame, largest: float
+    response: solver.Response,
+    joints: InitialJoints,
+    shown: list[solver.Increment],
+    frame: Frame,
+    largest: float,
+    live: LiveLoads,
 ) -> dict[str, Any]:
     """Pack what moves, and the scales of all frames.
 
@@ -74,6 +80,8 @@ def model_of_frames(
         In which all of it lies.
     largest : float [N]
         Resultant of a joint.
+    live : LiveLoads
+        Of what is shown.
     """
     assembly = response.assembly
     # Coordinates far from the origin (UTM) would waste the digits.
@@ -89,7 +97,7 @@ def model_of_frames(
         "largest_displacement": tables.largest_displacement,
         "arrows": _arrows(response, frame, origin),
         "has_forces": bool(len(sizes)),
-        "live_words": "",
+        "live_words": live.words if live.largest > 0.0 else "",
         "ground": None,
         "fill": None,
         "force_unit": FORCE_FINENESS * largest,
@@ -100,7 +108,20 @@ def model_of_frames(
             "centroids": deflated(rounded(assembly.centroids - origin, unit), assembly.n_blocks),
             "joint_blocks": deflated(np.stack([joints.block_a, joints.block_b], axis=1), len(joints)),
             **tables.packed(),
+            **_packed_live(live, shown, origin, unit),
         },
+    }
+
+
+def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
+    """Arrows of the live load, frame after frame; no more than their first numbers where there are none."""
+    found = [live.arrows(increment, increment.pose) for increment in shown]
+    first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()
+    tails, tips = (rounded(np.concatenate(ends) - origin, unit) for ends in zip(*found, strict=True))
+    return {
+        "live_first": deflated(first, len(first)),
+        "live_tail": deflated(tails, first[-1]),
+        "live_tip": deflated(tips, first[-1]),
     }
 
 

@@ -2,7 +2,6 @@
   const travel = scaled("travel", q), turn = scaled("turn", model.turn_unit);
   const joints = { blocks: raw.joint_blocks, ends: scaled("joint_ends", q), n: model.packed.joint_blocks.rows };
   const forces = { place: scaled("force_place", q), vector: scaled("force_vector", model.force_unit), blocks: raw.force_blocks, first: raw.force_first };
-  const live = { tail: scaled("live_tail", q), tip: scaled("live_tip", q), first: raw.live_first };
   const marks = { place: scaled("mark_place", q), kind: raw.mark_kind, first: raw.mark_first };
   const jointsOf = Array.from({ length: nBlocks }, () => []);
   for (let j = 0; j < joints.n; j++) { jointsOf[joints.blocks[2 * j]].push(j); jointsOf[joints.blocks[2 * j + 1]].push(j); }
@@ -198,7 +197,7 @@
       if (layers.forces && model.fill && !falling) drawFillLoad(pen, near);
       if (layers.hinges) drawDots(pen, near, 1, model.colours.hinge, "#fff");
       drawDots(pen, near, 3, model.colours.crushing, model.colours.hinge);
-      drawLive(pen, near);
+      drawLive(pen, near, ([x, y]) => [px(x), py(y)]);
     }
     drawTies(pen, near, colours, ([x, y]) => [px(x), py(y)]);
     scaleBar(pen, w, h, colours);
@@ -253,11 +252,6 @@
     pen.strokeStyle = model.colours.sliding; pen.lineWidth = 3.5; pen.lineCap = "round"; lineBetween(pen, ends);
   }
 
-  function drawLive(pen, k) {
-    for (let i = live.first[k]; i < live.first[k + 1]; i++) {
-      arrow(pen, px(live.tail[2 * i]), py(live.tail[2 * i + 1]), px(live.tip[2 * i]), py(live.tip[2 * i + 1]), model.colours.live, 2.5);
-    }
-  }
   const world = (x, y) => [(x - state.view.x) / state.view.scale, (state.view.y - y) / state.view.scale];
 
   function blockAt(x, y) {

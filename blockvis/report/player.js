@@ -64,6 +64,12 @@
     return `rgb(${low.map((v, i) => Math.round(v + (high[i] - v) * (at - k))).join(",")})`;
   }
 
+  const live = { tail: scaled("live_tail", q), tip: scaled("live_tip", q), first: raw.live_first };
+  function drawLive(pen, k, onPage) {
+    const d = model.space ? 3 : 2, place = (of, i) => onPage(of.slice(d * i, d * i + d));
+    for (let i = live.first[k]; i < live.first[k + 1]; i++) arrow(pen, ...place(live.tail, i), ...place(live.tip, i), model.colours.live, 2.5);
+  }
+
   function spot(pen, x, y, radius, fill, rim) {
     pen.beginPath(); pen.arc(x, y, radius, 0, 2 * Math.PI);
     pen.fillStyle = fill; pen.strokeStyle = rim; pen.lineWidth = 1.5; pen.stroke(); pen.fill();

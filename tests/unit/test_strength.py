@@ -9,7 +9,6 @@ from structures import alike, box, case_from, drawn, pixels, prism, rectangle, r
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.pictures import palette
 from solver import mechanics
 
 WIDTH, HEIGHT, THICKNESS = 0.8, 0.5, 0.3
@@ -87,7 +86,7 @@ def test_what_crushes_is_told_and_marked_where_it_presses(in_space, tmp_path):
     np.testing.assert_allclose(response.path[0].contacts.points[mechanism.crushing_points, 0], WIDTH)
     assert f'"{mechanism}"' in (tmp_path / "out" / "summary.json").read_text(encoding="utf-8")
     picture = pixels(blockvis.draw_mechanism(response, tmp_path / "mechanism.png", size=(640, 360)))
-    rows, columns = alike(picture[60:300], palette.CRUSHING).nonzero()
+    rows, columns = alike(picture[60:300], (255, 193, 7)).nonzero()
     assert len(rows) > 10
     if not in_space:
         assert np.ptp(columns) < 20
