@@ -324,7 +324,7 @@ def _add_render(verbs: Any) -> None:
     render.add_argument(
         "--animation", default="collapse.mp4", help="in OUT: .mp4, .gif, .webp, a folder such as frames/, or none"
     )
-    render.add_argument("--magnification", type=float, default=1.0, help="of the displacements")
+    render.add_argument("--magnification", type=float, default=1.0, help="of displacements; without forces and hinges")
     render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")
     render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")

@@ -88,7 +88,7 @@ def _film(table: Table, key: Key) -> str | bool | None:
         raise table.error(
             key.name,
             f"is {shortened(name)}; give a name ending in {', '.join(VIDEO_SUFFIXES)}, without a folder: "
-            'it is written into the results folder; or one such as "frames/" for a folder of pictures',
+            'it is written into the results folder; or one such as "frames/" for a folder of pictures; false for none',
         )
     return name
 

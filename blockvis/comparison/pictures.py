@@ -102,6 +102,10 @@ class Pair:
             self.drawers.append(Drawer(side.response, look, self._panel, shown, fall=fall))
             # What is in front in one picture is so in the other.
             look = replace(look, sight=self.drawers[0].sight if in_space else None)
+        if comparison.same_layout():
+            # Openings and tilts can be compared by eye at one scale only.
+            for drawer in self.drawers:
+                drawer.hold(self.drawers)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -114,8 +114,14 @@ def comparison_html(found: Comparison, curves: bytes, stations: bytes, film: str
         if cracks
         else "",
         side_by_side="At the same places of the path" if found.is_path else "At the limit load",
-        film=f'<h2>Film</h2><video controls src="{html.escape(film)}"></video>' if film else "",
+        film=f"<h2>Film</h2>{_film(html.escape(film))}" if film else "",
     )
+
+
+def _film(name: str) -> str:
+    """Write what plays a film: browsers take .gif and .webp for pictures."""
+    moving_picture = Path(name).suffix.lower() in (".gif", ".webp")
+    return f'<img src="{name}" alt="film">' if moving_picture else f'<video controls src="{name}"></video>'
 
 
 def _rows(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

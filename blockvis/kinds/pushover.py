@@ -82,7 +82,7 @@ class PushoverKind(AnalysisKind):
         if case.settings is None:
             raise ValueError(
                 f'{case.source}: [control] is missing; a pushover needs the displacement that grows, block = "..." and '
-                "direction = [1, 0]"
+                "direction = [1, 0], in space [1, 0, 0]"
             )
         for number, load in enumerate(case.loads, start=1):
             if load.positions:

@@ -15,6 +15,9 @@ from solver import mechanics
 #: Warning on frames of a fall in real time.
 FALL_BADGE = "FALLING · real time"
 
+#: Warning on blocks that are drawn where a mechanism takes them.
+MECHANISM_BADGE = "MECHANISM · pseudo-motion"
+
 #: Warning on pictures of runs that the solver could not follow to their end.
 FAILED_BADGE = "SOLVER FAILED"
 
@@ -223,7 +226,7 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
 
 def badge_of(response: solver.Response) -> str:
     """Warning on frames that are no equilibrium."""
-    return "MECHANISM · pseudo-motion" if response.swings else "FALLING · pseudo-time"
+    return MECHANISM_BADGE if response.swings else "FALLING · pseudo-time"
 
 
 def fall_text(response: solver.Response) -> str:

@@ -62,6 +62,7 @@ class CracksInSpace:
         cut: Cut | None = None,
     ) -> None:
         assembly, swing = response.assembly, swing_of(response)
+        self._roles = palette.role_colours(assembly, bool(response.settlements))
         motion = swing.displaced.positions - swing.increment.pose.positions
         self._views = views_of(response, motion, joints, sight, cut)
         self._sheet, self._joints = sheet, joints
@@ -85,8 +86,7 @@ class CracksInSpace:
         width, height = self._sheet.inside_size
         below = round(WORDS * self._sheet.text) if len(self._views) > 1 else 0
         size = width // len(self._views), height - below
-        roles = palette.role_colours(assembly)
-        fill = palette.pale(roles, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
+        fill = palette.pale(self._roles, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
         frames = [
             framed(assembly, [solver.Pose.initial(assembly)], MARGIN, 0.3, view.axes[:2], WHOLE, plane)
             for view in self._views
@@ -96,7 +96,7 @@ class CracksInSpace:
         for view, frame in zip(self._views, alike(frames), strict=True):
             outlined = hiding_supports(assembly, view)
             scene = SolidScene(
-                assembly, view, frame, size, roles, fine=True, cut=plane, outlined=outlined,
+                assembly, view, frame, size, self._roles, fine=True, cut=plane, outlined=outlined,
                 outline=palette.PALE_OUTLINE,
             )  # fmt: skip
             scene.hide(gone)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import TYPE_CHECKING
@@ -132,7 +132,7 @@ class _Series:
         Displacement of any free block.
     widest : float [m]
         Opening of any crack in equilibrium.
-    cracks, sliding, hinges, lost, pulls : bool
+    cracks, sliding, hinges, crushing, lost, pulls : bool
         Whether there are any anywhere; of blocks that are lost, of joints that pull.
     largest_force : float [N]
     forces : list of arrays [N]
@@ -145,6 +145,7 @@ class _Series:
     cracks: bool = False
     sliding: bool = False
     hinges: bool = False
+    crushing: bool = False
     lost: bool = False
     pulls: bool = False
     largest_force: float = 0.0
@@ -200,6 +201,9 @@ class Drawer:
         self._underlay, self._still = underlay, still
         few = self._flat and assembly.n_blocks <= FEW_BLOCKS
         self._forces_hidden = look.forces == "auto" and self._flat and not few
+        if look.magnification != 1.0:
+            # Between blocks that are magnified apart, points of contact have no place.
+            look, self._forces_hidden = replace(look, forces="none"), False
         self.look = look = replace(look, forces="thrust" if few else "none") if look.forces == "auto" else look
         self.response, self.increments, self.fall = response, increments, fall
         self.joints = initial_joints(assembly)
@@ -234,12 +238,9 @@ class Drawer:
         if self._plane is not None:
             ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
         frame = self._with_floor(frame.holding(self._projected(ends)))
-        # Supports in the plane are hatched, and an outline stays where those that move were; of limit loads none moves.
-        plain = self._flat or not response.settlements
-        self.fill = (
-            palette.block_colours(assembly.materials, assembly.free) if plain else palette.role_colours(assembly)
-        )
-        self.scene = self._scene(frame)
+        # Supports in the plane are hatched, and an outline stays where those that move were.
+        self.fill = palette.role_colours(assembly, not self._flat and bool(response.settlements))
+        self.frame, self.scene = frame, self._scene(frame)
         self._loses = bool(response.losses)
         self.force_scale, self.force_shown = self._force_scale()
         self.tints: np.ndarray | None = None
@@ -322,6 +323,15 @@ class Drawer:
             return scenes[0]
         return PairedScenes(scenes, ("from above", "from below"), self.sheet.text)
 
+    def hold(self, drawers: Sequence[Drawer]) -> None:
+        """Draw in one frame that holds those of several, this among them, with arrows of supports as long."""
+        frames = [one.frame for one in drawers]
+        self.frame = Frame(np.min([of.low for of in frames], axis=0), np.max([of.high for of in frames], axis=0))
+        self._arrow = max(one._arrow for one in drawers)
+        self.scene.close()
+        self.scene = self._scene(self.frame)
+        self.force_scale, self.force_shown = self._force_scale()
+
     def _projected(self, points: np.ndarray) -> np.ndarray:
         """(n, d) array [m]: places in the picture, or in each of several, of points (n, d) [m]."""
         return points if not self._views else np.asarray(points @ self._axes.T)
@@ -350,6 +360,7 @@ class Drawer:
                 seen.cracks |= len(found.cracks) > 0
                 seen.sliding |= len(found.sliding) > 0
                 seen.hinges |= len(found.hinges) > 0
+                seen.crushing |= len(found.crushing) > 0
             if look.forces != "none" and matters(increment, self.response):
                 sizes = np.linalg.norm(joint_forces(increment, look.forces)[1], axis=1)
                 largest = float(sizes.max(initial=0.0))
@@ -513,9 +524,10 @@ class Drawer:
                 keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
             if self._drawn_at is not None:
                 layers = ("motion outline", "motion top")
-                keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT, layers=layers))
+                what = "motion" if self._flat else "motion, blocks drawn after it"
+                keys.append(Key("line", f"{what} (not to scale)", palette.SETTLEMENT, layers=layers))
                 if self.scene.holds("before"):
-                    keys.append(Key("line", "where they stood", palette.GHOST))
+                    keys.append(Key("line", "at equilibrium", palette.GHOST))
             # In space every picture has the whole legend.
             self._keys = keys if self._flat else [replace(key, layers=()) for key in keys]
         return self._keys
@@ -527,12 +539,16 @@ class Drawer:
             widest = "" if self._flat or seen.widest == 0.0 else f", up to {width_text(seen.widest)}"
             kind = "area" if self._flat else "line"
             keys.append(Key(kind, f"open joint{widest}", palette.OPEN, layers=("crack", "crack edge")))
+        if self.look.magnification != 1.0:
+            return [*keys, Key("", "hinges, sliding joints and forces are shown at true scale only", palette.FAINT)]
         marked = [
             *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),
             *([Key("dot" if self._flat else "line", "hinge", palette.HINGE, layers=("hinge",))] if seen.hinges else []),
         ]
         if seen.hinges and len(self._views) == 1 and not self.many:
             marked.append(Key("dash", "hidden hinge", palette.HINGE))
+        if seen.crushing:
+            keys.append(Key("dot", "crushing", palette.CRUSHING, layers=("crushing top",)))
         if not self.many:
             return keys + marked
         # They would hide the cracks: in a wall of many blocks nearly every brick turns or slides a little.
@@ -617,16 +633,19 @@ class Drawer:
         return self._acting[place]
 
     def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> np.ndarray:
-        """Draw open and sliding joints and hinges; returns where hinges are drawn, (n, d) [m]."""
+        """Draw open and sliding joints, hinges and what crushes; returns where dots are drawn, (n, d) [m]."""
         if not self.look.joints:
             return np.zeros((0, self.assembly.dimension))
         found = marks_of(self.assembly, self.joints, increment, shown)
         self.scene.cracks(found, self.look.magnification, self._seen.widest)
-        if self.many:
+        if self.look.magnification != 1.0:
             return np.zeros((0, self.assembly.dimension))
+        self.scene.crushing(found)
+        if self.many:
+            return found.crushing
         self.scene.sliding(found)
         self.scene.hinges(found)
-        return found.hinges[:, 0]
+        return np.concatenate([found.hinges[:, 0], found.crushing])
 
     def _write_labels(
         self, picture: Image.Image, increment: solver.Increment, shown: solver.Pose, dots: np.ndarray, widths: bool
@@ -744,12 +763,14 @@ def without_removed(increment: solver.Increment, fell_at: np.ndarray) -> solver.
     gone = np.isneginf(fell_at) if len(fell_at) else increment.removed
     contacts = increment.contacts
     kept = ~(gone[contacts.block_a] | gone[contacts.block_b])
+    crushing = increment.state.crushing
     return increment.with_arrays(
         fell_at=fell_at,
         contacts=contacts[kept],
         forces=increment.forces[kept],
         displacements=increment.displacements[kept],
         friction=increment.friction[kept],
+        crushing=crushing[kept] if len(crushing) else crushing,
     )
 
 

@@ -140,9 +140,9 @@ def _with_forces_between(
         friction=friction,
         ties=_ties_between(before.ties, after.ties, part),
         **{
-            name: np.append(of, np.zeros(len(more)))
+            name: np.append(of, np.zeros(len(more), dtype=of.dtype))
             for name, of in vars(before.state).items()
-            if name in ("intact", "bonded", "unloaded") and len(of)
+            if name in ("intact", "bonded", "unloaded", "crushing") and len(of)
         },
     )
     rates = mechanics.with_motion(state, before.velocity).displacements[len(early) :]

@@ -29,7 +29,8 @@ ORDER = (
     "earth", "backfill", "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding",
     "motion outline", "force line", "force",
     "tie rim", "tie ground", "tie slack", "tie elastic", "tie pressed", "tie yielding", "tie broken", "tie end",
-    "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top", "arrow rim", "arrow top",
+    "hinge", "hinge top", "crushing", "crushing top",
+    "motion rim", "motion top", "live rim", "live top", "arrow rim", "arrow top",
 )  # fmt: skip
 
 #: A picture is drawn in bands of at most so many pixels, so that its size does not decide how much memory that takes.
@@ -164,10 +165,18 @@ class FlatScene(Scene):
 
     def hinges(self, found: Marks) -> None:
         """Draw dots with a rim of paper."""
-        places, thin = found.hinges[:, 0], self._thin
-        radius = float(np.clip(0.09 * self.assembly.block_size / self.pixel, 3.0 * thin, 11.0 * thin))
-        self.discs("hinge/rim", places, radius * 1.35, palette.PAPER)
-        self.discs("hinge top", places, radius, palette.HINGE)
+        self.discs("hinge/rim", found.hinges[:, 0], self._dot * 1.35, palette.PAPER)
+        self.discs("hinge top", found.hinges[:, 0], self._dot, palette.HINGE)
+
+    def crushing(self, found: Marks) -> None:
+        """Draw dots with a dark rim."""
+        self.discs("crushing/rim", found.crushing, self._dot * 1.35, palette.HINGE)
+        self.discs("crushing top", found.crushing, self._dot, palette.CRUSHING)
+
+    @property
+    def _dot(self) -> float:
+        """Radius of the dots of hinges [pixels]."""
+        return float(np.clip(0.09 * self.assembly.block_size / self.pixel, 3.0 * self._thin, 11.0 * self._thin))
 
     def forces(self, ends: np.ndarray, line: np.ndarray) -> None:
         """Draw bars, and the line of thrust."""

@@ -95,6 +95,8 @@ class Marks:
         Faces in space that slide, of both blocks.
     hinges : (n, 2, d) array [m]
         Ends of the line about which each hinge turns; the same twice for a point, as in the plane.
+    crushing : (n, d) array [m]
+        Contact points that crush.
     """
 
     cracks: np.ndarray
@@ -103,6 +105,7 @@ class Marks:
     sliding: np.ndarray
     exposed: list[np.ndarray]
     hinges: np.ndarray
+    crushing: np.ndarray
 
     @property
     def middles(self) -> np.ndarray:
@@ -119,24 +122,24 @@ class Marks:
 def marks_of(
     assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment, shown: solver.Pose
 ) -> Marks:
-    """Cracks, sliding joints and hinges of an increment, on blocks shown at a pose.
+    """Cracks, sliding joints, hinges and what crushes of an increment, on blocks shown at a pose.
 
     Parameters
     ----------
     assembly : solver.Assembly
     joints : InitialJoints
     increment : solver.Increment
-        Its mechanism has the hinges and sliding joints.
+        Its mechanism has the hinges, sliding and crushing joints.
     shown : solver.Pose
         Where the blocks are drawn: the increment's own pose, a magnified one, or a later one.
     """
     contacts, mechanism = increment.contacts, mechanics.mechanism_of(assembly, increment)
     points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
-    hinges = points[hinge_ends(assembly, increment, mechanism)]
+    turning = points[hinge_ends(assembly, increment, mechanism)], points[mechanism.crushing_points]
     cracks = cracks_between(assembly, joints, increment.pose, shown, increment.fallen)
     if assembly.dimension == 2:
-        return Marks(*cracks, sliding_lines(assembly, contacts, mechanism.sliding_points, points), [], hinges)
-    return Marks(*cracks, *_sliding_faces(assembly, joints, mechanism, shown), hinges)
+        return Marks(*cracks, sliding_lines(assembly, contacts, mechanism.sliding_points, points), [], *turning)
+    return Marks(*cracks, *_sliding_faces(assembly, joints, mechanism, shown), *turning)
 
 
 def cracks_between(
@@ -171,11 +174,11 @@ def cracks_between(
     if assembly.dimension == 2:
         is_open &= ~parted[joint]
     start, end, gaps, joint = start[is_open], end[is_open], gaps[is_open], joint[is_open]
-    shares = np.zeros(len(joint)), np.ones(len(joint))
-    if assembly.dimension == 3:
-        # The faces are plane: the gap grows evenly along an edge, and the crack ends where it is small.
-        cut = (least - gaps[:, 0]) / np.where(gaps[:, 0] == gaps[:, 1], 1.0, gaps[:, 1] - gaps[:, 0])
-        shares = np.where(gaps[:, 0] < least, cut, 0.0), np.where(gaps[:, 1] < least, cut, 1.0)
+    # The faces are plane: the gap grows evenly along an edge, and the crack ends where it is small; in the plane, where
+    # it tapers off as it is filled, where blocks that crush lie in each other.
+    end_of_crack = least if assembly.dimension == 3 else 0.0
+    cut = (end_of_crack - gaps[:, 0]) / np.where(gaps[:, 0] == gaps[:, 1], 1.0, gaps[:, 1] - gaps[:, 0])
+    shares = np.where(gaps[:, 0] < end_of_crack, cut, 0.0), np.where(gaps[:, 1] < end_of_crack, cut, 1.0)
     first, last = (
         [of[start] + part[:, None] * (of[end] - of[start]) for of in (drawn.on_a, drawn.on_b)] for part in shares
     )

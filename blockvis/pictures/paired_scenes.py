@@ -48,8 +48,9 @@ class PairedScenes(Scene):
         self.size = (sum(scene.size[0] for scene in self._scenes), first.size[1] + round(WORDS * text))
         self.frame, self.pixel = first.frame, first.pixel
 
-    pose, hide, backfill, cracks, sliding, hinges, forces, ties, arrows, clear = map(
-        _on_each, ("pose", "hide", "backfill", "cracks", "sliding", "hinges", "forces", "ties", "arrows", "clear")
+    pose, hide, backfill, cracks, sliding, hinges, crushing, forces, ties, arrows, clear = map(
+        _on_each,
+        ("pose", "hide", "backfill", "cracks", "sliding", "hinges", "crushing", "forces", "ties", "arrows", "clear"),
     )
 
     def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:

@@ -17,6 +17,7 @@ OPEN = (226, 78, 27)
 SLIDING = (126, 55, 178)
 FORCE = (20, 92, 168)
 HINGE = (17, 17, 17)
+CRUSHING = (255, 193, 7)
 SETTLEMENT = (0, 121, 107)
 #: The ground of a fall in space, and shadows on it.
 GROUND, SHADOW = (238, 236, 231), (214, 210, 202)
@@ -105,10 +106,10 @@ def block_colours(materials: tuple[str, ...], free: np.ndarray) -> np.ndarray:
     return np.clip(np.rint(colours), 0, 255).astype(np.uint8)
 
 
-def role_colours(assembly: solver.Assembly) -> np.ndarray:
-    """(n_blocks, 3) uint8 array: fills by material, fixed supports grey, moving ones in the colour of settlements."""
+def role_colours(assembly: solver.Assembly, settles: bool = True) -> np.ndarray:
+    """(n_blocks, 3) uint8 array: fills by material, supports grey, moving ones in the colour of what settles."""
     fill = block_colours(assembly.materials, assembly.free)
-    fill[assembly.moving] = MOVING
+    fill[assembly.moving & settles] = MOVING
     return fill
 
 

@@ -18,7 +18,7 @@ from blockvis.results.increments import numbered
 from blockvis.system.atomic_files import atomic_file
 from solver import mechanics
 
-from .captions import in_one_unit, parameter_unit, phase_words
+from .captions import MECHANISM_BADGE, in_one_unit, parameter_unit, phase_words
 from .drawer import Drawer, Look
 from .film import film_of, poster_of
 from .swing import MOST_PARTS, shown_increments, swing_of
@@ -147,7 +147,9 @@ def draw_mechanism(
     if swing.moves:
         drawer.show_motion(swing)
     note = "   ·   ".join([_mechanism_note(response, swing.parts), *phase_words(response, swing.increment)])
-    return _save(drawer.picture(swing.increment, note=note, widths=True), path)
+    moved_on = swing.moves and response.assembly.dimension == 3 and response.stop != solver.Status.SOLVER_FAILED
+    badge = MECHANISM_BADGE if moved_on else None
+    return _save(drawer.picture(swing.increment, note=note, badge=badge, widths=True), path)
 
 
 def animate(

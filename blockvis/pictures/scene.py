@@ -19,6 +19,7 @@ from .ties import Strands
 #: Layers that hold what statics knows: a fall in time has none of them.
 OF_STATICS = (
     *("crack", "crack edge", "sliding", "exposed", "hinge", "hinge rim", "hinge top", "hidden hinge"),
+    *("crushing", "crushing top"),
     *("force", "force line", "ground", "backfill"),
     *("arrow rim", "arrow top", "live rim", "live top"),
 )
@@ -66,6 +67,9 @@ class Scene(Protocol):
     def hinges(self, found: Marks) -> None:
         """Draw hinges."""
 
+    def crushing(self, found: Marks) -> None:
+        """Draw contact points that crush."""
+
     def forces(self, ends: np.ndarray, line: np.ndarray) -> None:
         """Draw forces as bars with ends (n, 2, d) [m], and the line from joint to joint, (m, 2, d) [m]."""
 
@@ -90,6 +94,10 @@ class Scene(Protocol):
 
     def image(self) -> Image.Image:
         """Draw the picture."""
+
+    def close(self) -> None:
+        """Give back what the scene holds outside of memory."""
+        return
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: pixel (column, row) of points (n, d) [m]."""

@@ -316,22 +316,33 @@ class SolidScene(Scene):
         dashes = dashed(found.hinges, 24.0 * max(self._thin, 0.6) * self.pixel)
         self.lines("hidden hinge", dashes, palette.HINGE, 0.22 * width, forward=IN_FRONT_OF_ALL)
 
+    def crushing(self, found: Marks) -> None:
+        """Draw discs with a dark rim in front of all: they are few, and say where it fails."""
+        radius = 9.0 * self._thin * self.pixel
+        for layer, grown, colour in (("crushing", 1.35, palette.HINGE), ("crushing top", 1.0, palette.CRUSHING)):
+            rims = found.crushing[:, None] + grown * radius * self._circle
+            self.polygons(layer, rims, colour, forward=IN_FRONT_OF_ALL + grown - 1.35)
+
     def forces(self, ends: np.ndarray, line: np.ndarray) -> None:
         """Draw bars and the line of thrust in front of all: they lie inside the blocks."""
         width = max(2.5, self.size[1] / 240.0)
         self.lines("force", ends, palette.FORCE, width, forward=IN_FRONT_OF_ALL)
         self.lines("force line", line, palette.FORCE, 0.6 * width, forward=IN_FRONT_OF_ALL)
 
+    @property
+    def _circle(self) -> np.ndarray:
+        """(16, 3) array: a unit circle that faces the eye."""
+        angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+        return np.asarray(np.stack([np.cos(angles), np.sin(angles)], axis=1) @ self.view.axes[:2])
+
     def ties(self, strands: Sequence[Strands]) -> None:
         """Draw lines and discs where they are held, thin and dashed in front of the blocks that hide them."""
-        angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
-        circle = np.stack([np.cos(angles), np.sin(angles)], axis=1) @ self.view.axes[:2]
         for strand in strands:
             width = max(strand.width * self._thin, 1.6)
             radius = (0.9 * width + 2.0 * self._thin) * self.pixel
             self.lines(strand.layer, strand.ends, strand.colour, width, forward=6.0)
             self.polygons(
-                f"tie end/{strand.layer}", strand.anchors[:, None] + radius * circle, strand.colour, forward=6.0
+                f"tie end/{strand.layer}", strand.anchors[:, None] + radius * self._circle, strand.colour, forward=6.0
             )
             hidden = dashed(strand.ends, DASH * max(self._thin, 0.6) * self.pixel)
             self.lines(f"hidden {strand.layer}", hidden, strand.colour, 0.35 * width, forward=IN_FRONT_OF_ALL)

@@ -9,6 +9,7 @@ import numpy as np
 
 import solver
 from blockvis.pictures.frame import Frame, framed
+from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.marks import (
     SMALLEST_RESULTANT,
     hinge_ends,
@@ -60,7 +61,12 @@ def surveyed(
 
 
 def model_of_frames(
-    response: solver.Response, joints: InitialJoints, shown: list[solver.Increment], frame: Frame, largest: float
+    response: solver.Response,
+    joints: InitialJoints,
+    shown: list[solver.Increment],
+    frame: Frame,
+    largest: float,
+    live: LiveLoads,
 ) -> dict[str, Any]:
     """Pack what moves, and the scales of all frames.
 
@@ -74,6 +80,8 @@ def model_of_frames(
         In which all of it lies.
     largest : float [N]
         Resultant of a joint.
+    live : LiveLoads
+        Of what is shown.
     """
     assembly = response.assembly
     # Coordinates far from the origin (UTM) would waste the digits.
@@ -89,7 +97,7 @@ def model_of_frames(
         "largest_displacement": tables.largest_displacement,
         "arrows": _arrows(response, frame, origin),
         "has_forces": bool(len(sizes)),
-        "live_words": "",
+        "live_words": live.words if live.largest > 0.0 else "",
         "ground": None,
         "fill": None,
         "force_unit": FORCE_FINENESS * largest,
@@ -100,7 +108,20 @@ def model_of_frames(
             "centroids": deflated(rounded(assembly.centroids - origin, unit), assembly.n_blocks),
             "joint_blocks": deflated(np.stack([joints.block_a, joints.block_b], axis=1), len(joints)),
             **tables.packed(),
+            **_packed_live(live, shown, origin, unit),
         },
+    }
+
+
+def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
+    """Arrows of the live load, frame after frame; no more than their first numbers where there are none."""
+    found = [live.arrows(increment, increment.pose) for increment in shown]
+    first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()
+    tails, tips = (rounded(np.concatenate(ends) - origin, unit) for ends in zip(*found, strict=True))
+    return {
+        "live_first": deflated(first, len(first)),
+        "live_tail": deflated(tails, first[-1]),
+        "live_tip": deflated(tips, first[-1]),
     }
 
 
@@ -119,9 +140,10 @@ def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list
 
 
 class FrameTables:
-    """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding joints (2).
+    """What changes from frame to frame, as integers: motion, resultants of the joints, and marks.
 
-    A hinge has the ends of its line, in the plane its place twice; a sliding joint has its ends in the plane, and in
+    Marks are hinges (1), sliding joints (2) and points that crush (3). A hinge has the ends of its line, in the plane
+    its place twice, as what crushes has; a sliding joint has its ends in the plane, and in
     space its number. Each resultant names its two blocks.
 
     Parameters
@@ -196,7 +218,7 @@ class FrameTables:
 def _marks(
     assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment
 ) -> tuple[np.ndarray, np.ndarray]:
-    """List ends (n, 2, d) [m] of hinges and sliding joints, and (n, 2): 1 and -1, or 2 and in space the joint."""
+    """List ends (n, 2, d) [m] of marks, and (n, 2): 1 or 3 and -1 of hinges or crushing, 2 and in space the joint."""
     mechanism, contacts = mechanics.mechanism_of(assembly, increment), increment.contacts
     points = contacts.points
     hinges = points[hinge_ends(assembly, increment, mechanism)]
@@ -207,8 +229,9 @@ def _marks(
         pairs = {pair: k for k, pair in enumerate(zip(joints.block_a.tolist(), joints.block_b.tolist(), strict=True))}
         numbers = [pairs.get((a, b), -1) for a, b in mechanism.sliding.tolist()]
         sliding = np.broadcast_to(points[:1], (len(numbers), 2, 3)) if numbers else np.zeros((0, 2, 3))
-    marks = [(1, -1)] * len(hinges) + [(2, number) for number in numbers]
-    return np.concatenate([hinges, sliding]), np.array(marks, dtype=np.int32).reshape(-1, 2)
+    crushing = points[mechanism.crushing_points][:, None].repeat(2, axis=1)
+    marks = [*[(1, -1)] * len(hinges), *[(2, number) for number in numbers], *[(3, -1)] * len(crushing)]
+    return np.concatenate([hinges, sliding, crushing]), np.array(marks, dtype=np.int32).reshape(-1, 2)
 
 
 def _nothing(columns: int) -> list[np.ndarray]:

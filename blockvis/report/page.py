@@ -283,6 +283,9 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
     else:
         own = _model_in_plane(response, shown, None if fall is None else fall.ground)
     roles = {role: number for number, role in enumerate(mechanics.ROLES)}
+    if not response.settlements:
+        # Supports for moving hold the others where nothing settles.
+        roles[mechanics.MOVING] = roles[mechanics.FIXED]
     fills = palette.block_colours(assembly.materials, assembly.free)
     return own | {
         "space": assembly.dimension == 3,
@@ -303,7 +306,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
             name: palette.hexadecimal(getattr(palette, name.upper()))
             for name in (
                 "ink", "outline", "support", "moving", "hatch", "open", "sliding", "force", "hinge", "settlement",
-                "warning", "live",
+                "crushing", "warning", "live",
             )
         },
         "frames": _frames(response, frames),
@@ -325,17 +328,16 @@ def _model_in_plane(response: solver.Response, shown: list[solver.Increment], gr
     tied = DrawnTies(response).ends([shown[0].pose, shown[-1].pose])
     heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, 2)
     frame = frame.holding(np.concatenate([live.tails, tied, heads]))
-    model = model_of_frames(response, joints, shown, frame, largest)
+    model = model_of_frames(response, joints, shown, frame, largest, live)
     origin, unit = np.array(model["origin"]), model["unit"]
     own = {
         "offsets": deflated(assembly.offsets, len(assembly.offsets)),
         "joint_ends": deflated(rounded(joints.ends - origin, unit), len(joints)),
     }
     return model | {
-        "live_words": live.words if live.largest > 0.0 else "",
         "ground": None if ground is None else float(ground - origin[1]),
         "fill": _fill(response, shown, origin, FILL_ARROW * float(frame.size.max())),
-        "packed": model["packed"] | own | _packed_live(live, shown, origin, unit),
+        "packed": model["packed"] | own,
     }
 
 
@@ -385,20 +387,6 @@ def _thinned(increments: tuple[solver.Increment, ...], most: int) -> list[solver
     last = max((k for k, i in enumerate(increments) if i.status == solver.Status.EQUILIBRIUM), default=0)
     chosen = np.unique([*np.linspace(0, len(increments) - 1, most - 1).round().astype(int), last])
     return [increments[k] for k in chosen]
-
-
-def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
-    """Arrows of the live load, frame after frame; no more than their first numbers where there are none."""
-    found = [
-        live.arrows(increment, increment.pose) if live.largest > 0.0 else (np.zeros((0, 2)),) * 2 for increment in shown
-    ]
-    first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()
-    tails, tips = (np.concatenate([np.zeros((0, 2)), *ends]) for ends in zip(*found, strict=True))
-    return {
-        "live_first": deflated(first, len(first)),
-        "live_tail": deflated(rounded(tails - origin, unit), first[-1]),
-        "live_tip": deflated(rounded(tips - origin, unit), first[-1]),
-    }
 
 
 def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, Any]]:

@@ -2,7 +2,6 @@
   const travel = scaled("travel", q), turn = scaled("turn", model.turn_unit);
   const joints = { blocks: raw.joint_blocks, ends: scaled("joint_ends", q), n: model.packed.joint_blocks.rows };
   const forces = { place: scaled("force_place", q), vector: scaled("force_vector", model.force_unit), blocks: raw.force_blocks, first: raw.force_first };
-  const live = { tail: scaled("live_tail", q), tip: scaled("live_tip", q), first: raw.live_first };
   const marks = { place: scaled("mark_place", q), kind: raw.mark_kind, first: raw.mark_first };
   const jointsOf = Array.from({ length: nBlocks }, () => []);
   for (let j = 0; j < joints.n; j++) { jointsOf[joints.blocks[2 * j]].push(j); jointsOf[joints.blocks[2 * j + 1]].push(j); }
@@ -196,8 +195,9 @@
       if (layers.sliding) drawSliding(pen, near);
       if (!falling) drawForces(pen, near);
       if (layers.forces && model.fill && !falling) drawFillLoad(pen, near);
-      if (layers.hinges) drawHinges(pen, near);
-      drawLive(pen, near);
+      if (layers.hinges) drawDots(pen, near, 1, model.colours.hinge, "#fff");
+      drawDots(pen, near, 3, model.colours.crushing, model.colours.hinge);
+      drawLive(pen, near, ([x, y]) => [px(x), py(y)]);
     }
     drawTies(pen, near, colours, ([x, y]) => [px(x), py(y)]);
     scaleBar(pen, w, h, colours);
@@ -238,12 +238,11 @@
     return met.filter((of) => of.length === 2).map(([i, j]) => [forces.place[2 * i], forces.place[2 * i + 1], forces.place[2 * j], forces.place[2 * j + 1]]);
   }
 
-  function drawHinges(pen, k) {
+  function drawDots(pen, k, kind, fill, rim) {
     const radius = Math.max(2.2, Math.min(6.5, 0.09 * model.block_size * state.view.scale));
     for (let i = marks.first[k]; i < marks.first[k + 1]; i++) {
-      if (marks.kind[i] !== 1) continue;
-      pen.beginPath(); pen.arc(px(marks.place[4 * i]), py(marks.place[4 * i + 1]), radius, 0, 2 * Math.PI);
-      pen.fillStyle = model.colours.hinge; pen.strokeStyle = "#fff"; pen.lineWidth = 1.5; pen.stroke(); pen.fill();
+      if (marks.kind[i] !== kind) continue;
+      spot(pen, px(marks.place[4 * i]), py(marks.place[4 * i + 1]), radius, fill, rim);
     }
   }
 
@@ -253,11 +252,6 @@
     pen.strokeStyle = model.colours.sliding; pen.lineWidth = 3.5; pen.lineCap = "round"; lineBetween(pen, ends);
   }
 
-  function drawLive(pen, k) {
-    for (let i = live.first[k]; i < live.first[k + 1]; i++) {
-      arrow(pen, px(live.tail[2 * i]), py(live.tail[2 * i + 1]), px(live.tip[2 * i]), py(live.tip[2 * i + 1]), model.colours.live, 2.5);
-    }
-  }
   const world = (x, y) => [(x - state.view.x) / state.view.scale, (state.view.y - y) / state.view.scale];
 
   function blockAt(x, y) {

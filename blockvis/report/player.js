@@ -64,6 +64,17 @@
     return `rgb(${low.map((v, i) => Math.round(v + (high[i] - v) * (at - k))).join(",")})`;
   }
 
+  const live = { tail: scaled("live_tail", q), tip: scaled("live_tip", q), first: raw.live_first };
+  function drawLive(pen, k, onPage) {
+    const d = model.space ? 3 : 2, place = (of, i) => onPage(of.slice(d * i, d * i + d));
+    for (let i = live.first[k]; i < live.first[k + 1]; i++) arrow(pen, ...place(live.tail, i), ...place(live.tip, i), model.colours.live, 2.5);
+  }
+
+  function spot(pen, x, y, radius, fill, rim) {
+    pen.beginPath(); pen.arc(x, y, radius, 0, 2 * Math.PI);
+    pen.fillStyle = fill; pen.strokeStyle = rim; pen.lineWidth = 1.5; pen.stroke(); pen.fill();
+  }
+
   function arrow(pen, x0, y0, x1, y1, colour, width) {
     const length = norm(x1 - x0, y1 - y0), ux = (x1 - x0) / length, uy = (y1 - y0) / length, head = Math.min(3.6 * width, 0.6 * length);
     if (length < 2) return;
@@ -176,6 +187,7 @@
     if (state.cracks && model.space) add("ramp", `open joint, to ${+(1000 * model.widest_crack).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.cracks.join(",")})`);
     else if (state.cracks) add("area", "open joint", model.colours.open);
     if (layers.hinges && marked && countOf(k, 1)) add(model.space ? "line" : "dot", model.space ? "hinge, faint where hidden" : "hinge", model.colours.hinge);
+    if (marked && countOf(k, 3)) add("dot", "crushing", model.colours.crushing);
     if (layers.sliding && marked && countOf(k, 2)) add("line", "sliding joint", model.colours.sliding);
     if (layers.forces && marked && !falling && model.has_forces) add("line", "resultant of a joint", model.colours.force);
     if (layers.thrust && marked && !falling && thrustLine(k).length) add("line", "thrust line", model.colours.force);
@@ -483,8 +495,12 @@
   const HEAD = 34;
   function caption(pen, w) {
     const k = Math.min(Math.round(state.frame), nFrames - 1), falling = model.frames[k].falling;
-    pen.fillStyle = LIGHT.ink; pen.font = `16px ${FONT}`; pen.textAlign = "left"; pen.textBaseline = "middle";
-    pen.fillText(model.frames[k].caption + (falling ? `  ·  ${$("badge").textContent}` : ""), 14, HEAD / 2);
+    const text = model.frames[k].caption + (falling ? `  ·  ${$("badge").textContent}` : ""), ruler = canvas.getContext("2d");
+    // Smaller where the screen is narrow: a number that is cut off reads as another number.
+    ruler.font = `16px ${FONT}`;
+    const size = Math.min(16, (16 * (w - 28)) / ruler.measureText(text).width);
+    pen.fillStyle = LIGHT.ink; pen.font = `${size}px ${FONT}`; pen.textAlign = "left"; pen.textBaseline = "middle";
+    pen.fillText(text, 14, HEAD / 2);
   }
   function shifted(work) {
     state.view.y += HEAD;
@@ -495,14 +511,14 @@
     const target = document.createElement("canvas"), w = canvas.clientWidth, h = canvas.clientHeight + HEAD, pen = target.getContext("2d");
     target.width = 2 * w; target.height = 2 * h;
     pen.scale(2, 2); pen.fillStyle = LIGHT.paper; pen.fillRect(0, 0, w, h);
-    shifted(() => paint(pen, w, h, LIGHT));
+    shifted(() => paint(pen, w, h, LIGHT, HEAD));
     caption(pen, w);
     target.toBlob((blob) => save(blob, fileName(`_${Math.round(state.frame)}.png`)), "image/png");
   });
   $("svg").addEventListener("click", () => {
     const w = canvas.clientWidth, h = canvas.clientHeight + HEAD, pen = new SvgPen();
     pen.fillStyle = LIGHT.paper; pen.fillRect(0, 0, w, h);
-    shifted(() => paint(pen, w, h, LIGHT));
+    shifted(() => paint(pen, w, h, LIGHT, HEAD));
     caption(pen, w);
     const text = `<svg xmlns="http://www.w3.org/2000/svg" width="${w}" height="${h}" viewBox="0 0 ${w} ${h}">\n${pen.out.join("\n")}\n</svg>\n`;
     save(new Blob([text], { type: "image/svg+xml" }), fileName(`_${Math.round(state.frame)}.svg`));

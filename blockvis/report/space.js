@@ -285,8 +285,8 @@
     return lines;
   }
 
-  // Everything in the picture.
-  function paint(pen, w, h, colours) {
+  // Everything in the picture, below a head of so many pixels.
+  function paint(pen, w, h, colours, head = 0) {
     const near = Math.min(Math.round(state.frame), nFrames - 1), falling = model.frames[near].falling, sharpness = Math.abs(pen.getTransform().a);
     state.cracks = 0;
     if (gl) {
@@ -296,9 +296,13 @@
       drawSolid(w, h, colours, near, falling);
       pen.drawImage(glass, 0, 0, w, h);
     }
-    if (state.magnify === 1 && Math.abs(state.frame - near) < 0.5 && !falling) drawForces(pen, near);
+    if (state.magnify === 1 && Math.abs(state.frame - near) < 0.5) {
+      if (!falling) drawForces(pen, near);
+      drawLive(pen, near, onPage);
+      for (let i = marks.first[near]; i < marks.first[near + 1]; i++) if (marks.kind[i] === 3) spot(pen, ...onPage(marks.place.slice(6 * i, 6 * i + 3)), 5, model.colours.crushing, model.colours.hinge);
+    }
     drawTies(pen, near, colours, onPage);
-    axesOfDrawing(pen, w, colours);
+    axesOfDrawing(pen, w, head, colours);
     scaleBar(pen, w, h, colours);
   }
 
@@ -325,8 +329,8 @@
   }
 
   // The axes of the drawing, in the upper right corner.
-  function axesOfDrawing(pen, w, colours) {
-    const [right, up] = axes(), x0 = w - 44, y0 = 46;
+  function axesOfDrawing(pen, w, head, colours) {
+    const [right, up] = axes(), x0 = w - 44, y0 = head + 46;
     pen.strokeStyle = pen.fillStyle = colours.ghost; pen.lineWidth = 1.5; pen.font = `13px ${FONT}`; pen.textAlign = "center"; pen.textBaseline = "middle";
     ["x", "y", "z"].forEach((name, c) => {
       const dx = right[c], dy = -up[c];

@@ -9,6 +9,7 @@ import numpy as np
 import solver
 from blockvis.pictures import palette
 from blockvis.pictures.backfill import FillBodies, fill_bodies
+from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.solid_view import chosen_view
 from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import Swing
@@ -37,8 +38,9 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
     joints = initial_joints(assembly)
     frame, largest, widest = surveyed(assembly, joints, shown)
     bodies = [fill_bodies(response, increment.pose, increment.fallen) for increment in shown]
-    frame = frame.holding(np.concatenate([fill.heads.reshape(-1, 3) for fill in bodies]))
-    model = model_of_frames(response, joints, shown, frame, largest)
+    live = LiveLoads(response, shown, float(frame.size.max()))
+    frame = frame.holding(np.concatenate([live.tails, *(fill.heads.reshape(-1, 3) for fill in bodies)]))
+    model = model_of_frames(response, joints, shown, frame, largest, live)
     triangles, _ = triangles_of(shapes)
     edges, rings = sharp_edges(shapes), joints.rings
     corners = rounded(rings.points - np.array(model["origin"]), model["unit"])

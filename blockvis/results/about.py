@@ -138,11 +138,12 @@ def mechanism_text(response: solver.Response) -> str:
 
 
 def counts_text(mechanism: mechanics.Mechanism) -> str:
-    """Count the moving parts, hinges and sliding joints of a mechanism."""
+    """Count the moving parts, hinges, sliding and crushing joints of a mechanism."""
     counted = (
         (len(mechanism.motions), "moving part"),
         (len(mechanism.hinges), "hinge"),
         (len(mechanism.sliding), "sliding joint"),
+        (len(mechanism.crushing), "crushing joint"),
     )
     return ", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in counted if n)
 

@@ -167,7 +167,9 @@ def _draw_swing(axes: Axes, place: int, swing: Swing, centre: float, factor: flo
         axes.errorbar(factor * mean, place, xerr=factor * error, color="#333333", linewidth=1.0, capsize=3, zorder=3)
         # Of a parameter without effect the two values stand to both sides.
         outwards = side if np.isclose(factor * mean, centre, rtol=1e-9) else 1 if factor * mean > centre else -1
-        edge = factor * (mean + outwards * (0.0 if np.isnan(error) else error))
+        # Beyond the errors of both ends, which lie in one line: one of them would strike the value through.
+        reaches = [mean, *(of + outwards * about for of, _, about, _ in ends if not np.isnan(about))]
+        edge = factor * (max(reaches) if outwards > 0 else min(reaches))
         words = textwrap.shorten(value, 16) if isinstance(value, str) else rounded_text(value)
         axes.annotate(
             words, (edge, place), xytext=(6 * outwards, 0), textcoords="offset points", va="center",

@@ -40,7 +40,7 @@ from solver.ties import (
     tie_ends,
     tie_lengths,
 )
-from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
+from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION, USED_UP
 from solver.words import checked, counted, plain
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
@@ -469,11 +469,11 @@ class _Problem:
             live_force=self.live_force,
             programs=programs,
             torsion=POINTS if self.faces is None else UNIFORM,
-            held=self._held(forces * self.force, mechanism),
+            held=self._held(forces * self.force, mechanism, state.forces[:, 0] >= self.crushing * (1.0 - USED_UP)),
         )
 
-    def _held(self, forces: np.ndarray, mechanism: np.ndarray) -> State:
-        """The arrays of a limit load, from forces [N]."""
+    def _held(self, forces: np.ndarray, mechanism: np.ndarray, at_strength: np.ndarray) -> State:
+        """The arrays of a limit load, from forces [N], and which points carry their compressive strength."""
         between, on_blocks = ~is_member(self.contacts), block_forces(self.contacts, self.pose, forces)
         contacts = self.contacts[between]
         return State(
@@ -486,6 +486,7 @@ class _Problem:
             support_forces=np.where(self.assembly.free[:, None], 0.0, on_blocks),
             fell_at=np.where(self.gone, -np.inf, np.nan) if self.gone.any() else np.zeros(0),
             ties=plastic_forces(self.ties, self.assembly, self.pose, self.contacts, forces, self.tie_states),
+            crushing=at_strength[between] if np.isfinite(self.crushing[between]).any() else at_strength[:0],
         )
 
 

@@ -126,6 +126,8 @@ class State:
         Part of the joint, at rest, that its mortar or its springs stand for; empty for dry rigid joints.
     unloaded : (n_contacts,) array [m]
         Gap at which an elastic joint has no force, as :attr:`Bonds.rest`; empty for rigid joints.
+    crushing : (n_contacts,) bool array
+        Which contact points carry their compressive strength; empty where no joint has one.
     """
 
     pose: Pose
@@ -140,6 +142,7 @@ class State:
     intact: np.ndarray = field(default_factory=lambda: np.zeros(0))
     bonded: np.ndarray = field(default_factory=lambda: np.zeros(0))
     unloaded: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    crushing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 class StoredState(Protocol):

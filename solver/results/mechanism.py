@@ -1,4 +1,4 @@
-"""Mechanism: macro-blocks, and the hinges and sliding joints between them."""
+"""Mechanism: macro-blocks, and the hinges, sliding and crushing joints between them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NAMED = 8
 class Mechanism:
     """The mechanism in the motion that follows an increment.
 
-    Hinges and sliding joints are pairs of blocks, not contact points, that move noticeably beside the fastest block.
+    Joints are pairs of blocks, not contact points, that move noticeably beside the fastest block.
 
     Attributes
     ----------
@@ -29,12 +29,13 @@ class Mechanism:
         Macro-block of each block, largest first; -1 for blocks at rest.
     motions : (n_parts, n_dof) array
         Velocity of the centroid of each macro-block and its angular velocity, in the scale of the increment.
-    hinges, sliding : (n, 2) int arrays
-        Pairs of blocks between which macro-blocks turn about a point, or slide along a joint.
+    hinges, sliding, crushing : (n, 2) int arrays
+        Pairs of blocks between which macro-blocks turn about a point, slide along a joint, or come closer at their
+        compressive strength; a joint that crushes is no hinge, as it presses where it does not turn.
     hinge_points : (n_hinges,) int array
         The contact point about which each hinge turns; of several the one that carries most.
-    sliding_points : (k,) int array
-        The contact points that slide, of all sliding joints.
+    sliding_points, crushing_points : (k,) int arrays
+        The contact points that slide or crush, of all joints.
     names : tuple of str
         Of the blocks.
     """
@@ -43,15 +44,17 @@ class Mechanism:
     motions: np.ndarray
     hinges: np.ndarray
     sliding: np.ndarray
+    crushing: np.ndarray
     hinge_points: np.ndarray
     sliding_points: np.ndarray
+    crushing_points: np.ndarray
     names: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Count the macro-blocks, and name the hinges and sliding joints."""
+        """Count the macro-blocks, and name the hinges, sliding and crushing joints."""
         n = len(self.motions)
         words = [f"{n} macro-block{'' if n == 1 else 's'}"]
-        for what, pairs in (("hinge", self.hinges), ("sliding", self.sliding)):
+        for what, pairs in (("hinge", self.hinges), ("sliding", self.sliding), ("crushing", self.crushing)):
             if len(pairs) == 0:
                 continue
             several = "hinges" if what == "hinge" and len(pairs) > 1 else what
@@ -83,7 +86,7 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
 
 
 def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
-    """Find the mechanism in the motion that follows an increment: macro-blocks, hinges, sliding joints.
+    """Find the mechanism in the motion that follows an increment: macro-blocks, hinges, sliding and crushing joints.
 
     Notes
     -----
@@ -106,11 +109,17 @@ def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
     turns = closed & at_rest(opening, slow) & at_rest(slip, slow) & ~at_rest(spin * assembly.block_size, slow)
     slips = closed & slides(slip, opening, increment.friction, slow)
     carrying = carries(increment.forces)
+    at_strength = increment.state.crushing
+    crushes = closed & carrying & (opening < -slow) & (at_strength if len(at_strength) else False)
     if carrying.any():
         slips &= carrying
-    hinges, hinge_points = _joints(contacts, np.flatnonzero(turns), increment.forces[:, 0])
-    sliding, _ = _joints(contacts, np.flatnonzero(slips), increment.forces[:, 0])
-    return Mechanism(parts, motions, hinges, sliding, hinge_points, np.flatnonzero(slips), assembly.names)
+    of_pair = contacts.pair_keys()
+    turns &= ~np.isin(of_pair, of_pair[crushes])
+    slipping, crushing = np.flatnonzero(slips), np.flatnonzero(crushes)
+    (hinges, points), (sliding, _), (crushed, _) = (
+        _joints(contacts, chosen, increment.forces[:, 0]) for chosen in (np.flatnonzero(turns), slipping, crushing)
+    )
+    return Mechanism(parts, motions, hinges, sliding, crushed, points, slipping, crushing, assembly.names)
 
 
 def _joints(contacts: Contacts, chosen: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -511,7 +511,8 @@ MOVING = '[[loads]]\nkind = "live"\nforce = [0.0, -1.0]\npositions = {}\n'
         (PUSHED.replace('"block 1"', '"blok 1"'), ["[control] block 'blok 1' is no block", "did you mean 'block 1'"]),
         (PUSHED.replace('"block 1"', '"ground"'), ["[control] block 'ground' is a support", "block 1"]),
         (PUSHED.replace("[1.0, 0.0]\npoint", "[-1.0, 0.0]\npoint"), ["the mechanism does not move block 'block 1'"]),
-        (PUSHED[: PUSHED.index("[control]")], ["[control] is missing"]),
+        (PUSHED[: PUSHED.index("[control]")], ["[control] is missing", "in space [1, 0, 0]"]),
+        (LIMIT + '[output]\nanimation = "none"\n' + SIDEWAYS, ["animation is 'none'", "false for none"]),
         (PUSHED + MOVING.format("[0.05, 0.15, 2]"), ["[loads 2] positions belong to"]),
     ],
 )

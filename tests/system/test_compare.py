@@ -65,6 +65,22 @@ def test_both_pictures_of_a_settlement_have_one_unit(arch_results, other, tmp_pa
     assert titles == [f"Settlement {at} m" for at in ("0.0200", "0.0400", "0.0600") for _ in range(2)]
 
 
+@pytest.mark.parametrize("name", ["both.gif", "both.webp"])
+def test_one_layout_has_one_scale_and_moving_pictures_are_no_videos(name, arch_results, other, tmp_path, monkeypatch):
+    """Openings are to be compared by eye, and no browser plays a .gif as a video."""
+    scales, blank = [], Image.new("RGB", (800, 620))
+    picture = "blockvis.pictures.drawer.Drawer.picture"
+    monkeypatch.setattr(picture, lambda drawer, *of, **look: scales.append(drawer.scene.pixel) or blank)
+    film = "blockvis.comparison.write.film_in_step"
+    monkeypatch.setattr(film, lambda found, path, progress: path.write_bytes(b""))
+    further = blockvis.write(arch_response(), tmp_path / "falls")
+    assert main(["compare", str(further), str(other), "-o", str(tmp_path / "both"), "--animation", name]) == 0
+    assert len(set(scales)) == 1
+    page = (tmp_path / "both" / "compare.html").read_text(encoding="utf-8")
+    assert f'<img src="{name}"' in page
+    assert "<video controls" not in page
+
+
 def test_between_rest_and_the_first_increment_no_reaction_is_told(tmp_path, monkeypatch):
     """The reaction leaves that at rest at once: a line from there gave one path two reactions, by its increments."""
     titles, blank, folders = [], Image.new("RGB", (800, 620)), []

@@ -284,6 +284,22 @@ def test_what_is_seen_can_be_saved(tmp_path):
 
 
 @browser
+def test_on_narrow_screens_the_title_of_a_saved_picture_is_whole(tmp_path):
+    page = write_report(arch_response(), tmp_path / "report.html")
+    script = """const saved = []; URL.createObjectURL = (blob) => { saved.push(blob); return "#"; };
+      canvas.style.width = "200px"; window.dispatchEvent(new Event("resize")); await paused(100); press("svg");
+      const title = new DOMParser().parseFromString(await saved[0].text(), "image/svg+xml").querySelectorAll("text");
+      const text = [...title].at(-1), pen = document.createElement("canvas").getContext("2d");
+      pen.font = `${text.getAttribute("font-size")}px ${text.getAttribute("font-family")}`;
+      out.width = canvas.clientWidth;
+      out.title = pen.measureText(text.textContent).width; out.text = text.textContent;"""
+    found = told(page, tmp_path, script)
+    assert found["width"] < 320, found
+    assert found["text"].startswith("Settlement ")
+    assert 14 + found["title"] <= found["width"]
+
+
+@browser
 def test_dark_rooms_get_a_dark_page_and_those_who_ask_get_less_motion(tmp_path):
     page = write_report(arch_response(), tmp_path / "report.html")
     for name, options in (("light", ()), ("dark", ("--blink-settings=preferredColorScheme=0",))):

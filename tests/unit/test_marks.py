@@ -83,6 +83,13 @@ def test_sliding_and_pressing_leave_none():
     assert len(cracks(*stacked(shift=(0.0, -0.05)))) == 0
 
 
+def test_where_blocks_lie_in_each_other_there_is_no_crack():
+    """Turned about the middle of its face: only the half that gapes is a crack."""
+    found = cracks(*stacked(shift=(-0.5 * np.sin(0.2), 0.5 * np.cos(0.2) - 0.5), turn=0.2))
+    assert len(found) == 1
+    np.testing.assert_allclose(area(found[0]), 0.125 * np.sin(0.2), rtol=0.05)
+
+
 def test_blocks_that_have_parted_have_no_joint():
     assert len(cracks(*stacked(shift=(0.0, 1.6)))) == 0
     assert len(cracks(*stacked(shift=(0.0, 0.4)))) == 1

@@ -11,7 +11,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from structures import BENT, alike, arch_response, box, parted, pixels, rectangle, wall
+from structures import BENT, alike, arch_response, box, parted, pixels, rectangle, report_of, wall
 
 import solver
 from blockvis import animate, draw_mechanism, draw_still, generators
@@ -162,6 +162,38 @@ def test_options_change_the_picture(tmp_path):
     assert alike(drawn["thrust"], palette.FORCE).sum() > 200
     scale = drawn["displacement"][:, 560:]
     assert all(alike(scale, colour).any() for colour in palette.RAMP[1:-1])
+
+
+def test_magnified_blocks_have_no_points_of_contact(tmp_path, monkeypatch):
+    """They would float in the air between blocks that are drawn apart."""
+    keys, composed = [], Sheet.composed
+    monkeypatch.setattr(Sheet, "composed", lambda *of, **look: keys.extend(look["keys"]) or composed(*of, **look))
+    response = arch_response()
+    options = {"size": SMALL, "magnification": 2.0, "forces": "points"}
+    picture = pixels(draw_still(response, len(response.path) - 1, tmp_path / "a.png", **options))
+    assert not alike(picture, palette.FORCE).any()
+    assert alike(picture, palette.OPEN).any()
+    told = "hinges, sliding joints and forces are shown at true scale only"
+    assert [key.text for key in keys] == ["open joint", told]
+
+
+def test_in_space_the_mechanism_is_said_to_be_drawn_moved_on(tmp_path, monkeypatch):
+    """Blocks stand off the equilibrium that the title gives; and nothing settles, so no support is."""
+    seen, composed = [], Sheet.composed
+    monkeypatch.setattr(Sheet, "composed", lambda *of, **look: seen.append(look) or composed(*of, **look))
+    solids = [box((-1, -1, -0.4), (1, 1, 0)), box((-0.2, -0.2, 0), (0.2, 0.2, 1))]
+    column = solver.Assembly.from_solids(solids, roles=["moving", "free"])
+    push = solver.Loads(solver.self_weight(column).dead, solver.weight_fraction(column, (1.0, 0.0, 0.0)))
+    response = solver.limit_load(column, loads=push, friction_coefficient=0.9).response
+    draw_mechanism(response, tmp_path / "a.png", size=SMALL)
+    assert seen[0]["badge"] == "MECHANISM · pseudo-motion"
+    assert [key.text for key in seen[0]["keys"]][-2:] == [
+        "motion, blocks drawn after it (not to scale)",
+        "at equilibrium",
+    ]
+    report = report_of(response).replace(" ", "")
+    assert '"roles":[1,0]' in report
+    assert '"live_words":""' not in report
 
 
 def test_mechanism_shows_parts_and_motion(tmp_path):

@@ -4,8 +4,9 @@ import re
 
 import numpy as np
 import pytest
-from structures import case_from, drawn, prism, rectangle, run_command
+from structures import alike, box, case_from, drawn, pixels, prism, rectangle, run_command
 
+import blockvis
 import solver
 from blockvis import generators
 from solver import mechanics
@@ -103,6 +104,30 @@ def test_a_block_heavier_than_its_joint_is_not_carried():
     assembly, interfaces, _ = block(compressive_strength=0.9 * weight / AREA)
     found = limit(assembly, interfaces, solver.weight_fraction(assembly, (1.0, 0.0), np.array([0])))
     assert found.status is solver.LimitStatus.NO_EQUILIBRIUM
+
+
+@pytest.mark.parametrize("in_space", [False, True])
+def test_what_crushes_is_told_and_marked_where_it_presses(in_space, tmp_path):
+    """The block turns about its heel, which keeps its place: a dot there would put the force on the wrong side."""
+    _, _, weight = block(2.0)
+    assembly, interfaces, _ = block(2.0, friction_coefficient=2.0, compressive_strength=1.5 * weight / AREA)
+    if in_space:
+        solids = [box((0, 0, 0), (WIDTH, THICKNESS, 2)), box((-1, -1, -1), (2, 1, 0))]
+        assembly = solver.Assembly.from_solids(solids, roles=["free", "fixed"], names=["block", "ground"])
+    live = solver.weight_fraction(assembly, np.eye(assembly.dimension)[0], np.array([0]))
+    found = limit(assembly, interfaces, live)
+    blockvis.write(found.response, tmp_path / "out")
+    response = blockvis.open_results(tmp_path / "out")
+    mechanism = mechanics.mechanism_of(assembly, response.path[0])
+    assert str(mechanism) == "1 macro-block; crushing at block | ground"
+    np.testing.assert_allclose(response.path[0].contacts.points[mechanism.crushing_points, 0], WIDTH)
+    assert f'"{mechanism}"' in (tmp_path / "out" / "summary.json").read_text(encoding="utf-8")
+    picture = pixels(blockvis.draw_mechanism(response, tmp_path / "mechanism.png", size=(640, 360)))
+    rows, columns = alike(picture[60:300], (255, 193, 7)).nonzero()
+    assert len(rows) > 10
+    if not in_space:
+        assert np.ptp(columns) < 20
+    assert "1 moving part, 1 crushing joint" in blockvis.write_report(response, tmp_path / "r.html").read_text()
 
 
 def test_a_press_crushes_at_the_strength_of_the_joint():

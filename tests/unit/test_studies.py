@@ -539,6 +539,23 @@ def test_means_with_runs_that_stood_are_the_least_that_they_may_be(tmp_path):
     assert f"at least: {mechanics.counted(int(stood.sum()), 'run')} stood" in drawn
 
 
+def test_no_error_strikes_a_value_through(tmp_path, monkeypatch):
+    """Both ends of a swing lie in one line: each value stands beyond the errors of both."""
+    study, reach, beside = _study(runs=24), {-1: {}, 1: {}}, []
+
+    def errorbar(axes, x, y, xerr, **look):
+        for side, found in reach.items():
+            found[y] = max(found.get(y, -np.inf), side * x + xerr)
+
+    monkeypatch.setattr("matplotlib.axes.Axes.errorbar", errorbar)
+    monkeypatch.setattr("matplotlib.axes.Axes.annotate", lambda *of, xytext, **look: beside.append((*of[2], xytext[0])))
+    outcome = np.random.default_rng(1).exponential(size=24)
+    pictures.draw_sensitivity(study, _table(study, outcome), tmp_path / "sensitivity.svg")
+    sides = [(int(np.sign(away)), x, y) for x, y, away in beside]
+    assert len(sides) == 4
+    assert all(side * x >= reach[side][y] - 1e-9 for side, x, y in sides), (sides, reach)
+
+
 def test_where_nothing_ever_stands_displacements_are_drawn_without_words_of_matplotlib(tmp_path):
     study = _study(runs=8)
     table = _table(study, np.zeros(8), ["no initial equilibrium"] * 8)
