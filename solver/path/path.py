@@ -404,7 +404,8 @@ class Path:
         fast = error.moved > min(max(FAST * length / self.stepper.unit, NEAR), FAR)
         if not (fast or refining):
             return True
-        if self.checks.in_equilibrium(new, self.closed_gap):
+        # Of a live load that has viscosity in it more than a step may err by.
+        if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):
             return True
         # Blocks that the viscosity retards may come to rest nearby.
         return not refining and self.fall.relaxed(new, JUMP) is not None
