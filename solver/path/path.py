@@ -249,7 +249,7 @@ class Path:
                 message = "at a control displacement of 0 m no live load of this pattern moves the structure"
                 return Ending(Status.LOCKED, message)
             yield self.reports.falling_increment(place, np.zeros_like(model.load))
-            return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, self.reports.nothing_carried())
         if model.live is not None:
             first_state, _ = self.advance(state, self._onset())
             if first_state.place.multiplier <= 0.0:
