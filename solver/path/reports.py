@@ -146,7 +146,7 @@ class Reports:
             return "no live load of this pattern is carried"
         return (
             f"no live load of this pattern is carried as drawn, with the prestress alone ({', '.join(ties)}): where "
-            "they carry more before the live load acts, put a settlement before it, of 1e-6 m, in which they take that up"
+            "they carry more before the live load acts, put a settlement before it, of 1e-6 m, in which they do"
         )
 
     def jump(self, start: Pose, end: Pose) -> str:
