@@ -103,7 +103,11 @@ class Fall:
         # The first movement that is large against the compliance of the joints.
         sizes = [float(motion_size(frame.velocity, model.length).max()) for frame in frames]
         chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
-        velocity, largest = frames[chosen].velocity, max(sizes[chosen], 1e-300)
+        velocity = frames[chosen].velocity
+        if model.live is not None and beyond.velocity is not None and sizes[chosen] <= MECHANISM * model.length:
+            # Where blocks stand without the live load, the mechanism is that of the path at its end.
+            velocity = beyond.velocity
+        largest = max(float(motion_size(velocity, model.length).max()), 1e-300)
         multiplier, reaction = last.measured, None
         if upper_bound > last.place.s:
             reaction = multiplier if model.live is None else multiplier * model.live_force

@@ -32,10 +32,10 @@ class EquilibriumChecks:
     def __init__(self, stepper: Stepper) -> None:
         self.stepper, self.model, self.driver = stepper, stepper.model, stepper.driver
 
-    def in_equilibrium(self, place: Place, gap: float = COMPUTED_GAP) -> bool:
-        """Whether points with gaps up to this one [block sizes] hold a place, with some of a live load."""
+    def in_equilibrium(self, place: Place, gap: float = COMPUTED_GAP, part: float = 0.0) -> bool:
+        """Whether points with gaps up to this one [block sizes] hold a place with some, or a part, of its live load."""
         program = self._program(place, gap)
-        found = program.in_equilibrium()
+        found = program.in_equilibrium(max(part * place.multiplier * program.live_size - CARRIES, 0.0))
         self.stepper.programs += program.programs
         return found
 

@@ -249,7 +249,7 @@ class Path:
                 message = "at a control displacement of 0 m no live load of this pattern moves the structure"
                 return Ending(Status.LOCKED, message)
             yield self.reports.falling_increment(place, np.zeros_like(model.load))
-            return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, self.reports.nothing_carried())
         if model.live is not None:
             first_state, _ = self.advance(state, self._onset())
             if first_state.place.multiplier <= 0.0:
@@ -404,7 +404,8 @@ class Path:
         fast = error.moved > min(max(FAST * length / self.stepper.unit, NEAR), FAR)
         if not (fast or refining):
             return True
-        if self.checks.in_equilibrium(new, self.closed_gap):
+        # Of a live load that has viscosity in it more than a step may err by.
+        if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):
             return True
         # Blocks that the viscosity retards may come to rest nearby.
         return not refining and self.fall.relaxed(new, JUMP) is not None

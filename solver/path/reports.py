@@ -139,6 +139,16 @@ class Reports:
             "or a missing support"
         )
 
+    def nothing_carried(self) -> str:
+        """Message of a pushover without a start, with the members that carry no more than they are drawn with."""
+        ties = [f"{tie.kind} '{tie.name}' {tie.prestress:g} N" for tie in self.model.ties]
+        if not ties:
+            return "no live load of this pattern is carried"
+        return (
+            f"no live load of this pattern is carried as drawn, with the prestress alone ({', '.join(ties)}): where "
+            "they carry more before the live load acts, put a settlement before it, of 1e-6 m, in which they do"
+        )
+
     def jump(self, start: Pose, end: Pose) -> str:
         """Message that names the blocks of a jump, and how far they moved."""
         assembly = self.model.assembly

@@ -119,13 +119,13 @@ class StaticProgram:
             sticky = np.repeat(contacts.points[cohesion > 0.0], 2, axis=0)
             self.places = np.vstack([self.places, contacts.points[limited], sticky])
 
-    def in_equilibrium(self) -> bool:
-        """Whether an equilibrium within friction exists, with some of the live load where there is one."""
+    def in_equilibrium(self, least: float = 0.0) -> bool:
+        """Whether an equilibrium within friction exists, with more than so much of a live load, in block weights."""
         balanced, unbalanced = self.most_balanced()
         if unbalanced > FALLING_FRACTION or self.live_size == 0.0:
             return unbalanced <= FALLING_FRACTION
         most = self.bound(-1.0, balanced)
-        return most is None or self.value(most) > 0.0
+        return most is None or self.value(most) * self.live_size > least
 
     def bounds(self) -> EquilibriumBounds:
         """Bound the reaction or the multiplier of all equilibria within friction.

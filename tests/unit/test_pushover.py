@@ -1,3 +1,4 @@
+import json
 import pkgutil
 from functools import cache
 from itertools import pairwise
@@ -5,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+import blockvis
 import solver
 from blockvis import generators
 from solver import limit_load, mechanics, pushover
@@ -209,6 +211,21 @@ def test_without_friction_nothing_is_carried():
     )
 
 
+def test_what_stands_only_by_a_prop_without_prestress_is_refused_with_a_remedy():
+    """A beam on a pad at its left end and a prop, pressed down at its tip."""
+    outlines = [[[0, 0], [4, 0], [4, 0.3], [0, 0.3]], [[0, -1], [1, -1], [1, 0], [0, 0]]]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["free", "moving"], names=["beam", "pad"])
+    prop = solver.Tie("p", (0, None), ((3.0, 0.05), (3.0, -2.0)), stiffness=1e7, kind="prop")
+    loads = solver.Loads(
+        solver.self_weight(assembly).dead, solver.point_load(assembly, 0, (0.0, -1e3), point=(4.0, 0.3))
+    )
+    structure = solver.Structure(assembly, friction_coefficient=0.6, loads=loads, ties=[prop])
+    response = structure.pushover(solver.ControlDisplacement("beam", (0, -1), increment=0.002, limit=0.004))
+    assert response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
+    assert "the prestress alone (prop 'p' 0 N)" in response.message
+    assert "put a settlement before it, of 1e-6 m" in response.message
+
+
 @pytest.mark.slow
 def test_the_end_of_a_pushover_is_told_where_blocks_are_a_little_out_of_balance():
     opening = {"x": 0.25, "y": 0.0, "width": 0.5, "height": 0.7, "head": "flat arch"}
@@ -250,3 +267,70 @@ def test_a_program_that_fails_on_the_way_is_told_with_the_increment_before(monke
     response = pushover(assembly, control, loads=sideways(assembly), friction_coefficient=0.7)
     assert [increment.parameter for increment in response.path] == pytest.approx([0.0, 0.002, 0.004])
     assert response.message == "beyond a control displacement of 0.004 m: planted"
+
+
+#: Six stones cut from a wall, half of which stands on ground that moves: name, role, material, density, outline.
+CUT = [
+    ("s0", "free", "b", 1800, [[1.03, 0.0], [0.0, 0.0], [0.0, 0.61], [0.99, 0.65]]),
+    ("s1", "free", "b", 1800, [[0.99, 1.27], [1.95, 1.27], [1.95, 0.69], [1.02, 0.65]]),
+    ("s2", "free", "a", 1800, [[0.0, 0.61], [0.0, 1.27], [0.47, 1.27], [0.45, 0.63]]),
+    ("s3", "free", "a", 2400, [[0.47, 1.27], [0.99, 1.27], [1.02, 0.65], [0.45, 0.63]]),
+    ("s4", "free", "b", 2400, [[1.95, 0.69], [1.95, 0.0], [1.38, 0.0], [1.42, 0.67]]),
+    ("s5", "free", "b", 2400, [[1.38, 0.0], [1.03, 0.0], [0.99, 0.65], [1.42, 0.67]]),
+    ("gl", "fixed", "g", 2000, [[-0.3, -0.3], [0.98, -0.3], [0.98, 0], [-0.3, 0]]),
+    ("gr", "moving", "g", 2000, [[0.98, -0.3], [2.25, -0.3], [2.25, 0], [0.98, 0]]),
+]
+
+
+def pushed_stones(tmp_path, increment, limit):
+    keys = ("name", "role", "material", "density", "outline")
+    blocks = [dict(zip(keys, row, strict=True), thickness=0.6) for row in CUT]
+    layout = {"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}
+    (tmp_path / "stones.json").write_text(json.dumps(layout))
+    (tmp_path / "stones.toml").write_text(
+        f"""
+        geometry = {{file = "stones.json"}}
+        material = {{friction_coefficient = 0.786}}
+        interfaces = [
+            {{materials = ["a", "b"], friction_coefficient = 1.151}},
+            {{materials = ["a", "g"], friction_coefficient = 1.131}},
+        ]
+        analysis = {{kind = "pushover", falling_frames = 0}}
+        loads = [
+            {{blocks = "s4", force = [-654.98, -1190.5], point = [1.71, 0.36]}},
+            {{blocks = "s2", force = [-313.11, -4209.26], point = [0.26, 0.96]}},
+            {{blocks = "s5", moment = 194.69}},
+            {{kind = "live", weight_fraction = [1.0, 0.19]}},
+        ]
+        output = {{animation = false}}
+        [settlement]
+        increment = 0.01
+        limit = 0.02
+        direction = [2.35, -0.28]
+        rotation_centre = [1.4, 0.1]
+        rotation = 0.26
+        [control]
+        block = "s5"
+        direction = [1.0, 0.1]
+        point = [1.2, 0.34]
+        increment = {increment}
+        limit = {limit}
+        """
+    )
+    folder = tmp_path / "out"
+    return blockvis.run_case(tmp_path / "stones.toml", folder, overwrite=True, film=False, pictures=False).response
+
+
+@pytest.mark.slow
+def test_what_viscosity_alone_holds_is_not_on_the_path(tmp_path):
+    """The multiplier of the path was 0.97 where equilibrium allows 0.1, which was told as that of the last one."""
+    response = pushed_stones(tmp_path, 0.01, 0.01)
+    assert response.load_multiplier[-1] > 0.5
+
+
+@pytest.mark.thorough
+def test_where_nothing_falls_without_the_live_load_the_mechanism_is_that_of_the_path(tmp_path, monkeypatch):
+    """It was the give of the joints, scaled up; here the fall, back against the push, counts as such."""
+    monkeypatch.setattr("solver.path.collapse.MECHANISM", 1.0)
+    response = pushed_stones(tmp_path, 0.002, 0.04)
+    assert response.collapse.mechanism[response.assembly.index("s5"), 0] > 0.0
