@@ -145,6 +145,7 @@ def test_joints_open_on_one_side_and_carry_the_weight():
     assert opened > 0.05
 
 
+@pytest.mark.slow
 def test_contact_points_have_forces_and_slip_as_vectors():
     response = vault_response()
     assembly, last = response.assembly, response.path[-1]
