@@ -94,7 +94,7 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
     values, coloured = _values(image)
     wanted = None if background is None else _value(background, image, coloured)
     exact = _alike(values) >= EXACT and image.format != "JPEG"
-    found = _of_values(values, image) if exact else _of_noise(image)
+    found = _of_values(values, image, wanted) if exact else _of_noise(image)
     known = list(found.values)
     called = [f"#{value:06x}" if coloured else str(value) for value in known]
     if not exact:
@@ -242,8 +242,8 @@ def _alike(values: np.ndarray) -> float:
     return float(((first == values[1:, :-1]) & (first == values[:-1, 1:])).mean())
 
 
-def _of_values(values: np.ndarray, image: Image.Image) -> _Found:
-    """Find the labels of an exact image."""
+def _of_values(values: np.ndarray, image: Image.Image, wanted: int | None) -> _Found:
+    """Find the labels of an exact image; the value of a background that is asked for is one."""
     from scipy import ndimage
 
     known, inverse = np.unique(values, return_inverse=True)
@@ -257,7 +257,7 @@ def _of_values(values: np.ndarray, image: Image.Image) -> _Found:
         label = np.bincount(place[core], minlength=len(known)) > 0
         thin = ~label & (share >= THIN)
         if label.sum() == 2 and thin.any():
-            thin &= ~_half_covered(place, label, shown)
+            thin &= ~_half_covered(place, label, shown) | (known == wanted)
         # Many values of some share each are a blur, not lines between stones.
         label |= thin & (thin.sum() <= max(2, label.sum()))
         white = known[label & (known > 255)]
@@ -294,6 +294,9 @@ def _half_covered(place: np.ndarray, label: np.ndarray, shown: np.ndarray) -> np
 
     colours = shown.reshape(-1, shown.shape[2])[np.unique(place.ravel(), return_index=True)[1]]
     one, other = colours[label]
+    if np.abs(one - other).max() <= 2 * FLAT:
+        # Numbers of stones, as 1 and 3, not colours.
+        return np.zeros(len(label), dtype=bool)
     mixed = np.abs(colours - one).sum(axis=1) + np.abs(colours - other).sum(axis=1) <= np.abs(one - other).sum()
     beside = [ndimage.maximum_filter(place == k, 5) for k in np.flatnonzero(label)]
     both = np.bincount(place[beside[0] & beside[1]], minlength=len(label))

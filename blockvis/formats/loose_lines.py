@@ -188,21 +188,24 @@ def _without_mortar(found: Faces, reach: float) -> list[Note]:
     widths, areas = np.array([ring_width(ring) for _, ring in every]), shapely.area(shapes)
     order = np.argsort(widths)
     thin = widths < STRIP * widths[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())]
-    i, j = shapely.STRtree(shapes).query(shapes[thin], "dwithin", reach)
-    i = np.flatnonzero(thin)[i]
+    if not thin.any():
+        return []
+    i, j = shapely.STRtree(shapes).query(shapes, "dwithin", reach)
     beside, borders = shapely.buffer(shapes, reach), shapely.get_exterior_ring(shapes)
     along = shapely.length(shapely.intersection(borders[i], beside[j])) * (i != j)
     length, strip = shapely.length(borders), np.zeros(len(every), dtype=bool)
     # Where strips cross, what they share lies between strips.
     for _ in range(2):
-        strip = np.bincount(i, along * (~thin | strip)[j], len(every)) > BETWEEN * length
+        strip = thin & (np.bincount(i, along * (~thin | strip)[j], len(every)) > BETWEEN * length)
     if not strip.any():
         return []
     half = length[strip] / 2.0
     across = float(np.median(half - np.sqrt(np.maximum(half**2 - 4.0 * areas[strip], 0.0)))) / 2.0
     x, y = every[int(strip.argmax())][1].mean(axis=0)
     words = f"mortar: {counted(int(strip.sum()), 'strip')} {across:.3g} units wide between larger faces"
-    if strip.sum() < max(LEAST_STRIPS, MOSTLY * len(every)):
+    # Mortar parts the stones; between thin courses of tiles or slabs they touch each other.
+    beside_stones = np.bincount(i, along * ~strip[j], len(every))[~strip]
+    if strip.sum() < max(LEAST_STRIPS, MOSTLY * len(every)) or np.median(beside_stones) > 8.0 * reach:
         said = "count as blocks; if they are mortar, draw each joint as one line or leave them out (ignore)"
         return [Note(CHANGED, f"{words}, the first around ({x:.6g}, {y:.6g}), {said}")]
     for k in np.flatnonzero(strip):

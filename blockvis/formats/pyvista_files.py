@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 import warnings
@@ -55,24 +56,27 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     _check_counts(path)
     if path.suffix.lower() in (".pvd", ".vtm", ".vtmb"):
         _check_parts(path)
+    faults = pyvista.VtkErrorCatcher(send_to_logging=False)
+    data: Any = None
+    failed: Exception | None = None
+    # VTK would print every fault of a file to the terminal, and pyvista log it, as well.
+    logging.disable(logging.ERROR)
     try:
-        # VTK would print every fault of a file to the terminal as well.
-        with (
-            warnings.catch_warnings(),
-            pyvista.vtk_verbosity("off"),
-            pyvista.VtkErrorCatcher(send_to_logging=False) as faults,
-        ):
+        with warnings.catch_warnings(), pyvista.vtk_verbosity("off"), faults:
             warnings.simplefilter("ignore")
-            if path.suffix.lower() == ".pvd":
-                data: Any = pyvista.PVDReader(str(path)).read()
-            else:
-                data = pyvista.read(str(path))
+            # pyvista.read would take the errors of the reader itself from the catcher.
+            data = pyvista.get_reader(str(path)).read()
     except (OSError, ValueError, RuntimeError, KeyError, TypeError, AttributeError, IndexError, SyntaxError) as error:
-        raise ValueError(f"'{path}' cannot be read as {path.suffix} ({error}); export it again") from None
+        failed = error
+    finally:
+        logging.disable(logging.NOTSET)
     if faults.error_events:
         # At an array of a type that it does not know VTK leaves out all further ones and hands out the rest.
         reason = " ".join(faults.error_events[0].alert.split())[:200]
-        raise ValueError(f"'{path}' cannot be read whole by VTK ({reason}); save it as .vtu")
+        remedy = "save it as .vtu" if path.suffix.lower() == ".vtk" else "export it again"
+        raise ValueError(f"'{path}' cannot be read whole by VTK ({reason}); {remedy}")
+    if failed is not None:
+        raise ValueError(f"'{path}' cannot be read as {path.suffix} ({failed}); export it again") from None
     return found_in_dataset(data, path, reading.view)
 
 

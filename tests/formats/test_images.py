@@ -172,6 +172,18 @@ def test_lines_of_grey_between_stones_of_a_mask_stay_lines(tmp_path):
     assert read_layout(tmp_path / "wall.png", width=1.2, background=0).groups.count("label 255") == 4
 
 
+@pytest.mark.parametrize(("values", "joint", "background"), [((1, 3), 2, None), ((1, 3), 2, 2), ((0, 255), 128, 128)])
+def test_joints_a_pixel_wide_between_two_labels_are_no_half_covered_pixels(tmp_path, values, joint, background):
+    """Numbers of stones do not mix as colours do, and a background that is given is one."""
+    pixels = np.full((60, 120), joint, dtype=np.uint8)
+    for k in range(18):
+        row, column = divmod(k, 6)
+        pixels[20 * row : 20 * row + 19, 20 * column : 20 * column + 19] = values[(row + column) % 2]
+    Image.fromarray(pixels).save(tmp_path / "wall.png")
+    layout = read_layout(tmp_path / "wall.png", width=1.2, background=background)
+    assert [layout.groups.count(f"label {value}") for value in values] == [9, 9]
+
+
 @pytest.mark.parametrize("ending", ["png", "tif"])
 def test_a_noisy_mask_of_16_bits_is_that_of_8(tmp_path, ending):
     image, n = drawn_wall(gap=6)

@@ -296,6 +296,19 @@ def test_few_strips_between_lines_stay_blocks_and_are_told(tmp_path):
     )
 
 
+def test_courses_of_tiles_between_stones_that_touch_stay_blocks_and_are_told(tmp_path):
+    """Lines are single here: a course of tiles is as thin as mortar, but no stone is parted by it from its course."""
+    lines, low = [((0, 0), (3000, 0))], 0
+    for course in range(5):
+        high, step = (40, 300) if course % 2 else (300, 500)
+        lines += [((x, low), (x, low + high)) for x in range(0, 3001, step)]
+        low += high
+        lines.append(((0, low), (3000, low)))
+    drawing = read_layout(dxf(tmp_path, lambda space: [space.add_line(a, b) for a, b in lines]))
+    assert drawing.n_blocks == 3 * 6 + 2 * 10
+    assert any("mortar: 20 strips 40 units wide" in note and "count as blocks" in note for note in drawing.notes)
+
+
 def test_an_outline_whose_ends_miss_by_little_is_closed_with_a_note(tmp_path):
     ring = [(0, 0), (240, 0), (240, 65), (0, 65), (0, 0.01)]
     drawing = read_layout(dxf(tmp_path, lambda space: space.add_lwpolyline(ring)))

@@ -1,5 +1,7 @@
 """Files of VTK as pyvista and ParaView write them."""
 
+import re
+
 import numpy as np
 import pytest
 import pyvista as pv
@@ -115,6 +117,21 @@ def test_an_array_that_vtk_gives_up_is_not_left_out_in_silence(tmp_path):
         ValueError, match=r"cannot be read whole by VTK \(Unsupported .*vtktypeint32.*\); save it as .vtu"
     ):
         read(tmp_path / "a.vtk")
+
+
+def test_a_broken_vtu_is_refused_with_the_reason_of_vtk_and_nothing_is_logged(tmp_path, caplog):
+    mesh = pv.Plane(i_resolution=2, j_resolution=1).triangulate().cast_to_unstructured_grid()
+    mesh.cell_data["block_id"] = np.array([1, 1, 2, 2], dtype=np.int32)
+    mesh.save(tmp_path / "a.vtu", binary=False)
+    text = (tmp_path / "a.vtu").read_text(encoding="utf-8")
+    short = re.sub(r'(Name="block_id"[^>]*>)[^<]*<', r"\1 1 <", text)
+    unknown = re.sub(r'type="\w+" Name="block_id"', 'type="Foo" Name="block_id"', text)
+    for broken, reason in ((short, 'Cannot read cell data array "block_id"'), (unknown, 'Unknown data type "Foo"')):
+        assert broken != text
+        (tmp_path / "b.vtu").write_text(broken, encoding="utf-8")
+        with pytest.raises(ValueError, match=rf"read whole by VTK \({reason}.*\); export it again"):
+            read(tmp_path / "b.vtu")
+    assert caplog.records == []
 
 
 def test_points_and_lines_are_no_blocks(tmp_path):
