@@ -212,8 +212,8 @@ class Structure(Shown):
             controls=controls,
             pose=pose,
             ties=self.ties,
-            ties_at=ties_at and checked(ties_at, TieForces, "ties_at"),
-            bonds_at=bonds_at and checked(bonds_at, Bonds, "bonds_at"),
+            ties_at=ties_at if ties_at is None else checked(ties_at, TieForces, "ties_at"),
+            bonds_at=bonds_at if bonds_at is None else checked(bonds_at, Bonds, "bonds_at"),
             fallen=fallen,
         )
         kind = {"analysis": "pushover", "parameter": CONTROL_DISPLACEMENT, "measured": LOAD_MULTIPLIER}
@@ -298,8 +298,8 @@ class Structure(Shown):
             overlap_tolerance=overlap_tolerance,
             torsion=torsion,
             ties=self.ties,
-            ties_at=ties_at and checked(ties_at, TieForces, "ties_at"),
-            bonds_at=bonds_at and checked(bonds_at, Bonds, "bonds_at"),
+            ties_at=ties_at if ties_at is None else checked(ties_at, TieForces, "ties_at"),
+            bonds_at=bonds_at if bonds_at is None else checked(bonds_at, Bonds, "bonds_at"),
             fallen=fallen,
         )
         return replace(found, analysed=(self.assembly, self.interfaces, under.loads, self.ties))

@@ -407,7 +407,9 @@ class _Problem:
             [None, eye, -eye, eye, None, None, None],
             [None, sp.csr_array(eye)[brittle], None, None, None, None, None],
         ]
-        of_forces = [np.zeros(first), self.price, change_cost, change_cost]
+        # Joints that may pull press sooner: pulling takes friction away, until nothing is left that could carry.
+        released = change_cost * (1.0 + (self.tension > 0.0))
+        of_forces = [np.zeros(first), self.price, change_cost, released]
         solution = solve_between(
             np.concatenate([*of_forces, [-1.0], np.full(2 * rows, UNBALANCED_COST)]),
             sp.csc_array(sp.block_array(blocks, format="csc")),

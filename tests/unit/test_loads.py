@@ -214,6 +214,11 @@ def test_friction_given_in_degrees_warns():
             lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), ties_at=(1,)),
             r"ties_at is \(1,\); give solver\.TieForces",
         ),
+        (lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), ties_at=()), r"ties_at is \(\); give solver"),
+        (
+            lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), bonds_at=np.zeros(2)),
+            r"bonds_at is array\(\[0\., 0\.\]\); give solver\.Bonds",
+        ),
         (lambda: solver.limit_load(ASSEMBLY, acceleration=(1, 0), bonds_at=1), r"bonds_at is 1; give solver\.Bonds"),
         (lambda: solver.surface_pressure(ASSEMBLY, (1, 0, 0)), r"pressure is \(1, 0, 0\); give a number"),
         (lambda: solver.edge_pressure(ASSEMBLY, 0, 0, np.nan), "pressure is nan; give a number"),

@@ -68,6 +68,26 @@ def test_a_block_glued_between_two_walls_slips_at_its_cohesion(dimension, more):
     assert found.forces[:, 0] == pytest.approx(0.0, abs=1e-5 * weight)
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(("tension", "strength"), [(3e3, 1e5), (1e4, 1e6)])
+def test_a_block_glued_between_two_walls_that_is_pushed_at_one_of_them_locks_until_it_crushes(
+    dimension, tension, strength
+):
+    """What the push presses adds more friction than it needs; off the other wall alone it pulled, and slipped."""
+    shapes = [rectangle(*at) for at in ((0, 0, 1, 0.5), (-1, -1, 0, 2), (1, -1, 2, 2))]
+    roles, down, push = ["free", "fixed", "fixed"], (0.0, -1.0, 0.0)[:dimension], (1.0, -0.3, 0.0)[:dimension]
+    if dimension == 3:
+        assembly = solver.Assembly.from_solids([prism(shape) for shape in shapes], roles=roles)
+    else:
+        assembly = solver.Assembly.from_outlines(shapes, roles=roles)
+    loads = solver.Loads(*(solver.weight_fraction(assembly, of, [0]) for of in (down, push)))
+    law = solver.InterfaceLaw(1.0, 1e4, strength, tensile_strength=tension)
+    structure = solver.Structure(assembly, solver.Interfaces(law), loads)
+    found = structure.limit_load(flow="non-associative")
+    assert found.status is solver.LimitStatus.FOUND
+    assert 0.65 < found.multiplier / structure.limit_load().multiplier < 0.75
+
+
 def test_a_flat_arch_whose_corners_have_cohesion_and_crush_begins_with_its_forces_at_rest():
     """Three blocks of weight w between walls, P = σ A / 2 at each corner: associative α = P h / (w l) - 1.
 
