@@ -42,7 +42,7 @@ WIDEST = 1.0
 #: A point that is displaced by more than this fraction of the structure is a mistake in its unit.
 FARTHEST_POINT = 0.3
 
-#: Blocks of a drawing of the damaged state have moved by less than this, in block sizes, or are others.
+#: Blocks of a drawing that are paired by their shapes have moved by less than this, in block sizes, or are others.
 FARTHEST_BLOCK = 1.5
 
 #: A width [m] below this nobody can measure.
@@ -523,12 +523,20 @@ def _check_moved(moved: np.ndarray, known: list[int], assembly: solver.Assembly,
             f"{path}: its blocks, supports too, lie about {place_text(shift, 3)} m beside those of the case, and what "
             "all have in common opens no joint; move it: a support that stands still lies where the case draws it"
         )
-    lost = [block for block in known if far[block] > FARTHEST_BLOCK * assembly.block_size]
+    lost = [block for block in known if far[block] > FARTHEST_POINT * float(np.ptp(assembly.vertices, axis=0).max())]
     if lost:
         shown = ", ".join(f"'{assembly.names[k]}' {far[k]:.3g} m" for k in lost[:6]) + (" ..." if len(lost) > 6 else "")
         raise ValueError(
             f"{path}: puts {shown} from where the case draws it; check names that are swapped, the origin and the unit"
         )
+    # Blocks that still stand have moved by the shortest ways to where they lie; those with swapped names have not.
+    places = assembly.centroids[known]
+    owners = linear_sum_assignment(((places[:, None] + moved[known][:, None] - places) ** 2).sum(axis=2))[1]
+    names = [assembly.names[k] for k in known]
+    swapped = [f"'{names[k]}' where '{names[own]}' lies" for k, own in enumerate(owners.tolist()) if k != own]
+    if swapped:
+        shown = ", ".join(swapped[:6]) + (" ..." if len(swapped) > 6 else "")
+        raise ValueError(f"{path}: puts {shown} in the case; check names that are swapped")
 
 
 def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: solver.Assembly) -> dict[int, int]:

@@ -540,7 +540,8 @@ class Drawer:
             kind = "area" if self._flat else "line"
             keys.append(Key(kind, f"open joint{widest}", palette.OPEN, layers=("crack", "crack edge")))
         if self.look.magnification != 1.0:
-            return [*keys, Key("", "hinges, sliding joints and forces are shown at true scale only", palette.FAINT)]
+            told = "are shown at true scale only" if self.look.joints and not self.many else "not shown"
+            return [*keys, Key("", f"hinges, sliding joints and forces {told}", palette.FAINT)]
         marked = [
             *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),
             *([Key("dot" if self._flat else "line", "hinge", palette.HINGE, layers=("hinge",))] if seen.hinges else []),

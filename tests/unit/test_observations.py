@@ -185,6 +185,25 @@ def test_a_drawing_whose_names_are_swapped_is_refused(tmp_path):
         read_observations(path, ARCH)
 
 
+def test_a_drawing_whose_neighbours_have_swapped_names_is_refused(tmp_path):
+    swapped = {"voussoir 3": "voussoir 4", "voussoir 4": "voussoir 3"}
+    names = [swapped.get(name, name) for name in ARCH.names]
+    path = drawn(tmp_path / "damaged.json", corners_of(lifted()), names)
+    with pytest.raises(ValueError, match="puts 'voussoir 3' where 'voussoir 4' lies, 'voussoir 4' where 'voussoir 3'"):
+        read_observations(path, ARCH)
+
+
+def test_a_drawing_of_small_stones_that_have_moved_far_is_taken(tmp_path):
+    """A support may move by more than the stones on it are large."""
+    wall = generators.wall(bricks=8, courses=6, brick_length=0.2, brick_height=0.1)
+    away = 1.8 * wall.block_size
+    pose = solver.Pose.initial(wall)
+    pose.positions[wall.centroids[:, 0] > np.median(wall.centroids[:, 0])] += [away, 0.0]
+    corners = np.split(mechanics.moved_vertices(wall, pose), wall.offsets[1:-1])
+    found = read_observations(drawn(tmp_path / "damaged.json", corners, wall.names), wall)
+    assert np.linalg.norm(found.displacements, axis=1).max() == pytest.approx(away)
+
+
 def test_a_drawing_of_something_else_is_refused(tmp_path):
     save_layout(generators.wall(bricks=2, courses=2, brick_length=0.05, brick_height=0.02), tmp_path / "other.json")
     with pytest.raises(ValueError, match="none of its"):

@@ -177,6 +177,15 @@ def test_magnified_blocks_have_no_points_of_contact(tmp_path, monkeypatch):
     assert [key.text for key in keys] == ["open joint", told]
 
 
+def test_of_many_magnified_blocks_no_marks_are_promised_at_true_scale(tmp_path, monkeypatch):
+    keys, composed = [], Sheet.composed
+    monkeypatch.setattr(Sheet, "composed", lambda *of, **look: keys.extend(look["keys"]) or composed(*of, **look))
+    monkeypatch.setattr("blockvis.pictures.drawer.FEW_BLOCKS", 2)
+    response = arch_response()
+    draw_still(response, len(response.path) - 1, tmp_path / "a.png", size=SMALL, magnification=2.0)
+    assert [key.text for key in keys] == ["open joint", "hinges, sliding joints and forces not shown"]
+
+
 def test_in_space_the_mechanism_is_said_to_be_drawn_moved_on(tmp_path, monkeypatch):
     """Blocks stand off the equilibrium that the title gives; and nothing settles, so no support is."""
     seen, composed = [], Sheet.composed
