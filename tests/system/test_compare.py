@@ -223,6 +223,7 @@ kind = "live"
 """
 
 
+@pytest.mark.slow
 def test_loads_that_move_are_compared_where_they_are_lowest(tmp_path, monkeypatch):
     """Between two positions, on the line between their limit loads, nothing is a limit state."""
     folders, seen, lowest = [], [], []

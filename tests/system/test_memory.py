@@ -170,6 +170,7 @@ def test_stored_increments_equal_those_in_memory(tmp_path):
     assert moved.forces.tobytes() == told.increments[0].forces.tobytes()
 
 
+@pytest.mark.slow
 def test_results_that_change_below_the_reader_are_named(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(increments, "CACHED", 0)
     shutil.copytree(folder, tmp_path / "out")
@@ -186,6 +187,7 @@ def test_results_that_change_below_the_reader_are_named(folder, tmp_path, monkey
         response.increments[3].contacts  # noqa: B018 - it is read here
 
 
+@pytest.mark.slow
 def test_results_are_not_written_over_what_they_are_read_from(folder):
     response = blockvis.open_results(folder)
     with pytest.raises(ValueError, match=r"is read from '.*' itself; write it to another folder"):

@@ -330,6 +330,7 @@ def test_what_cannot_be_resumed_is_refused(tmp_path, monkeypatch, capsys, argume
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_damaged_checkpoint_is_refused(whole, tmp_path, capsys):
     out = tmp_path / "out"
     shutil.copytree(whole / "out", out)

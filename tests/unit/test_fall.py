@@ -227,6 +227,7 @@ def test_what_does_not_collapse_along_a_path_does_not_fall():
     assert fall_of(replace(response, parameter=mechanics.Quantity("position", "x", "m", is_path=False))) is None
 
 
+@pytest.mark.slow
 def test_blocks_smaller_than_any_stone_have_no_fall_that_would_never_end():
     arch = blockvis.generators.arch(radius=1e-12, voussoirs=5)
     spread = solver.Settlement(direction=(1.0, 0.0), increment=1e-12, limit=2e-12, tolerance=1e-13)

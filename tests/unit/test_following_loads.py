@@ -112,6 +112,7 @@ def test_the_capacity_after_a_tilt_is_that_of_the_point_where_it_is():
     assert found.multiplier == pytest.approx((toe - centroid) / (point - toe), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_load_that_is_added_later_goes_with_its_block():
     assembly, weight = wall()
     forces = solver.PointForces.at(1, (0.0, -3.0 * weight), (0.0, H))

@@ -84,6 +84,7 @@ def test_the_live_load_does_what_the_weight_gains_and_a_jump_takes():
     assert jumps == 1
 
 
+@pytest.mark.slow
 def test_zero_capacity_does_not_depend_on_the_increment():
     coarse, fine = arch(0.02), arch(0.005)
     assert coarse.collapse.displacement == pytest.approx(fine.collapse.displacement, rel=1e-3)

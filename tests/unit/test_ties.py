@@ -367,6 +367,7 @@ def test_blocks_of_a_tie_are_two_numbers(blocks):
         solver.Tie("rod", blocks, ((0, 0), (1, 0)), 1e6)
 
 
+@pytest.mark.slow
 def test_a_tie_that_yields_under_a_limit_load_has_not_yielded_before(tmp_path, capsys):
     """The settlement stretches the tie by a hundredth of its strength, the push at the limit by all of it."""
     (tmp_path / "piers.json").write_text(BLOCKS, encoding="utf-8")
