@@ -81,6 +81,7 @@ def _made_here(study, folder, runs):
     records = StudyFolder(folder, study)
     for run in runs:
         records.add([run_once(study.values, str(study.case_source), study.order(run), study.n_seeded)])
+    records.close()
     return records
 
 
