@@ -348,7 +348,8 @@ def _labels(
             bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": palette.hexadecimal(palette.OPEN), "lw": 0.7},
             zorder=5,
         )
-        for k in order.tolist()
+        # Each is laid out before those that cover others are removed.
+        for k in order[: 4 * MOST_LABELS].tolist()
         if max(sizes[k], widths[k]) > least
     ]
 

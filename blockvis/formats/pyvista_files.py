@@ -60,7 +60,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     data: Any = None
     failed: Exception | None = None
     # VTK would print every fault of a file to the terminal, and pyvista log it, as well.
-    logging.disable(logging.ERROR)
+    disabled = logging.root.manager.disable
+    logging.disable(max(disabled, logging.ERROR))
     try:
         with warnings.catch_warnings(), pyvista.vtk_verbosity("off"), faults:
             warnings.simplefilter("ignore")
@@ -69,7 +70,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     except (OSError, ValueError, RuntimeError, KeyError, TypeError, AttributeError, IndexError, SyntaxError) as error:
         failed = error
     finally:
-        logging.disable(logging.NOTSET)
+        logging.disable(disabled)
     if faults.error_events:
         # At an array of a type that it does not know VTK leaves out all further ones and hands out the rest.
         reason = " ".join(faults.error_events[0].alert.split())[:200]

@@ -300,11 +300,11 @@ class _Problem:
         return replace(found, unbalanced=balanced.unbalanced)
 
     def _carried(self, price: np.ndarray, beside: list[sp.csc_array], cost: np.ndarray, left: np.ndarray) -> _State:
-        """The program over forces that points can carry, their normal forces at a price, and columns with a cost.
+        """The associative program over forces that points can carry, at a price, and columns with a cost.
 
-        The first of the columns beside the forces is that of the multiplier; ``left`` is what rows may leave.
+        The price is that of normal forces; the first of the columns is that of the multiplier; ``left`` is what rows
+        may leave.
         """
-        # Associative.
         carried, rows = Admissible.of(self.friction, self.cohesion, self.crushing, self.size), len(self.dead)
         columns, limits = carried.columns, [carried.limits, *[None] * len(beside)]
         of_forces = columns.T @ (price[:, None] * np.eye(self.size)[0]).ravel()

@@ -1,5 +1,6 @@
 """Files of VTK as pyvista and ParaView write them."""
 
+import logging
 import re
 
 import numpy as np
@@ -23,6 +24,16 @@ def test_one_polygon_is_one_block_without_ids(tmp_path, suffix):
     drawing = read_layout(tmp_path / f"a{suffix}")
     assert drawing.n_blocks == 3
     assert any("one per cell: no cell array 'block_id'" in note for note in drawing.notes)
+
+
+def test_reading_leaves_logging_as_it_was(tmp_path):
+    quads().save(tmp_path / "a.vtp")
+    try:
+        logging.disable(logging.WARNING)
+        read_layout(tmp_path / "a.vtp")
+        assert logging.root.manager.disable == logging.WARNING
+    finally:
+        logging.disable(logging.NOTSET)
 
 
 def test_cells_with_one_id_are_one_block(tmp_path):
