@@ -66,6 +66,7 @@ def test_both_pictures_of_a_settlement_have_one_unit(arch_results, other, tmp_pa
 
 
 @pytest.mark.parametrize("name", ["both.gif", "both.webp"])
+@pytest.mark.slow
 def test_one_layout_has_one_scale_and_moving_pictures_are_no_videos(name, arch_results, other, tmp_path, monkeypatch):
     """Openings are to be compared by eye, and no browser plays a .gif as a video."""
     scales, blank = [], Image.new("RGB", (800, 620))

@@ -159,6 +159,7 @@ def test_contact_points_have_forces_and_slip_as_vectors():
     np.testing.assert_allclose((grid.point_data["slip"] * grid.point_data["normal"]).sum(axis=1), 0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_slip_is_what_one_block_has_moved_along_another():
     plate, brick = [[0, 0], [4, 0], [4, 1], [0, 1]], [[1, 1], [2, 1], [2, 2], [1, 2]]
     two = solver.Assembly.from_solids([prism(plate), prism(brick)], roles=["fixed", "free"])

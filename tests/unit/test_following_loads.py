@@ -36,6 +36,7 @@ def tilt(dimension, limit, increment=0.05):
 
 
 @pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_a_load_on_the_top_of_a_wall_leans_with_it(dimension):
     """3 W on the top, W at half the height: b/2 cos 4 W = sin (W h/2 + 3 W h). At the centroid it would be atan b/h."""
     assembly, weight = wall(dimension)

@@ -61,6 +61,7 @@ def test_a_load_that_presses_on_the_ground_has_no_limit():
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("friction", [pytest.param(0.37, marks=pytest.mark.slow), 0.6, 3.0])
+@pytest.mark.slow
 def test_without_dilatancy_a_block_on_a_slope_carries_any_weight_below_its_angle_of_friction(dimension, friction):
     """W tan 20° = 0.364 W slides at any W or at none: what locks itself has no limit in either flow."""
     angle = np.radians(20.0)

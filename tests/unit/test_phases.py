@@ -272,6 +272,7 @@ def columns(folder: Path, more: str) -> solver.Response:
 
 
 @pytest.mark.parametrize("blocks", ["", 'blocks = "right"'])
+@pytest.mark.slow
 def test_what_has_been_taken_away_shields_nothing_from_a_later_pressure(tmp_path: Path, blocks: str) -> None:
     # 100 kN push on a column of 9.8 kN.
     found = columns(tmp_path, f"[[loads]]\npressure = 1e5\ndirection = [1, 0]\nphase = 2\n{blocks}\n")
