@@ -6,19 +6,19 @@ import json
 import logging
 import math
 from collections import Counter
-from collections.abc import Iterator, Set
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from blockvis.layout.block_table import layers_of, rows_of, with_rows
+from blockvis.layout.block_table import layer_of, moved_notes, on_layer, rows_of, with_rows
 from blockvis.layout.choice import Choice, look_of
 from blockvis.layout.layout import Layout
-from blockvis.layout.left_out import LeftOut
-from blockvis.layout.notes import CHANGED, LEFT_OUT, UPRIGHT, Note, kind_of
-from blockvis.layout.outlines import FLAT, arc_points, sagitta
+from blockvis.layout.left_out import LeftOut, passed_over
+from blockvis.layout.notes import CHANGED, UPRIGHT, Note, kind_of
+from blockvis.layout.outlines import FLAT, arc_points, filled, sagitta
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import metres_per
 from blockvis.layout.views import VIEWS, axis_across, upright_note
@@ -32,7 +32,12 @@ from .reading import Reading
 BINARY = b"AutoCAD Binary DXF"
 
 #: Units by the header variable $INSUNITS.
-UNIT_CODES = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 14: "dm"}
+UNIT_CODES = {
+    1: "in", 2: "ft", 3: "1609.344 m", 4: "mm", 5: "cm", 6: "m", 7: "km", 8: "1e-6 in", 9: "0.001 in", 10: "yd",
+    11: "1e-10 m", 12: "1e-9 m", 13: "0.001 mm", 14: "dm", 15: "10 m", 16: "100 m", 17: "1e9 m",
+    # The feet of American surveyors, 2 millionths longer.
+    21: "ft", 22: "in", 23: "yd", 24: "1609.347219 m",
+}  # fmt: skip
 
 #: Application name of the extended data of an outline that hold the block's row of the block table.
 APPLICATION = "BLOCKVIS"
@@ -120,15 +125,17 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
         raise ValueError(
             f"'{path}' is not a readable DXF file ({error}); save it again as DXF R2000 or later"
         ) from None
-    stated = UNIT_CODES.get(int(document.header.get("$INSUNITS", 0) or 0), "")
+    stated, doubts = _unit(document, reading)
     in_metres = metres_per(reading.unit or stated or "m")
     tolerance = None if reading.chord_tolerance is None else reading.chord_tolerance / in_metres
     frozen = {layer.dxf.name for layer in document.layers if layer.is_frozen()}
     shut = frozen | {layer.dxf.name for layer in document.layers if layer.is_off()}
-    found = _Outlines()
+    found = _Outlines(notes=doubts)
     for entity, handle in _bounded(document.modelspace(), path, frozen):
         if entity.dxf.layer in shut:
             found.hidden[entity.dxf.layer] += 1
+        elif entity.dxf.get("invisible", 0):
+            found.skipped[f"invisible {entity.dxftype()}"] += 1
         else:
             _add(entity, handle, found, tolerance)
     closed = meshes_of_faces([(found.layers[k], found.names[k], found.rings[k]) for k in found.faces], path)
@@ -154,6 +161,16 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     return _layout(found, faces, stated)
 
 
+def _unit(document: Any, reading: Reading) -> tuple[str, list[str]]:
+    """Find the unit that a file states, "" for none, and a note if that is not one of length."""
+    code = int(document.header.get("$INSUNITS", 0) or 0)
+    if not code or code in UNIT_CODES or reading.unit is not None:
+        return UNIT_CODES.get(code, ""), []
+    return "", [
+        Note(CHANGED, f"the file states unit {code} ($INSUNITS), which is not known; give unit=... to settle it")
+    ]
+
+
 def _layout(found: _Outlines, faces: Faces, stated: str) -> Layout:
     """Make a layout of what was found; ``stated`` is the unit that the file states."""
     notes = found.notes + faces.notes + joined_note(found.misses, _size(found))
@@ -166,11 +183,18 @@ def _layout(found: _Outlines, faces: Faces, stated: str) -> Layout:
         left_out=tuple(item.seen([0, 1]) for item in found.left_out),
         looks=tuple(found.looks),
     )
+    moved = [
+        row and _layer_name(row).lower() != layer.lower() for row, layer in zip(found.rows, found.layers, strict=True)
+    ]
+    own = [
+        on_layer(row, layer) if was else row for row, layer, was in zip(found.rows, found.layers, moved, strict=True)
+    ]
     rows = [
         {"group": layer, **({"material": layer} if layer != "0" else {}), "name": name, **row}
-        for layer, name, row in zip(found.layers, found.names, found.rows, strict=True)
+        for layer, name, row in zip(found.layers, found.names, own, strict=True)
     ]
-    return with_rows(layout, rows)
+    notes = moved_notes([pair for pair, was in zip(zip(found.rows, rows, strict=True), moved, strict=True) if was])
+    return with_rows(replace(layout, notes=(*layout.notes, *notes)), rows)
 
 
 def _chosen_meshes(found: _Outlines, reading: Reading) -> list[DrawnMesh]:
@@ -187,13 +211,8 @@ def _chosen_meshes(found: _Outlines, reading: Reading) -> list[DrawnMesh]:
 
 def _skipped(found: _Outlines) -> list[str]:
     """Count what was skipped in notes."""
-    notes = []
-    if found.skipped:
-        listed = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
-        notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
-    if found.hidden:
-        notes.append(Note(LEFT_OUT, f"skipped on layers that are off or frozen: {_listed(found.hidden)}"))
-    return list(notes)
+    hidden = {f"on '{layer}'": n for layer, n in found.hidden.items()}
+    return [*passed_over(found.skipped), *passed_over(hidden, "skipped on layers that are off or frozen")]
 
 
 def _faults(audit: Any) -> list[str]:
@@ -270,7 +289,7 @@ def _flat(
             entity.dxf.layer = layer
         if parent and entity.dxf.get("color", BY_LAYER) == BY_BLOCK:
             entity.dxf.color = colour
-        if entity.dxftype() != "INSERT" or entity.dxf.layer in frozen:
+        if entity.dxftype() != "INSERT" or entity.dxf.layer in frozen or _is_closed(entity):
             yield entity, handle
             continue
         copies = entity.multi_insert() if entity.mcount > 1 else [entity]
@@ -280,6 +299,12 @@ def _flat(
             own = int(entity.dxf.get("color", BY_LAYER))
             inner = _flat(_inserted(plain, path), depth + 1, path, frozen, number_of, entity.dxf.layer, own)
             yield from inner if stretch is None else _transformed(inner, stretch, frozen)
+
+
+def _is_closed(insert: Any) -> bool:
+    """Whether nothing of an inserted block is drawn here: it is invisible, in another file, or not there."""
+    block = insert.block()
+    return bool(insert.dxf.get("invisible", 0)) or block is None or bool(block.block.is_xref)
 
 
 def _stretched(insert: Any) -> tuple[Any, Any]:
@@ -347,7 +372,7 @@ def _add(entity: Any, handle: str, found: _Outlines, tolerance: float | None) ->
     elif kind in _CURVES:
         _add_curve(entity, handle, found, tolerance)
     else:
-        found.skipped[kind] += 1
+        found.skipped[f"reference to another file ('{entity.dxf.name}')" if kind == "INSERT" else kind] += 1
 
 
 def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
@@ -505,29 +530,19 @@ def _add_hatch(entity: Any, handle: str, found: _Outlines, tolerance: float | No
     if not rings:
         found.skipped["HATCH without boundary"] += 1
         return
-    inside = [k for k, ring in enumerate(rings) if any(_within(ring, other) for other in rings if other is not ring)]
-    if inside:
+    outlined = [(k, holes) for k, holes in filled(rings) if not _drawn_already(rings[k], found)]
+    for number, (k, inside) in enumerate(outlined):
+        if not inside:
+            found.add(rings[k], entity, handle if len(rings) == 1 else f"{handle}.{number}", bounds[k][1])
+            continue
         x, y = rings[inside[0]][:, :2].mean(axis=0)
         message = (
             f"HATCH {handle} on layer '{entity.dxf.layer}' has a hole around ({x:.6g}, {y:.6g}); "
             "cut the block in two, or fill the hole with a block"
         )
-        outer = max(
-            (ring for k, ring in enumerate(rings) if k not in inside), key=lambda ring: float(np.ptp(ring, 0).max())
-        )
-        holes = tuple(rings[k] for k in inside)
         layer, name = str(entity.dxf.layer), f"hatch {handle}"
-        found.left_out.append(LeftOut("hole", outer, message, layer, name, holes=holes, looks=_looks(entity)))
-        return
-    outlined = [k for k, ring in enumerate(rings) if not _drawn_already(ring, found)]
-    for number, k in enumerate(outlined):
-        found.add(rings[k], entity, handle if len(rings) == 1 else f"{handle}.{number}", bounds[k][1])
-
-
-def _within(inner: np.ndarray, outer: np.ndarray) -> bool:
-    """Whether the box around a boundary lies within the larger box around another."""
-    smaller = np.ptp(inner, 0).max() < np.ptp(outer, 0).max()
-    return bool(smaller and (inner.min(0) >= outer.min(0)).all() and (inner.max(0) <= outer.max(0)).all())
+        holes = tuple(rings[j] for j in inside)
+        found.left_out.append(LeftOut("hole", rings[k], message, layer, name, holes=holes, looks=_looks(entity)))
 
 
 def _drawn_already(ring: np.ndarray, found: _Outlines) -> bool:
@@ -581,10 +596,6 @@ def _size(found: _Outlines) -> float:
     return float(np.ptp(np.concatenate(drawn), axis=0).max()) if drawn else 0.0
 
 
-def _listed(counter: Counter[str]) -> str:
-    return ", ".join(f"{n} on '{layer}'" for layer, n in counter.items())
-
-
 def _own_data(entity: Any) -> dict[str, Any]:
     if not entity.has_xdata(APPLICATION):
         return {}
@@ -595,6 +606,12 @@ def _own_data(entity: Any) -> dict[str, Any]:
     return row if isinstance(row, dict) else {}
 
 
+def _layer_name(row: Mapping[str, Any]) -> str:
+    """Name the layer on which a block is written, without the characters that no layer may have."""
+    layer = layer_of(row)[0] or "0"
+    return "".join("_" if c in '<>/\\":;?*|=`' or ord(c) < 32 else c for c in layer)[:255]
+
+
 def write(layout: Layout, path: Path) -> None:
     """Write .dxf R2000 in m: a closed LWPOLYLINE per block on the layer of its group, role or material."""
     import ezdxf
@@ -603,8 +620,8 @@ def write(layout: Layout, path: Path) -> None:
     document.header["$INSUNITS"] = 6
     document.appids.add(APPLICATION)
     space = document.modelspace()
-    for row, layer, ring in zip(rows_of(layout), layers_of(layout, "0"), layout.outlines, strict=True):
-        layer = "".join("_" if c in '<>/\\":;?*|=`' or ord(c) < 32 else c for c in layer)[:255]
+    for row, ring in zip(rows_of(layout), layout.outlines, strict=True):
+        layer = _layer_name(row)
         if layer not in document.layers:
             document.layers.add(layer)
         outline = space.add_lwpolyline(ring.tolist(), close=True, dxfattribs={"layer": layer})

@@ -19,12 +19,12 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from blockvis.layout.block_table import layers_of, rows_of, with_rows
+from blockvis.layout.block_table import layer_of, layers_of, moved_notes, on_layer, rows_of, with_rows
 from blockvis.layout.choice import Choice
 from blockvis.layout.layout import Layout
-from blockvis.layout.left_out import LeftOut
-from blockvis.layout.notes import LEFT_OUT, Note
-from blockvis.layout.outlines import LARGEST_CHORD, sagitta
+from blockvis.layout.left_out import LeftOut, passed_over
+from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
+from blockvis.layout.outlines import LARGEST_CHORD, filled, sagitta
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import UNITS, metres_per
 from solver import mechanics
@@ -48,6 +48,9 @@ _SELECTOR = re.compile(r"(\*|[a-zA-Z][\w-]*)?((?:[.#][\w-]+)*)")
 #: Properties by which shapes are read, chosen or left out.
 _READ = re.compile(r"(?:^|[;{])\s*(?:display|visibility|fill|stroke|transform)\s*:", re.IGNORECASE)
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
+
+#: Layer on which blocks are written that have no group, role as a support or material.
+_LAYER = "blocks"
 
 #: Numbers that follow each path command.
 _TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
@@ -79,6 +82,9 @@ class _Outlines:
     loose: list[Line] = field(default_factory=list)
     loose_labels: list[tuple[str, ...]] = field(default_factory=list)
     misses: list[float] = field(default_factory=list)
+    moved: list[tuple[dict[str, Any], dict[str, Any]]] = field(default_factory=list)
+    skipped: Counter[str] = field(default_factory=Counter)
+    clipped: Counter[str] = field(default_factory=Counter)
     notes: list[str] = field(default_factory=list)
     left_out: list[LeftOut] = field(default_factory=list)
 
@@ -92,6 +98,7 @@ class _Context:
     tolerance: float | None
     path: Path
     depth: int = 0
+    label: str = ""
     fill: str = "black"
     stroke: str = "none"
     visibility: str = "visible"
@@ -128,7 +135,9 @@ def read(path: Path, reading: Reading) -> Layout:
     turned = tuple(ring * [1.0, -1.0] for ring in found.rings)
     names = tuple(row.get("name", f"block {k}") for k, row in enumerate(found.rows))
     left_out = tuple(item.mapped((1.0, -1.0)) for item in found.left_out)
-    notes = tuple(dict.fromkeys(found.notes))
+    found.notes += passed_over(found.skipped)
+    found.notes += passed_over(found.clipped, "read whole, not clipped")
+    notes = tuple(dict.fromkeys([*found.notes, *moved_notes(found.moved)]))
     looks = tuple(found.looks)
     layout = Layout(blocks=turned, names=names, unit=stated, notes=notes, left_out=left_out, looks=looks)
     return with_rows(replace(layout, unit_by="layout" if own else ""), found.rows)
@@ -209,9 +218,8 @@ def _unit(root: ElementTree.Element) -> tuple[str, list[str]]:
         ratio = root.get("preserveAspectRatio", "")
         if "none" in ratio or "slice" in ratio:
             remedy = "give a page of the shape of the viewBox, or the unit"
-            return "", [
-                f'the page has another shape than the viewBox, and preserveAspectRatio="{ratio}": no scale; {remedy}'
-            ]
+            no_scale = f'the page has another shape than the viewBox, and preserveAspectRatio="{ratio}": no scale'
+            return "", [Note(CHANGED, f"{no_scale}; {remedy}")]
         # The drawing is shown as large as fits into the page.
         number = min(number, upright)
     scale = number * UNITS[width[2]]
@@ -310,10 +318,10 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> No
     if tag in ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata"):
         return
     if _style(element, "display") == "none":
-        found.notes.append(Note(LEFT_OUT, f"a hidden <{tag}> was skipped"))
+        found.skipped[f"hidden <{tag}>"] += 1
         return
     if tag == "use":
-        found.notes.append(Note(LEFT_OUT, "a <use> (clone) was skipped; unlink clones to have them read"))
+        found.skipped["<use> (clones; unlink them to have them read)"] += 1
         return
     matrix = where.matrix @ _matrix(_transform(element), where.path)
     if tag == "svg" and where.depth:
@@ -326,11 +334,13 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> No
     fill, stroke = _style(element, "fill") or where.fill, _style(element, "stroke") or where.stroke
     where = replace(where, fill=fill, stroke=stroke, visibility=_style(element, "visibility") or where.visibility)
     if tag == "g":
-        label = element.get(f"{_INKSCAPE}label") or element.get("id") or ""
-        where = replace(where, layers=(*where.layers, label) if label else where.layers)
+        named = element.get(f"{_INKSCAPE}label", "")
+        label = named or element.get("id") or ""
+        where = replace(where, layers=(*where.layers, label) if label else where.layers, label=named or where.label)
     shape = _SHAPES.get(tag)
+    found.clipped.update(f"<{tag}> with a {key}" for key in ("clip-path", "mask") if "url(" in _style(element, key))
     if shape is not None and where.visibility != "visible":
-        found.notes.append(Note(LEFT_OUT, f"a hidden <{tag}> was skipped"))
+        found.skipped[f"hidden <{tag}>"] += 1
     elif shape is not None:
         try:
             parts = shape(element, where)
@@ -346,13 +356,9 @@ def _called(element: ElementTree.Element) -> str:
 
 
 def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, found: _Outlines) -> None:
-    own = element.get("data-blockvis")
-    try:
-        kept = json.loads(own) if own else {}
-    except ValueError:
-        kept = {}
     title = next((child.text or "" for child in element if _tag(child) == "title"), "")
     name = title.strip() or element.get(f"{_INKSCAPE}label") or element.get("id") or ""
+    kept = _kept(element, title, where, found)
     looks = (_tag(element), *_colour(where))
     labels = (*where.layers, *(x for x in (title.strip(), element.get(f"{_INKSCAPE}label"), element.get("id")) if x))
     rings, offs = [], []
@@ -374,24 +380,41 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
         rings.append(placed if short or joined is None else joined[0])
         offs.append(off)
         found.misses += [] if joined is None or closed else [joined[1]]
-    hole = _hole(rings)
-    if hole is not None:
-        x, y = rings[hole].mean(axis=0)
-        message = (
-            f"{_called(element)} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a "
-            "block"
-        )
-        outer = max(range(len(rings)), key=lambda k: float(np.ptp(rings[k], axis=0).max()))
-        holes = tuple(ring for k, ring in enumerate(rings) if k != outer)
-        found.left_out.append(LeftOut("hole", rings[outer], message, where.layer, name, holes=holes, looks=looks))
-        return
-    for k, ring in enumerate(rings):
-        row = _row(where.layer, "" if not name else name if len(rings) == 1 else f"{name} {k + 1}")
-        found.rings.append(ring)
+    for k, inside in filled(rings):
+        called = name if len(rings) == 1 or not name else f"{name} {k + 1}"
+        if inside:
+            x, y = rings[inside[0]].mean(axis=0)
+            message = (
+                f"{_called(element)} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole "
+                "with a block"
+            )
+            holes = tuple(rings[j] for j in inside)
+            found.left_out.append(LeftOut("hole", rings[k], message, where.layer, called, holes=holes, looks=looks))
+            continue
+        found.rings.append(rings[k])
         found.offs.append(offs[k])
-        found.rows.append(kept if isinstance(kept, dict) and kept else row)
+        found.rows.append(kept or _row(where.layer, called))
         found.labels.append(labels)
         found.looks.append(looks)
+
+
+def _kept(element: ElementTree.Element, title: str, where: _Context, found: _Outlines) -> dict[str, Any]:
+    """Row of the block table that our own writer put on a shape, with the layer and name that the shape has now."""
+    try:
+        kept = json.loads(element.get("data-blockvis", "{}"))
+    except ValueError:
+        return {}
+    if not isinstance(kept, dict) or not kept:
+        return {}
+    row = kept
+    # A program that drops the labels of layers leaves ids that it made up.
+    if where.label not in ("", layer_of(kept)[0] or _LAYER):
+        row = {**_row(where.label, ""), **on_layer(kept, where.label)}
+        found.moved.append((kept, row))
+    names = (element.get(f"{_INKSCAPE}label", ""), title)
+    written = _in_xml(str(kept.get("name", ""))).split()
+    renamed = next((name for name in names if name.strip() and name.split() != written), None)
+    return row if renamed is None else {**row, "name": renamed.strip()}
 
 
 def _style(element: ElementTree.Element, key: str) -> str:
@@ -422,18 +445,6 @@ def _row(layer: str, name: str) -> dict[str, Any]:
     """Write the row of the block table of an outline that has none of its own."""
     row: dict[str, Any] = {"group": layer, "material": "" if layer.lower() in mechanics.ROLES else layer}
     return row | ({"name": name} if name else {})
-
-
-def _hole(rings: list[np.ndarray]) -> int | None:
-    """Find the number of an outline that lies within another one."""
-    import shapely
-
-    shapes = [shapely.Polygon(ring) for ring in rings] if len(rings) > 1 else []
-    for i, outer in enumerate(shapes):
-        for j, inner in enumerate(shapes):
-            if i != j and outer.is_valid and inner.is_valid and outer.contains(inner):
-                return j
-    return None
 
 
 def _matrix(text: str, path: Path) -> np.ndarray:
@@ -476,7 +487,21 @@ def _length(element: ElementTree.Element, key: str) -> float:
 
 def _rectangle(element: ElementTree.Element, where: _Context) -> list[_Part]:
     x, y, w, h = (_length(element, key) for key in ("x", "y", "width", "height"))
-    return [_Part(np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]]), True)] if w > 0 and h > 0 else []
+    if not (w > 0 and h > 0):
+        return []
+    corners = np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]])
+    # A radius that is not given is the other one.
+    given = [_length(element, key) for key in ("rx", "ry") if element.get(key, "auto").strip() != "auto"] or [0.0]
+    radii = np.minimum([given[0], given[-1]], [w / 2.0, h / 2.0])
+    if not (radii > 0).all():
+        return [_Part(corners, True)]
+    points, off = list[np.ndarray](), 0.0
+    for before, corner, after in zip(np.roll(corners, 1, axis=0), corners, np.roll(corners, -1, axis=0), strict=True):
+        start, end = (corner + np.sign(other - corner) * radii for other in (before, after))
+        curve, apart = _arc(start, end, [*radii, 0.0, 0.0, 1.0], where)
+        points += [start, *curve]
+        off = max(off, apart)
+    return [_Part(np.array(points), True, off)]
 
 
 def _ellipse(element: ElementTree.Element, where: _Context) -> list[_Part]:
@@ -640,6 +665,11 @@ _SHAPES: dict[str, Callable[[ElementTree.Element, _Context], list[_Part]]] = {
 }
 
 
+def _in_xml(text: str) -> str:
+    """Text without control characters, for which XML has no place; the row of a block has its name as it is."""
+    return re.sub(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]", "", text)
+
+
 def write(layout: Layout, path: Path) -> None:
     """Write .svg in m: a layer per group, role or material, a path per block with its name as title."""
     every = np.concatenate(layout.outlines)
@@ -653,7 +683,7 @@ def write(layout: Layout, path: Path) -> None:
         'data-blockvis-unit="m">',
     ]
     rows = rows_of(layout)
-    layers = layers_of(layout, "blocks")
+    layers = layers_of(layout, _LAYER)
     # Blocks keep their order: a new group begins whenever the layer changes.
     for i, row in enumerate(rows):
         if i == 0 or layers[i] != layers[i - 1]:
@@ -663,7 +693,6 @@ def write(layout: Layout, path: Path) -> None:
                 f'stroke-width="{0.1 * margin:.4g}">'
             )
         points = " L ".join(f"{float(x)!r},{-float(y)!r}" for x, y in layout.outlines[i])
-        # XML has no place for control characters; the row has the name as it is.
-        title = escape(re.sub(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]", "", row["name"]))
+        title = escape(_in_xml(row["name"]))
         lines.append(f'<path d="M {points} Z" data-blockvis={quoteattr(json.dumps(row))}><title>{title}</title></path>')
     path.write_text("\n".join([*lines, "</g>", "</svg>", ""]), encoding="utf-8")

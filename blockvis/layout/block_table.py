@@ -12,6 +12,7 @@ import numpy as np
 from solver import mechanics
 
 from .layout import Layout
+from .notes import CHANGED, Note
 
 
 def rows_of(layout: Layout) -> list[dict[str, Any]]:
@@ -77,9 +78,47 @@ def _number(value: Any, key: str, name: str) -> float:
         raise ValueError(f"block '{name}' has {key} {value!r}; give a number") from None
 
 
+def layer_of(row: Mapping[str, Any]) -> tuple[str, str]:
+    """Name the layer on which a block is drawn, and the key that says it: its group, role as a support, or material."""
+    support = row.get("role") in (mechanics.FIXED, mechanics.MOVING)
+    keys = (key for key in ("group", "role", "material") if row.get(key) and (key != "role" or support))
+    return next(((str(row[key]), key) for key in keys), ("", ""))
+
+
 def layers_of(layout: Layout, default: str) -> list[str]:
-    """Name the layer of each block: its group, else its role as a support, else its material, else the default."""
-    return [
-        group or (role if role in (mechanics.FIXED, mechanics.MOVING) else "") or material or default
-        for group, role, material in zip(layout.groups, layout.roles, layout.materials, strict=True)
-    ]
+    """Name the layer of each block; see :func:`layer_of`."""
+    return [layer_of(row)[0] or default for row in rows_of(layout)]
+
+
+def on_layer(row: Mapping[str, Any], layer: str) -> dict[str, Any]:
+    """Row of a block that somebody moved to another layer: what that layer says holds, and the rest of the row.
+
+    A layer that is called as a role gives one, and what is taken from such a layer has none any more.
+    """
+    old, key = layer_of(row)
+    was, is_now = (word.strip().lower() in mechanics.ROLES for word in (old, layer))
+    gone = {"group": True, "role": was or is_now, "material": key == "material" and not is_now}
+    return {**{key: value for key, value in row.items() if not gone.get(key)}, "group": layer}
+
+
+def moved_notes(moved: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> list[str]:
+    """Say which blocks lie on other layers than the rows say that were written with them.
+
+    Parameters
+    ----------
+    moved : sequence of (mapping, mapping)
+        The row as it was written, and as it holds.
+    """
+
+    def listed(some: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> str:
+        words = [f"'{row.get('name', '')}' on '{row['group']}'" for _, row in some[:6]]
+        return ", ".join(words) + (f" and {len(some) - 6} more" if len(some) > 6 else "")
+
+    held = [(old, row) for old, row in moved if row.get("role") in (mechanics.FIXED, mechanics.MOVING)]
+    notes: list[str] = [f"moved to another layer since blockvis wrote the drawing: {listed(moved)}"] if moved else []
+    if held:
+        says = "they are fixed or moving still, as blockvis wrote with them"
+        notes.append(
+            Note(CHANGED, f"layers of supports were changed ({listed(held)}): {says}; [roles] can say otherwise")
+        )
+    return notes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -116,6 +116,18 @@ def in_words(left_out: Sequence[LeftOut]) -> list[Note]:
         text = f"left out: {len(members)} {words}{where}{at}{ends}{', nearly an outline: close it' * nearly}"
         lines.append(Note(LEFT_OUT, text))
     return lines
+
+
+def passed_over(counts: Mapping[str, int], words: str = "skipped") -> list[Note]:
+    """Say what a reader passes over, by its kind: one note for all, none where there is nothing.
+
+    Examples
+    --------
+    >>> passed_over({"TEXT": 2, "POINT": 1})
+    ['skipped: 2 TEXT, 1 POINT']
+    """
+    listed = ", ".join(f"{n} {kind}" for kind, n in counts.items() if n)
+    return [Note(LEFT_OUT, f"{words}: {listed}")] if listed else []
 
 
 def matches(labels: Iterable[str], patterns: Sequence[str]) -> bool:

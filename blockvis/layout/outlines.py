@@ -18,6 +18,9 @@ COLLINEAR = 1e-6
 #: Spread of the third coordinate, as a fraction of the size of the drawing, that still counts as flat.
 FLAT = 1e-6
 
+#: Part of an outline that may stick out of another one in which it lies, or by which it may be smaller and the same.
+WITHIN = 1e-6
+
 #: Largest angle of a chord, whatever the tolerance: twelve chords make a circle.
 LARGEST_CHORD = math.pi / 6.0
 
@@ -90,6 +93,39 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
 def share_in(inner: Any, outer: Any) -> float:
     """Fraction of the area of one shape that lies in another."""
     return float(inner.intersection(outer).area / inner.area) if inner.intersects(outer) else 0.0
+
+
+def filled(rings: Sequence[np.ndarray]) -> list[tuple[int, list[int]]]:
+    """Numbers of the outlines of one shape that are filled, each with those of its holes.
+
+    Of outlines that lie in each other every second is filled; one that crosses itself lies in none and holds none.
+
+    Parameters
+    ----------
+    rings : sequence of (n, 2) or (n, 3) arrays
+        In space in one plane.
+    """
+    import shapely
+
+    if len(rings) < 2:
+        return [(k, []) for k in range(len(rings))]
+    spread = np.ptp(np.concatenate(rings), axis=0)
+    plane = np.sort(np.argsort(spread)[-2:])
+    shapes = np.array([shapely.Polygon(ring[:, plane]) for ring in rings])
+    areas = shapely.area(shapes)
+    sound = np.flatnonzero(shapely.is_valid(shapes) & (areas > 0.0))
+    inner, outer = sound[shapely.STRtree(shapes[sound]).query(shapes[sound])]
+    smaller = areas[inner] < (1.0 - WITHIN) * areas[outer]
+    inner, outer = inner[smaller], outer[smaller]
+    shared = shapely.area(shapely.intersection(shapes[inner], shapes[outer]))
+    within = shared >= (1.0 - WITHIN) * areas[inner]
+    inner, outer = inner[within], outer[within]
+    depth = np.bincount(inner, minlength=len(rings))
+    holes: dict[int, list[int]] = {k: [] for k in np.flatnonzero(depth % 2 == 0).tolist()}
+    for k in np.flatnonzero(depth % 2).tolist():
+        around = outer[inner == k]
+        holes[int(around[np.argmin(areas[around])])].append(k)
+    return list(holes.items())
 
 
 def spread_of(points: np.ndarray, where: str) -> np.ndarray:

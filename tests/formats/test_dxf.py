@@ -319,3 +319,57 @@ def test_faces_of_lines_are_noted_where_they_are_analysed(tmp_path):
 
     with pytest.warns(UserWarning, match="1 block is a face between 4 loose lines; an opening enclosed by lines"):
         read(saved(tmp_path, draw))
+
+
+def test_a_hatch_of_many_areas_loses_those_with_a_hole_alone(tmp_path):
+    stone = [(0, 0), (1, 0), (1, 0.3), (0.5, 0.3), (0.5, 0.6), (0, 0.6)]
+    in_its_notch = [(0.5, 0.3), (1, 0.3), (1, 0.6), (0.5, 0.6)]
+    holed = [(2 + x, y) for x, y in SQUARE]
+
+    def draw(document, space):
+        hatch = space.add_hatch()
+        for ring in (stone, in_its_notch, holed):
+            hatch.paths.add_polyline_path(ring)
+        # A hole, and in it a stone.
+        for size in (0.8, 0.4):
+            hatch.paths.add_polyline_path([(2.5 + size * (x - 0.5), 0.5 + size * (y - 0.5)) for x, y in SQUARE])
+
+    layout = read_layout(saved(tmp_path, draw))
+    areas = [shapely.Polygon(ring).area for ring in layout.outlines]
+    assert areas == pytest.approx([0.45, 0.15, 0.16])
+    assert [(item.kind, len(item.holes)) for item in layout.left_out] == [("hole", 1)]
+
+
+@pytest.mark.parametrize(("code", "metres"), [(21, 0.3048), (15, 10.0), (9, 0.0254e-3), (6, 1.0)])
+def test_every_unit_of_the_header_is_read(tmp_path, code, metres):
+    def draw(document, space):
+        document.header["$INSUNITS"] = code
+        space.add_lwpolyline([(x / metres, y / metres) for x, y in SQUARE], close=True)
+
+    layout = read_layout(saved(tmp_path, draw))
+    assert layout.outlines[0].max(axis=0) == pytest.approx([1.0, 1.0])
+    assert not any("does not say its unit" in note for note in layout.notes)
+
+
+def test_a_unit_of_the_header_that_is_not_known_is_told_in_a_run(tmp_path):
+    def draw(document, space):
+        document.header["$INSUNITS"] = 30
+        space.add_lwpolyline(SQUARE, close=True)
+
+    with pytest.warns(UserWarning, match=r"the file states unit 30 \(\$INSUNITS\), which is not known"):
+        read(saved(tmp_path, draw))
+
+
+def test_what_is_invisible_or_in_another_file_is_counted(tmp_path):
+    def draw(document, space):
+        space.add_lwpolyline(SQUARE, close=True)
+        space.add_lwpolyline([(x + 1, y) for x, y in SQUARE], close=True, dxfattribs={"invisible": 1})
+        document.blocks.new("stone").add_lwpolyline([(x + 2, y) for x, y in SQUARE], close=True)
+        space.add_blockref("stone", (0, 0), dxfattribs={"invisible": 1})
+        document.add_xref_def("wall.dwg", "WALL")
+        space.add_blockref("WALL", (3, 0))
+
+    layout = read_layout(saved(tmp_path, draw))
+    assert layout.n_blocks == 1
+    left = "skipped: 1 invisible LWPOLYLINE, 1 invisible INSERT, 1 reference to another file ('WALL')"
+    assert left in layout.notes

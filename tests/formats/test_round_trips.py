@@ -1,11 +1,16 @@
 """Every format by round trip on a generated layout: blocks, names, roles, materials, thickness, density."""
 
+import json
+import re
+from xml.etree import ElementTree
+
+import ezdxf
 import numpy as np
 import pytest
 from structures import suffixes_known
 
 import solver
-from blockvis import generators, read, read_layout, save_layout
+from blockvis import generators, read, read_layout, save_layout, write_layout
 
 #: All but single precision, which test_space_round_trips looks at.
 WRITTEN = [suffix for suffix in suffixes_known(save_layout, generators.arch()) if suffix != ".glb"]
@@ -82,3 +87,81 @@ def test_a_bigger_layout_survives_a_chain_of_formats(tmp_path):
         current = read(path)
     assert current.names == wall.names
     assert np.abs(np.sort(current.vertices, axis=0) - np.sort(wall.vertices, axis=0)).max() < 1e-12
+
+
+def _moved_in_dxf(path, layer):
+    document = ezdxf.readfile(path)
+    next(iter(document.modelspace())).dxf.layer = layer
+    document.saveas(path)
+
+
+def _moved_in_svg(path, layer):
+    name = "{http://www.inkscape.org/namespaces/inkscape}label"
+    tree = ElementTree.parse(path)
+    next(one for one in tree.getroot()).set(name, layer)
+    tree.write(path)
+
+
+@pytest.mark.parametrize(("suffix", "moved"), [(".dxf", _moved_in_dxf), (".svg", _moved_in_svg)])
+@pytest.mark.parametrize(
+    ("role", "material", "layer", "expected"),
+    [
+        ("free", "brick", "moving", "moving"),
+        ("free", "brick", "lime", "free"),
+        ("fixed", "brick", "Moving", "moving"),
+        # Layer "fixed", from which the block was taken.
+        ("fixed", "", "lime", "free"),
+    ],
+)
+def test_a_block_on_another_layer_than_it_was_written_on_is_what_that_layer_says(
+    suffix, moved, role, material, layer, expected, tmp_path
+):
+    squares = [[[x, 0], [x + 1, 0], [x + 1, 1], [x, 1]] for x in (0, 1)]
+    written = solver.Assembly.from_outlines(
+        squares, names=["a", "b"], roles=[role, "free"], materials=[material, "stone"]
+    )
+    path = tmp_path / f"wall{suffix}"
+    save_layout(written, path)
+    moved(path, layer)
+    layout = read_layout(path)
+    assert layout.groups[0] == layer
+    assert layout.names == ("a", "b")
+    assert "moved to another layer since blockvis wrote the drawing: 'a' on '" + layer + "'" in layout.notes
+    assert read(path).roles.tolist() == [expected, "free"]
+
+
+@pytest.mark.parametrize(("suffix", "moved"), [(".dxf", _moved_in_dxf), (".svg", _moved_in_svg)])
+def test_a_support_on_another_layer_that_says_nothing_of_it_is_told(suffix, moved, tmp_path):
+    path = tmp_path / f"wall{suffix}"
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"name": name, "layer": layer, "role": role},
+            "geometry": {"type": "Polygon", "coordinates": [[[x, 0], [x + 1, 0], [x + 1, 1], [x, 1], [x, 0]]]},
+        }
+        for x, name, layer, role in ((0, "a", "pier", "fixed"), (1, "b", "arch", "free"))
+    ]
+    drawn = tmp_path / "wall.geojson"
+    drawn.write_text(json.dumps({"type": "FeatureCollection", "crs": None, "features": features}), encoding="utf-8")
+    write_layout(read_layout(drawn), path)
+    moved(path, "abutment")
+    with pytest.warns(UserWarning, match=r"layers of supports were changed \('a' on 'abutment'\): they are fixed"):
+        assert read(path).roles.tolist() == ["fixed", "free"]
+
+
+def test_a_title_or_label_that_was_changed_names_the_block(layout, tmp_path):
+    path = tmp_path / "a.svg"
+    save_layout(layout, path)
+    text = path.read_text(encoding="utf-8").replace("<title>L-block</title>", "<title>pier</title>")
+    path.write_text(text.replace("<path ", '<path inkscape:label="first" ', 1), encoding="utf-8")
+    assert read(path).names == ("first", "pier", *layout.names[2:])
+
+
+def test_layers_whose_labels_a_program_dropped_are_those_that_were_written(layout, tmp_path):
+    path = tmp_path / "a.svg"
+    save_layout(layout, path)
+    plain = re.sub(r'inkscape:groupmode="layer" inkscape:label="[^"]*"', 'id="g1"', path.read_text(encoding="utf-8"))
+    path.write_text(plain, encoding="utf-8")
+    again = read_layout(path)
+    assert again.roles == ("fixed", "moving", "free", "free")
+    assert again.notes == ()

@@ -103,7 +103,7 @@ def test_what_a_style_sheet_says_of_shapes_is_read(tmp_path):
     colours = ["#d2b48c", "#e30613", "#000000", "#0000ff", "#000000"]
     assert layout.looks == tuple(("rect", colour) for colour in colours)
     assert [ring[:, 1].min() for ring in layout.outlines] == [-10, -10, -40, -10, -9]
-    assert [note for note in layout.notes if "hidden" in note] == [f"a hidden <{x}> was skipped" for x in ("g", "rect")]
+    assert "skipped: 1 hidden <g>, 2 hidden <rect>" in layout.notes
     assert read_layout(path, ignore=["#E30613"]).n_blocks == 4
 
 
@@ -212,3 +212,40 @@ def test_names_of_any_characters_are_written_and_read(tmp_path):
     squares = [[[x, 0], [x + 1, 0], [x + 1, 1], [x, 1]] for x in (0, 2, 4)]
     save_layout(solver.Assembly.from_outlines(squares, names=names), tmp_path / "names.svg")
     assert read(tmp_path / "names.svg").names == tuple(names)
+
+
+def test_only_the_parts_of_a_path_that_have_holes_are_left_out(tmp_path):
+    parts = "M0,0 H10 V10 H0 Z M10,0 H20 V10 H10 Z M20,0 H30 V10 H20 Z M24,4 H26 V6 H24 Z"
+    layout = read_layout(saved(tmp_path, f'<path id="stones" d="{parts}"/>'))
+    assert layout.names == ("stones 1", "stones 2")
+    assert [(item.kind, item.name, len(item.holes)) for item in layout.left_out] == [("hole", "stones 3", 1)]
+
+
+@pytest.mark.parametrize(
+    ("radii", "area"),
+    [
+        ('rx="40"', 10000 - (4 - np.pi) * 40**2),
+        ('ry="40" rx="auto"', 10000 - (4 - np.pi) * 40**2),
+        ('rx="20" ry="900"', 10000 - (4 - np.pi) * 20 * 50),
+        ('rx="900"', np.pi * 50**2),
+        ('rx="0" ry="9"', 10000),
+    ],
+)
+def test_rounded_corners_of_rectangles_are_round(tmp_path, radii, area):
+    path = saved(tmp_path, f'<rect width="100" height="100" {radii}/>', 'data-blockvis-unit="mm"')
+    assert read(path, chord_tolerance=1e-3, unit="m").areas == pytest.approx([area], rel=1e-4)
+
+
+def test_what_is_clipped_is_read_whole_with_a_note(tmp_path):
+    clip = '<clipPath id="c"><rect width="5" height="10"/></clipPath>'
+    body = f"""{clip}<rect width="10" height="10" clip-path="url(#c)"/>
+        <g style="mask: url(#m)"><rect x="10" width="10" height="10" clip-path="none"/></g>"""
+    layout = read_layout(saved(tmp_path, body))
+    assert layout.n_blocks == 2
+    assert "read whole, not clipped: 1 <rect> with a clip-path, 1 <g> with a mask" in layout.notes
+
+
+def test_a_page_that_gives_no_scale_is_told_in_a_run(tmp_path):
+    head = 'width="400mm" height="200mm" viewBox="0 0 4 1" preserveAspectRatio="xMidYMid slice"'
+    with pytest.warns(UserWarning, match="another shape than the viewBox"):
+        read(saved(tmp_path, '<rect width="1" height="1"/>', head))
