@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from blockvis.layout.notes import Note
 from blockvis.layout.units import UNITS
 from blockvis.system.extras import require
 
@@ -23,9 +24,9 @@ UP = {"X_UP": ([1, 2, 0], "z"), "Y_UP": ([0, 1, 2], "y"), "Z_UP": ([0, 1, 2], "z
 
 @dataclass(frozen=True)
 class Drawn:
-    """Meshes of a file: name, (n, 3) points in place and (m, 3) faces of each; unit, axis that points up, rows.
+    """Meshes of a file: name, (n, 3) points in place and (m, 3) faces of each; unit, axis that points up, notes.
 
-    ``grouped`` are those that may be parts of stones.
+    ``rows`` has one for each mesh, or is empty; ``grouped`` are meshes that may be parts of stones.
     """
 
     parts: list[tuple[str, np.ndarray, np.ndarray]]
@@ -34,6 +35,7 @@ class Drawn:
     up_says: str
     rows: list[dict[str, Any]] = field(default_factory=list)
     grouped: bool = False
+    notes: list[Note] = field(default_factory=list)
 
 
 def drawn_in(path: Path) -> Drawn:

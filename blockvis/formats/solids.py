@@ -45,12 +45,16 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     drawn = {".dae": _dae, ".obj": _obj}.get(suffix, _scene)(path)
     size = _checked_size(drawn.parts, path)
     if _are_flat(drawn.parts, size):
-        return replace(_flat(drawn.parts, path, drawn.rows, reading.view), unit=drawn.unit)
+        flat = _flat(drawn.parts, path, drawn.rows, reading.view)
+        return replace(flat, unit=drawn.unit, notes=(*flat.notes, *drawn.notes))
     closed = _enclosed(drawn, size, path, reading)
-    bodies, rows = closed.bodies, drawn.rows
-    known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
+    bodies = closed.bodies
+    known = [
+        {**(drawn.rows[k] if drawn.rows else {}), **({"name": body.name} if body.piece_of or not drawn.rows else {})}
+        for body, k in zip(bodies, closed.owners.tolist(), strict=True)
+    ]
     up, up_says = _up(path, bodies, size) if suffix == ".glb" else (drawn.up, drawn.up_says)
-    return Bodies(tuple(bodies), tuple(known), drawn.unit, tuple(closed.notes), up=up, up_says=up_says)
+    return Bodies(tuple(bodies), tuple(known), drawn.unit, (*closed.notes, *drawn.notes), up=up, up_says=up_says)
 
 
 def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> Enclosed:
@@ -110,7 +114,7 @@ def _obj(path: Path) -> dae.Drawn:
         if len(own):
             parts.append((name, every[own], triangles.reshape(-1, 3)))
     rows = _own_rows(path)
-    rows = rows if _distinct(rows) == [name for name, _, _ in parts] else []
+    rows = rows if word == "o" and _distinct(rows) == [name for name, _, _ in parts] else []
     return dae.Drawn(parts, "", "z", "", rows, grouped=word == "g")
 
 
@@ -143,13 +147,14 @@ def _scene(path: Path) -> dae.Drawn:
             for name, mesh in _placed(scene, path)
             if len(mesh.faces)
         ]
-        parts = _numbered(parts, scene) if suffix == ".ply" else parts
+        if suffix == ".ply":
+            return _numbered(parts, scene, _own_rows(path))
     except Exception as error:  # noqa: BLE001
         # trimesh passes on the errors of whatever parser it uses.
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
         raise ValueError(f"'{path}' cannot be read as {suffix} ({reason}); export it again") from None
     if suffix != ".glb":
-        return dae.Drawn(parts, "", "z", "", _own_rows(path))
+        return dae.Drawn(parts, "", "z", "")
     rows = [mesh.metadata.get("blockvis") for _, mesh in _placed(scene, path) if len(mesh.faces)]
     return dae.Drawn(parts, "m", "y", "", rows if all(isinstance(row, dict) for row in rows) else [])
 
@@ -266,18 +271,25 @@ def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:
     return found
 
 
-def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Split a .ply whose faces have a ``block_id`` into one part per number."""
-    raw = next(iter(scene.geometry.values())).metadata.get("_ply_raw", {})
+def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any, rows: list[dict[str, Any]]) -> dae.Drawn:
+    """Split a .ply whose faces have a ``block_id`` into one part per number, to which its row belongs."""
+    raw = next(iter(scene.geometry.values())).metadata.get("_ply_raw", {}) if parts else {}
     data = raw.get("face", {}).get("data")
     names = getattr(getattr(data, "dtype", None), "names", None) or (data if isinstance(data, dict) else ())
-    if len(parts) != 1 or "block_id" not in names:
-        return parts
-    ids = np.asarray(data["block_id"]).ravel()
-    _, points, faces = parts[0]
-    if len(ids) != len(faces):
-        return parts
-    return [(f"block {value}", points, faces[ids == value]) for value in np.unique(ids).tolist()]
+    if "block_id" not in names:
+        lost = f"not read: what blockvis wrote of {counted(len(rows), 'block')}: faces have no block_id any more"
+        return dae.Drawn(parts, "", "z", "", notes=[Note(LEFT_OUT, lost)] if rows else [])
+    # trimesh puts the triangles of polygons in another order.
+    polygons = data["vertex_indices" if "vertex_indices" in names else "vertex_index"]
+    polygons = polygons if isinstance(data, dict) else polygons["f1"]
+    points = np.column_stack([np.ravel(raw["vertex"]["data"][axis]) for axis in "xyz"]).astype(float)
+    values, owners = np.unique(np.ravel(data["block_id"]), return_inverse=True)
+    faces: list[list[list[int]]] = [[] for _ in values]
+    for polygon, owner in zip(polygons, owners.tolist(), strict=True):
+        faces[owner].append(polygon.tolist())
+    split = [(f"block {value}", points, fans(own)) for value, own in zip(values.tolist(), faces, strict=True)]
+    known = bool(rows) and all(value in range(len(rows)) for value in values.tolist())
+    return dae.Drawn(split, "", "z", "", [rows[int(value)] for value in values] if known else [])
 
 
 def _flat(

@@ -251,3 +251,38 @@ def test_small_holes_of_a_scanned_stone_are_closed_with_a_note(tmp_path, edges):
     layout = read_layout(tmp_path / "a.ply", dimension=3)
     assert layout.volumes[0] == pytest.approx(stone.volume, rel=5e-3)
     assert f"small holes in the surface of 'a.ply' ({edges} edges) were closed" in layout.notes
+
+
+def polygons(path, vertices, faces, ids, comments=()):
+    """Write a .ply of polygons with the number of the block of each, if there are any."""
+    lines = ["ply", "format ascii 1.0", *(f"comment blockvis {json.dumps(row)}" for row in comments)]
+    lines += [f"element vertex {len(vertices)}", *(f"property double {axis}" for axis in "xyz")]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    lines += ["property int block_id"] * bool(ids) + ["end_header", *(" ".join(map(str, one)) for one in vertices)]
+    lines += [" ".join(map(str, (len(face), *face, *ids[k : k + 1]))) for k, face in enumerate(faces)]
+    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    return path
+
+
+def test_polygons_of_a_ply_keep_their_block(tmp_path):
+    corners = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 0), (2, 1, 0), (3, 1, 0)]
+    faces = [(0, 1, 4, 3), (2, 6, 5), (1, 2, 5, 4)]
+    layout = read_layout(polygons(tmp_path / "a.ply", corners, faces, [7, 3, 7]))
+    assert layout.names == ("block 3", "block 7")
+    assert [np.ptp(ring, axis=0).tolist() for ring in layout.outlines] == [[1, 1], [2, 1]]
+
+
+@pytest.mark.parametrize("numbered", [True, False])
+def test_rows_of_a_ply_belong_to_the_blocks_of_their_number_or_to_none(tmp_path, numbered):
+    corners = [(x + a, y, z) for x in (0, 2, 4) for z in (0, 1) for y in (0, 1) for a in (0, 1)]
+    faces = [tuple(n - 1 + 8 * k for n in face) for k in range(3) for face in BOX]
+    rows = [{"name": "C"}, {"name": "B"}, {"name": "A", "role": "fixed"}]
+    ids = [2 - k // 6 for k in range(18)] if numbered else []
+    layout = read_layout(polygons(tmp_path / "a.ply", corners, faces, ids, rows))
+    left = {name: ring[:, 0].min() for name, ring in zip(layout.names, layout.outlines, strict=True)}
+    if numbered:
+        assert left == {"A": 0, "B": 2, "C": 4}
+        assert dict(zip(layout.names, layout.roles, strict=True))["A"] == "fixed"
+    else:
+        assert not {"A", "B", "C"} & set(left)
+        assert "not read: what blockvis wrote of 3 blocks: faces have no block_id any more" in layout.notes
