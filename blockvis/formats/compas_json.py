@@ -8,6 +8,7 @@ elements with a geometry. https://compas.dev describes the data of each class.
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import Note
 from blockvis.layout.outlines import FLAT, spread_of
 from blockvis.layout.solids import fans
@@ -37,7 +39,7 @@ _BETWEEN = {"edge", "adjacency", "interfaces", "interface", "contacts", "interac
 
 @dataclass(frozen=True)
 class _Context:
-    """What is known of a mesh from the objects around it."""
+    """What is known of a mesh from the objects around it; what is passed over is counted for the whole file."""
 
     name: str = ""
     group: str = ""
@@ -45,6 +47,7 @@ class _Context:
     material: Mapping[str, Any] = field(default_factory=dict)
     matrix: np.ndarray = field(default_factory=lambda: np.eye(4))
     depth: int = 0
+    passed: Counter[str] = field(default_factory=Counter)
 
 
 @dataclass(frozen=True)
@@ -73,8 +76,9 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies 
         For damaged meshes, bodies that are not closed, and blocks whose geometry is no mesh.
     """
     meshes: list[_Mesh] = []
+    context = _Context()
     try:
-        meshes.extend(_meshes(content, _Context()))
+        meshes.extend(_meshes(content, context))
     except (LookupError, TypeError, AttributeError, OverflowError) as error:
         raise ValueError(
             f"'{path}' has a mesh of COMPAS that cannot be read, number {len(meshes) + 1} ({type(error).__name__} "
@@ -82,7 +86,10 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies 
         ) from None
     except ValueError as error:
         raise ValueError(f"'{path}': {error}") from None
-    return _layout_of(meshes, path, reading) if meshes else None
+    if not meshes:
+        return None
+    found = _layout_of(meshes, path, reading)
+    return replace(found, notes=(*found.notes, *passed_over(context.passed)))
 
 
 def _layout_of(meshes: list[_Mesh], path: Path, reading: Reading) -> Layout | Bodies:
@@ -180,9 +187,11 @@ def _of_graph(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
     default = data.get("default_node_attributes") or data.get("dna") or data.get("node_attributes") or {}
     for key, node in data["node"].items():
         attributes = {**default, **node}
-        if attributes.get("block") is not None:
-            support = context.support or bool(attributes.get("is_support"))
-            yield from _meshes(attributes["block"], replace(context, name=str(key), support=support))
+        if attributes.get("block") is None:
+            context.passed["nodes without a block"] += 1
+            continue
+        support = context.support or bool(attributes.get("is_support"))
+        yield from _meshes(attributes["block"], replace(context, name=str(key), support=support))
 
 
 def _of_old_assembly(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
@@ -209,6 +218,7 @@ def _of_model(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
     for k, (guid, element, name) in enumerate(known):
         geometry = element.get("geometry") or element.get("shape")
         if geometry is None:
+            context.passed["elements without geometry"] += 1
             continue
         within = replace(
             context,

@@ -19,8 +19,8 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.left_out import LeftOut, matches
-from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
+from blockvis.layout.left_out import LeftOut, matches, passed_over
+from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import FLAT, ring_area, spread_of
 from blockvis.layout.units import DOUBTED, UNITS
 from blockvis.layout.views import VIEWS, axis_across, upright_note
@@ -48,6 +48,9 @@ GEOJSON = (
 
 #: What a file without a coordinate system draws so many of its widths away from 0 is a park or a country in degrees.
 FAR = 50.0
+
+#: What is counted of features that draw nothing.
+NO_GEOMETRY = "features without geometry"
 
 #: Bytes of the envelope in the header of a geometry of a GeoPackage, by its kind.
 ENVELOPES = {0: 0, 1: 32, 2: 48, 3: 48, 4: 64}
@@ -89,7 +92,8 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     name = str(crs.get("properties", {}).get("name", "")) if isinstance(crs, dict) else ""
     says = name if re.search(r"CRS84|4326$", name) else ""
     known = [one for one in features if one is not None]
-    return layout_of_features(known, path, reading, degrees=says, lengths="crs" in content and crs is None)
+    lengths, skipped = "crs" in content and crs is None, {NO_GEOMETRY: len(features) - len(known)}
+    return layout_of_features(known, path, reading, degrees=says, lengths=lengths, skipped=skipped)
 
 
 def _geojson_features(content: Mapping[str, Any], path: Path) -> list[Any]:
@@ -147,7 +151,7 @@ def _read_shapefile(path: Path, reading: Reading) -> Layout:
             records = [record.as_dict() for record in reader.iterRecords()] if table else []
             for k, drawn in enumerate(reader.iterShapes()):
                 if drawn.shapeTypeName in ("NULL", "MULTIPATCH"):
-                    skipped[drawn.shapeTypeName] += 1
+                    skipped[NO_GEOMETRY if drawn.shapeTypeName == "NULL" else "MULTIPATCH"] += 1
                     continue
                 row = records[k] if k < len(records) else {}
                 features.append(Feature(shape(drawn.__geo_interface__), row))
@@ -184,17 +188,22 @@ def _read_geopackage(path: Path, reading: Reading) -> Layout:
     unit, degrees = _unit_of_system(next((layer.description for layer in systems.values()), ""))
     # What is left out as asked is counted with the rest, but not what lies in another system.
     features = [feature for layer in layers if layer.system in systems for feature in layer.features]
-    found = layout_of_features(features, path, reading, unit=unit, degrees=degrees)
+    skipped = {NO_GEOMETRY: sum(layer.empty for layer in layers if layer.system in systems)}
+    found = layout_of_features(features, path, reading, unit=unit, degrees=degrees, skipped=skipped)
     other = [LeftOut("asked", np.zeros((0, 2)), "", one.name) for one in layers if one.system not in systems]
     return replace(found, left_out=(*found.left_out, *other))
 
 
 @dataclass(frozen=True)
 class _Layer:
-    """A table of a GeoPackage: its features, and the name and description of its coordinate system, "" for none."""
+    """A table of a GeoPackage: its features, the number of those without geometry, and its coordinate system.
+
+    Name and description of the system are "" for none.
+    """
 
     name: str
     features: list[Feature]
+    empty: int
     system: str
     description: str
 
@@ -212,7 +221,7 @@ def _layers(base: sqlite3.Connection, path: Path) -> list[_Layer]:
         query = "SELECT srs_name, definition FROM gpkg_spatial_ref_sys WHERE srs_id = ?"
         system, text = base.execute(query, (table["srs_id"],)).fetchone() or (table["srs_id"], "")
         system = "" if str(system).lower().startswith("undefined") else str(system)
-        found.append(_Layer(name, features, system, str(text)))
+        found.append(_Layer(name, features, len(rows) - len(features), system, str(text)))
     return found
 
 
@@ -239,6 +248,8 @@ def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Fe
 
 def _unit_of_system(text: str) -> tuple[str, str]:
     """Find the unit of length of a coordinate system in words, "" for none, and its name if it is in degrees."""
+    # Heights have a system of their own behind that of the plan, and often another unit.
+    text = re.split(r"\bVERT\w*\s*\[", text)[0]
     head = re.search(r'\b(PROJCS|PROJCRS|GEOGCS|GEOGCRS|GEODCRS|LOCAL_CS|ENGCRS)\s*\[\s*"([^"]*)"', text)
     if head is None:
         return "", ""
@@ -249,7 +260,8 @@ def _unit_of_system(text: str) -> tuple[str, str]:
         metres = float(found[-1]) if found else 0.0
     except ValueError:
         return "", ""
-    return next((unit for unit, size in UNITS.items() if math.isclose(metres, size, rel_tol=1e-5)), ""), ""
+    other = f"{metres:.9g} m" if 0.0 < metres < math.inf else ""
+    return next((unit for unit, size in UNITS.items() if math.isclose(metres, size, rel_tol=1e-5)), other), ""
 
 
 def layout_of_features(
@@ -287,9 +299,10 @@ def layout_of_features(
     found = _Found(skipped=Counter(skipped or {}))
     for k, feature in enumerate(features):
         _add(feature.geometry, k, found)
-    every, listed = found.points, ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
+    every, skips = found.points, passed_over(found.skipped, "found")
     if not len(every):
-        raise ValueError(f"'{path}' has no polygon (found: {listed or 'nothing'}); draw each block as one polygon")
+        seen = skips[0] if skips else "found: nothing"
+        raise ValueError(f"'{path}' has no polygon ({seen}); draw each block as one polygon")
     order, notes = _order(every, reading.view, path)
     rows = _rows(features)
     strange = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)
@@ -300,8 +313,7 @@ def layout_of_features(
     outlines = [*rings, *(holed[0][:, order] for holed, _ in found.holed)]
     far = not (unit or degrees or lengths) and list(order) == [0, 1]
     _check_degrees(outlines, path, reading, degrees, notes, far=far)
-    if listed:
-        notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
+    notes += passed_over(found.skipped)
     kinds = _parts(rows, found.of)
     wanted, unwanted = _lines(found, rows, order, reading)
     faces = faces_of_lines(wanted, rings, [0.0] * len(rings), only=reading.only)

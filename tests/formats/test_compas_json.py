@@ -237,3 +237,14 @@ def test_info_and_convert(tmp_path, capsys):
     again = read_layout(tmp_path / "b.json")
     assert again.roles == ("fixed", "fixed", "")
     assert again.n_blocks == 3
+
+
+def test_elements_and_nodes_without_a_body_are_counted(tmp_path):
+    model = block_model()
+    model["data"]["elements"]["e1"]["data"]["geometry"] = None
+    assembly = version_2()
+    del assembly["data"]["graph"]["data"]["node"]["1"]["block"]
+    for content, what in ((model, "elements without geometry"), (assembly, "nodes without a block")):
+        layout = read_layout(saved(tmp_path, content))
+        assert layout.n_blocks == 2
+        assert f"skipped: 1 {what}" in layout.notes

@@ -88,7 +88,7 @@ def test_properties_give_names_groups_and_roles(tmp_path):
     assert layout.density[1] == 1800
     np.testing.assert_allclose(layout.sizes**2, 0.08)
     assert layout.points[:, 1].min() == 0.0, "y points up"
-    assert "skipped: 1 Point" in layout.notes
+    assert "skipped: 1 features without geometry, 1 Point" in layout.notes
 
 
 def test_numbers_that_tell_features_apart_name_them(tmp_path):
@@ -272,3 +272,24 @@ def test_a_shapefile_without_its_package_names_the_command(tmp_path, monkeypatch
     (tmp_path / "wall.shp").write_bytes(bytes(100))
     with pytest.raises(ImportError, match=r"need pyshp, which .*pip install 'blockvis\[geo\]'$"):
         blockvis.read_layout(tmp_path / "wall.shp")
+
+
+@pytest.mark.parametrize(
+    "heights",
+    [
+        ',VERTCS["NAVD_1988",VDATUM["NAVD_1988"],PARAMETER["Direction",1.0],UNIT["Meter",1.0]]',
+        ',VERT_CS["height",VERT_DATUM["d",2005],UNIT["metre",1]]]',
+        ',VERTCRS["height",VDATUM["d"],CS[vertical,1],AXIS["up",up],LENGTHUNIT["metre",1]]]',
+    ],
+)
+def test_the_unit_of_heights_is_not_that_of_the_plan(tmp_path, heights):
+    system = (
+        'COMPD_CS["plan and heights",' * heights.endswith("]]]") + UTM.format("Foot_US", 0.304800609601219) + heights
+    )
+    path = write_shapefile(tmp_path / "wall.shp", SQUARES, system)
+    assert blockvis.read_layout(path).unit == "ft"
+
+
+def test_a_unit_that_has_no_name_here_is_read_by_its_length(tmp_path):
+    path = write_shapefile(tmp_path / "wall.shp", SQUARES, UTM.format("Link", 0.201168))
+    np.testing.assert_allclose(blockvis.read_layout(path).sizes ** 2, 0.08 * 0.201168**2)
