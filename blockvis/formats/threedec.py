@@ -1,7 +1,8 @@
 """Blocks of 3DEC's command files, .3ddat .3dec .dat .txt: ``poly brick``, ``poly prism``, ``block create ... face`` ...
 
-Of the other commands those are followed that call a file beside this one, that fix blocks or give their density, and
-that say which way gravity acts. What cuts or deletes blocks, or makes them by FISH, is refused: only 3DEC runs it.
+Of the other commands those are followed that call a file beside this one, that fix or free blocks, give their group or
+density, and that say which way gravity acts. What cuts, moves or deletes blocks, or makes them by FISH, is refused:
+only 3DEC runs it. All others are counted, but for those that steer the program alone.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.layout import Layout
-from blockvis.layout.notes import LEFT_OUT, Note
+from blockvis.layout.left_out import passed_over
 from blockvis.layout.solids import fans
 from solver import mechanics
 from solver.mechanics import counted
@@ -48,10 +49,38 @@ CHANGES = (
     "block delete",
     "block densify",
     "block excavate",
+    "block move",
+    "block translate",
+    "block rotate",
+    "block scale",
+    "block mirror",
+    "block transform",
+    "move",
+    "mirror",
+    "rotate",
+    "scale",
 )
 
 #: Commands that make blocks from what is not in the file.
 IMPORTS = ("block import", "block generate")
+
+#: Commands that make the blocks of a range supports, or free ones again.
+FIXES = {"fix": True, "block fix": True, "free": False, "block free": False}
+
+#: Commands of two words, by the first.
+LONG = ("block", "model", "program", "set", "fish")
+
+#: Commands that say nothing of the blocks as they are made: first words of each.
+STEERS = frozenset(
+    (
+        *("model", "program", "set", "fish", "new", "title", "heading", "config", "plot", "history", "hist", "save"),
+        *("solve", "step", "cycle", "ret", "return", "stop", "quit", "exit", "log", "pause", "print", "list"),
+        *("block history", "block list", "block export"),
+    )
+)
+
+#: Commands that begin as those of STEERS do, and bring in what is not in the file.
+BRINGS = ("model restore", "model import")
 
 #: Words that say something of a block by the number after them.
 ABOUT = ("region", "reg", "r", "mat", "material", "con", "cons", "constitutive", "join", "joint", "id")
@@ -73,6 +102,7 @@ class _Block:
     points: np.ndarray
     faces: list[list[int]]
     words: dict[str, str] = field(default_factory=dict)
+    groups: list[str] = field(default_factory=list)
     fixed: bool = False
     density: float | None = None
 
@@ -166,22 +196,17 @@ def _follow(line: int, words: list[str], model: _Model) -> None:
     """Carry out one command, or count it as passed over."""
     small = [word.lower() for word in words]
     two = " ".join(small[:2])
+    head = two if small[0] in LONG else small[0]
     if small[0] in ("poly", "polyhedron"):
         model.blocks.append(_made(line, words[1:], model.path))
     elif two == "block create":
         model.blocks.append(_made(line, words[2:], model.path))
     elif small[0] == "range" and small[1:2] == ["name"] and len(words) == 5 and small[3] == "region":
         model.names[words[4]] = _plain(words[2])
-    elif two in ("model gravity", "block gravity") or small[0] == "gravity":
+    elif head in ("gravity", "model gravity", "block gravity", "set gravity"):
         _turn(words, model)
-    elif small[0] == "fix" or two == "block fix":
-        chosen = _in_range(words[1 if small[0] == "fix" else 2 :], model)
-        for block in chosen:
-            block.fixed = True
-        model.passed["fix"] += not chosen
-    elif two == "block property" and small[2:3] == ["density"] and len(words) > 3:
-        for block in _in_range(words[4:], model) if len(words) > 4 else model.blocks:
-            block.density = _number(words[3])
+    elif head in FIXES or head in ("block group", "block property"):
+        model.passed[head] += not _says(head, words, model)
     elif two in IMPORTS:
         raise ValueError(
             f"'{model.path}': line {line} makes blocks ('{' '.join(words)[:60]}'), which only 3DEC does; write them by "
@@ -192,8 +217,26 @@ def _follow(line: int, words: list[str], model: _Model) -> None:
             f"'{model.path}': line {line} changes the blocks ('{' '.join(words)[:60]}'), which only 3DEC does; write "
             "the blocks as they are then, by poly prism or block create"
         )
-    elif small[0] == "join" or two == "block join":
-        model.passed[two if small[0] == "block" else small[0]] += 1
+    elif head in BRINGS or not STEERS & {small[0], head}:
+        model.passed["FISH" if small[0][0] in "@[" else head] += 1
+
+
+def _says(head: str, words: list[str], model: _Model) -> bool:
+    """Take what a command says of the blocks of a range; whether there are such blocks, and it is understood."""
+    if head in FIXES:
+        chosen = _in_range(words[len(head.split()) :], model)
+        for block in chosen:
+            block.fixed = FIXES[head]
+    elif head == "block group":
+        chosen = _in_range(words[5 if words[3:4] == ["slot"] else 3 :], model) if len(words) > 2 else []
+        for block in chosen:
+            block.groups.append(_plain(words[2]))
+    else:
+        density = _number(words[3]) if len(words) > 3 and words[2].lower() == "density" else None
+        chosen = _in_range(words[4:], model) if density is not None else []
+        for block in chosen:
+            block.density = density
+    return bool(chosen)
 
 
 def _made(line: int, words: list[str], path: Path) -> _Block:
@@ -216,7 +259,7 @@ def _made(line: int, words: list[str], path: Path) -> _Block:
     points, faces = _shape(shapes or lists[:1], line, path)
     if not np.isfinite(points).all():
         raise ValueError(f"'{path}': line {line} has a corner that is not finite; repair it")
-    return _Block(line, points, faces, about)
+    return _Block(line, points, faces, about, [about.pop("group")] if "group" in about else [])
 
 
 def _shape(shapes: list[tuple[str, list[float]]], line: int, path: Path) -> tuple[np.ndarray, list[list[int]]]:
@@ -274,16 +317,21 @@ def _turn(words: list[str], model: _Model) -> None:
 
 
 def _in_range(words: list[str], model: _Model) -> list[_Block]:
-    """Choose the blocks of a region or group, or those whose middle lies within limits; none of an unknown range."""
+    """Choose the blocks of a region or group, or those whose middle lies within limits; none of an unknown range.
+
+    None either where blocks are hidden: commands may pass these over.
+    """
     small = [word.lower() for word in words if word.lower() not in ("range", "and")]
     words = [_plain(word) for word in words if word.lower() not in ("range", "and")]
     regions = {name.lower(): region for region, name in model.names.items()}
-    chosen, k = model.blocks if words else [], 0
+    chosen, k = [] if model.passed["hide"] + model.passed["block hide"] else model.blocks, 0
     while k < len(words):
         key = small[k].removeprefix("position-").removeprefix("pos-")
         after = words[k + 1 : k + 3]
-        if key in ("region", "group") and after:
+        if key == "region" and after:
             chosen, k = [block for block in chosen if block.words.get(key) == after[0]], k + 2
+        elif key == "group" and after:
+            chosen, k = [block for block in chosen if after[0] in block.groups], k + 2
         elif key in ("x", "y", "z") and len(after) == 2 and None not in (limits := [_number(word) for word in after]):
             low, high = (number for number in limits if number is not None)
             axis = "xyz".index(key)
@@ -308,15 +356,13 @@ def _bodies(model: _Model) -> Bodies:
     notes = [f"{counted(len(model.blocks), 'block')} of 3DEC; its joints, loads and steps are not read"]
     fixed = sum(block.fixed for block in model.blocks)
     notes += [f"fixed, as the file says: {fixed} of them"] if fixed else []
-    if model.passed.total():
-        listed = ", ".join(f"{n} {command}" for command, n in model.passed.items() if n)
-        notes.append(Note(LEFT_OUT, f"commands that were passed over: {listed}"))
+    notes += passed_over(model.passed, "commands that were passed over")
     return Bodies(tuple(bodies), tuple(rows), notes=tuple(notes), up=model.up, up_says=model.up_says)
 
 
 def _row(name: str, block: _Block, names: dict[str, str]) -> dict[str, Any]:
     region = block.words.get("region", "")
-    group = block.words.get("group") or names.get(region) or (f"region {region}" if region else "")
+    group = (block.groups[-1] if block.groups else "") or names.get(region) or (f"region {region}" if region else "")
     material = block.words.get("mat") or block.words.get("material")
     row: dict[str, Any] = {"name": name, "group": group}
     row |= {"material": f"mat {material}"} if material else {}

@@ -125,6 +125,7 @@ def test_gravity_says_which_way_is_up_and_groups_and_places_what_is_fixed(tmp_pa
         ("poly brick 0 1 0 1 0 1\njset dip 90 dd 0 spacing 0.2", "line 2 changes the blocks ('jset dip 90 dd 0"),
         ("poly brick 0 1 0 1 0 1\ndelete range x 0 1", "line 2 changes the blocks"),
         ("block create brick 0 1\nblock cut joint-set dip 3", "line 2 changes the blocks"),
+        ("block create brick 0 1\nblock move 0 0 5 range group 'a'", "line 2 changes the blocks ('block move 0 0 5"),
         ("poly brick @x0 @x1 0 1 0 1", "line 1 makes blocks by FISH ('brick @x0 @x1"),
         (
             "def wall\nloop n (1,3)\ncommand\npoly brick 0 1 0 1 0 1\nendcommand\nendloop\nend",
@@ -155,3 +156,49 @@ def test_a_table_of_tecplot_is_still_one_and_a_text_beside_stones_is_none(tmp_pa
     path.unlink()
     written(tmp_path / "readme.txt", "stones of the wall")
     assert blockvis.read_layout(tmp_path).n_blocks == 4
+
+
+def test_what_is_said_of_blocks_is_followed_or_counted(tmp_path):
+    text = """
+    model new
+    model large-strain on
+    set gravity 0 0 -9.81
+    poly brick 0 1 0 1 0 1
+    poly brick 0 1 0 1 1 2
+    poly brick 0 1 0 1 2 3
+    block group 'base' range position-z 0 2
+    block group 'low' slot 'part' range position-z 0 1
+    block fix range group 'base'
+    block free range position-z 1 2
+    block property density 2600 range group 'base'
+    block property density 1900 range group 'low'
+    block property density 1000 range not group 'base'
+    block property density [rho] range group 'low'
+    block property kn 1e9
+    fix range not z 0 1
+    prop mat 1 dens 2600
+    block hide range group 'base'
+    block apply vel-x 1
+    block history vel-x position 0 0 0
+    @make_it_heavy
+    [block.density(block.head) = 3000]
+    model restore 'earlier.sav'
+    model solve
+    """
+    layout = blockvis.read_layout(written(tmp_path / "wall.3ddat", text), dimension=3)
+    assert layout.groups == ("low", "base", "")
+    assert layout.roles == ("fixed", "", "")
+    np.testing.assert_array_equal(layout.density, [1900, 2600, np.nan])
+    counted = "3 block property, 1 fix, 1 prop, 1 block hide, 1 block apply, 2 FISH, 1 model restore"
+    assert f"commands that were passed over: {counted}" in layout.notes
+
+
+def test_what_is_said_of_no_range_holds_for_all_unless_some_are_hidden(tmp_path):
+    bricks = "poly brick 0 1 0 1 0 1\npoly brick 0 1 0 1 1 2\n"
+    said = "block property density 2600\nfix\nfree range z 1 2\n"
+    layout = blockvis.read_layout(written(tmp_path / "wall.3ddat", bricks + said), dimension=3)
+    assert layout.roles == ("fixed", "")
+    assert layout.density.tolist() == [2600, 2600]
+    layout = blockvis.read_layout(written(tmp_path / "wall.3ddat", f"{bricks}hide range z 1 2\n{said}"), dimension=3)
+    assert layout.roles == ("", "")
+    assert "commands that were passed over: 1 hide, 1 block property, 1 fix, 1 free" in layout.notes
