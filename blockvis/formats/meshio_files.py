@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.layout import Layout
+from blockvis.layout.notes import LEFT_OUT, Note
 from solver.mechanics import counted
 
 from .bodies import Bodies
@@ -29,6 +30,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     _check_text(path)
     suffix = path.suffix.lower()
     cards = _abaqus_cards(path) if suffix == ".inp" else []
+    _check_members(cards, path)
     said = io.StringIO()
     try:
         # meshio prints to the terminal, and raises SystemExit for some files.
@@ -204,7 +206,8 @@ def _arrays_of_sets(sets: Mapping[str, np.ndarray], total: int) -> tuple[dict[st
     # Sets of cells at a loaded or supported face are parts of blocks: beside them the largest hold every cell once.
     blocks = _dividing(by_size, total) or _dividing(by_size[::-1], total)
     if not blocks:
-        return {}, (f"the cell sets {_listed(by_size)} were not used: no choice of them holds every cell once",)
+        unused = f"the cell sets {_listed(by_size)} were not used: no choice of them holds every cell once"
+        return {}, (Note(LEFT_OUT, unused),)
     owner = np.zeros(total, dtype=np.int64)
     for k, (_, index) in enumerate(blocks):
         owner[index] = k
@@ -216,7 +219,8 @@ def _arrays_of_sets(sets: Mapping[str, np.ndarray], total: int) -> tuple[dict[st
         elif 1 < len(within) < len(blocks):
             groups = [group or (name if k in within else "") for k, group in enumerate(groups)]
     names = [name for name, _ in blocks]
-    notes = (f"the cell sets {_listed(cutting)} were not used: they cut blocks",) if cutting else ()
+    unused = f"the cell sets {_listed(cutting)} were not used: they cut blocks"
+    notes = (Note(LEFT_OUT, unused),) if cutting else ()
     return {"block_id": owner, "name": np.array(names)[owner], "group": np.array(groups)[owner]}, notes
 
 
@@ -254,6 +258,28 @@ def _abaqus_cards(path: Path) -> list[tuple[str, str, str]]:
     return [] if "INCLUDE" in words else cards
 
 
+def _set_name(parameters: str) -> str:
+    """Name of the set of cells of a card, "" for none."""
+    found = re.search(r"(?i)\belset\s*=\s*\"?([^,\"]+)", parameters)
+    return found[1].strip() if found else ""
+
+
+def _check_members(cards: Sequence[tuple[str, str, str]], path: Path) -> None:
+    """Refuse a set of cells that names another one which is not there."""
+    known: set[str] = set()
+    for word, parameters, data in cards:
+        if word not in ("ELEMENT", "ELSET"):
+            continue
+        name = _set_name(parameters)
+        members = data.replace(",", " ").split() if word == "ELSET" else []
+        strange = next((one for one in members if not one.isdigit() and one.upper() not in known), None)
+        if strange is not None:
+            raise ValueError(
+                f"'{path}': set '{name}' names '{strange}', which is neither a cell nor a set before it; repair it"
+            )
+        known.add(name.upper())
+
+
 def _mesh_alone(cards: Sequence[tuple[str, str, str]]) -> str:
     """Text of the nodes and cells of an .inp file; of several lists of nodes meshio keeps the last."""
     nodes = [data for word, _, data in cards if word == "NODE"]
@@ -264,29 +290,33 @@ def _mesh_alone(cards: Sequence[tuple[str, str, str]]) -> str:
 def _abaqus_sets(cards: Sequence[tuple[str, str, str]], blocks: Sequence[Any]) -> dict[str, np.ndarray]:
     """Numbers of the cells of each ELSET; meshio mixes up those of several blocks of cells and those of other sets.
 
-    The name of ``*ELSET`` is that of the same cells: programs number those of ``*ELEMENT``.
+    The name of ``*ELSET`` is that of the same cells: programs number those of ``*ELEMENT``. Small and capital letters
+    are the same to Abaqus; the first writing of a name is kept.
     """
-    named = [(word, re.search(r"(?i)\belset\s*=\s*\"?([^,\"]+)", parameters), parameters, data)
+    named = [(word, _set_name(parameters), parameters, data)
              for word, parameters, data in cards if word in ("ELEMENT", "ELSET")]  # fmt: skip
+    written: dict[str, str] = {}
+    for _, name, _, _ in named:
+        written.setdefault(name.upper(), name)
     numbers: list[np.ndarray] = []
     of_elements: dict[str, list[np.ndarray]] = {}
     for (_, name, _, data), block in zip((one for one in named if one[0] == "ELEMENT"), blocks, strict=True):
         cells = np.fromstring(data.replace(",", " "), dtype=np.int64, sep=" ")
         numbers.append(cells[:: max(1, len(cells) // max(1, len(block.data)))])
         if name:
-            of_elements.setdefault(name[1].strip(), []).append(numbers[-1])
+            of_elements.setdefault(name.upper(), []).append(numbers[-1])
     every = np.concatenate([*numbers, np.zeros(0, dtype=np.int64)])
     sets: dict[str, list[np.ndarray]] = {}
     for word, name, parameters, data in named:
         if word == "ELEMENT" or not name:
             continue
-        own = sets.setdefault(name[1].strip(), [])
+        own = sets.setdefault(name.upper(), [])
         rows = [line.replace(",", " ").split() for line in data.splitlines() if line.strip()]
         if re.search(r"(?i)\bgenerate\b", parameters):
             ranges = [(int(row[0]), int(row[1]), int(row[2]) if len(row) > 2 else 1) for row in rows]
             own += [every[(every >= a) & (every <= b) & ((every - a) % step == 0)] for a, b, step in ranges]
         else:
-            words = [one for row in rows for one in row]
+            words = [one.upper() for row in rows for one in row]
             own.append(np.array([one for one in words if one.isdigit()], dtype=np.int64))
             own += [part for one in words for part in (*sets.get(one, ()), *of_elements.get(one, ()))]
     found = {}
@@ -294,4 +324,5 @@ def _abaqus_sets(cards: Sequence[tuple[str, str, str]], blocks: Sequence[Any]) -
         members = np.concatenate([*sets.get(key, ()), *of_elements.get(key, ())])
         found[key] = np.flatnonzero(np.isin(every, members))
     named_twice = {found[key].tobytes() for key in sets}
-    return {key: index for key, index in found.items() if key in sets or index.tobytes() not in named_twice}
+    kept = {key: index for key, index in found.items() if key in sets or index.tobytes() not in named_twice}
+    return {written[key]: index for key, index in kept.items()}
