@@ -279,5 +279,5 @@ def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path
             part = replace(part, names=(file.stem,)) if alone else part
         parts.append(part)
         labels.append("" if alone else file.stem)
-    # Each part has its roles by the rules of its own format, which may not go by how names begin.
+    # Bodies have their roles by how names begin; outlines by the rules of their own format, which may not.
     return _joined(parts, labels, path)

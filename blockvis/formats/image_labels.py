@@ -199,7 +199,9 @@ def _values(image: Image.Image) -> tuple[np.ndarray, bool]:
     if image.mode in ("1", "L", "P", "I") or image.mode.startswith("I;16"):
         return np.asarray(image).astype(np.int64), False
     rgb = np.asarray(image.convert("RGB")).astype(np.int64)
-    if np.ptp(rgb, axis=2).max() <= GREY:
+    apart = np.ptp(rgb, axis=2).max()
+    # Small numbers in one channel, as panoptic labels have, differ by no more than the channels of a noisy grey.
+    if apart == 0 or (apart <= GREY < np.ptp(rgb[..., 1])):
         return rgb[..., 1], False
     return rgb @ [65536, 256, 1], True
 

@@ -485,3 +485,13 @@ def test_labels_that_cover_stones_are_proposed_to_be_left_out(tmp_path):
     assert read(tmp_path / "w.json", width=np.float32(3.0), ignore="shadow").areas.sum() == pytest.approx(2.0)
     with pytest.raises(ValueError, match=r"w\.json': width is '3'; give a length in m above 0"):
         read_layout(tmp_path / "w.json", width="3")
+
+
+@pytest.mark.parametrize("step", [1, 10])
+def test_small_numbers_in_one_channel_are_labels(tmp_path, step):
+    pixels = np.zeros((60, 90, 3), dtype=np.uint8)
+    for k in range(3):
+        pixels[10:50, 5 + 28 * k : 28 + 28 * k, 0] = step * (k + 1)
+    Image.fromarray(pixels).save(tmp_path / "ids.png")
+    layout = read_layout(tmp_path / "ids.png", width=1.0)
+    assert layout.names == tuple(f"#{step * k:02x}0000" for k in (1, 2, 3))
