@@ -408,7 +408,7 @@ def _kept(element: ElementTree.Element, title: str, where: _Context, found: _Out
         return {}
     row = kept
     # A program that drops the labels of layers leaves ids that it made up.
-    if where.label not in ("", layer_of(kept)[0] or _LAYER):
+    if where.label not in ("", _in_xml(layer_of(kept)[0] or _LAYER)):
         row = {**_row(where.label, ""), **on_layer(kept, where.label)}
         found.moved.append((kept, row))
     names = (element.get(f"{_INKSCAPE}label", ""), title)
@@ -666,7 +666,7 @@ _SHAPES: dict[str, Callable[[ElementTree.Element, _Context], list[_Part]]] = {
 
 
 def _in_xml(text: str) -> str:
-    """Text without control characters, for which XML has no place; the row of a block has its name as it is."""
+    """Text without control characters, for which XML has no place; the row of a block has its words as they are."""
     return re.sub(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]", "", text)
 
 
@@ -683,7 +683,7 @@ def write(layout: Layout, path: Path) -> None:
         'data-blockvis-unit="m">',
     ]
     rows = rows_of(layout)
-    layers = layers_of(layout, _LAYER)
+    layers = [_in_xml(layer) for layer in layers_of(layout, _LAYER)]
     # Blocks keep their order: a new group begins whenever the layer changes.
     for i, row in enumerate(rows):
         if i == 0 or layers[i] != layers[i - 1]:
