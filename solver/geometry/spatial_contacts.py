@@ -22,6 +22,9 @@ from .separations import edge_separations
 from .solids import cross, dot, unit
 from .spatial_features import ACROSS, BEFORE_EDGE, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
 
+#: Difference of separations, in widths, that is more than rounding.
+SAME_PLACE = 1e-4
+
 #: Width of a sliver at a cut, as a part of both faces, and its area, as a part of that in which the two blocks touch.
 SLIVER = 0.005
 
@@ -108,7 +111,8 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
     Of two near parts, the face from which the other part is farthest leads, and the face of the other that opposes it
     best answers. Both are projected into the plane half-way between and clipped. A corner of the clipped polygon is a
     corner of one part in the face of the other, or an edge across an edge. Where they do not cover each other, the next
-    best answer. Where no faces oppose each other, a tip stands on a face, or an edge lies across an edge.
+    best answer. Where they do not come as near as their parts are, a tip stands on a face, or an edge lies across an
+    edge.
     """
     parts, solids, block_of_part = placed.parts, placed.solids, placed.parts.block_of_part
     pairs = facing_parts(placed, reach, useful, widths)
@@ -120,17 +124,12 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
     shallow = pairs.apart >= -PENETRATION_FRACTION * pairs.width
     # Flanks of steep tips hardly face each other.
     face_each_other = pairs.cosine <= -0.05
-    tips = measured_points(placed, _tips(placed, pairs[shallow & ~face_each_other], reach))
-    tips = tips[near(tips) & ~parts.made[tips.features[:, 1]]]
-    # No edges fit between faces that oppose each other better.
-    crossed = measured_points(placed, _crossed_edges(placed, pairs[pairs.cosine > -0.94], reach))
-    crossed = crossed[near(crossed) & ~parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)]
-    found = [tips, crossed]
-    # The planes of both faces, and whether the point is near.
-    labels = [np.tile([-1, -1, 1], (len(contacts), 1)) for contacts in found]
     # Other faces are tried where those that oppose each other best do not cover each other.
-    facing = pairs[shallow & face_each_other]
-    every = np.arange(len(facing.i))
+    numbers = np.flatnonzero(shallow & face_each_other)
+    facing, every, nearest = pairs[numbers], np.arange(len(numbers)), np.full(len(pairs.i), np.inf)
+    # With each point the planes of both faces, and whether it is near.
+    found: list[Contacts] = []
+    labels: list[np.ndarray] = []
     resolved, largest = np.zeros(len(every), dtype=bool), np.zeros(len(every))
     _, joint = np.unique(block_of_part[facing.i] * len(widths) + block_of_part[facing.j], return_inverse=True)
     rounds = chain([(every, facing.face_i, facing.face_j)], facing.other_faces(placed))
@@ -141,6 +140,7 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
         contacts = measured_points(placed, corners.features, corners.areas)
         lowest = np.full(len(pair), np.inf)
         np.minimum.at(lowest, corners.owner, contacts.gaps)
+        nearest[numbers[pair]] = np.minimum(nearest[numbers[pair]], lowest)
         strip = corners.widths < 0.5 * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
         np.maximum.at(largest, joint[pair], np.bincount(corners.owner, corners.areas, minlength=len(pair)))
         sliver = _slivers(placed, face_i, face_j, corners, largest[joint[pair]])
@@ -156,15 +156,21 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
         found.append(contacts[kept])
         owner = corners.owner[kept]
         labels.append(np.stack([parts.plane[face_i[owner]], parts.plane[face_j[owner]], inside[kept]], axis=1))
-    contacts, label = joined_contacts(found), np.concatenate(labels)
+    # Where a plane separates parts and points of both are as near as that, no tips or edges touch.
+    slack = SAME_PLACE * pairs.width
+    others = (pairs.apart < -slack) | (nearest > pairs.apart + slack)
+    single = _single_points(placed, pairs[others & shallow], pairs[others], reach)
+    single = single[near(single)]
+    contacts = joined_contacts([*found, single])
+    label = np.concatenate([*labels, np.tile([-1, -1, 1], (len(single), 1))])
     at_one_place = CORNER_TOLERANCE * float(widths.min())
     if not parts.whole:
         contacts, kept = without_points_of_cuts(parts, contacts, label[:, :2], at_one_place)
         contacts = contacts[label[kept, 2] > 0]
     contacts = contacts[np.lexsort(contacts.features.T[[2, 1, 0]])]
-    # Parts of one block may have a point in common, and edges across each other a corner of a polygon.
+    # Parts of one block may have a point in common, and tips and edges across each other a corner of a polygon.
     in_parts = np.bincount(block_of_part, minlength=len(widths)) > 1
-    in_parts[crossed.block_a] = True
+    in_parts[single.block_a] = True
     duplicates = in_parts[contacts.block_a] | in_parts[contacts.block_b]
     return _without_duplicates(contacts, duplicates, at_one_place)
 
@@ -201,6 +207,15 @@ def _without_duplicates(contacts: Contacts, duplicates: np.ndarray, near: float)
     return replace(contacts, areas=areas[group])[np.sort(np.unique(group, return_index=True)[1])]
 
 
+def _single_points(placed: PlacedParts, tipping: FacingParts, crossing: FacingParts, reach: float) -> Contacts:
+    """Points of tips on faces and of edges across edges, but those of cuts."""
+    parts = placed.parts
+    tips = measured_points(placed, _tips(placed, tipping, reach))
+    crossed = measured_points(placed, _crossed_edges(placed, crossing, reach))
+    of_cuts = parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)
+    return joined_contacts([tips[~parts.made[tips.features[:, 1]]], crossed[~of_cuts]])
+
+
 def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
     """Features of corners before a leading face that none of their faces opposes: a steep tip on a plane."""
     solids, faces, vertices = placed.solids, placed.faces, placed.vertices
@@ -217,7 +232,8 @@ def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
     inward = cross(faces.normals[face[owner]], unit(placed.along(corner)))
     inside = dot(vertices[vertex[owner]] - placed.starts(corner), inward)
     inside = np.minimum.reduceat(inside, np.flatnonzero(position == 0))
-    over = inside >= -CORNER_TOLERANCE * solids.shortest_edges[face]
+    # What meets a boundary only, as a stone beyond the joint of its neighbour, does not stand on the face.
+    over = inside > CORNER_TOLERANCE * solids.shortest_edges[face]
     return feature_rows(ON_FACE, vertex[over], face[over], -1)
 
 
@@ -225,10 +241,10 @@ def _crossed_edges(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.
     """Features of edges that separate two parts better than any of their faces: one point for a pair."""
     apart, own, other = edge_separations(placed, pairs.i, pairs.j)
     # By more than rounding, in widths.
-    k = np.flatnonzero((apart > pairs.apart + 1e-4 * pairs.width) & (apart <= reach))
+    k = np.flatnonzero((apart > pairs.apart + SAME_PLACE * pairs.width) & (apart <= reach))
     own, other = own[k], other[k]
     on_a, on_b = _crossings(placed, own, other)
-    inside = (on_a > 0.0) & (on_a < 1.0) & (on_b > 0.0) & (on_b < 1.0)
+    inside = (np.abs(np.stack([on_a, on_b]) - 0.5) < 0.5 - CORNER_TOLERANCE).all(axis=0)
     return feature_rows(ACROSS, own[inside], other[inside], places_of(on_a[inside], on_b[inside]))
 
 

@@ -4,6 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
+from scipy.spatial import HalfspaceIntersection
 from structures import box, hull_of, turn_by
 
 import solver
@@ -140,6 +142,72 @@ def test_a_tip_stands_on_a_plane(half):
     contacts = found([box((-2, -2, -1), (2, 2, 0)), hull_of(np.concatenate([[[0.0, 0.0, 0.0]], ring]))], 1e-6)
     np.testing.assert_allclose(contacts.points, [[0.0, 0.0, 0.0]], atol=1e-9)
     np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("chamfer", [0.3, 0.02])
+def test_a_tip_stands_on_a_plane_though_flatter_faces_beside_it_oppose_that_better(chamfer):
+    """A pyramid on its tip, whose ridges are cut by flatter faces from a height on."""
+    directions = np.pi / 4 * np.arange(8)
+    steep = np.radians(np.where(np.arange(8) % 2, 71.0, 75.0))
+    normals = np.column_stack([np.sin(steep) * np.cos(directions), np.sin(steep) * np.sin(directions), -np.cos(steep)])
+    radius = chamfer * np.sqrt(2.0) / np.tan(np.radians(75.0))
+    corner = np.column_stack([radius * np.cos(directions), radius * np.sin(directions), np.full(8, chamfer)])
+    offsets = np.where(np.arange(8) % 2, -(normals * corner).sum(axis=1), 0.0)
+    planes = np.vstack([np.column_stack([normals, offsets]), [0.0, 0.0, 1.0, -1.0]])
+    corners = HalfspaceIntersection(planes, np.array([0.0, 0.0, 0.5])).intersections
+    contacts = found([box((-2, -2, -1), (2, 2, 0)), hull_of(np.unique(corners.round(12), axis=0))], 1e-6)
+    np.testing.assert_allclose(contacts.points, [[0.0, 0.0, 0.0]], atol=1e-9)
+
+
+def touching(lower, upper, way):
+    """The corners of the upper one moved along a way until the two convex bodies just touch."""
+    n, m = len(upper), len(lower)
+    equal = np.zeros((5, n + m + 1))
+    equal[:3, :n], equal[:3, n:-1], equal[:3, -1] = upper.T, -lower.T, way
+    equal[3, :n] = equal[4, n:-1] = 1.0
+    cost = np.append(np.zeros(n + m), -1.0)
+    bounds = [(0.0, None)] * (n + m) + [(None, None)]
+    return upper + linprog(cost, A_eq=equal, b_eq=[0, 0, 0, 1, 1], bounds=bounds).x[-1] * way
+
+
+@pytest.mark.parametrize("tilt", [0.1, 0.5, 3.0])
+@pytest.mark.parametrize("corners", [8, 14])
+def test_bodies_that_touch_have_a_point_there(corners, tilt):
+    """However tips, edges and faces come to lie on each other; bricks and frustums, or any convex bodies."""
+    random = np.random.default_rng(corners)
+    unit = np.array([[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]) / 2.0
+    missed = []
+    for scene in range(40):
+        bodies = []
+        for _ in range(2):
+            body = unit * random.uniform(0.3, 1.0, 3) if corners == 8 else random.normal(size=(corners, 3))
+            body[4:8, :2] *= random.uniform(0.7, 1.0)
+            bodies.append(body @ turn_by(tilt * random.normal(size=3)).T)
+        way = np.append(0.3 * random.normal(size=2), 1.0)
+        upper = touching(*bodies, way / np.linalg.norm(way))
+        contacts = found([hull_of(bodies[0]), hull_of(upper)], 0.1)
+        missed += [scene] if np.abs(contacts.gaps).min(initial=np.inf) > 1e-6 else []
+    assert not missed
+
+
+@pytest.mark.parametrize(("lean", "roll"), [(1.0, 5.0), (5.0, 1.0), (10.0, 10.0), (15.0, 15.0)])
+def test_a_lintel_lies_on_the_edges_of_leaning_piers(lean, roll):
+    """Its lower edge across one of either pier, which oppose it by -0.98; pushed along it slides at about μ."""
+
+    def turned(solid, rotation, about):
+        corners, faces = solid
+        return (corners - about) @ turn_by(np.radians(rotation)).T + about, faces
+
+    solids = [
+        turned(box((-1, -1.6, -1), (1, -1, 0)), (lean, 0, 0), (0, -1, 0)),
+        turned(box((-1, 1, -1), (1, 1.6, 0)), (-lean, 0, 0), (0, 1, 0)),
+        turned(box((0.3, -0.1, -1), (0.4, 0.1, 0)), (0, -roll, 0), (0, 0, 0)),
+        turned(box((0, -1.3, 0), (0.4, 1.3, 0.3)), (0, -roll, 0), (0, 0, 0)),
+    ]
+    assembly = solver.Assembly.from_solids(solids, roles=["fixed"] * 3 + ["free"])
+    along = solver.weight_fraction(assembly, (0.0, 1.0, 0.0))
+    limit = solver.Structure(assembly, friction_coefficient=0.6).with_live(along).limit_load()
+    assert limit.multiplier == pytest.approx(0.6, abs=0.01)
 
 
 @pytest.mark.parametrize("angle", [0.02, 0.049, 0.051, 0.2, 1.0, np.pi / 4])
