@@ -276,7 +276,7 @@ class Structure(Shown):
         ------
         ValueError
             For no free block, overlapping blocks, no live load on a free block, a law of torsion that is not known or
-            that blocks in the plane do not have.
+            that blocks in the plane, or faces that are not convex, do not have.
         SolveError
             If no solution of the programs passes its check.
 

@@ -250,6 +250,7 @@ class _Problem:
         self.faces = Faces.of(contacts, self.length) if torsion == UNIFORM and len(contacts) else None
         matrix = wrench_matrix(contacts, pose, self.length)
         if self.faces is not None:
+            self.faces.refuse_not_convex(contacts, assembly)
             matrix = face_wrench_matrix(contacts, self.faces, pose, self.length)
         self.matrix = sp.csr_array(matrix)[np.repeat(free, len(units))]
         self.contacts, self.gaps, self.friction = contacts, gaps, friction

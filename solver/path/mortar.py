@@ -10,7 +10,7 @@ from solver.geometry.contacts import Contacts, matched_contacts, successors
 from solver.program.model import Model
 from solver.program.strength import largest_tension
 from solver.results.increment import Bonds, State
-from solver.tolerances import COMPUTED_GAP
+from solver.tolerances import COMPUTED_GAP, DRAWN_GAP
 
 from .state import Place
 
@@ -80,9 +80,13 @@ class Mortar:
         """The place with all of its closed joints whole."""
         if not self.present:
             return place
-        closed = contacts[contacts.gaps <= COMPUTED_GAP * self.model.length]
-        n = len(closed)
-        return replace(place, bonds=Bonds(closed.features[:, :3], closed.areas, np.ones(n), np.zeros(n)))
+        # What is accepted of a drawing as a joint is filled.
+        accepted = max(COMPUTED_GAP * self.model.length, DRAWN_GAP * float(self.model.assembly.widths.min()))
+        closed = contacts[contacts.gaps <= accepted]
+        whole = Bonds(closed.features[:, :3], closed.areas, np.ones(len(closed)), np.zeros(len(closed)))
+        joints = self.points(replace(place, bonds=whole), closed)
+        filled = (joints.strength > 0.0).any(axis=1) | (joints.give > 0.0).any(axis=1)
+        return replace(place, bonds=replace(whole, rest=np.where(filled, closed.gaps, 0.0)))
 
     def at_rest(self, place: Place, contacts: Contacts, forces: np.ndarray) -> Place:
         """The place with elastic joints compressed by forces in units of the program, as they are drawn."""
@@ -90,7 +94,7 @@ class Mortar:
             return place
         number, same = matched_contacts(contacts, place.bonds)
         rest, give = place.bonds.rest.copy(), self.points(place, contacts).give[:, 0]
-        rest[number[same]] = (give * forces[:, 0])[same] * self.model.length
+        rest[number[same]] += (give * forces[:, 0])[same] * self.model.length
         return replace(place, bonds=replace(place.bonds, rest=rest))
 
     def kept(self, place: Place, contacts: Contacts, bonds: Bonds) -> Place:
@@ -144,7 +148,7 @@ class Mortar:
             state,
             bonded=bonds.of(contacts).areas,
             intact=left if any(law.bonds for law in interfaces.laws) else state.intact,
-            unloaded=joints.rest if interfaces.elastic else state.unloaded,
+            unloaded=joints.rest if interfaces.elastic or joints.rest.any() else state.unloaded,
         )
 
     def renamed(self, place: Place, contacts: Contacts) -> Place:

@@ -256,8 +256,9 @@ class Stepper:
         joint_area = np.bincount(joint, contacts.areas, len(pairs))[joint]
         share = np.divide(contacts.areas, joint_area, out=np.full(n, 0.5), where=joint_area > 0.0)
         of_joint = factor * np.array([COMPLIANCE] + [SHEAR_COMPLIANCE] * (d - 1))
-        # Points of tiny tributary areas keep a finite compliance.
-        return of_joint / np.clip(share, 0.05, 1.0)[:, None]
+        # Points of tiny tributary areas keep a finite compliance, however many share the joint.
+        least = np.minimum(0.05, 0.2 / np.bincount(joint)[joint])
+        return of_joint / np.maximum(share, least)[:, None]
 
     def transferred(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Forces, trial forces and followed normal forces of a place at these contact points, and which are new.

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from solver.assembly import Assembly
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.geometry.outlines import polygon_integrals
@@ -18,6 +19,9 @@ POINTS, UNIFORM = TORSIONS = ("points", "uniform")
 
 #: Difference of normals, and distance in block sizes, up to which contact points of two blocks are of one face.
 ONE_FACE = 1e-4
+
+#: Part by which the polygon of a face's points may be larger than what touches there.
+NOT_CONVEX = 0.01
 
 
 @dataclass(frozen=True)
@@ -32,11 +36,14 @@ class Faces:
     radii : (n_faces,) array [m]
         Mean distance of a polygon's points from its centroid: torsional strength over friction and normal force; of
         two points a quarter of their distance, of one zero.
+    areas : (n_faces,) array [m²]
+        Of the polygons.
     """
 
     face: np.ndarray
     centres: np.ndarray
     radii: np.ndarray
+    areas: np.ndarray
 
     @property
     def first(self) -> np.ndarray:
@@ -49,12 +56,23 @@ class Faces:
         face = _faces(contacts, length)
         count = np.bincount(face)
         order, first = np.argsort(face, kind="stable"), np.cumsum(count) - count
-        centres, radii = np.zeros((len(count), 3)), np.zeros(len(count))
+        centres, radii, areas = np.zeros((len(count), 3)), np.zeros(len(count)), np.zeros(len(count))
         for corners in np.unique(count):
             chosen = np.flatnonzero(count == corners)
             members = order[first[chosen][:, None] + np.arange(corners)]
-            centres[chosen], radii[chosen] = _measured(contacts.points[members], contacts.frames[members[:, 0]])
-        return cls(face, centres, radii)
+            points, frames = contacts.points[members], contacts.frames[members[:, 0]]
+            centres[chosen], radii[chosen], areas[chosen] = _measured(points, frames)
+        return cls(face, centres, radii, areas)
+
+    def refuse_not_convex(self, contacts: Contacts, assembly: Assembly) -> None:
+        """Raise ``ValueError`` where the polygon of points is larger than what touches there."""
+        wide = self.first[self.areas > (1.0 + NOT_CONVEX) * np.bincount(self.face, contacts.areas)]
+        if len(wide):
+            one, other = (assembly.names[of[wide[0]]] for of in (contacts.block_a, contacts.block_b))
+            raise ValueError(
+                f"torsion is 'uniform', but '{one}' and '{other}' do not touch on all of a convex face; take torsion = "
+                "'points', or cut the stone into convex ones"
+            )
 
 
 def face_wrench_matrix(contacts: Contacts, faces: Faces, pose: Pose, length: float) -> sp.csc_array:
@@ -124,11 +142,11 @@ def _faces(contacts: Contacts, length: float) -> np.ndarray:
     return connected_components(graph, directed=False)[1]
 
 
-def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Centroids (n, 3) and mean distances (n,) of polygons with corners (n, k, 3) in any order, convex."""
+def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centroids (n, 3), mean distances and areas (n,) of convex polygons with corners (n, k, 3) in any order."""
     middle = points.mean(axis=1)
     if points.shape[1] < 3:
-        return middle, np.linalg.norm(points[:, 0] - points[:, -1], axis=1) / 4.0
+        return middle, np.linalg.norm(points[:, 0] - points[:, -1], axis=1) / 4.0, np.zeros(len(points))
     flat = np.einsum("nkx,nix->nki", points - middle[:, None], frames[:, 1:])
     angular_order = np.argsort(np.arctan2(flat[..., 1], flat[..., 0]), axis=1)
     flat = np.take_along_axis(flat, angular_order[..., None], axis=1)
@@ -150,4 +168,4 @@ def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.nd
         mean += sign * (height / 6.0 * (t * np.hypot(t, height) + height**2 * np.arcsinh(over))).sum(axis=1)
     farthest = np.linalg.norm(flat[:, :, None] - flat[:, None], axis=3).max(axis=(1, 2))
     radii = np.where(wide, mean / np.where(wide, area, 1.0), farthest / 4.0)
-    return middle + np.einsum("ni,nix->nx", centre, frames[:, 1:]), radii
+    return middle + np.einsum("ni,nix->nx", centre, frames[:, 1:]), radii, area

@@ -75,7 +75,7 @@ class Bonds:
     left : (n,) array
         Part of the cohesion and the tensile strength that is left.
     rest : (n,) array [m]
-        Gap without force, of elastic joints: positive where the drawing has them compressed.
+        Gap without force: as drawn where mortar fills it, and more where elastic joints are drawn compressed.
     """
 
     features: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
@@ -125,7 +125,7 @@ class State:
     bonded : (n_contacts,) array [m²]
         Part of the joint, at rest, that its mortar or its springs stand for; empty for dry rigid joints.
     unloaded : (n_contacts,) array [m]
-        Gap at which an elastic joint has no force, as :attr:`Bonds.rest`; empty for rigid joints.
+        Gap at which a joint has no force, as :attr:`Bonds.rest`; empty where that is none.
     crushing : (n_contacts,) bool array
         Which contact points carry their compressive strength; empty where no joint has one.
     """
@@ -182,7 +182,7 @@ class HasState:
 
     @property
     def bonds(self) -> Bonds | None:
-        """The strength that joints have left, and where elastic ones have no force; None of dry rigid joints."""
+        """The strength that joints have left, and where they have no force; None of dry rigid joints."""
         state = self.state
         n = len(state.bonded)
         if not n:

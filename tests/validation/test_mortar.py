@@ -382,6 +382,29 @@ def dry_and_weak(assembly, settlement, friction, strength):
     return zip(paths[0].path, paths[1].path, strict=True)
 
 
+@pytest.mark.parametrize("elastic", [{}, {"normal_stiffness": 1e10, "shear_stiffness": 1e10}])
+def test_mortar_fills_the_gap_that_is_accepted_of_a_drawing(elastic):
+    """Two blocks glued to each other, one support of which sinks: the same with a head joint a little open as drawn."""
+
+    def settled(gap):
+        shapes = [rectangle(0, 0, 1, 1), rectangle(1, 0, 2, 1)]
+        shapes += [rectangle(0.5, 1, 1 - gap / 2, 1.5), rectangle(1 + gap / 2, 1, 1.5, 1.5)]
+        assembly = solver.Assembly.from_outlines(shapes, roles=["fixed", "moving", "free", "free"])
+        law = solver.InterfaceLaw(0.6, cohesion=2e5, tensile_strength=1e5, **elastic)
+        structure = solver.Structure(assembly, solver.Interfaces(law))
+        response = structure.settle(solver.Settlement(direction=(0.0, -1.0), increment=1e-3, limit=1e-3))
+        last = response.increments[-1]
+        assert holds(last)
+        pulled = structure.with_live(solver.weight_fraction(assembly, (1.0, 0.0)))
+        left = pulled.limit_load(pose=last.pose, bonds_at=last.bonds)
+        return [last.measured / response.total_weight, left.multiplier]
+
+    whole = settled(0.0)
+    assert whole == pytest.approx([0.25, 11.19], rel=0.02)
+    for gap in (2e-6, 1e-5, 1e-4):
+        assert settled(gap) == pytest.approx(whole, rel=1e-3)
+
+
 @pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(voussoirs=st.integers(7, 15), strength=st.floats(1e-9, 1e-6), spread=st.floats(0.0, 1.0))
