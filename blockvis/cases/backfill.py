@@ -10,6 +10,7 @@ import numpy as np
 
 import solver
 from blockvis.layout.left_out import matches
+from blockvis.layout.names import drawn_names
 from blockvis.text import nearest
 
 from .extrados import SLIVER, extrados
@@ -149,8 +150,8 @@ def _chosen(over: Sequence[str], assembly: solver.Assembly, where: str) -> np.nd
     names, chosen = assembly.names, np.zeros(assembly.n_blocks, dtype=bool)
     for pattern in over:
         meant = [
-            matches(filter(None, (name, material)), [pattern])
-            for name, material in zip(names, assembly.materials, strict=True)
+            matches(filter(None, labels), [pattern])
+            for labels in zip(names, drawn_names(names), assembly.materials, strict=True)
         ]
         if not any(meant):
             known = [*names, *sorted(set(assembly.materials) - {""})]

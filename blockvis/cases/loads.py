@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import solver
-from blockvis.layout.left_out import matches
+from blockvis.layout.names import blocks_matching
 from blockvis.text import force_text, nearest
 
 from .block_at import block_at, note_outside
@@ -206,7 +206,7 @@ def _loaded(load: LoadCase, named: np.ndarray, gone: np.ndarray, assembly: solve
 
 
 def _named(load: LoadCase, assembly: solver.Assembly, gone: np.ndarray, where: str) -> np.ndarray:
-    named = [i for i, name in enumerate(assembly.names) if matches([name], [load.blocks])]
+    named = blocks_matching(load.blocks, assembly.names)
     chosen = [i for i in named if assembly.free[i]]
     if not chosen and named:
         raise ValueError(f"{where} '{load.blocks}' matches supports only; loads act on free blocks: name one")

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 import solver
+from blockvis.layout.names import blocks_called
 from blockvis.text import nearest
 from solver import mechanics
 from solver.mechanics import counted
@@ -225,9 +226,7 @@ def with_profiles(
         profile = profiles[k] if k < len(profiles) else None
         where = f"{source}: [settlement{f' {k + 1}' if len(settlements) > 1 else ''}] profile"
         if profile is None:
-            for name in settlement.profile or ():
-                _check_support(name, assembly, where)
-            found.append(settlement)
+            found.append(_on_every_support(settlement, assembly, where))
             continue
         blocks = np.flatnonzero(settlement.taking_part(assembly)).tolist()
         motions = profile.motions(assembly, blocks, settlement.direction)  # type: ignore[arg-type]
@@ -235,6 +234,17 @@ def with_profiles(
             raise ValueError(f"{where} moves none of the {counted(len(blocks), 'support')}; look at its places x")
         found.append(replace(settlement, direction=None, blocks=None, profile=motions))
     return tuple(found)
+
+
+def _on_every_support(settlement: solver.Settlement, assembly: solver.Assembly, where: str) -> solver.Settlement:
+    """Give all supports drawn with a name of a profile its motion, but for those with a motion of their own."""
+    if settlement.profile is None:
+        return settlement
+    given, names = dict(settlement.profile), assembly.names
+    motions = {names[i]: motion for name, motion in given.items() for i in blocks_called(name, names)} | given
+    for name in motions:
+        _check_support(name, assembly, where)
+    return replace(settlement, profile=motions)
 
 
 def _check_support(name: str, assembly: solver.Assembly, where: str) -> None:
@@ -284,11 +294,16 @@ def _bent_supports(assembly: solver.Assembly, profiles: Sequence[Profile | None]
 
 
 def pieces_named(names: Sequence[str], assembly: solver.Assembly) -> tuple[str, ...]:
-    """Put the names of the pieces in the place of that of a support that :func:`cut_ground` has cut."""
-    found: list[str] = []
+    """Put the names of all blocks drawn with a name in its place, those of the pieces that :func:`cut_ground` cut."""
+    parts = [name.rpartition(" ") for name in assembly.names]
+    uncut = [
+        first if number.isdigit() and first not in assembly.names else name
+        for name, (first, _, number) in zip(assembly.names, parts, strict=True)
+    ]
+    found: dict[str, None] = {}
     for name in names:
-        cut = [one for one in assembly.names if one.rpartition(" ")[0] == name and one.rpartition(" ")[2].isdigit()]
-        found += [name] if name in assembly.names or not cut else cut
+        hits = sorted({*blocks_called(name, assembly.names), *blocks_called(name, uncut)})
+        found |= dict.fromkeys([assembly.names[i] for i in hits] or [name])
     return tuple(found)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import solver
-from blockvis.layout.left_out import matches
+from blockvis.layout.names import blocks_matching
 from blockvis.text import nearest
 
 from .key import TEXTS, Key, Section, whole
@@ -95,7 +95,7 @@ def _matching(patterns: Sequence[str], names: Sequence[str], where: str, what: s
     """Names that match patterns, each at least one."""
     chosen = []
     for pattern in patterns:
-        found = [name for name in names if matches([name], [pattern])]
+        found = [names[i] for i in blocks_matching(pattern, names)]
         if not found:
             listed = f"the {what}s are {', '.join(names[:12])}" if names else f"the case has no {what}s"
             more = " ..." if len(names) > 12 else ""

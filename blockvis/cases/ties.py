@@ -11,6 +11,7 @@ import numpy as np
 import solver
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, in_words, matches
+from blockvis.layout.names import blocks_called
 from blockvis.text import nearest, place_text
 from solver import mechanics
 
@@ -372,12 +373,13 @@ def _holding(
     if end.fixed:
         return None
     if end.block:
-        if end.block not in assembly.names:
+        meant = np.array(blocks_called(end.block, assembly.names))
+        if not len(meant):
             near = nearest(end.block, assembly.names)
             raise ValueError(
                 f"{where}: no block is called '{end.block}'{near}; the layout has {', '.join(assembly.names[:12])}"
             )
-        block = assembly.index(end.block)
+        block = int(meant[0]) if len(meant) == 1 else block_at(assembly, point, meant, away.tolist(), where, gone)
         if gone[block]:
             raise ValueError(
                 f"{where}: [[remove]] has taken '{end.block}' away before settlement {entry.phase}, before which the "

@@ -12,6 +12,7 @@ import numpy as np
 import solver
 from blockvis.cases.explain_settings import DIRECTIONS, ExplainSettings
 from blockvis.cases.profiles import Profile, cut_ground
+from blockvis.layout.names import blocks_called
 from blockvis.text import nearest
 from solver import mechanics
 
@@ -214,7 +215,9 @@ def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> li
                 )
     found: list[Candidate] = []
     directions = _directions(ground, settings, source)
-    for group in settings.supports or _groups(ground):
+    called = {name: [names[i] for i in blocks_called(name, names)] for group in settings.supports for name in group}
+    asked = [tuple(dict.fromkeys(one for name in group for one in called[name])) for group in settings.supports]
+    for group in asked or _groups(ground):
         pieces = [piece for name in group for piece in ground.pieces[name]]
         if not _bearing(ground.assembly, pieces):
             continue

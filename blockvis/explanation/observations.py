@@ -20,6 +20,7 @@ from blockvis.cases.block_at import distances_to
 from blockvis.cases.toml_table import Table, shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
+from blockvis.layout.names import blocks_called
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
 from blockvis.text import files_like, nearest, place_text
 from solver.mechanics import counted
@@ -424,10 +425,15 @@ def _check_place(place: np.ndarray, away: float, what: str, cells: _Cells, assem
 
 
 def _block(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> int:
-    if name not in assembly.names:
+    meant = blocks_called(name, assembly.names) if name else []
+    if not meant:
         problem = f"'{name}' is no block{nearest(name, assembly.names)}" if name else "names no block"
         raise cells.error(key, f"{problem}; blockvis info lists the names")
-    return assembly.index(name)
+    if len(meant) > 1:
+        raise cells.error(
+            key, f"'{name}' is the name of {len(meant)} blocks; leave it out and give the place, x and y, in space z"
+        )
+    return meant[0]
 
 
 def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray, str, np.ndarray, float] | None:

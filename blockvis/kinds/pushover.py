@@ -7,10 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
+import numpy as np
+
 import solver
+from blockvis.cases.block_at import block_at
 from blockvis.cases.contents import Case
 from blockvis.cases.key import FRACTION, POSITIVE, TEXT, VECTOR, Key, Section
 from blockvis.cases.toml_table import Table
+from blockvis.layout.names import blocks_called
 from blockvis.results.about import mechanism_text
 from blockvis.text import nearest
 from solver import mechanics
@@ -96,9 +100,8 @@ class PushoverKind(AnalysisKind):
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
         """Prepare the settlements of a case, of which only a fall is reported, and the pushover."""
         control = _checked_control(given.case, given.assembly)
-        return AnalysisRun(
-            self.name, given, self.course(given.case), mechanics.Increments(_steps(given, control, resume)).begin()
-        )
+        course = replace(self.course(given.case), control=control)
+        return AnalysisRun(self.name, given, course, mechanics.Increments(_steps(given, control, resume)).begin())
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
         """Give the control displacement, and the multiplier at the start and where it is largest."""
@@ -176,15 +179,24 @@ def _lost(response: solver.Response) -> str:
 
 
 def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDisplacement:
+    """Find the one free block that a [control] names, of several with its name the one that holds the point."""
     control: solver.ControlDisplacement = case.settings
-    free = [name for name, is_free in zip(assembly.names, assembly.free, strict=True) if is_free]
-    if control.block not in free:
+    where, free = f"{case.source}: [control]", np.flatnonzero(assembly.free)
+    meant = np.intersect1d(blocks_called(control.block, assembly.names), free)
+    if not len(meant):
+        names = [assembly.names[i] for i in free]
         what = "is a support" if control.block in assembly.names else "is no block of the layout"
         raise ValueError(
-            f"{case.source}: [control] block '{control.block}' {what}{nearest(control.block, free)}; name a free "
-            f"block, for instance {', '.join(free[:6])}"
+            f"{where} block '{control.block}' {what}{nearest(control.block, names)}; name a free block, for instance "
+            f"{', '.join(names[:6])}"
         )
-    return control
+    block = int(meant[0])
+    if len(meant) > 1:
+        if control.point is None:
+            raise ValueError(f"{where} block: {len(meant)} blocks are called '{control.block}'; give a point of one")
+        towards = np.eye(assembly.dimension)[0] if control.direction is None else control.direction
+        block = block_at(assembly, control.point, meant, towards, f"{where} point", ~assembly.free)
+    return replace(control, block=assembly.names[block])
 
 
 def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechanics.PathState | None) -> Steps:

@@ -15,6 +15,7 @@ from solver import mechanics
 
 from .inspect import Inspection
 from .layout import Layout
+from .names import drawn_names
 from .outlines import without_collinear
 from .repair import repaired
 from .simplify import default_tolerance, simplified
@@ -480,12 +481,12 @@ def _plan_box(layout: Layout, block: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _can_be_named(found: Inspection, block: int) -> bool:
-    name = found.layout.names[block]
-    return bool(name) and [found.layout.names[i] for i in found.kept].count(name) == 1
+    return bool(_names_of(found.layout, found.kept, [block]))
 
 
 def _names_of(layout: Layout, kept: Iterable[int], chosen: Sequence[int]) -> list[str]:
-    """Names that these blocks have and no other; none where they cannot be told by names."""
+    """Names that as keys of roles stand for these blocks and no other; none where they cannot be told by names."""
     names = dict.fromkeys(layout.names[i] for i in chosen)
-    others = {layout.names[i] for i in kept if i not in set(chosen)}
+    labels = list(zip(layout.names, drawn_names(layout.names), layout.groups, layout.materials, strict=True))
+    others = {label for i in kept if i not in set(chosen) for label in labels[i]}
     return [] if "" in names or others.intersection(names) else list(names)

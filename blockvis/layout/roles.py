@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 from blockvis.text import by_similarity
@@ -9,6 +10,7 @@ from solver import mechanics
 
 from .layout import Layout
 from .left_out import matches
+from .names import drawn_names
 
 
 def checked_role(role: str, whose: str) -> str:
@@ -27,28 +29,26 @@ def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True
     for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):
         said = (role, group.strip().lower(), name.strip().lower())
         found.append(next((word for word in said if word in mechanics.ROLES), mechanics.FREE))
-    labels = {"name": layout.names, "group": layout.groups, "material": layout.materials}
-    by_name: list[tuple[list[int], str]] = []
-    by_group: list[tuple[list[int], str]] = []
-    by_pattern: list[tuple[list[int], str]] = []
+    drawn = drawn_names(layout.names)
+    labels = list(zip(layout.names, layout.groups, layout.materials, strict=True))
+    # Of keys that hold for one block a pattern has the first word, and the block's own name the last.
+    ranked: tuple[list[tuple[list[int], str]], ...] = [], [], [], []
     for key, role in roles.items():
         checked_role(role, f"roles: '{key}'")
-        for kind, values in labels.items():
-            hits = [i for i, value in enumerate(values) if value == key]
-            if hits:
-                (by_name if kind == "name" else by_group).append((hits, role))
-                break
-        else:
-            hits = [
-                i
-                for i in range(layout.n_blocks)
-                if matches(filter(None, (values[i] for values in labels.values())), [key])
-            ]
-            if not hits and all_match:
-                raise ValueError(_unmatched(key, layout))
-            by_pattern.append((hits, role))
-    for hits, role in by_pattern + by_group + by_name:
-        for i in hits:
+        hits = [
+            [],
+            [i for i, (_, group, material) in enumerate(labels) if key in (group, material)],
+            [i for i, name in enumerate(drawn) if name == key],
+            [i for i, name in enumerate(layout.names) if name == key],
+        ]
+        if not any(hits):
+            hits[0] = [i for i, words in enumerate(labels) if matches(filter(None, words), [key])]
+        if not any(hits) and all_match:
+            raise ValueError(_unmatched(key, layout))
+        for rank, blocks in zip(ranked, hits, strict=True):
+            rank.append((blocks, role))
+    for blocks, role in itertools.chain(*ranked):
+        for i in blocks:
             found[i] = role
     return found
 

@@ -31,6 +31,11 @@ def test_roles_by_name_group_material_and_pattern(row):
     assert read(drawing, roles={"stone": "fixed"}).roles.tolist() == ["free", "free", "fixed", "free"]
 
 
+def test_a_role_by_a_word_that_is_a_name_and_a_group_is_of_all(row):
+    drawing = row(3, name=("abutment", "brick", "abutment 2"), group=("abutment", "wall", "abutment"))
+    assert read(drawing, roles={"abutment": "fixed"}).roles.tolist() == ["fixed", "free", "fixed"]
+
+
 def test_a_group_or_block_called_fixed_or_moving_is_that(row):
     drawing = row(3, group=("Fixed", "", ""), role=("", "", "moving"))
     assert read(drawing).roles.tolist() == ["fixed", "free", "moving"]

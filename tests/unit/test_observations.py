@@ -220,3 +220,11 @@ def test_widths_at_the_middles_of_joints_are_noted(tmp_path, recwarn):
 def test_a_place_far_away_is_told_in_one_sentence(tmp_path):
     with pytest.raises(ValueError, match=r"line 2: x and y are \(1445, 293\) m, .* from any joint"):
         table(tmp_path, "x,y,width\n1445,293,0.003\n")
+
+
+def test_an_observation_of_one_of_several_blocks_with_its_name_needs_a_place(tmp_path):
+    row = [[[k, 0], [k + 1, 0], [k + 1, 1], [k, 1]] for k in range(3)]
+    assembly = solver.Assembly.from_outlines(row, names=["a", "cap", "cap"])
+    (tmp_path / "seen.csv").write_text("block,dx,dy\ncap,0.01,0\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="'cap' is the name of 2 blocks; leave it out and give the place"):
+        read_observations(tmp_path / "seen.csv", assembly)

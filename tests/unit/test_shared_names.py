@@ -1,0 +1,91 @@
+"""A name in a case stands for every block that is drawn with it."""
+
+import numpy as np
+import pytest
+from structures import drawn, rectangle
+
+import blockvis
+import solver
+
+NAMES = ["pier", "mid", "pier", "beam", "cap", "cap"]
+BLOCKS = [
+    *(rectangle(x, -0.3, x + 0.4, 0.0) for x in (0.0, 0.8, 1.6)),
+    rectangle(0.0, 0.0, 2.0, 0.3),
+    *(rectangle(x, 0.3, x + 0.4, 0.6) for x in (0.2, 1.2)),
+]
+STEP = "[[settlement]]\nincrement = 0.001\nlimit = 0.001\n"
+SETTLES = f"{STEP}direction = [0, -1]\n"
+PUSHED = '[[loads]]\nkind = "live"\nforce = [1, 0]\nblocks = "beam"\n[analysis]\nkind = "pushover"\n'
+
+
+@pytest.fixture
+def response(tmp_path):
+    """A function that runs a beam on three piers, under two stones; two names are there twice."""
+    drawn(tmp_path / "names.json", BLOCKS, NAMES, role=["moving"] * 3 + ["free"] * 3)
+
+    def run(text):
+        (tmp_path / "case.toml").write_text(f'[geometry]\nfile = "names.json"\n{text}', encoding="utf-8")
+        return blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", overwrite=True, outputs=()).response
+
+    return run
+
+
+@pytest.mark.parametrize(
+    "motion", ['direction = [0, -1]\nblocks = ["pier"]', "profile = {supports = {pier = [0, -1]}}"]
+)
+def test_a_settlement_moves_all_supports_with_its_name(response, motion):
+    found = response(f"{STEP}{motion}")
+    gone = found.path[-1].pose.positions - found.assembly.centroids
+    np.testing.assert_allclose(gone[:3], [[0.0, -0.001], [0.0, 0.0], [0.0, -0.001]], atol=1e-12)
+
+
+def test_pieces_of_all_supports_with_a_name_settle(response):
+    """Of two, of which the profile cuts the first into pieces."""
+    under = "".join(
+        f'[[supports]]\nname = "ground"\nrole = "moving"\noutline = [[{a}, -1], [{b}, -1], [{b}, -0.3], [{a}, -0.3]]\n'
+        for a, b in ((0.0, 1.2), (1.6, 2.0))
+    )
+    profile = 'blocks = ["ground"]\nprofile = {kind = "gaussian", centre = 1.0, inflection = 0.3}\n'
+    with pytest.warns(UserWarning, match="'ground' into 3 pieces"):
+        found = response(f'{under}[roles]\npier = "free"\nmid = "free"\n{SETTLES}{profile}')
+    assert found.assembly.names[-4:] == ("ground 1", "ground 2", "ground 3", "ground #2")
+    assert (found.path[-1].pose.positions[-4:, 1] < found.assembly.centroids[-4:, 1]).all()
+
+
+def test_loads_and_removals_are_of_all_blocks_with_their_name(response):
+    with pytest.warns(UserWarning, match="acts on each of 2 blocks"):
+        found = response(
+            f'{SETTLES}{SETTLES}[[loads]]\nblocks = "cap"\nforce = [5, 0]\n'
+            '[[loads]]\nblocks = "cap #2"\nforce = [0, 1]\n[[remove]]\nphase = 2\nblocks = ["cap"]\n'
+        )
+    more = found.loads.dead - solver.self_weight(found.assembly).dead
+    np.testing.assert_allclose(more[3:, :2], [[0.0, 0.0], [5.0, 0.0], [5.0, 1.0]], atol=1e-9)
+    assert found.path[-1].removed.tolist() == [False] * 4 + [True] * 2
+
+
+def test_one_block_is_the_one_that_holds_the_point(response):
+    found = response(
+        f'{PUSHED}[control]\nblock = "cap"\npoint = [1.3, 0.6]\nincrement = 1e-3\nlimit = 1e-3\n'
+        '[[ties]]\nname = "tie"\nfrom = {block = "cap", point = [1.4, 0.4]}\nto = {fixed = [3, 0.4]}\nstiffness = 1e6\n'
+    )
+    assert found.control.block == "cap #2"
+    assert found.ties[0].blocks == (5, None)
+    with pytest.raises(ValueError, match=r"\[control\] block: 2 blocks are called 'cap'; give a point of one"):
+        response(f'{PUSHED}[control]\nblock = "cap"\n')
+
+
+def test_fill_lies_over_all_blocks_with_its_name(response):
+    found = response(f'{SETTLES}[[backfill]]\nover = ["cap"]\nsurface = 1.0\nunit_weight = 1e4\n')
+    assert np.unique(found.loads.fills[0].block).tolist() == [4, 5]
+
+
+def test_a_role_by_the_drawn_name_gives_way_to_that_of_one_block(tmp_path):
+    """As in a layout that was written with names of its own for every block."""
+    names = ["pier", "mid", "pier #2", "beam", "stone #2", "cap #2"]
+    path = drawn(tmp_path / "written.json", BLOCKS, names)
+    read = blockvis.read(path, roles={"pier #2": "moving", "pier": "fixed"})
+    assert read.roles.tolist() == ["fixed", "free", "moving", "free", "free", "free"]
+    assert blockvis.read(path, roles={"pier": "fixed"}).roles.tolist() == ["fixed", "free", "fixed", *["free"] * 3]
+    # Numbers that were drawn are part of a name.
+    with pytest.raises(ValueError, match="'stone' matches no block"):
+        blockvis.read(path, roles={"stone": "fixed"})
