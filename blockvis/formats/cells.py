@@ -28,6 +28,9 @@ BLOCK_ARRAYS = (
     "netgen:index", "avsucd:material", "ugrid:ref",
 )  # fmt: skip
 
+#: Names of the cell arrays that say what a block is.
+TABLE_ARRAYS = ("name", "group", "material", "role_name", "role", "thickness", "density")
+
 
 def block_array(data: Mapping[str, np.ndarray]) -> str | None:
     """Name of the cell array that numbers the blocks; None if there is none."""
@@ -87,10 +90,9 @@ def layout_of_cells(
         how = f"{counted(len(names), 'block')}, one per connected piece: no cell array 'block_id' says which are one"
     unusable: dict[int, LeftOut] = {}
     outlines = outlines_of_cells(flat, rings, owner, names, unusable)
-    first = np.unique(owner, return_index=True)[1]
     notes = tuple(text for text in (how, note) if text)
     layout = Layout(blocks=tuple(outlines), names=tuple(names), unit="", notes=notes)
-    layout = with_rows(layout, [with_role(row_of(data, int(cell), names[k])) for k, cell in enumerate(first)])
+    layout = with_rows(layout, [with_role(row) for row in rows_of_cells(data, owner, names, path)])
     return layout.leaving_out(unusable)
 
 
@@ -113,40 +115,66 @@ def _enclosed(
         if key or len(names) < 2 or len(rings) < 4 * len(names):
             raise
         closed = bodies_of_surfaces(points, rings, owner, names, path)
-    bodies = closed.bodies
-    first = np.unique(owner, return_index=True)[1]
-    rows = [
-        row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, closed.owners.tolist(), strict=True)
-    ]
+    bodies, found = closed.bodies, rows_of_cells(data, owner, names, path)
+    rows = [{"name": body.name, **found[whose]} for body, whose in zip(bodies, closed.owners.tolist(), strict=True)]
     how = f"one per value of the cell array '{key}'" if key else "one per closed surface"
     return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}", *closed.notes))
 
 
-def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, Any]:
-    """Read the row of the block table of a block from the cell arrays at one of its cells.
+def rows_of_cells(
+    data: Mapping[str, np.ndarray], owner: np.ndarray, names: Sequence[str], path: Path | str
+) -> list[dict[str, Any]]:
+    """Read the block table from the cell arrays; names only where an array has them.
 
     Parameters
     ----------
     data : mapping of str to (n_cells, ...) array
-    cell : int
-    name : str
-        Of the block, unless the arrays have another.
+    owner : (n_cells,) int array
+        Block of each cell, from 0 on.
+    names : sequence of str
+        Of the blocks, for messages, as is the path.
+    path : Path or str
+
+    Raises
+    ------
+    ValueError
+        For cells of one block that differ in what the table says of it.
     """
-    row: dict[str, Any] = {"name": name}
-    for key in ("name", "group", "material", "role_name", "role"):
+    for key in TABLE_ARRAYS:
+        values = np.asarray(data.get(key, ()))
+        if values.shape != owner.shape:
+            continue
+        known, number = np.unique(values, return_inverse=True)
+        pairs = np.unique([owner, number], axis=1)
+        several = np.flatnonzero(np.bincount(pairs[0]) > 1)
+        if len(several):
+            block = int(several[0])
+            listed = " and ".join(str(value) for value in known[pairs[1][pairs[0] == block]][:2])
+            raise ValueError(
+                f"'{path}': cells of the block '{names[block]}' differ in the cell array '{key}', as {listed}; give "
+                "them one value, or number the blocks in a cell array 'block_id'"
+            )
+    return [_row(data, cell) for cell in np.unique(owner, return_index=True)[1].tolist()]
+
+
+def _row(data: Mapping[str, np.ndarray], cell: int) -> dict[str, Any]:
+    """Read the row of the block table of a block from the cell arrays at one of its cells."""
+    row: dict[str, Any] = {}
+    for key in TABLE_ARRAYS[:5]:
         if key not in data or len(data[key]) <= cell:
             continue
         value = data[key][cell]
         if isinstance(value, np.str_ | str | bytes | np.bytes_):
             word = value.decode("utf-8", "replace") if isinstance(value, bytes | np.bytes_) else str(value)
-        elif key == "role" and np.ndim(value) == 0 and float(value) in (0.0, 1.0, 2.0):
-            word = mechanics.ROLES[int(value)]
+        elif key == "role" and np.ndim(value) == 0:
+            # A number that is no role is refused as a word that is none.
+            word = mechanics.ROLES[int(value)] if float(value) in (0.0, 1.0, 2.0) else f"{value:g}"
         else:
             continue
         field = "role" if key == "role_name" else key
         if word:
             row.setdefault(field, word) if field == "role" else row.update({field: word})
-    for key in ("thickness", "density"):
+    for key in TABLE_ARRAYS[5:]:
         if key in data and len(data[key]) > cell and np.ndim(data[key][cell]) == 0:
             row[key] = float(data[key][cell])
     return row

@@ -17,7 +17,7 @@ from blockvis.layout.notes import LEFT_OUT, Note
 from solver.mechanics import counted
 
 from .bodies import Bodies
-from .cells import block_array, flat_beside, layout_of_cells, row_of
+from .cells import block_array, flat_beside, layout_of_cells, rows_of_cells
 from .node_order import MESHIO, ring_of_nodes
 from .reading import Reading
 from .volumes import MESHIO_SOLIDS, Faces, bodies_of_cells
@@ -64,7 +64,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         chosen = [(k, len(mesh.cells[k].data)) for k, _ in solid]
         cells = [(shape, np.asarray(mesh.cells[k].data, dtype=np.int64)) for k, shape in solid]
         data, notes = _cell_data(mesh, chosen, sets)
-        bodies = _bodies(points, cells, data)
+        bodies = _bodies(points, cells, data, path)
         flat = [cell for block in mesh.cells if block.type in MESHIO for cell in block.data]
         notes += flat_beside([nodes for _, nodes in cells], flat)
         return replace(bodies, notes=bodies.notes + notes)
@@ -122,15 +122,16 @@ def _starts(cells: Sequence[Any]) -> np.ndarray:
     return np.cumsum([0, *(len(block.data) for block in cells)])
 
 
-def _bodies(points: np.ndarray, cells: list[tuple[Faces, np.ndarray]], data: dict[str, np.ndarray]) -> Bodies:
+def _bodies(
+    points: np.ndarray, cells: list[tuple[Faces, np.ndarray]], data: dict[str, np.ndarray], path: Path
+) -> Bodies:
     key = block_array(data)
     total = sum(len(nodes) for _, nodes in cells)
-    values, first, owner = np.unique(
-        data[key] if key else np.zeros(total, dtype=np.int64), return_index=True, return_inverse=True
-    )
+    values, owner = np.unique(data[key] if key else np.zeros(total, dtype=np.int64), return_inverse=True)
     numbered = [f"block {value}" for value in values.tolist()] if key else ["block"]
-    found = [row_of(data, cell, name) for cell, name in zip(first.tolist(), numbered, strict=True)]
-    bodies, owners = bodies_of_cells(points, cells, owner, [row["name"] for row in found])
+    found = rows_of_cells(data, owner, numbered, path)
+    names = [row.get("name", name) for row, name in zip(found, numbered, strict=True)]
+    bodies, owners = bodies_of_cells(points, cells, owner, names)
     rows = [{**found[whose], "name": body.name} for body, whose in zip(bodies, owners.tolist(), strict=True)]
     how = f"one per value of the cell array '{key}'" if key else "one per piece that hangs together"
     return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}",))

@@ -7,6 +7,7 @@ import math
 import re
 import warnings
 import zlib
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,8 +22,8 @@ from blockvis.layout.notes import LEFT_OUT, Note
 from solver.mechanics import counted
 
 from .bodies import Bodies, Body, body_of_polygons, in_dimension
-from .cells import block_array, flat_beside, layout_of_cells, merged, row_of
-from .node_order import VTK, ring_of_nodes
+from .cells import block_array, flat_beside, layout_of_cells, merged, rows_of_cells
+from .node_order import VTK, VTK_LINES, VTK_OTHER_FACES, ring_of_nodes
 from .reading import Reading
 from .volumes import VTK_SOLIDS, bodies_of_cells
 from .vtk_arrays import announced_bytes, largest_number
@@ -309,8 +310,10 @@ def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | 
     if solid.any():
         found: Layout | Bodies = _bodies_of_solids(grid, path, ~gone)
         points_of = np.split(connectivity, offset[1:-1])
-        flat = [points_of[k] for k in np.flatnonzero(np.isin(types, list(VTK)) & ~gone)]
+        faces = np.isin(types, [*VTK, *VTK_OTHER_FACES])
+        flat = [points_of[k] for k in np.flatnonzero(faces & ~gone)]
         notes += flat_beside([points_of[k] for k in np.flatnonzero(solid)], flat)
+        notes += _unread(types[~gone & ~solid & ~faces])
         return replace(found, notes=found.notes + notes)
     surface = np.flatnonzero(np.isin(types, list(VTK)) & ~gone)
     rings = []
@@ -319,7 +322,21 @@ def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | 
         rings.append(ring_of_nodes(nodes, VTK[int(types[cell])]))
     cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
     found = layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path, view)
+    notes += _unread(types[~gone & ~np.isin(types, list(VTK))])
     return replace(found, notes=found.notes + notes)
+
+
+def _unread(types: np.ndarray) -> tuple[str, ...]:
+    """Count in a note the cells of types that are not read, but for lines and points, which draw no block."""
+    import pyvista
+
+    names = {int(kind): kind.name.lower().replace("_", " ") for kind in pyvista.CellType}
+    counts = Counter(names.get(kind, f"type {kind}") for kind in types.tolist() if kind not in VTK_LINES)
+    if not counts:
+        return ()
+    listed = ", ".join(f"{n} {kind}" for kind, n in counts.items())
+    text = f"left out: {counted(counts.total(), 'cell')} of kinds that are not read ({listed})"
+    return (Note(LEFT_OUT, f"{text}; save them as polygons or polyhedra"),)
 
 
 def _gone(grid: Any) -> np.ndarray:
@@ -398,8 +415,8 @@ def _bodies_of_solids(grid: Any, path: Path | str, stands: np.ndarray) -> Bodies
         bodies, owners = found(grid, np.asarray(grid.points, dtype=float), solid, owner, names)
     except IndexError as error:
         raise ValueError(f"'{path}' has a damaged cell ({error}); export it again") from None
-    first = np.unique(owner, return_index=True)[1]
-    rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
+    table = rows_of_cells(data, owner, names, path)
+    rows = [{"name": body.name, **table[whose]} for body, whose in zip(bodies, owners.tolist(), strict=True)]
     return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'body', 'bodies')}, {note}",))
 
 

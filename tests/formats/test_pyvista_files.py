@@ -157,3 +157,40 @@ def test_points_and_lines_are_no_blocks(tmp_path):
     bent.save(tmp_path / "b.vtp")
     with pytest.raises(ValueError, match="is not flat: its points spread over"):
         read(tmp_path / "b.vtp")
+
+
+def row_of_squares(*types):
+    points = np.array([[x, y, 0] for x in range(4) for y in (0, 1)], dtype=float)
+    cells = [[4, 2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1] for k in range(len(types))]
+    return pv.UnstructuredGrid(np.ravel(cells), np.array(types, dtype=np.uint8), points)
+
+
+def test_cells_of_kinds_that_are_not_read_are_counted(tmp_path):
+    grid = row_of_squares(pv.CellType.QUAD, pv.CellType.LAGRANGE_QUADRILATERAL, pv.CellType.QUAD)
+    grid.save(tmp_path / "a.vtu")
+    with pytest.warns(UserWarning, match=r"left out: 1 cell of kinds that are not read \(1 lagrange quadrilateral\)"):
+        assert read(tmp_path / "a.vtu").n_blocks == 2
+    lines = [2, 0, 1, 2, 1, 3]
+    pv.PolyData(grid.points, faces=[4, 0, 2, 3, 1], lines=lines).save(tmp_path / "b.vtp")
+    assert not any("left out" in note for note in read_layout(tmp_path / "b.vtp").notes)
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "says"),
+    [
+        (
+            "density",
+            [1000.0, 3000.0, 2000.0],
+            "cells of the block 'block 0' differ in the cell array 'density', as 1000",
+        ),
+        ("role", [0, 1, 0], "differ in the cell array 'role', as 0 and 1"),
+        ("role", [1, 1, 5], "block 'block 1' has role '5' in the file; roles are free, fixed, moving"),
+    ],
+)
+def test_cells_that_say_different_things_of_one_block_are_refused(tmp_path, key, values, says):
+    grid = row_of_squares(*[pv.CellType.QUAD] * 3)
+    grid.cell_data["block_id"] = [0, 0, 1]
+    grid.cell_data[key] = values
+    grid.save(tmp_path / "a.vtu")
+    with pytest.raises(ValueError, match=says):
+        read_layout(tmp_path / "a.vtu")
