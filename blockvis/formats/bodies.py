@@ -142,7 +142,7 @@ def as_drawn(found: Layout | Bodies) -> Layout:
     for body in _drawable(found):
         own, number = np.unique(body.faces, return_inverse=True)
         points = body.points[own]
-        turned = points[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if found.up == "y" else points
+        turned = with_z_up(points) if found.up == "y" else points
         blocks.append((turned, number.reshape(-1, 3).tolist()))
     return Layout(blocks=tuple(blocks), names=tuple(body.name for body in _drawable(found)), unit=found.unit)
 
@@ -210,6 +210,11 @@ def layout_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
     return replace(layout, left_out=asked.left_out(found, name, reading.ignore))
 
 
+def with_z_up(points: np.ndarray) -> np.ndarray:
+    """(n, 3) array: points of a drawing in which y is up, turned about x."""
+    return points[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
+
+
 def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layout:
     """Make a layout in space of bodies of any shape.
 
@@ -252,7 +257,7 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
             bent.append((bend, width_of(points, faces), body.name, corner))
         drawn = body.volume or abs(volume(body.points, body.faces))
         changed.append((volume(points, faces) / drawn - 1.0, body.name))
-        solids.append((points[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if lying else points, faces))
+        solids.append((with_z_up(points) if lying else points, faces))
     said = _plane_faces_said(warped, changed)
     if found.up_says and view is None:
         taken = "its (x, y, z) were read as (x, -z, y)" if lying else "z was taken as up"

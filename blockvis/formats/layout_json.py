@@ -22,14 +22,19 @@ from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.solids import Solid
 from blockvis.layout.surfaces import cleaned
+from blockvis.text import refuse_unknown
 
 from . import compas_json, geodata
 from .annotations import program_of
 from .annotations import read_content as read_annotations
-from .bodies import Bodies
+from .bodies import Bodies, with_z_up
 from .reading import Reading
 
 FORMAT = "blockvis layout"
+
+#: Keys of a file, and of each block beside those of its shape.
+KEYS = ("format", "version", "unit", "blocks")
+BLOCK_KEYS = ("name", "group", "role", "material", "density")
 
 #: What reads the parsed JSON of other programs; each returns None for what it does not know.
 KINDS: tuple[Callable[[Any, Path, Reading], Layout | Bodies | None], ...] = (
@@ -59,13 +64,20 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
             f"'{path}' is JSON but no layout; it needs a list \"blocks\" of {{name, outline}}, annotations of COCO, "
             "LabelMe or VIA, features of GeoJSON, or meshes of COMPAS"
         )
-    if reading.view not in (None, "xy"):
-        raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
     version = content.get("version", 1)
     if version != 1:
         raise ValueError(f"'{path}' is a layout of version {version!r}; version 1 is read: update blockvis")
+    refuse_unknown(content, KEYS, f"'{path}'")
     in_space = any(isinstance(block, dict) and "points" in block for block in content["blocks"])
+    if reading.view not in (None, "xy") and not in_space:
+        raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
+    for k, block in enumerate(content["blocks"]):
+        if isinstance(block, dict):
+            of_block = (*BLOCK_KEYS, *(("points", "faces") if in_space else ("outline", "thickness")))
+            refuse_unknown(block, of_block, f"'{path}': block '{block.get('name', f'block {k}')}'")
     layout = (_read_solids if in_space else _read_outlines)(content, path)
+    if in_space and reading.view == "xy":
+        layout = replace(layout, blocks=tuple((with_z_up(points), faces) for points, faces in layout.solids))
     return replace(layout, unit_by="layout" if layout.unit else "")
 
 

@@ -3,9 +3,11 @@
 import json
 import math
 
+import numpy as np
 import pytest
+from structures import box, drawn
 
-from blockvis import read
+from blockvis import read, read_layout
 
 RING = [[0, 0], [1, 0], [1, 1]]
 STAR = [[(1 + k % 2) * math.cos(k * math.pi / 1250), (1 + k % 2) * math.sin(k * math.pi / 1250)] for k in range(2500)]
@@ -27,6 +29,11 @@ STAR = [[(1 + k % 2) * math.cos(k * math.pi / 1250), (1 + k % 2) * math.sin(k * 
             r"a\.json': block 'a' has thickness 'thick'; give",
         ),
         ({"blocks": [{"name": "a", "outline": RING, "density": -1}]}, "'a'\\) has density -1"),
+        (
+            {"blocks": [{"name": "a", "outline": RING, "thicknes": 0.2}]},
+            r"a\.json': block 'a' has no 'thicknes' \(did you mean 'thickness'\?\); it has name, group",
+        ),
+        ({"units": "mm", "blocks": [{"outline": RING}]}, r"a\.json' has no 'units' \(did you mean 'unit'\?\)"),
         ({"unit": "parsec", "blocks": [{"outline": RING}]}, "unit 'parsec' is not known"),
         ({"blocks": [{"name": "a", "outline": STAR}]}, "has 2500 corners, more than 2000"),
     ],
@@ -36,3 +43,18 @@ def test_refusals(tmp_path, content, message):
     path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
     with pytest.raises(ValueError, match=message):
         read(path)
+
+
+def test_the_view_says_what_is_up_in_space_as_of_other_bodies(tmp_path):
+    """The higher box is the thinner one, along z."""
+    boxes = [box((0, 0, 0), (2, 1, 1)), box((0, 0, 1), (1, 1, 3))]
+    path = drawn(tmp_path / "a.json", boxes)
+    heights = {view: [np.ptp(points[:, 2]) for points, _ in read_layout(path, view=view, dimension=3).solids]
+               for view in (None, "xz", "xy")}  # fmt: skip
+    assert heights == {None: [1.0, 2.0], "xz": [1.0, 2.0], "xy": [1.0, 1.0]}
+    turned = read_layout(path, view="xy", dimension=3)
+    assert turned.volumes == pytest.approx([2.0, 2.0])
+    assert turned.solids[1][0][:, 1].min() == -3.0
+    flat = drawn(tmp_path / "b.json", [np.array(RING)])
+    with pytest.raises(ValueError, match="is drawn in the plane xy; it has no view xz"):
+        read_layout(flat, view="xz")
