@@ -12,11 +12,12 @@ import shapely
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import without_collinear
+from solver.mechanics import counted
 
 from .bonds import BRICKWORK
 from .bricks import LOWEST_BRICK, NARROWEST
 from .dimensions import MOST_BLOCKS, above_zero, at_least_zero, choice, whole
-from .heads import HEADS, Units, head_of, top_of
+from .heads import HEADS, LESS, Units, head_of, top_of
 from .patterns import PATTERNS, bedded, coursed, rubble
 from .slivers import in_simple_pieces, without_slivers
 
@@ -40,6 +41,12 @@ KEPT = 1e-9
 
 #: What is left over when shapes are cut that share an edge is dropped below this fraction of a brick.
 DUST = 1e-9
+
+#: Values that only some bonds, or heads, have: the key that chooses these, and its words.
+OF_KINDS = {
+    "stone": ("bond", ("rubble",)), "flatness": ("bond", ("rubble",)),
+    "bearing": ("heads", tuple(head for head in HEADS if head != "none")),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -94,6 +101,13 @@ class Pattern:
         for name in ("bearing", "stone"):
             if getattr(self, name) is not None:
                 above_zero(name, getattr(self, name))
+        for name, (key, kinds) in OF_KINDS.items():
+            if getattr(self, name) != getattr(type(self), name) and getattr(self, key) not in kinds:
+                raise ValueError(
+                    f"{name} is that of {key} {' or '.join(kinds)}; {key} is '{getattr(self, key)}': leave {name} out"
+                )
+        if self.bond == "rubble" and self.stone is not None and self.brick != Pattern.brick:
+            raise ValueError("brick and stone are both given; the size of rubble is that of its stone: leave brick out")
         if at_least_zero("joint", self.joint) > 0.5 * min(self.module):
             raise ValueError(
                 f"joint is {self.joint:g} m, more than half of a course of {min(self.module):g} m; give the thickness "
@@ -226,7 +240,7 @@ def filled(
     area = rest.area
     bearing = length / 2.0 if pattern.bearing is None else pattern.bearing
     units = Units(length=length, height=height, bearing=bearing, base=0.0, grid=grid)
-    stones, rest, hanging = _heads(holes, rest, pattern, units)
+    stones, rest, lacking = _heads(holes, rest, pattern, units)
     quoins = _quoins(solid, rest, pattern, grid)
     stones += [(f"quoin {k}", shape) for k, shape in enumerate(quoins, start=1)]
     rest = _without(rest, quoins, grid)
@@ -238,7 +252,7 @@ def filled(
         )
     if pattern.joint and mortar:
         stones = _with_mortar(stones, pattern.joint)
-    notes = _hanging_note(hanging, corner)
+    notes = tuple(_note(what, shapes, corner) for what, shapes in lacking.items())
     return Layout(
         blocks=tuple(without_collinear(np.array(shape.exterior.coords)[:-1], 1e-9) + corner for _, shape in stones),
         names=tuple(name for name, _ in stones),
@@ -338,32 +352,39 @@ def _without(wall: shapely.Geometry, parts: Sequence[shapely.Polygon], grid: flo
     return shapely.difference(wall, shapely.union_all(parts, grid_size=grid), grid_size=grid) if parts else wall
 
 
-def _hanging_note(hanging: Sequence[shapely.Polygon], corner: np.ndarray) -> tuple[Note, ...]:
-    if not hanging:
-        return ()
-    x, y = np.array(hanging[0].centroid.coords[0]) + corner
-    said = f"bond: {len(hanging)} openings have no room for a head, the first around ({x:.6g}, {y:.6g})"
-    return (Note(CHANGED, f"{said}: what lies over them may hang; give a smaller bearing or brick"),)
+def _note(what: str, openings: Sequence[shapely.Polygon], corner: np.ndarray) -> str:
+    """Say of which openings the head is another than was asked for, or missing: ``what`` is what they have."""
+    x, y = np.array(openings[0].centroid.coords[0]) + corner
+    said = f"bond: {counted(len(openings), 'opening has', 'openings have')} no room for "
+    place = f", the first around ({x:.6g}, {y:.6g})"
+    if not what:
+        hang = "what lies over them may hang; give a smaller bearing or brick"
+        return Note(CHANGED, f"{said}a head{place}: {hang}")
+    text = f"{said}the head that is asked for and got {what}{place}"
+    # Heads of a smaller size are what a mason would build; a lintel carries in another way.
+    return Note(CHANGED, text) if what == LESS[1] else text
 
 
 def _heads(
     holes: Sequence[shapely.Polygon], rest: shapely.Geometry, pattern: Pattern, units: Units
-) -> tuple[list[tuple[str, shapely.Polygon]], shapely.Geometry, list[shapely.Polygon]]:
-    """Lay heads over openings; give their stones, what is left of the wall, and the openings without room for one."""
+) -> tuple[list[tuple[str, shapely.Polygon]], shapely.Geometry, dict[str, list[shapely.Polygon]]]:
+    """Lay heads over openings; give their stones, what is left of the wall, and openings without room for theirs.
+
+    These come by what they got instead, "" for nothing.
+    """
     stones: list[tuple[str, shapely.Polygon]] = []
-    hanging = []
+    lacking: dict[str, list[shapely.Polygon]] = {}
     for number, hole in enumerate(holes, start=1):
         if pattern.heads == "none" or not _has_wall_over(hole, rest, OVER * units.height):
             continue
         head = head_of(hole, pattern.heads, rest, _nearest(hole, holes), units)
-        if head is None:
-            hanging.append(hole)
-            continue
-        word, parts = head
+        word, parts, less = head or ("", [], "")
+        if head is None or less:
+            lacking.setdefault(less, []).append(hole)
         several = len(parts) > 1
         stones += [(f"{word} {number}-{i}" if several else f"{word} {number}", part) for i, part in enumerate(parts, 1)]
         rest = _without(rest, parts, units.grid)
-    return stones, rest, hanging
+    return stones, rest, lacking
 
 
 def _laid(

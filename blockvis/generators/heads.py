@@ -34,7 +34,10 @@ LEAST = 5
 #: Where there is no room a head is made smaller, down to these fractions of its depth and bearing.
 DEPTHS, BEARINGS = (1.0, 0.75, 0.5), (1.0, 0.75, 0.5, 0.25, 0.1)
 
-#: What of a head may lie outside of the wall, as a fraction of its area: rounding errors.
+#: What is made of a head for which there is no room.
+LESS = ("a shallower one, or one with less bearing", "a lintel instead of an arch")
+
+#: What of a head may lie outside of the wall and is cut off, as a fraction of its area: rounding errors.
 OUTSIDE = 1e-7
 
 
@@ -136,7 +139,7 @@ def top_of(opening: shapely.Polygon) -> Top:
 
 def head_of(
     opening: shapely.Polygon, kind: str, room: shapely.Geometry, near: float, units: Units
-) -> tuple[str, list[shapely.Polygon]] | None:
+) -> tuple[str, list[shapely.Polygon], str] | None:
     """Build the head of an opening.
 
     Parameters
@@ -153,19 +156,22 @@ def head_of(
 
     Returns
     -------
-    (str, list of shapely.Polygon [m]) or None
-        "voussoir" or "lintel", and the stones from left to right; None where no head fits.
+    (str, list of shapely.Polygon [m], str) or None
+        "voussoir" or "lintel", the stones from left to right, and what was made of the head that is asked for, one of
+        :data:`LESS`, "" where it fits; None where no head does.
     """
     top = top_of(opening)
     shapely.prepare(room)
+    asked = ""
     for word, stones in _tried(top, kind, near, units):
-        parts = [shapely.difference(stone, opening, grid_size=units.grid) for stone in stones]
+        less = "" if not asked else LESS[0] if word == asked else LESS[1]
+        asked = asked or word
+        drawn = [shapely.difference(stone, opening, grid_size=units.grid) for stone in stones]
+        parts = [shapely.intersection(stone, room, grid_size=units.grid) for stone in drawn]
         if not all(part.geom_type == "Polygon" and not len(part.interiors) and part.area > 0.0 for part in parts):
             continue
-        whole = shapely.union_all(parts)
-        total = sum(part.area for part in parts)
-        if whole.area > (1.0 - OUTSIDE) * total and shapely.difference(whole, room).area <= OUTSIDE * total:
-            return word, parts
+        if shapely.union_all(parts).area > (1.0 - OUTSIDE) * sum(stone.area for stone in drawn):
+            return word, parts, less
     return None
 
 

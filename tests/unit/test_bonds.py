@@ -74,7 +74,8 @@ def first_status(layout, friction=0.6):
     [pytest.param(bond, marks=[pytest.mark.thorough] * (bond in ("stack", "english", "header"))) for bond in BONDS],
 )
 def test_each_bond_fills_the_wall_and_stands_over_a_door_and_two_windows(bond):
-    layout = generators.bond(WALL, OPENINGS, bond=bond, brick=(0.5, 0.25), stone=0.5)
+    size = {"stone": 0.5} if bond == "rubble" else {"brick": (0.5, 0.25)}
+    layout = generators.bond(WALL, OPENINGS, bond=bond, **size)
     checked(layout, WALL.area - shapely.union_all(OPENINGS).area)
     heads = {name for name in layout.names if name.startswith(("lintel", "voussoir"))}
     assert {"lintel 1", "voussoir 2-1", "lintel 3"} <= heads
@@ -90,6 +91,23 @@ def test_other_heads_stand_too(heads):
     assert ("lintel 1" in layout.names) == (heads == "lintel")
     assert ("voussoir 1-3" in layout.names) == (heads != "lintel")
     assert first_status(layout) is solver.Status.EQUILIBRIUM
+
+
+def test_a_head_that_reaches_the_rim_by_less_than_rounding_is_cut_there():
+    """A flat arch that stuck out of the wall by 0.09 mm was laid, and its wall refused."""
+    layout = generators.bond(shapely.box(0, 0, 2, 1.5), [shapely.box(0.1, 0.0, 1.9, 1.0)], heads="flat arch")
+    checked(layout, 3.0 - 1.8)
+    assert not layout.notes
+
+
+def test_other_heads_than_those_that_are_asked_for_are_told():
+    wall, opening = shapely.box(0, 0, 2, 1.5), shapely.box(0.1, 0.0, 1.9, 1.1)
+    said = "bond: 1 opening has no room for the head that is asked for and got "
+    layout = generators.bond(wall, [opening], heads="arch")
+    assert layout.names[-1] == "lintel 1"
+    assert layout.notes == (f"{said}a lintel instead of an arch, the first around (1, 0.55)",)
+    (note,) = generators.bond(wall, [opening], heads="lintel").notes
+    assert note.startswith(f"{said}a shallower one, or one with less bearing")
 
 
 def test_without_heads_stones_of_a_stack_bond_fall_out_over_an_opening():
@@ -129,7 +147,8 @@ def test_any_wall_is_filled_whatever_its_openings_are(wall, openings, bond, head
         else shapely.box(x * 0.9 * width, y * 0.9 * high, (x * 0.9 + w) * width, (y * 0.9 + h) * high)
         for x, y, w, h, curved in openings
     ]  # fmt: skip
-    layout = generators.bond(outline, holes, bond=bond, brick=(0.5, 0.25), heads=heads, stone=0.4, seed=seed)
+    size = {"stone": 0.4} if bond == "rubble" else {"brick": (0.5, 0.25)}
+    layout = generators.bond(outline, holes, bond=bond, heads=heads, seed=seed, **size)
     checked(layout, outline.difference(shapely.union_all(holes)).area if holes else outline.area)
 
 
@@ -206,6 +225,10 @@ def test_stones_far_from_the_origin_have_no_corner_twice(bond, heads):
         ({"brick": (0.001, 0.001)}, "makes .* blocks .* give a larger brick"),
         ({"brick": (0.25,)}, "brick is .*; give its length and height"),
         ({"bond": "rubbel"}, "choose from running"),
+        ({"stone": 0.9}, "stone is that of bond rubble; bond is 'running': leave stone out"),
+        ({"bond": "ashlar", "flatness": 4.0}, "flatness is that of bond rubble; bond is 'ashlar'"),
+        ({"heads": "none", "bearing": 0.1}, "bearing is that of heads auto or .*; heads is 'none': leave bearing out"),
+        ({"bond": "rubble", "stone": 0.3, "brick": (0.5, 0.05)}, "brick and stone are both given; .*: leave brick out"),
         ({"joint": 0.06}, "joint is 0.06 m, more than half of a course of 0.075 m"),
         ({"quoins": (3.0, 0.3)}, "quoins are 3 m long, the wall 5.2 m wide; give at most half"),
         ({"openings": [shapely.box(8, 0, 9, 1)]}, r"opening 1 around \(8.5, 0.5\) lies outside its wall"),
