@@ -16,16 +16,21 @@ from solver.mechanics import counted
 
 from .facing import faced, facing_tolerance
 from .inspect import DENSITY, inspected
+from .joints.close import WAYS
 from .layout import Layout
 from .notes import changes_analysis
+from .outlines import ring_width
 from .repair import duplicates, overlaps, refuse_overlaps, repaired
 from .roles import checked_role, dropped_twins, roles_of, twins_note
 from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
-from .solids import prism
+from .solids import prism, width_of
 
 #: Overlaps below this fraction of the width of the thinnest block are contacts without a word.
 DRAWN_GAP = 1e-3
+
+#: Joints thicker than this multiple of the width of a typical block are a mistake.
+THICKEST_JOINT = 2.0
 
 #: Convex parts that hold more than their block, by more than this part of its volume, share some of it.
 CROSSING = 2.5e-3
@@ -76,9 +81,10 @@ def assemble(
     Raises
     ------
     ValueError
-        For an unknown role, a key of ``roles`` that matches no block, a support without a volume, and an overlap
-        deeper than the tolerance.
+        For an unknown role, a key of ``roles`` that matches no block, a support without a volume, an overlap
+        deeper than the tolerance, and a length that is none.
     """
+    _check_lengths(layout, joint_thickness, overlap_tolerance, closing, outline_tolerance)
     where = layout.source or "layout"
     for note in layout.notes:
         if changes_analysis(note):
@@ -125,6 +131,34 @@ def assemble(
     return solver.Assembly.from_outlines(outlines, **of_blocks)
 
 
+def _check_lengths(
+    layout: Layout,
+    joint_thickness: float | str,
+    overlap_tolerance: float | None,
+    closing: str,
+    outline_tolerance: float | None,
+) -> None:
+    """Refuse what is no length of at least 0, a joint much thicker than blocks are, and an unknown way of closing."""
+    if closing not in WAYS:
+        raise ValueError(f"closing is '{closing}'; choose from {', '.join(WAYS)}")
+    given = {"overlap_tolerance": overlap_tolerance, "outline_tolerance": outline_tolerance}
+    if not isinstance(joint_thickness, str):
+        given["joint_thickness"] = joint_thickness
+    elif joint_thickness.strip().lower() != "auto":
+        raise ValueError(f"joint_thickness is '{joint_thickness}'; give a length in m or \"auto\"")
+    for name, length in given.items():
+        if length is not None and not 0.0 <= float(length) < np.inf:
+            raise ValueError(f"{name} is {length:g} m; it must be a length of at least 0")
+    in_space = layout.dimension == 3
+    widths = [width_of(*solid) for solid in layout.solids] if in_space else list(map(ring_width, layout.outlines))
+    width, joint = float(np.median(widths or [np.inf])), given.get("joint_thickness") or 0.0
+    if joint > THICKEST_JOINT * width:
+        raise ValueError(
+            f"joint_thickness is {joint:g} m, more than {THICKEST_JOINT:g} times the width of a typical block "
+            f"({width:.3g} m); give the width of the mortar joints in m"
+        )
+
+
 def without_twins(layout: Layout, roles: Mapping[str, str]) -> tuple[Layout, str]:
     """Drop blocks that are drawn in the place of another, and say which; "" for none."""
     twins = duplicates(layout.every_corner)
@@ -169,8 +203,6 @@ def _crossings(assembly: solver.Assembly) -> str:
 def _simplified(layout: Layout, tolerance: float | None) -> tuple[Layout, str]:
     """Drop corners of outlines that are finer than needed, and say so."""
     tolerance = default_tolerance(layout.outlines) if tolerance is None else float(tolerance)
-    if not (np.isfinite(tolerance) and tolerance >= 0):
-        raise ValueError(f"outline_tolerance is {tolerance:g} m; it must be a length of at least 0")
     if not tolerance:
         return layout, ""
     # Counter-clockwise and checked, with the names of their blocks in messages.

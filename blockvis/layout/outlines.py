@@ -38,12 +38,13 @@ def ring_area(ring: np.ndarray) -> float:
 
 def ring_width(ring: np.ndarray) -> float:
     """Twice the area over the perimeter of a (n, 2) ring: near b for a long a × b."""
-    return 2.0 * abs(ring_area(ring)) / float(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum())
+    perimeter = float(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum())
+    return 2.0 * abs(ring_area(ring)) / perimeter if perimeter else 0.0
 
 
 def is_flat(points: np.ndarray) -> bool:
     """Whether (n, 2) or (n, 3) points lie in a plane across an axis; also if their coordinates are not finite."""
-    if points.shape[1] == 2 or len(points) == 0:
+    if points.shape[1] == 2:
         return True
     spread = np.ptp(points, axis=0)
     return not np.isfinite(spread).all() or bool((spread <= FLAT * spread.max()).any())
@@ -72,10 +73,8 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
     ValueError
         For coordinates that are not finite, and for points that are not in a plane, or not in that of the view.
     """
-    if points.shape[1] == 2 and len(points):
+    if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
-    if len(points) == 0:
-        return points[:, :2], ""
     spread = spread_of(points, where)
     flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
     if not flat:

@@ -85,10 +85,18 @@ def test_small_overlaps_are_resolved_and_large_ones_name_both_blocks(tmp_path):
     assert read(pair(0.1), overlap_tolerance=0.2).outline(0)[:, 0].max() == pytest.approx(0.95)
 
 
-@pytest.mark.parametrize("wrong", ["automatic", -1.0, float("nan")])
-def test_joint_thickness_is_checked(wrong, row):
-    with pytest.raises(ValueError, match="joint_thickness is"):
-        read(row(2), joint_thickness=wrong)
+@pytest.mark.parametrize("in_space", [False, True])
+@pytest.mark.parametrize(
+    ("key", "wrong"),
+    [
+        *(("joint_thickness", wrong) for wrong in ("automatic", -1.0, float("nan"), 10.0)),
+        *((f"{what}_tolerance", wrong) for what in ("overlap", "outline") for wrong in (-1.0, float("nan"))),
+        ("closing", "glue"),
+    ],
+)
+def test_lengths_are_checked_in_the_plane_and_in_space(key, wrong, in_space, row):
+    with pytest.raises(ValueError, match=f"{key} is .*(a length|mortar joints in m|choose from auto)"):
+        read(row(3), dimension=3 if in_space else 2, **{key: wrong})
 
 
 def test_exact_layouts_keep_their_coordinates(row):
