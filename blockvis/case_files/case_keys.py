@@ -289,8 +289,8 @@ GEOMETRY = Section(
             otherwise="0, or what is on most of the rim; of a mask that between more stones"),
         Key("smallest", POSITIVE, "Regions of an image less than this across (root of the area) are specks", 0.01, "m",
             otherwise="a twentieth of the typical stone"),
-        Key("thickness", POSITIVE, "Thickness out of plane of blocks for which the file has none", 0.25, "m",
-            THICKNESS, elsewhere=True),
+        Key("thickness", POSITIVE, "Thickness out of plane of blocks for which the file has none; bodies have "
+            "their own", 0.25, "m", THICKNESS, elsewhere=True),
         Key("joint_thickness", _THICKNESS_OR_AUTO,
             'Gaps between facing edges up to this width are closed; "auto" measures them', "auto", "m", 0.0),
         Key("closing", one_of(WAYS),
@@ -405,15 +405,17 @@ SETTLEMENT = Section(
             "m", 1.0),
         Key("tolerance", POSITIVE, "Width of the bracket of the collapse; of a rotation alone in rad", 1e-4, "m",
             otherwise="a hundredth of the increment"),
-        Key("step_tolerance", FRACTION, "Relative error of the reaction that steps aim for; the smallest of several "
-            "holds", 0.002, default=_CONTROLS.step_tolerance, elsewhere=True),
+        Key("step_tolerance", FRACTION, "Relative error of the reaction that steps aim for; the smallest that a "
+            "settlement gives holds for all", 0.002, default=_CONTROLS.step_tolerance, elsewhere=True),
         Key("local_loss", SHARE, "Share of the weight up to which blocks that leave for good are let go and the path "
-            "goes on without them; 0 ends it at the first", 0.0, default=_CONTROLS.local_loss, elsewhere=True),
+            "goes on without them; 0 ends it at the first, and the smallest that a settlement gives holds for all", 0.0,
+            default=_CONTROLS.local_loss, elsewhere=True),
         Key("profile", PROFILES, "In the plane, how far each support goes, in proportion: a Gaussian trough or heave "
             "along x, points of a table, or one vector and rotation per support; s is the largest displacement of a "
             "support's centroid",
             {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),
-        Key("blocks", TEXTS, "Names of the moving supports that take part; the others stand still",
+        Key("blocks", TEXTS, "Names of the moving supports that take part; the others stand still. A name is "
+            "of all supports that are drawn with it",
             ["ground right"], otherwise="all moving supports"),
     ),
     several=True,

@@ -69,7 +69,7 @@ def case_assembly(case: Case) -> solver.Assembly:
     _refuse_doubted_unit(case, sketch)
     sketch = with_roles_by_place(sketch, case.role_places)
     _refuse_shared_names(case, sketch)
-    _note_density(case, sketch)
+    _note_kept(case, sketch)
     if case.densities:
         sketch = _with_densities(case, sketch)
     try:
@@ -177,19 +177,23 @@ def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
         )
 
 
-def _note_density(case: Case, sketch: layout.Layout) -> None:
-    """Warn where the density of the case loses against the file's."""
-    if case.density is None or case.file is None or sketch.density is None:
+def _note_kept(case: Case, sketch: layout.Layout) -> None:
+    """Warn where the density or thickness of the case loses against the file's."""
+    if case.file is None:
         return
-    own = sketch.density[np.isfinite(sketch.density)]
-    if len(own) and (own != case.density).any():
-        warnings.warn(
-            f"{case.source}: [material] density = {case.density:g} is that of "
-            f"{counted(sketch.n_blocks - len(own), 'block')}; "
-            f"{len(own)} of {sketch.n_blocks} keep what '{case.file.name}' says, {own.min():g} to {own.max():g} kg/m³; "
-            "[materials.NAME] density replaces it",
-            stacklevel=3,
-        )
+    laid = np.array(sketch.laid)
+    for key, given, drawn, unit, remedy in (
+        ("[material] density", case.density, sketch.density, "kg/m³", "[materials.NAME] density replaces it"),
+        ("[geometry] thickness", case.thickness, sketch.thickness, "m", "change it there, or leave the key out"),
+    ):
+        own = np.zeros(0) if given is None or drawn is None else drawn[np.isfinite(drawn) & ~laid]
+        if (own != given).any():
+            warnings.warn(
+                f"{case.source}: {key} = {given:g} is that of {counted(sketch.n_blocks - len(own), 'block')}; "
+                f"{len(own)} of {sketch.n_blocks} keep what '{case.file.name}' says, {own.min():g} to {own.max():g} "
+                f"{unit}; {remedy}",
+                stacklevel=3,
+            )
 
 
 def _note_units(case: Case, assembly: solver.Assembly) -> None:

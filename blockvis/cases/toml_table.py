@@ -113,7 +113,7 @@ class Table:
         if value is None:
             return None
         right = isinstance(value, Sequence) and not isinstance(value, str) and len(value) > 0
-        if not right or not all(type(v) in (int, float) and math.isfinite(v) for v in value):
+        if not right or not all(map(is_number, value)):
             raise self.error(key, f"is {value!r}; give a list of numbers")
         return tuple(float(v) for v in value)
 

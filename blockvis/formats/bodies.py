@@ -181,7 +181,7 @@ def layout_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
     seen = [_projected(axis, bodies, size) for axis in axes]
     fitting = [one for one in seen if not one.refused]
     if not fitting:
-        raise _not_flat(seen, bodies, path, view)
+        raise _not_flat(seen, asked, path, view)
     best = fitting[0]
     for one in fitting[1:]:
         if one.scatter < best.scatter - 1e-4 * size:
@@ -462,14 +462,14 @@ class NotFlat(ValueError):
         self.reason = reason
 
 
-def _not_flat(seen: Sequence[_Projection], bodies: Sequence[Body], path: Path | str, view: str | None) -> NotFlat:
+def _not_flat(seen: Sequence[_Projection], asked: _Selection, path: Path | str, view: str | None) -> NotFlat:
     """Make the error for bodies that are not prisms side by side, with the reason in every view that was tried."""
+    bodies, size = asked.bodies, asked.size
     remedy = "dimension = 3 reads them in space; in the plane leave out all but one leaf (ignore), or draw its outlines"
     if view is None and not any(len(one.outlines) for one in seen):
         holed = [one.refused for one in seen if "no extrusion" not in one.refused]
         if holed:
             return NotFlat(f"'{path}': {holed[0]}; dimension = 3 reads the blocks in space", holed[0])
-        size = _size(bodies)
         alone = next((body.name for body in bodies if not any(_is_prism(body, axis, size) for axis in range(3))), None)
         reason = f"body '{alone}' is no extrusion along x, y or z" if alone else "; ".join(one.refused for one in seen)
         return NotFlat(
@@ -482,13 +482,9 @@ def _not_flat(seen: Sequence[_Projection], bodies: Sequence[Body], path: Path | 
         ordered = sorted(seen, key=lambda one: not len(one.outlines))
         reasons = "; ".join(one.refused for one in ordered)
         return NotFlat(f"'{path}' is three-dimensional: {reasons}; {remedy}", ordered[0].refused)
-    other = next((v for v in VIEWS if v != view and not _projected(axis_across(v), bodies, _size(bodies)).refused), "")
+    other = next((v for v in VIEWS if v != view and not _projected(axis_across(v), bodies, size).refused), "")
     remedy = f'view = "{other}" shows them side by side' if other else remedy
     return NotFlat(f"'{path}' cannot be seen as {view}: {seen[0].refused}; {remedy}", seen[0].refused)
-
-
-def _size(bodies: Sequence[Body]) -> float:
-    return float(np.ptp(np.concatenate([body.points[np.unique(body.faces)] for body in bodies]), axis=0).max())
 
 
 def _is_prism(body: Body, axis: int, size: float) -> bool:

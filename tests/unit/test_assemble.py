@@ -1,10 +1,11 @@
 """Layout to assembly: roles, supports, duplicates, overlaps, units; and what is refused."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
-from structures import drawn
+from structures import assembly_of, drawn
 
 import blockvis
 import solver
@@ -109,6 +110,24 @@ def test_density_and_thickness_of_the_file_hold_where_it_has_them(row):
     assembly = read(drawing, density=2500.0, thickness=0.5)
     assert assembly.density.tolist() == [1800.0, 2500.0]
     assert assembly.thickness.tolist() == [0.5, 0.3]
+
+
+@pytest.mark.parametrize(
+    ("key", "given"), [("material", "density = 1800"), ("geometry", "thickness = 0.5"), ("geometry", "thickness = 0.2")]
+)
+def test_a_value_of_the_case_that_loses_against_the_file_is_told(tmp_path, row, key, given):
+    row(3, density=[2000, None, 2200], thickness=[0.2, 0.2, None], role=["free", "free", "fixed"])
+    case = tmp_path / "case.toml"
+    tables = {"geometry": 'file = "row.json"\n', "material": "", "analysis": 'kind = "limit load"\n'}
+    tables[key] += f"{given}\n"
+    tables["[loads]"] = 'kind = "live"\nforce = [1, 0]\n'
+    case.write_text("".join(f"[{name}]\n{text}" for name, text in tables.items()), encoding="utf-8")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        assembly_of(case)
+    told = [str(warning.message) for warning in caught if "keep what 'row.json' says" in str(warning.message)]
+    assert len(told) == (given != "thickness = 0.2")
+    assert all(f"[{key}] {given} is that of 1 block; 2 of 3 keep" in text for text in told)
 
 
 def test_a_deformed_pose_is_written(tmp_path, row):
