@@ -144,6 +144,9 @@ def rows_of_cells(
         values = np.asarray(data.get(key, ()))
         if values.shape != owner.shape:
             continue
+        if values.dtype.kind == "f":
+            # Rounding of a program that writes them with seven digits.
+            values = np.array([float(f"{value:.6g}") for value in values.tolist()])
         known, number = np.unique(values, return_inverse=True)
         pairs = np.unique([owner, number], axis=1)
         several = np.flatnonzero(np.bincount(pairs[0]) > 1)

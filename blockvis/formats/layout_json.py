@@ -11,7 +11,8 @@ the points around each face, counter-clockwise seen from outside; z is up.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,9 +21,10 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import passed_over
 from blockvis.layout.solids import Solid
 from blockvis.layout.surfaces import cleaned
-from blockvis.text import refuse_unknown
+from blockvis.text import nearest, refuse_unknown
 
 from . import compas_json, geodata
 from .annotations import program_of
@@ -67,18 +69,26 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     version = content.get("version", 1)
     if version != 1:
         raise ValueError(f"'{path}' is a layout of version {version!r}; version 1 is read: update blockvis")
-    refuse_unknown(content, KEYS, f"'{path}'")
+    more = _not_read(content, KEYS, f"'{path}'")
     in_space = any(isinstance(block, dict) and "points" in block for block in content["blocks"])
     if reading.view not in (None, "xy") and not in_space:
         raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
     for k, block in enumerate(content["blocks"]):
         if isinstance(block, dict):
             of_block = (*BLOCK_KEYS, *(("points", "faces") if in_space else ("outline", "thickness")))
-            refuse_unknown(block, of_block, f"'{path}': block '{block.get('name', f'block {k}')}'")
+            more += _not_read(block, of_block, f"'{path}': block '{block.get('name', f'block {k}')}'")
     layout = (_read_solids if in_space else _read_outlines)(content, path)
     if in_space and reading.view == "xy":
         layout = replace(layout, blocks=tuple((with_z_up(points), faces) for points, faces in layout.solids))
-    return replace(layout, unit_by="layout" if layout.unit else "")
+    notes = passed_over(Counter(more), "keys that are not known")
+    return replace(layout, unit_by="layout" if layout.unit else "", notes=(*layout.notes, *notes))
+
+
+def _not_read(given: Mapping[str, Any], known: Sequence[str], where: str) -> list[str]:
+    """List keys that are not known; raises ``ValueError`` for one that is like one of these, which it was to be."""
+    more = [key for key in given if key not in known]
+    refuse_unknown((key for key in more if nearest(key, known)), known, where)
+    return more
 
 
 def _read_outlines(content: dict[str, Any], path: Path) -> Layout:

@@ -45,6 +45,13 @@ def test_refusals(tmp_path, content, message):
         read(path)
 
 
+def test_keys_of_others_are_told(tmp_path):
+    path = tmp_path / "a.json"
+    content = {"author": "M. Cascini", "blocks": [{"outline": RING, "colour": "red"}, {"outline": RING}]}
+    path.write_text(json.dumps(content), encoding="utf-8")
+    assert "keys that are not known: 1 author, 1 colour" in read_layout(path).notes
+
+
 def test_the_view_says_what_is_up_in_space_as_of_other_bodies(tmp_path):
     """The higher box is the thinner one, along z."""
     boxes = [box((0, 0, 0), (2, 1, 1)), box((0, 0, 1), (1, 1, 3))]
