@@ -20,13 +20,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 import solver
-from solver import mechanics
-from solver.mechanics import counted
 
-from .generators import LAYOUTS, help_text
 from .layout.sights import SIGHTS
 from .layout.views import VIEWS
 from .system.extras import MissingExtra
@@ -85,16 +80,10 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | 
     outputs : sequence of Output, optional
         What runs make beside their numbers, in place of what the arguments say; a new case is drawn without them only.
     """
-    parser = _parser()
-    options, left = parser.parse_known_args(arguments)
-    options.outputs = outputs
-    if options.verb in (_layout, _bond) and not any(word.startswith("-") for word in left):
-        # Parameters on either side of an option.
-        options.parameters += left
-    elif left:
-        parser.error(f"unrecognized arguments: {' '.join(left)}")
     warnings.showwarning = _notes_without_repeats()
     try:
+        options = _options(arguments)
+        options.outputs = outputs
         code: int = options.verb(options)
     except (ValueError, OSError, MissingExtra) as error:
         if isinstance(error, OSError) and is_broken_pipe(error):
@@ -104,12 +93,15 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | 
     except MemoryError:
         print("blockvis: there is not enough memory for what the input asks for", file=sys.stderr)
         return BAD_INPUT
-    except solver.SolveError as error:
-        print(f"blockvis: the linear program could not be solved: {error}", file=sys.stderr)
-        return SOLVER_FAILED
     except KeyboardInterrupt as stop:
         print(f"blockvis: {stop}" if str(stop) else "blockvis: interrupted", file=sys.stderr)
         return INTERRUPTED
+    except Exception as error:
+        # Not in the clause, where the end of a help would load the mechanics to look whether it is one.
+        if not isinstance(error, solver.SolveError):
+            raise
+        print(f"blockvis: the linear program could not be solved: {error}", file=sys.stderr)
+        return SOLVER_FAILED
     return code
 
 
@@ -153,6 +145,9 @@ def entry() -> None:
     if code == INTERRUPTED:
         # Workers of a study end with the process; a second Ctrl-C would break off their ending, with a traceback.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        # Where it went through a text that was executed, as scipy does while it is loaded, Python would end by the
+        # signal all the same; the next such text takes that back.
+        exec("")
     sys.exit(code)
 
 
@@ -167,6 +162,17 @@ class _Parser(argparse.ArgumentParser):
                 None, f"there is no verb '{value}'{nearest(str(value), verbs)}; there are {', '.join(verbs)}"
             )
         super()._check_value(action, value)
+
+
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = _parser()
+    options, left = parser.parse_known_args(arguments)
+    if options.verb in (_layout, _bond) and not any(word.startswith("-") for word in left):
+        # Parameters on either side of an option.
+        options.parameters += left
+    elif left:
+        parser.error(f"unrecognized arguments: {' '.join(left)}")
+    return options
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -247,7 +253,6 @@ def _parser() -> argparse.ArgumentParser:
     layout = verbs.add_parser(
         "layout",
         help="a parametric layout as a file",
-        epilog=f"layouts: {', '.join(_layout_names())}; blockvis layout NAME --help lists the parameters of one",
         add_help=False,
     )
     layout.add_argument("-h", "--help", action=_LayoutHelp, help="show this help, or the parameters of NAME")
@@ -285,8 +290,12 @@ class _LayoutHelp(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, *_: object) -> None:
         """Print the help and end."""
+        from .generators import help_text
+
         name = getattr(namespace, "name", None)
         if name is None:
+            names = ", ".join(_layout_names())
+            parser.epilog = f"layouts: {names}; blockvis layout NAME --help lists the parameters of one"
             parser.print_help()
             parser.exit()
         try:
@@ -298,6 +307,8 @@ class _LayoutHelp(argparse.Action):
 
 
 def _layout_names() -> list[str]:
+    from .generators import LAYOUTS
+
     return [name.replace(" ", "-") for name in LAYOUTS]
 
 
@@ -571,6 +582,8 @@ def _sweep(options: argparse.Namespace) -> int:
 
 
 def _new(options: argparse.Namespace) -> int:
+    from solver.mechanics import counted
+
     from .case_files.new_case import case_text, relative_to, unit_instead
     from .formats.read import inspect
     from .layout.units import metres_per
@@ -853,6 +866,8 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _convert(options: argparse.Namespace) -> int:
+    from solver.mechanics import counted
+
     from .formats.read import read_layout, write_layout
     from .layout.assemble import assemble, without_twins
     from .layout.layout import layout_of
@@ -876,6 +891,10 @@ def _convert(options: argparse.Namespace) -> int:
 
 def _convert_results(options: argparse.Namespace, target: Path) -> int:
     """Write a results folder as one file: a series, an animation, or the blocks where they are at the end."""
+    import numpy as np
+
+    from solver.mechanics import counted
+
     from .pictures.captions import loss_words
     from .results.about import in_phase, unit_in
     from .results.fall_files import known_fall
@@ -918,6 +937,8 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
 
 
 def _bond(options: argparse.Namespace) -> int:
+    from solver.mechanics import counted
+
     from .cases.bonds import bonded, read_bond
     from .cases.toml_table import Table
     from .formats.read import read_outlines, write_layout
@@ -938,6 +959,8 @@ def _bond(options: argparse.Namespace) -> int:
 
 
 def _layout(options: argparse.Namespace) -> int:
+    from solver.mechanics import counted
+
     from .formats.read import save_layout
     from .generators import build
 
@@ -1097,12 +1120,16 @@ def _parameter(given: str) -> tuple[str, Any]:
 
 
 def _levels(fill: solver.Backfill) -> str:
-    low = f"from {fill.base:g} m " if np.isfinite(fill.base) else ""
+    low = f"from {fill.base:g} m " if math.isfinite(fill.base) else ""
     return f"{low}up to {fill.surface:g} m"
 
 
 def _in_words(response: solver.Response, folder: Path) -> str:
     """Sum up a run in words."""
+    import numpy as np
+
+    from solver.mechanics import counted, worst_of
+
     from .kinds.kinds import KINDS
     from .results.about import certified
     from .results.ties import tie_courses, tie_texts
@@ -1126,7 +1153,7 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         lines.append(response.message)
     lines += kind.lines(response)
     lines += [": ".join(filter(None, tie_texts(course, response))) for course in tie_courses(response)]
-    worst = mechanics.worst_of(i.certificate for i in certified(response))
+    worst = worst_of(i.certificate for i in certified(response))
     if worst is not None:
         measures = {
             "equilibrium residual {:.1e} W": worst.equilibrium_residual,

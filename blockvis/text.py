@@ -10,8 +10,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 #: What stands before a unit of force, and from which number on.
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
 
@@ -128,9 +126,9 @@ def rounded_length(largest: float) -> float:
     >>> rounded_length(0.34)
     0.2
     """
-    if not (np.isfinite(largest) and largest > 0.0):
+    if not (math.isfinite(largest) and largest > 0.0):
         return 1.0
-    power = 10.0 ** np.floor(np.log10(largest))
+    power = 10.0 ** math.floor(math.log10(largest))
     return float(f"{max(m for m in (1.0, 2.0, 5.0) if m * power <= largest * (1 + 1e-9)) * power:.6g}")
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from blockvis.text import nearest
+from blockvis.text import LARGEST, nearest
 
 #: Degrees above the level of a view from below: steep enough for supports at the rim not to hide the intrados.
 BELOW = -50.0
@@ -128,7 +127,7 @@ def read_cut(value: Any) -> Cut:
     if not isinstance(value, Mapping) or "normal" not in value or not {"point", "normal"}.issuperset(value):
         raise ValueError(problem)
     normal = _triple(value["normal"], problem)
-    length = float(np.linalg.norm(normal))
+    length = math.hypot(*normal)
     if length == 0.0:
         raise ValueError(f"has a normal of length 0; {_SECTION_REMEDY}")
     unit = (normal[0] / length, normal[1] / length, normal[2] / length)
@@ -143,7 +142,7 @@ def _place(text: str, problem: str) -> float:
 
 
 def _number(value: Any, problem: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
         raise ValueError(problem)
     return float(value)
 

@@ -345,3 +345,21 @@ def test_a_second_ctrl_c_does_not_break_off_the_ending():
     )
     done = subprocess.run([sys.executable, "-c", ending], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (cli.INTERRUPTED, "")
+
+
+@pytest.mark.parametrize("package", ["numpy", "scipy", "solver.mechanics"])
+def test_ctrl_c_while_packages_are_loaded_ends_without_a_traceback(package, tmp_path):
+    """Also where a package executes a text just then, after which Python alone would end by the signal."""
+    stopped = (
+        "import sys\n"
+        "class Stop:\n"
+        "    @staticmethod\n"
+        "    def find_spec(name, *_):\n"
+        f"        if name == {package!r}: exec('raise KeyboardInterrupt')\n"
+        "sys.meta_path.insert(0, Stop)\n"
+        "from blockvis.cli import entry\n"
+        "entry()\n"
+    )
+    words = ["layout", "arch", "-o", str(tmp_path / "arch.json")]
+    done = subprocess.run([sys.executable, "-c", stopped, *words], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "blockvis: interrupted\n")

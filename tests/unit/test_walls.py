@@ -32,10 +32,13 @@ HEAVY = {
     "ezdxf",
     "gmsh",
 }
+LIBRARIES = {"numpy", "scipy", "shapely", "highspy", "clarabel"}
 STUDIES = {"dask", "distributed", "pandas", "pyarrow", "SALib", "tomli_w"}
 
 
-@pytest.mark.parametrize("first", ["import blockvis", "from blockvis.cli import main; main(['--help'])"])
+@pytest.mark.parametrize(
+    "first", ["import blockvis", *(f"from blockvis.cli import main; main(['{word}'])" for word in ("--help", "laout"))]
+)
 def test_neither_import_nor_help_waits_for_heavy_packages(first):
     code = f"""
 import sys
@@ -43,7 +46,7 @@ try:
     {first}
 except SystemExit:
     pass
-print(sorted({{name.partition(".")[0] for name in sys.modules}} & {HEAVY | STUDIES}))
+print(sorted({{name.partition(".")[0] for name in sys.modules}} & {HEAVY | STUDIES | LIBRARIES}))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
