@@ -77,8 +77,8 @@ class IncrementTooLong(Exception):
     """An increment has taken longer than it may; the message says what it was doing."""
 
 
-class DrawingInterrupted(KeyboardInterrupt):
-    """Ctrl-C while drawing: the results are complete; the message says which command draws the rest."""
+class RunInterrupted(KeyboardInterrupt):
+    """Ctrl-C beside the increments, which are all in the folder; the message says which command makes the rest."""
 
 
 def run_case(
@@ -184,7 +184,8 @@ def resume_run(
         if restore_grids(folder, response.assembly, response.increments, viewer_format(case)):
             write_end(folder, response, viewer_format(case))
         absent = [output for output in outputs if not output.is_written(case, folder)]
-        missing = _made(absent, case, response, folder, Clock())
+        with _resumable(folder):
+            missing = _made(absent, case, response, folder, Clock())
         return Run(response, folder, finished, missing, had_finished=True)
     for note in record.changes(checksum_of_files):
         warnings.warn(note, stacklevel=2)
@@ -210,13 +211,18 @@ def _finished(folder: Path) -> dict[str, Any] | None:
 def _made(
     outputs: Sequence[Output], case: Case, response: solver.Response, folder: Path, clock: Clock
 ) -> tuple[str, ...]:
-    """Make what is wanted beside the numbers; what Ctrl-C leaves undrawn is said."""
+    """Make what is wanted beside the numbers."""
+    return tuple(missing for output in outputs for missing in output.finish(case, response, folder, clock))
+
+
+@contextmanager
+def _resumable(folder: Path) -> Iterator[None]:
+    """Say to whoever interrupts what is not written or drawn yet by which command it is."""
     try:
-        return tuple(missing for output in outputs for missing in output.finish(case, response, folder, clock))
+        yield
     except KeyboardInterrupt:
-        raise DrawingInterrupted(
-            f"interrupted while drawing; the results are complete, what is not drawn yet is by: "
-            f"{resume_command(folder)}"
+        raise RunInterrupted(
+            f"interrupted; what is not solved, written or drawn yet is by: {resume_command(folder)}"
         ) from None
 
 
@@ -241,10 +247,11 @@ def _followed(
     increment_seconds: float | None,
 ) -> Run:
     """Follow the increments of a run, and make what is wanted beside."""
-    for output in outputs:
-        output.follow(results)
     try:
-        return _follow(case, results, run, outputs, clock, increment_seconds)
+        with _resumable(results.path):
+            for output in outputs:
+                output.follow(results)
+            return _follow(case, results, run, outputs, clock, increment_seconds)
     except OSError as error:
         for output in outputs:
             # They may have half-written files, too.

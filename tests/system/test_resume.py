@@ -289,6 +289,20 @@ def test_ctrl_c_ends_cleanly_and_the_run_resumes(whole, tmp_path, monkeypatch, c
 
 
 @pytest.mark.slow
+def test_ctrl_c_while_tables_are_written_says_how_to_go_on(whole, tmp_path, monkeypatch, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    out = tmp_path / "out"
+    monkeypatch.setattr(sys.modules[blockvis.run_case.__module__], "finish", stopped)
+    assert run_command(whole / "case.toml", "-o", out) == 130
+    assert capsys.readouterr().err.endswith(f"by: blockvis run --resume {out}\n")
+    monkeypatch.undo()
+    assert run_command("--resume", out) == 0
+    _same_result(whole / "out", out)
+
+
+@pytest.mark.slow
 def test_resuming_a_finished_run_draws_what_is_missing(whole, tmp_path, capsys):
     out = shutil.copytree(whole / "out", tmp_path / "out")
     before = (out / "response.csv").read_bytes()
