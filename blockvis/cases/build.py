@@ -41,9 +41,6 @@ LIGHTEST = 1e-14
 #: Masonry lighter than this [kg/m³] is probably in t/m³ or kN/m³.
 LIGHTEST_STONE = 100.0
 
-#: A settlement of more than this fraction of a block in one step passes over what happens within it.
-LONGEST_STEP = 0.1
-
 #: A settlement that ends further than so many times the size of the structure is probably in mm.
 FARTHEST_LIMIT = 5.0
 
@@ -216,12 +213,11 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
             f"density {light:g} kg/m³ is lighter than masonry; if it is in {unit}, give {factor * light:.4g} kg/m³"
         )
     steps = [s.increment for s in case.settlements if s.unit == "m"]
-    block = float(np.median(across_blocks(assembly)[assembly.free])) if assembly.free.any() else np.inf
-    if steps and max(steps) > LONGEST_STEP * block:
+    block = float(np.median(sizes)) if len(sizes) else np.inf
+    if steps and max(steps) > block:
         notes.append(
-            f"[settlement] increment = {max(steps):g} m is {max(steps) / block:.3g} of the median block, "
-            f"{block:.3g} m across: a step passes over what happens within it; at most {LONGEST_STEP * block:.2g} m"
-            + (f", or is it in mm? {1e-3 * max(steps):g} m" if max(steps) > block else "")
+            f"[settlement] increment = {max(steps):g} m is {max(steps) / block:.3g} times the size of the median "
+            f"block, {block:.3g} m: is it in mm? {1e-3 * max(steps):g} m"
         )
     limits = [s.limit for s in case.settlements if s.unit == "m"]
     whole = float(np.ptp(assembly.vertices, axis=0).max())
@@ -233,13 +229,6 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
     for note in notes:
         if note:
             warnings.warn(f"{case.source}: {note}", stacklevel=3)
-
-
-def across_blocks(assembly: solver.Assembly) -> np.ndarray:
-    """(n_blocks,) array [m]: diagonal of the box around each block."""
-    first = np.searchsorted(assembly.block_of_vertex, np.arange(assembly.n_blocks))
-    low, high = (pick.reduceat(assembly.vertices, first, axis=0) for pick in (np.minimum, np.maximum))
-    return np.asarray(np.linalg.norm(high - low, axis=1))
 
 
 def case_controls(case: Case, assembly: solver.Assembly) -> solver.Controls:

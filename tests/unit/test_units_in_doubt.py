@@ -1,5 +1,7 @@
 """Numbers that are probably in another unit, and what a run changes: one note each."""
 
+import warnings
+
 import numpy as np
 import pytest
 from structures import assembly_of, case_from, drawn
@@ -58,13 +60,20 @@ COLUMN = '[geometry]\nlayout = "column"\n'
         ("[material]\ndensity = 20", "density 20 kg/m³ is lighter than masonry; if it is in kN/m³, give 2039 kg/m³"),
         (
             "[settlement]\ndirection = [0, -1]\nincrement = 50\nlimit = 100",
-            "increment = 50 m is",
+            "increment = 50 m is .* times the size of the median block, .* m: is it in mm\\? 0.05 m",
         ),
     ],
 )
 def test_likely_unit_mistakes_are_named(tmp_path, keys, note):
     with pytest.warns(UserWarning, match=note):
         assembled(tmp_path, COLUMN + keys)
+
+
+def test_long_increments_within_a_block_are_not_noted(tmp_path):
+    """Steps within an increment are chosen by their own error, however long it is."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assembled(tmp_path, COLUMN + "[settlement]\ndirection = [0, -1]\nincrement = 0.3\nlimit = 0.6")
 
 
 def test_a_unit_in_doubt_stops_a_run_until_the_case_gives_one(tmp_path, capsys):
