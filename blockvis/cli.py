@@ -1060,9 +1060,9 @@ def _seen_from(options: argparse.Namespace, folder: Path, response: solver.Respo
     """Take view and section from the command line, or from the case of a results folder."""
     from .cases.toml_table import toml_value
     from .runs.outputs import seen_from
-    from .runs.underlay import drawn_case
+    from .runs.reopen import case_of
 
-    case = drawn_case(folder)
+    case = case_of(folder)
     found = {} if case is None else seen_from(case, response)
     if options.view is not None:
         angles = [] if "{" in options.view else [toml_value(angle) for angle in options.view.split(",")]

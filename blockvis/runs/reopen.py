@@ -8,11 +8,19 @@ from pathlib import Path
 import solver
 from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_changes, case_interfaces, case_loads
+from blockvis.cases.contents import Case
 from blockvis.cases.loads import with_moving_load
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.about import collapse_phase, unit_in
-from blockvis.results.folder import stored_case, stored_response
+from blockvis.results.folder import stored_response
 from blockvis.results.given import with_given
+from blockvis.results.record import RECORD, read_record
+
+
+def case_of(folder: Path) -> Case | None:
+    """Read the case of a results folder, which is named by the file it was run from; None for a run from Python."""
+    record = read_record(folder)
+    return parse_case(record.case, Path(record.case_file or folder / RECORD)) if record.case else None
 
 
 def open_results(folder: str | Path) -> solver.Response:
@@ -32,8 +40,7 @@ def open_results(folder: str | Path) -> solver.Response:
     """
     folder = Path(folder)
     response, summary = stored_response(folder)
-    text = stored_case(folder)
-    case = parse_case(text, folder / "case.toml") if text else None
+    case = case_of(folder)
     analysis = summary.get("analysis", case.analysis if case else response.analysis)
     kind = KINDS[analysis]
     response = kind.restored(replace(response, analysis=analysis), summary)

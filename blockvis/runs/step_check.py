@@ -12,16 +12,15 @@ from pathlib import Path
 import numpy as np
 
 import solver
-from blockvis.case_files.read import parse_case
 from blockvis.cases.contents import Case
 from blockvis.results.about import unit_in
 from blockvis.results.folder import STEP_CHECK, add_to_summary
-from blockvis.results.record import read_json, read_record
+from blockvis.results.record import read_json
 from blockvis.system.atomic_files import write_atomic
 from solver import mechanics
 
 from .once_more import LINEAR_PROGRAM, OnceMore, Traced, followed, takes_steps, traced
-from .reopen import open_results
+from .reopen import case_of, open_results
 
 #: Step tolerance of the other path over that of the run. Half of it is near by chance too often.
 FINER = 0.25
@@ -179,10 +178,10 @@ def stored_case(folder: Path) -> Case:
     ValueError
         For a run without one.
     """
-    record = read_record(folder)
-    if not record.case:
+    case = case_of(folder)
+    if case is None:
         raise ValueError(f"'{folder}' was written from Python, without a case file; run it again from there")
-    return parse_case(record.case, Path(record.case_file or folder / "case.toml"))
+    return case
 
 
 def check_steps(folder: str | Path) -> StepCheck:

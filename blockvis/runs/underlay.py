@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from blockvis.case_files.read import parse_case
 from blockvis.cases.contents import Case
 from blockvis.formats import FORMATS
 from blockvis.formats.annotations import annotated_placement, program_of
@@ -17,7 +16,8 @@ from blockvis.formats.images import opened
 from blockvis.formats.reading import Reading
 from blockvis.layout.units import metres_per
 from blockvis.pictures.underlay import Underlay
-from blockvis.results.record import RECORD, Record, read_record
+
+from .reopen import case_of
 
 #: A photograph whose sides are in the proportion of the drawing's image within this has its corners where that has.
 SAME_SHAPE = 0.01
@@ -64,14 +64,8 @@ def _pixels(image: Image.Image) -> np.ndarray:
 
 def stored_underlay(folder: Path) -> Underlay | None:
     """Read the photograph under the pictures of a results folder, if its case names one."""
-    case = drawn_case(folder)
+    case = case_of(folder)
     return None if case is None else underlay_of(case)
-
-
-def drawn_case(folder: Path) -> Case | None:
-    """Read the case of a results folder, if it has one."""
-    record = read_record(folder) if (folder / RECORD).is_file() else Record()
-    return parse_case(record.case, Path(record.case_file or folder / "case.toml")) if record.case else None
 
 
 def _drawing(case: Case) -> tuple[Placement, tuple[float, float] | None] | None:

@@ -117,3 +117,11 @@ def test_a_force_on_many_blocks_is_told_with_its_sum(tmp_path):
     with pytest.warns(UserWarning, match=r"acts on each of 18 blocks that blocks = '\*' names, 9 kN in all"):
         _, loads = loads_of(tmp_path, "")
     np.testing.assert_allclose(loads[:, :2].sum(axis=0), [0.0, -9000.0])
+
+
+def test_notes_of_reopened_results_name_the_file_of_the_case(tmp_path):
+    with pytest.warns(UserWarning, match="acts on each of 18 blocks"):
+        loads_of(tmp_path, "")
+    with pytest.warns(UserWarning, match="acts on each of 18 blocks") as noted:
+        blockvis.open_results(tmp_path / "out")
+    assert {str(note.message).partition(": [loads 1]")[0] for note in noted} == {str(tmp_path / "case.toml")}
