@@ -69,7 +69,7 @@ class CracksInSpace:
         self._pieces, self._openings, self._owner = _opened(assembly, joints, increment)
         limits = class_limits(float(self._openings.max(initial=0.0)))
         colours = [palette.rgb(colour) for colour in palette.crack_colours(len(limits) + 1)]
-        self._scenes = self._drawn(assembly, limits, colours, plane_of(assembly, cut), increment.fallen)
+        self._scenes = self._drawn(assembly, limits, colours, plane_of(assembly, cut, self._views[0]), increment.fallen)
         self.pixel = self._scenes[0].pixel
         texts = [width_text(limit) for limit in limits]
         words = [*(f"to {text}" for text in texts), f"above {texts[-1]}" if texts else "open joint"]

@@ -210,10 +210,7 @@ class Drawer:
         # The view of blocks in space is chosen by their mechanism.
         self._swing = swing_of(response) if look.colour_by == "mechanism" or not self._flat else None
         self._views = self._chosen_views()
-        self._plane = plane_of(assembly, look.cut)
-        if self._plane is not None and self._plane[1] @ self._views[0].axes[2] > 0.0:
-            # What lies between the plane and the eye is left out.
-            self._plane = self._plane * [[1.0], [-1.0]]
+        self._plane = plane_of(assembly, look.cut, self._views[0] if self._views else None)
         self.ties = DrawnTies(response, self._plane)
         numbers = np.array([k for k, i in enumerate(increments) if matters(i, response)], dtype=int)
         self._seen = _Series(sampled=frozenset(evenly(numbers, FORCES_OF).tolist()))
@@ -508,9 +505,13 @@ class Drawer:
         """Return what is marked in any of the increments, each with its place in the legends of all pictures."""
         if self._keys is None:
             keys = [*self._keys_of_tints(), *self._keys_of_joints(), *self._keys_of_forces(), *self.ties.keys()]
-            if not self._flat and self.response.settlements and self.assembly.moving.any():
-                solid = self.assembly.moving & ~hiding_supports(self.assembly, self._views[0])
-                keys.append(Key("area" if solid.any() else "line", "moving support", palette.MOVING))
+            if not self._flat and self.response.settlements:
+                moving = self.assembly.moving & (
+                    self._kept(self.increments[0].pose) | self._kept(self.increments[-1].pose)
+                )
+                solid = moving & ~hiding_supports(self.assembly, self._views[0])
+                if moving.any():
+                    keys.append(Key("area" if solid.any() else "line", "moving support", palette.MOVING))
             if self.response.loads.fills:
                 kind = "area" if self._flat else "line"
                 keys.append(

@@ -464,7 +464,8 @@ class _Box:
         self.low, self.high = np.full(d, np.inf), np.full(d, -np.inf)
 
     def hold(self, points: np.ndarray) -> None:
-        self.low, self.high = np.minimum(self.low, points.min(axis=0)), np.maximum(self.high, points.max(axis=0))
+        self.low = np.minimum(self.low, points.min(axis=0, initial=np.inf))
+        self.high = np.maximum(self.high, points.max(axis=0, initial=-np.inf))
 
 
 def framed(
@@ -495,16 +496,18 @@ def framed(
     cut : (2, 3) array, optional
         A point [m] of a plane and its normal towards what is kept: what is left out takes no room.
     """
-    free = assembly.free[assembly.block_of_vertex]
     d = assembly.dimension if axes is None else len(axes)
     inner, outer = _Box(d), _Box(d)
     for pose in poses:
-        corners = mechanics.moved_vertices(assembly, pose)
+        corners, owner = mechanics.moved_vertices(assembly, pose), assembly.block_of_vertex
         if cut is not None:
-            corners = corners - np.minimum((corners - cut[0]) @ cut[1], 0.0)[:, None] * cut[1]
+            corners, owner = _left_by(cut, assembly, corners)
         corners = corners if axes is None else corners @ axes.T
-        inner.hold(corners[free] if free.any() else corners)
-        outer.hold(corners[~free] if (~free).any() else corners)
+        free = assembly.free[owner]
+        inner.hold(corners[free])
+        outer.hold(corners[~free])
+    # Where no free block is to be seen, or no support.
+    inner, outer = (box if np.isfinite(box.low).all() else other for box, other in ((inner, outer), (outer, inner)))
     low, high = inner.low, inner.high
     size = float((high - low).max())
     all_of_it = float((np.maximum(high, outer.high) - np.minimum(low, outer.low)).max())
@@ -512,3 +515,16 @@ def framed(
     low = np.minimum(low, np.maximum(outer.low, low - beyond))
     high = np.maximum(high, np.minimum(outer.high, high + beyond))
     return Frame(low - margin * size, high + margin * size)
+
+
+def _left_by(cut: np.ndarray, assembly: solver.Assembly, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of what a plane leaves of blocks in space, (n, 3) [m], and the block of each; also those in the plane."""
+    shapes = assembly.polyhedra
+    heights = (corners - cut[0]) @ cut[1]
+    start, end = shapes.corners, shapes.corners[shapes.next_corner]
+    across = (heights[start] < 0.0) & (heights[end] > 0.0)
+    start, end = start[across], end[across]
+    share = (heights[start] / (heights[start] - heights[end]))[:, None]
+    kept, owner = heights >= 0.0, assembly.block_of_vertex
+    points = np.concatenate([corners[kept], corners[start] + share * (corners[end] - corners[start])])
+    return points, np.concatenate([owner[kept], owner[start]])

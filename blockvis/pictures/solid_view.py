@@ -127,8 +127,10 @@ def hiding_supports(assembly: solver.Assembly, view: View) -> np.ndarray:
     return hides
 
 
-def plane_of(assembly: solver.Assembly, cut: Cut | None) -> np.ndarray | None:
+def plane_of(assembly: solver.Assembly, cut: Cut | None, view: View | None = None) -> np.ndarray | None:
     """(2, 3) array: a point [m] of the plane that cuts blocks open, and its unit normal; None without one.
+
+    Seen from a view the normal points away from the eye: what lies between the plane and the eye is left out.
 
     Raises
     ------
@@ -146,7 +148,7 @@ def plane_of(assembly: solver.Assembly, cut: Cut | None) -> np.ndarray | None:
             f"section: the plane through ({', '.join(f'{x:.4g}' for x in point)}) m misses the blocks, which lie "
             f"{heights.min():.4g} to {heights.max():.4g} m from it along its normal; move its point there"
         )
-    return np.stack([point, normal])
+    return np.stack([point, -normal if view is not None and normal @ view.axes[2] > 0.0 else normal])
 
 
 def _above(assembly: solver.Assembly) -> float:

@@ -360,6 +360,33 @@ def settled_piers(reach):
 
 
 @pytest.mark.slow
+def test_cracks_are_drawn_on_the_half_behind_a_section_and_the_legend_names_what_is_left(tmp_path):
+    """From the east the slab that sinks, east of the section, is left out; from the west all is there but its end."""
+    response, out = settled_piers(1.0), tmp_path / "out"
+    blockvis.write(response, out)
+    for azimuth, sinks in ((20, False), (160, True)):
+        assert main(["render", str(out), "--cracks", "-1", "--section", "x = 2.5", "--view", f"{azimuth},20"]) == 0
+        drawn = pixels(out / "cracks.png").astype(int)
+        # Pale as it is, the slab is greener than red.
+        assert ((drawn[..., 1] - drawn[..., 0] > 5).sum() > 1000) == sinks
+        eye = {"azimuth": azimuth, "elevation": 20}
+        still = pixels(draw_still(response, -1, tmp_path / "still.png", view=eye, section="x = 2.5", size=SMALL))
+        assert alike(still, palette.MOVING).any() == sinks
+
+
+def test_what_a_section_leaves_out_takes_no_room():
+    """Above a plane, east of one, and below one that leaves no free block."""
+    assembly, plan = piers_on_slabs(1.0), np.array([[1.0, 0, 0], [0, 0, 1.0]])
+    for point, normal, low, high in (
+        ((0, 0, 1.0), (0, 0, 1.0), [1.0, 1.0], [5.0, 2.5]),
+        ((2.5, 0, 0), (1.0, 0, 0), [2.5, -0.5], [6.0, 2.5]),
+        ((0, 0, -0.2), (0, 0, -1.0), [0.0, -0.5], [6.0, -0.2]),
+    ):
+        frame = framed(assembly, [solver.Pose.initial(assembly)], 0.0, 9.0, plan, 9.0, np.array([point, normal]))
+        assert [*frame.low, *frame.high] == pytest.approx([*low, *high], abs=1e-12)
+
+
+@pytest.mark.slow
 def test_a_section_from_below_closes_supports_and_shows_which_moves_and_where_to(tmp_path):
     """Supports that hide the structure are drawn by their edges: those of the cut, too, and in their colours."""
     # The middle of the support lies in the half that is left out.
