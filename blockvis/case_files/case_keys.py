@@ -294,10 +294,11 @@ GEOMETRY = Section(
         Key("joint_thickness", _THICKNESS_OR_AUTO,
             'Gaps between facing edges up to this width are closed; "auto" measures them', "auto", "m", 0.0),
         Key("closing", one_of(WAYS),
-            'How joints are closed: "faces" moves edges to their midline, "voronoi" gives mortar to the nearest stone',
-            "faces", default="auto"),
+            'In the plane, how joints are closed: "faces" moves edges to their midline, "voronoi" gives mortar to the '
+            "nearest stone", "faces", default="auto"),
         Key("outline_tolerance", NOT_NEGATIVE,
-            "Corners within this distance of a simpler outline are dropped; 0 keeps every corner", 0.002, "m",
+            "In the plane, corners within this distance of a simpler outline are dropped; 0 keeps every corner",
+            0.002, "m",
             otherwise="a hundredth of a block where outlines have more than 24 corners in the mean, else 0"),
         Key("overlap_tolerance", POSITIVE, "Overlap of two blocks that is resolved to its midline", 0.001, "m",
             otherwise="0.04 of the width of a typical block, of a file in space 0.01, of a parametric layout a "
@@ -436,12 +437,12 @@ LOADS = Section(
             [1.0, 2.0], "m", otherwise="the centroid of each block"),
         Key("moment", _MOMENT, "Moment on each of the blocks, counter-clockwise; in space about x, y and z", 100.0,
             "N·m", 0.0),
-        Key("pressure", NUMBER, "Pressure on the first faces in the way of direction, or on an edge: a force that goes "
-            "with its block and keeps its direction", 1000.0, "Pa",
-            otherwise="none"),
-        Key("direction", _PUSHES, "Direction in which the pressure pushes", [1.0, 0.0], default=(0.0, -1.0)),
-        Key("edge", whole(1), "Number of the edge into which the pressure pushes, counter-clockwise from the first "
-            "corner, in whichever sense it is drawn", 2, otherwise="the faces in the way of direction"),
+        Key("pressure", NUMBER, "In the plane, pressure on the first faces in the way of direction, or on an edge: a "
+            "force that goes with its block and keeps its direction", 1000.0, "Pa", otherwise="none"),
+        Key("direction", _PUSHES, "In the plane, direction in which the pressure pushes", [1.0, 0.0],
+            default=(0.0, -1.0)),
+        Key("edge", whole(1), "In the plane, number of the edge into which the pressure pushes, counter-clockwise "
+            "from the first corner, in whichever sense it is drawn", 2, otherwise="the faces in the way of direction"),
         Key("positions", _PLACES,
             "Places x of a live force that moves over what is topmost there", [-1.9, 1.9, 77], "m", otherwise="none"),
         Key("y", NUMBER, "The y of all positions, of blocks in space", 0.5, "m", otherwise="none"),

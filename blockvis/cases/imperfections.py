@@ -24,8 +24,8 @@ IMPERFECTIONS = Section(
     "imperfections",
     "Random scatter, one table of each kind; joints stay closed and faces plane",
     (
-        Key("kind", one_of(tuple(MEANS)), "What scatters: corners (each coordinate, m), friction of each joint, "
-            "density of each block (both as factors)", "vertices", required=True),
+        Key("kind", one_of(tuple(MEANS)), "What scatters: in the plane corners (each coordinate, m), friction of each "
+            "joint, density of each block (both as factors)", "vertices", required=True),
         Key("seed", whole(0, 2**63 - 1), "Of the random numbers; the same seed gives the same blocks", 1, default=0),
         *(replace(key, otherwise="0 for vertices, 1 for friction and density") if key.name == "mean" else key
           for key in DISTRIBUTION_KEYS),

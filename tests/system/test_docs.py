@@ -124,3 +124,13 @@ def test_scripts_assert_a_number_and_show_a_picture(folder):
         ]
         assert numbers, f"{script.name} asserts no number"
         assert ".png" in text, f"{script.name} shows no picture"
+
+
+@pytest.mark.parametrize("key", ["pressure", "edge", "profile", "kind", "closing", "outline_tolerance", "window"])
+def test_keys_that_are_refused_in_space_say_so(key):
+    """Of kinds that of imperfections, which has corners."""
+    rows = [line for line in (DOCS / "keys" / "case_keys.md").read_text(encoding="utf-8").splitlines()
+            if line.startswith(f"| `{key}` |") and (key != "kind" or "vertices" in line)]  # fmt: skip
+    assert rows
+    assert all("in the plane" in row.lower() for row in rows)
+    assert f"`{'vertices' if key == 'kind' else key}`" in (DOCS / "space.md").read_text(encoding="utf-8")
