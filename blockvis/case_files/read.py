@@ -377,7 +377,9 @@ def _load(table: Table) -> LoadCase:
         raise table.error("y", "is that of positions; add positions = [first x, last x, number of places]")
     if load.positions:
         if load.kind != "live" or not load.has_force:
-            raise table.error("positions", 'are those of a live force; give kind = "live" and force = [fx, fy]')
+            live = [] if load.kind == "live" else ['kind = "live"']
+            missing = live + ([] if load.has_force else ["force = [fx, fy], in space [fx, fy, fz]"])
+            raise table.error("positions", f"are those of a live force; give {' and '.join(missing)}")
         for key in ("blocks", "weight_fraction", "point", "moment", "pressure"):
             if key in given:
                 raise table.error(key, "does not go with positions: the force acts on the topmost block at each")

@@ -8,6 +8,7 @@ from typing import Any
 import solver
 
 from .contents import Case
+from .role_places import INTO_SPACE
 
 
 def check_coordinates(case: Case, assembly: solver.Assembly) -> None:
@@ -25,7 +26,7 @@ def check_coordinates(case: Case, assembly: solver.Assembly) -> None:
         given += [(f"ties '{tie.name}'", key, end.point) for key, end in zip(("from", "to"), tie.ends, strict=False)]
     for table, key, numbers in (*_of_settlements(case, d), *_of_loads(case, d), *given):
         if numbers is not None and len(numbers) != d:
-            wanted = "three numbers [x, y, z]" if d == 3 else "two numbers [x, y]"
+            wanted = "three numbers [x, y, z]" if d == 3 else f"two numbers [x, y], {INTO_SPACE}"
             raise ValueError(
                 f"{case.source}: [{table}] {key} has {len(numbers)} numbers, but the blocks are {_where(d)}; give "
                 f"{wanted}"
@@ -49,7 +50,9 @@ def _of_settlements(case: Case, d: int) -> Iterator[tuple[str, str, Any]]:
             )
         for key in ("rotation_axis", "radial_from"):
             if d == 2 and getattr(settlement, key) is not None:
-                raise ValueError(f"{case.source}: [{table}] {key} belongs to blocks in space; these are {_where(d)}")
+                raise ValueError(
+                    f"{case.source}: [{table}] {key} belongs to blocks in space: leave it out, {INTO_SPACE}"
+                )
         yield from ((table, key, getattr(settlement, key)) for key in ("direction", "rotation_centre"))
 
 
@@ -58,14 +61,14 @@ def _of_loads(case: Case, d: int) -> Iterator[tuple[str, str, Any]]:
     for k, load in enumerate(case.loads, start=1):
         table = f"loads {k}" if len(case.loads) > 1 else "loads"
         if load.has_moment and (d == 3) != isinstance(load.moment, tuple):
-            wanted = "three numbers [mx, my, mz]" if d == 3 else "one number"
+            wanted = "three numbers [mx, my, mz]" if d == 3 else f"one number, {INTO_SPACE}"
             raise ValueError(f"{case.source}: [{table}] moment: the blocks are {_where(d)}; give {wanted}")
         if d == 3 and load.pressure is not None:
             raise ValueError(f"{case.source}: [{table}] pressure belongs to blocks in the plane; in space give forces")
         if d == 3 and load.positions and load.y is None:
             raise ValueError(f"{case.source}: [{table}] positions: the blocks are in space; add the line's y = ... [m]")
         if d == 2 and load.y is not None:
-            raise ValueError(f"{case.source}: [{table}] y is that of positions in space; the blocks are {_where(d)}")
+            raise ValueError(f"{case.source}: [{table}] y is that of positions in space: leave it out, {INTO_SPACE}")
         yield table, "weight_fraction", load.weight_fraction
         yield table, "force", load.force if load.has_force else None
         yield table, "point", load.point

@@ -18,6 +18,9 @@ PLACES = ("below", "touching", "box")
 #: A block touches a plane up to this, in sizes of the median block.
 TOUCHING = 1e-3
 
+#: What is said to whoever means blocks in space, where a drawing of bodies side by side was read as one in the plane.
+INTO_SPACE = "or take the blocks into space by dimension = 3 under [geometry]"
+
 
 @dataclass(frozen=True)
 class RolePlace:
@@ -108,7 +111,9 @@ def with_roles_by_place(layout: Layout, places: Sequence[RolePlace]) -> Layout:
         chosen = np.ones(layout.n_blocks, dtype=bool)
         for axis, least, most in place.ranges:
             if axis not in axes:
-                raise ValueError(f"{place.where}: a drawing in the plane has no {axis}; its height is y")
+                raise ValueError(
+                    f"{place.where}: a drawing in the plane has no {axis}; give its height y, {INTO_SPACE}"
+                )
             low, high = lows[:, axes.index(axis)], highs[:, axes.index(axis)]
             if place.kind != "touching":
                 low = high = (low + high) / 2.0

@@ -62,14 +62,16 @@ def test_rotations_and_loads_have_three_numbers(tmp_path):
     [
         (DOME + "[settlement]\ndirection = [0, -1]", r"\[settlement\] direction has 2 numbers, but the blocks are in "
          r"space; give three numbers \[x, y, z\]"),
-        (ARCH + DOWN, r"\[settlement\] direction has 3 numbers, but the blocks are in the plane; give two numbers"),
-        (ARCH + "[settlement]\nradial_from = [0, 0]", r"radial_from belongs to blocks in space"),
+        (ARCH + DOWN, r"\[settlement\] direction has 3 numbers, but the blocks are in the plane; give two numbers "
+         r"\[x, y\], or take the blocks into space by dimension = 3"),
+        (ARCH + "[settlement]\nradial_from = [0, 0]", r"radial_from belongs to blocks in space: leave it out, or take"),
         (DOME + "[settlement]\ndirection = [0]", r"is \[0\]; give two numbers \[x, y\], or in space three \[x, y, z\]"),
         (DOME + "[settlement]\nrotation_axis = [0, 1]", r"rotation_axis is \[0, 1\]; give three numbers \[x, y, z\]"),
         (DOME + "[settlement]\nrotation_centre = [0, 1, 0]", r"in space a rotation needs .* rotation_axis"),
         (DOME + DOWN + "[[loads]]\nforce = [1, 0]", r"\[loads\] force has 2 numbers"),
         (DOME + DOWN + "[[loads]]\nmoment = 3.0", r"\[loads\] moment: the blocks are in space; give three numbers"),
-        (ARCH + DOWN.replace("0, 0", "0") + "[[loads]]\nmoment = [1, 2, 3]", r"are in the plane; give one number"),
+        (ARCH + DOWN.replace("0, 0", "0") + "[[loads]]\nmoment = [1, 2, 3]",
+         r"are in the plane; give one number, or take the blocks into space by dimension = 3 under \[geometry\]"),
         (DOME + DOWN + "[[loads]]\npressure = 3.0", r"pressure belongs to blocks in the plane; in space give forces"),
         (DOME.replace("\n", "\ndimension = 2\n", 1) + DOWN, r"dimension is 2, but the layout 'dome' is in space"),
         (DOME.replace("\n", "\ndimension = 4\n", 1) + DOWN, r'dimension is 4; give 2, 3 or "auto"'),

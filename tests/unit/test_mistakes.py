@@ -52,6 +52,13 @@ def test_a_point_of_what_acts_all_over_is_refused(tmp_path, capsys, acts):
     assert "case.toml: [loads] point is that of a force or moment; pressure and weight" in capsys.readouterr().err
 
 
+def test_positions_of_a_live_load_without_a_force_say_what_is_missing(tmp_path, capsys):
+    for kind, missing in (("live", "give force"), ("dead", 'give kind = "live" and force')):
+        fraction = f'[[loads]]\nkind = "{kind}"\nweight_fraction = [1, 0, 0]\npositions = [-0.5, 0.5, 3]\ny = 0.0\n'
+        assert main(["run", str(written(tmp_path, ARCH + fraction))]) == 2
+        assert f"{missing} = [fx, fy], in space [fx, fy, fz]" in capsys.readouterr().err
+
+
 def test_more_positions_than_a_run_takes_are_refused(tmp_path, capsys):
     """Their list alone would need more memory than there is."""
     case = written(tmp_path, ARCH + "[[loads]]\nforce = [0, -1000]\npositions = [0, 1, 1e12]\n")

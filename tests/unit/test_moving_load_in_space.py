@@ -44,7 +44,7 @@ def test_over_an_arch_it_finds_the_limit_loads_of_the_plane(tmp_path):
     ("keys", "more", "message"),
     [
         (SPACE | {"y": ""}, "", r"positions: the blocks are in space; add the line's y = "),
-        (PLANE | {"y": "y = 0.0"}, "", "y is that of positions in space; the blocks are in the plane"),
+        (PLANE | {"y": "y = 0.0"}, "", "y is that of positions in space: leave it out, or take the blocks into space"),
         (SPACE | {"y": "y = 3.0"}, "", r"positions: nothing is below a load at x = -0.6, y = 3 m; .* y = -0.5"),
         (SPACE, "[roles]\n'voussoir *' = 'fixed'\n", r"x = -0.6, y = 0 m stands on the support 'voussoir"),
     ],

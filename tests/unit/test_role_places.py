@@ -68,7 +68,7 @@ def test_springers_of_a_vault_are_found_in_space(tmp_path):
 @pytest.mark.parametrize(
     ("roles", "words"),
     [
-        ("below = { z = 0.1 }", "[roles] below: a drawing in the plane has no z; its height is y"),
+        ("below = { z = 0.1 }", "[roles] below: a drawing in the plane has no z; give its height y, or take"),
         ("below = { y = -5.0 }", "[roles] below holds no block; the drawing reaches over x 0 to 3, y 0 to 2 m"),
         ("below = { y = 50.0 }", "[roles] below holds every block"),
         ("below = { }", "[roles] below names no coordinate; write below = { z = 0.1 }"),
