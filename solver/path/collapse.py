@@ -131,9 +131,8 @@ class Fall:
             yield frames.pop(0)
         if model.live is None:
             return Ending(Status.COLLAPSED, str(collapse), collapse)
-        what = "no capacity is left"
-        if multiplier_beyond is None:
-            what = f"equilibrium is lost along the control at α = {multiplier:.6g},"
+        lost = f"equilibrium is lost along the control at α = {multiplier:.6g},"
+        what = lost if multiplier_beyond is None else "no capacity is left"
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
 
     def frames(self, place: Place) -> Iterator[Increment]:

@@ -221,7 +221,8 @@ class Path:
             continued = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
             if continued is None:
                 yield from self._report_last(state)
-                check, multiplier = self._check(state.place), self._multiplier_beyond(state, beyond)
+                check = self._check(state.place)
+                multiplier = self._multiplier_beyond(state, check, beyond)
                 return (yield from self.fall.collapse(check, beyond, state.upper_bound, multiplier))
             self.state = continued
         return self.reports.reached()
@@ -492,7 +493,7 @@ class Path:
                 length /= 4.0
         return state.place
 
-    def _multiplier_beyond(self, state: PathState, beyond: Place) -> float | None:
+    def _multiplier_beyond(self, state: PathState, check: EquilibriumCheck, beyond: Place) -> float | None:
         """Multiplier at the place beyond, at or below zero; None where equilibrium itself is lost, not the capacity."""
         if self.model.live is None:
             return None
@@ -500,14 +501,13 @@ class Path:
         bonds = state.place.bonds if self.model.interfaces.elastic else None
         unloaded = self.stepper.unloaded(state.start, self.number, bonds_at=bonds)
         first, bounds = self.checks.bounds(unloaded), self.checks.bounds(beyond, CLOSING_GAP)
-        vanishes = state.place.multiplier <= VANISHING * first.high
+        # The multiplier of a place may be one that viscosity carries; that of its check is not.
+        vanishes = check.measured <= VANISHING * first.high
         return bounds.high if vanishes and bounds.in_equilibrium and bounds.high <= 0.0 else None
 
     def _reaction(self, place: Place) -> float:
         """Reaction of the forces of a place [N or N·m]."""
-        if place.contacts is None:
-            return 0.0
-        return self.checks.reaction(place, place.contacts, place.forces)
+        return 0.0 if place.contacts is None else self.checks.reaction(place, place.contacts, place.forces)
 
     def _check(self, place: Place, reaction: float | None = None) -> EquilibriumCheck:
         """Equilibrium and bounds at a place."""
