@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | 
     except (ValueError, OSError, MissingExtra) as error:
         if isinstance(error, OSError) and is_broken_pipe(error):
             raise
-        print(f"blockvis: {error}", file=sys.stderr)
+        print(f"blockvis: {_in_plain_words(error)}", file=sys.stderr)
         return BAD_INPUT
     except MemoryError:
         print("blockvis: there is not enough memory for what the input asks for", file=sys.stderr)
@@ -103,6 +103,14 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | 
         print(f"blockvis: the linear program could not be solved: {error}", file=sys.stderr)
         return SOLVER_FAILED
     return code
+
+
+def _in_plain_words(error: Exception) -> str:
+    """Write what a user is told of an error: of one of the system its words without a number, and a remedy."""
+    if not isinstance(error, OSError) or error.filename is None or error.strerror is None:
+        return str(error)
+    remedy = "; change the rights of file or folder, or choose another" if isinstance(error, PermissionError) else ""
+    return f"'{error.filename}': {error.strerror}{remedy}"
 
 
 class _Told(io.TextIOWrapper):

@@ -360,7 +360,7 @@ def _settlement(table: Table, values: Mapping[str, Any]) -> tuple[solver.Settlem
             return solver.Settlement(**motion, profile=profile), None
         return solver.Settlement(**motion, blocks=values["blocks"]), profile
     except ValueError as error:
-        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
+        raise ValueError(f"{table.source}: [{table.where}] {str(error).removeprefix('settlement ')}") from None
 
 
 def _load(table: Table) -> LoadCase:

@@ -82,6 +82,9 @@ def refuse_results(path: str | Path, overwrite: bool = False) -> None:
         raise ValueError("the folder is '': -o is empty; name the folder of the results")
     path = Path(path)
     unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
+    if unfinished and not overwrite:
+        # Another run may be about to finish it.
+        locked(ResultsFolder, path)()
     go_on = f"go on with it by {resume_command(path)}, " if unfinished else ""
     refuse_files(path, RUN_FILES, "results", overwrite, go_on + CHOOSE)
 

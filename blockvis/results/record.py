@@ -93,10 +93,9 @@ def read_record(folder: Path) -> Record:
     """
     path = folder / RECORD
     if not path.is_file():
-        raise ValueError(
-            f"'{folder}' holds no run that could go on (no {RECORD} in it); start it with blockvis run CASE.toml -o "
-            f"{folder} --force"
-        )
+        what = f"'{folder}' holds no run that could go on (no {RECORD} in it)"
+        what = what if folder.is_dir() else f"there is no folder '{folder}'"
+        raise ValueError(f"{what}; start a run with blockvis run CASE.toml -o {folder}")
     try:
         return Record(**read_json(path))
     except TypeError as error:

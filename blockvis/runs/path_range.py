@@ -126,14 +126,14 @@ class PathRange:
             said = f"range of collapse from {self._place(*falls[0])} on, {without}"
         else:
             alike = falls[0][0] == falls[-1][0]
-            first = f"{falls[0][1]:.4g}" if alike else self._place(*falls[0])
+            first = f"{falls[0][1]:.6g}" if alike else self._place(*falls[0])
             said = f"range of collapse {first} to {self._place(*falls[-1])}"
         nothing = f"; {counted(lost, 'run')} came to nothing" if lost else ""
         return f"{said} ({WORDS}{nothing})"
 
     def _place(self, phase: int, settlement: float) -> str:
         within = f" in phase {phase + 1}" if len(self.units) > 1 else ""
-        return f"{settlement:.4g} {self.units[phase]}{within}"
+        return f"{settlement:.6g} {self.units[phase]}{within}"
 
 
 def wants_range(case: Case) -> bool:

@@ -102,7 +102,7 @@ def test_what_could_not_be_written_is_named(case, tmp_path, capsys, monkeypatch)
     monkeypatch.setattr(Path, "write_bytes", _full)
     monkeypatch.setattr(Path, "write_text", _full)
     assert main(["report", str(tmp_path / "out")]) == 2
-    assert re.search(r"blockvis: .*No space left on device: '.*/out/report\.html'", capsys.readouterr().err)
+    assert re.search(r"blockvis: '.*/out/report\.html': No space left on device", capsys.readouterr().err)
     (tmp_path / "out" / "summary.json").unlink()
     assert run_command("--resume", tmp_path / "out", "--no-pictures", "--no-check-steps") == 2
     said = f"could not write to '{tmp_path / 'out'}': No space left on device; what is there stays as it is: make room"

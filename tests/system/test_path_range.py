@@ -90,6 +90,8 @@ def test_the_range_says_how_many_collapse():
     plain, other = (Variation(), path(0.3, 0.35)), Variation(friction_factor=0.95)
     both = PathRange([plain, (other, path(0.2, 0.25, 1.1))], ["m"])
     assert str(both) == f"range of collapse 0.25 to 0.35 m {ALL}"
+    near = PathRange([(Variation(), path(0.1, 0.141043)), (other, path(0.1, 0.141036))], ["m"])
+    assert str(near) == f"range of collapse 0.141036 to 0.141043 m {ALL}"
     one = PathRange([plain, (other, path(0.5))], ["m"])
     assert str(one) == f"range of collapse from 0.35 m on, 1 of 2 runs without a collapse {ALL}"
     assert one.numbers()["collapse"] == [0.35, None]

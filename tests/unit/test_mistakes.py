@@ -1,5 +1,7 @@
 """What a new user gets wrong is named with its place and its remedy."""
 
+import errno
+import os
 import re
 
 import pytest
@@ -120,3 +122,29 @@ def test_options_of_an_accessor_are_named():
         blocks.settle(rotation_centre=(0, 0))
     with pytest.raises(TypeError, match=r"no option 'densty'.*did you mean 'density'"):
         blocks.settle(densty=1)
+
+
+def test_a_direction_of_no_length_is_told_without_a_word_twice(tmp_path, capsys):
+    case = written(tmp_path, ARCH.replace("[1, 0]", "[0, 0]"))
+    assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 2
+    assert "case.toml: [settlement] direction is [0, 0]; give the direction" in capsys.readouterr().err
+
+
+def test_there_is_nothing_to_go_on_with_where_there_is_no_folder(tmp_path, capsys):
+    """And no advice to overwrite what a mistyped name may stand for."""
+    for folder, said in ((tmp_path / "nowhere", "there is no folder"), (tmp_path, "holds no run that could go on")):
+        assert main(["run", "--resume", str(folder)]) == 2
+        told = capsys.readouterr().err
+        assert said in told
+        assert "--force" not in told
+
+
+def test_what_may_not_be_written_is_told_in_plain_words(tmp_path, monkeypatch, capsys):
+    def refused(partial, _):
+        raise PermissionError(errno.EACCES, "Permission denied", str(partial))
+
+    monkeypatch.setattr(os, "replace", refused)
+    target = tmp_path / "arch.dxf"
+    assert main(["layout", "arch", "-o", str(target)]) == 2
+    told = f"blockvis: '{target}': Permission denied; change the rights of file or folder, or choose another\n"
+    assert capsys.readouterr().err == told

@@ -106,6 +106,16 @@ def _steps(arch):
     )
 
 
+def test_another_run_that_is_writing_is_told_before_what_it_has_written(tmp_path):
+    results = ResultsFolder(tmp_path / "out", generators.arch())
+    with pytest.raises(ResultsExist, match=r"another run is writing to '.*out'; wait for it"):
+        results_folder.refuse_results(tmp_path / "out")
+    del results
+    gc.collect()
+    with pytest.raises(ResultsExist, match=r"holds results already .*; go on with it by blockvis run --resume"):
+        results_folder.refuse_results(tmp_path / "out")
+
+
 @on_linux
 def test_states_are_flushed_before_the_checkpoint_and_the_rest_at_the_end(tmp_path, done):
     arch = generators.arch()
@@ -278,7 +288,7 @@ def test_a_file_that_stays_open_is_named(windows, tmp_path, monkeypatch):
 def test_a_run_holds_its_folder(windows, locks, tmp_path):
     assembly = generators.arch(voussoirs=5)
     first = ResultsFolder(tmp_path / "out", assembly)
-    with pytest.raises(ResultsExist, match="another run is writing"):
+    with pytest.raises(ResultsExist, match=r"another run is writing"):
         ResultsFolder(tmp_path / "out", assembly, overwrite=True)
     first._release()
     ResultsFolder(tmp_path / "out", assembly, overwrite=True)
