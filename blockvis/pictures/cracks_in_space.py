@@ -109,7 +109,7 @@ class CracksInSpace:
         return scenes
 
     def image(self, cracks: Sequence[Crack], numbers: Sequence[int]) -> Image.Image:
-        """Draw the views, with number and largest width of cracks where they are seen.
+        """Draw the views, with number and largest width of cracks where they are seen, in the view that has most of it.
 
         Parameters
         ----------
@@ -118,8 +118,8 @@ class CracksInSpace:
             As the report counts them.
         """
         text = self._sheet.text
-        page, left, labelled = Image.new("RGB", self._sheet.inside_size, palette.PAPER), 0, set()
-        found: list[tuple[np.ndarray, str]] = []
+        page, left = Image.new("RGB", self._sheet.inside_size, palette.PAPER), 0
+        found: dict[int, tuple[float, np.ndarray]] = {}
         dots = []
         for scene, words in zip(self._scenes, ("from above", "from below"), strict=False):
             page.paste(scene.image(), (left, 0))
@@ -131,15 +131,15 @@ class CracksInSpace:
             dots.append(pixels[seen])
             for crack, number in zip(cracks, numbers, strict=True):
                 here = seen & np.isin(self._owner, crack.joints)
-                if here.any() and number not in labelled:
-                    labelled.add(number)
-                    place = pixels[np.where(here, self._openings, -1.0).argmax()]
-                    found.append((place, f"{number}: {width_text(crack.width)}"))
+                widest = int(np.where(here, self._openings, -1.0).argmax())
+                if here.any() and (number not in found or self._openings[widest] > found[number][0]):
+                    found[number] = self._openings[widest], pixels[widest]
             left += scene.size[0]
             scene.close()
         if found:
-            places, labels = zip(*found, strict=True)
-            write_labels(page, np.array(places), labels, text, np.concatenate(dots))
+            labelled = [(crack, n) for crack, n in zip(cracks, numbers, strict=True) if n in found]
+            labels = [f"{n}: {width_text(crack.width)}" for crack, n in labelled]
+            write_labels(page, np.array([found[n][1] for _, n in labelled]), labels, text, np.concatenate(dots))
         return page
 
 

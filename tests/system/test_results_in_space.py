@@ -387,6 +387,21 @@ def test_what_a_section_leaves_out_takes_no_room():
 
 
 @pytest.mark.slow
+def test_a_crack_is_labelled_in_the_view_that_shows_most_of_it(tmp_path, monkeypatch):
+    """Of the far side of a dome an eye above it sees the rim of the crown, where cracks are narrow."""
+    dome = blockvis.generators.dome(lunes=8, courses=4, thickness_ratio=0.12)
+    spread = solver.Settlement(radial_from=(0.0, 0.0), increment=0.02, limit=0.02)
+    blockvis.write(solver.settle(dome, spread, friction_coefficient=0.6), tmp_path / "out")
+    written = []
+    monkeypatch.setattr("blockvis.pictures.cracks_in_space.write_labels", lambda *given: written.append(given[1:3]))
+    assert main(["render", str(tmp_path / "out"), "--cracks", "-1"]) == 0
+    ((places, words),) = written
+    wide = [word.endswith("15 mm") for word in words]
+    assert sum(wide) > 3
+    assert places[wide, 1].min() > 240.0, "at the springing, not at the crown"
+
+
+@pytest.mark.slow
 def test_a_section_from_below_closes_supports_and_shows_which_moves_and_where_to(tmp_path):
     """Supports that hide the structure are drawn by their edges: those of the cut, too, and in their colours."""
     # The middle of the support lies in the half that is left out.
