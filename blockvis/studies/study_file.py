@@ -36,7 +36,7 @@ RESERVED = (
 #: Most runs of one study: their table is made in memory.
 MOST_RUNS = 1_000_000
 
-#: Number of runs that are checked as cases before any run starts, which takes a few seconds; a later run of a larger
+#: Number of runs that are checked as cases before any run starts, which takes a few seconds; another run of a larger
 #: study that is no valid case is recorded as failed.
 CHECKED = 10_000
 
@@ -263,13 +263,6 @@ def _check(study: Study, where: str) -> None:
             f"vary the {base.analysis} in a loop, as blockvis run {base.source.name} --set "
             "material.friction_coefficient=0.5 -o out-0.5"
         )
-    units = [settlement.unit for settlement in base.settlements]
-    if len(set(units)) > 1:
-        tables = (", ".join(str(k) for k, found in enumerate(units, 1) if found == unit) for unit in ("m", "rad"))
-        raise ValueError(
-            f"{base.source}: a study counts settlements one after another, but [[settlement]] {next(tables)} is in m "
-            f"and {next(tables)} in rad; leave out those of one unit"
-        )
     if study.method == "grid":
         _check_grid(study, where)
     try:
@@ -316,12 +309,22 @@ def _check_runs(study: Study, where: str) -> None:
         case_assembly(case_of(study.values_of(0), study.case_source))
     except ValueError as error:
         raise ValueError(f"{where}run 0 cannot be built: {error}") from None
-    for run in range(min(study.n_runs, CHECKED)):
+    first: dict[str, str] = {}
+    # A large study is checked all over: the outermost value of a grid changes last.
+    for run in np.unique(np.linspace(0, study.n_runs - 1, min(study.n_runs, CHECKED)).astype(int)).tolist():
+        shown = f"run {run} ({', '.join(f'{name} = {shortened(value)}' for name, value in study.point(run).items())})"
         try:
-            case_of(study.values_of(run), study.case_source)
+            case = case_of(study.values_of(run), study.case_source)
         except ValueError as error:
-            shown = ", ".join(f"{name} = {value}" for name, value in study.point(run).items())
-            raise ValueError(f"{where}run {run} ({shown}) is no case: {error}") from None
+            raise ValueError(f"{where}{shown} is no case: {error}") from None
+        for number, settlement in enumerate(case.settlements, start=1):
+            first.setdefault(settlement.unit, f"settlement {number} of {shown}")
+    if len(first) > 1:
+        told = " and ".join(f"{place} is in {unit}" for unit, place in sorted(first.items()))
+        raise ValueError(
+            f"{where}a study tells the displacements of all its runs in one unit, but {told}; leave out those of one "
+            "unit, or make a study of each"
+        )
 
 
 def _base_case(given: Any, source: Path) -> tuple[dict[str, Any], Path]:

@@ -225,8 +225,21 @@ def test_settlements_in_m_and_in_rad_are_no_study(study_file, capsys):
     (study_file.parent / "case.toml").write_text(CASE + turn, encoding="utf-8")
     assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
     message = capsys.readouterr().err
-    assert "but [[settlement]] 1 is in m and 2 in rad; leave out those of one unit" in message
-    assert "case.toml" in message
+    assert "settlement 1 of run 0 (" in message
+    assert ") is in m and settlement 2 of run 0 (" in message
+    assert ") is in rad; leave out those of one unit" in message
+
+
+def test_runs_in_m_and_in_rad_are_no_study(study_file, capsys):
+    tables = "{direction = [1.0, 0.0], limit = 0.1}, {rotation = 1.0, rotation_centre = [1.0, 0.0], limit = 0.1}"
+    study = f'[study]\ncase = "case.toml"\n[parameters]\nsettlement = [{tables}]\n'
+    study_file.write_text(study, encoding="utf-8")
+    out = study_file.parent / "out"
+    assert main(["sweep", str(study_file), "-o", str(out)]) == 2
+    message = capsys.readouterr().err
+    assert "(settlement = {'direction': [1.0, 0.0], 'limit': 0.1}) is in m and settlement 1 of run " in message
+    assert "(settlement = {'rotation': 1.0," in message
+    assert not out.exists()
 
 
 @pytest.mark.parametrize(("old", "new", "words"), BAD, ids=[b[1][:24] for b in BAD])
