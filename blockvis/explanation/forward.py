@@ -216,7 +216,8 @@ def followed(order: Order) -> Run:
                 continue
             amounts.append(increment.parameter)
             moved.append(increment.pose.displacements(assembly))
-            if opening_and_slip(assembly, joints, increment.pose)[:, 0].max(initial=0.0) > order.enough:
+            moves = opening_and_slip(assembly, joints, increment.pose, increment.fallen)
+            if moves[:, 0].max(initial=0.0) > order.enough:
                 steps.close()
                 break
         else:

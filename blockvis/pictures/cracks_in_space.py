@@ -161,8 +161,7 @@ def _opened(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pieces of the edges of open joints in the layout, (n, 2, 3) [m], their openings (n,) [m] and joints (n,)."""
     rings = joints.rings
-    gaps = carried_faces(assembly, joints, increment.pose).gaps
-    gone = increment.fallen[joints.block_a] | increment.fallen[joints.block_b]
+    gaps = carried_faces(assembly, joints, increment.pose, increment.fallen).gaps
     start, end = rings.points, rings.points[rings.following]
     at = np.linspace(0.0, 1.0, PIECES + 1)[:, None, None]
     points = start + at * (end - start)
@@ -170,5 +169,5 @@ def _opened(
     middle = (at[:-1, :, 0] + at[1:, :, 0]) / 2.0
     openings = (gaps + middle * (gaps[rings.following] - gaps)).ravel()
     owner = np.tile(rings.ring, PIECES)
-    kept = (openings > SMALLEST_OPENING * assembly.block_size) & ~gone[owner]
+    kept = openings > SMALLEST_OPENING * assembly.block_size
     return pieces[kept], openings[kept], owner[kept]

@@ -159,7 +159,7 @@ def cracks_between(
         Blocks that have left for good, whose joints are no cracks.
     """
     size, least, rings = assembly.block_size, SMALLEST_OPENING * assembly.block_size, joints.rings
-    now, drawn = carried_faces(assembly, joints, pose), carried_faces(assembly, joints, shown)
+    now, drawn = carried_faces(assembly, joints, pose, fallen), carried_faces(assembly, joints, shown)
     turn = np.linalg.norm(pose.rotations[joints.block_a] - pose.rotations[joints.block_b], axis=1)
     extent = joints.sizes ** (1.0 / (assembly.dimension - 1))
     # Faces in space that have slid far over each other still have a crack between them.
@@ -170,7 +170,7 @@ def cracks_between(
     start = rings.offsets[:-1] if assembly.dimension == 2 else np.arange(len(rings.points))
     end, joint = rings.following[start], rings.ring[start]
     gaps = np.stack([now.gaps[start], now.gaps[end]], axis=1)
-    is_open = (gaps.max(axis=1) > least) & ~(fallen[joints.block_a] | fallen[joints.block_b])[joint]
+    is_open = gaps.max(axis=1) > least
     if assembly.dimension == 2:
         is_open &= ~parted[joint]
     start, end, gaps, joint = start[is_open], end[is_open], gaps[is_open], joint[is_open]

@@ -51,7 +51,8 @@ def surveyed(
             if increment.status != solver.Status.FALLING:
                 sizes = np.linalg.norm(resultants(increment)[1], axis=1)
                 largest = max(largest, float(sizes.max(initial=0.0)))
-                widest = max(widest, float(carried_faces(assembly, joints, increment.pose).gaps.max(initial=0.0)))
+                gaps = carried_faces(assembly, joints, increment.pose, increment.fallen).gaps
+                widest = max(widest, float(gaps.max(initial=0.0)))
 
     if assembly.dimension == 2:
         frame = framed(assembly, poses())

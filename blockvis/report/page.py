@@ -363,8 +363,6 @@ def _fill(
     largest = max(float(np.abs(fill.load(response.assembly, shown[0].pose)[:, :2]).max()) for fill in fills)
     return {
         "pieces": pieces,
-        # Blocks that have left take the fill over them along.
-        "gone": [np.flatnonzero(increment.fallen).tolist() for increment in shown],
         "scale": longest / (largest or 1.0),
         "gaping": GAPING_IN_PLANE * float(np.ptp(np.concatenate([fill.pieces for fill in fills]), axis=(0, 1)).max()),
         "words": f"load of the fill, {force_text(largest)} on a block at most",
@@ -401,7 +399,10 @@ def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, An
                 caption += f"  ·  phase {increment.phase + 1}"
         phase = min(increment.phase, max(len(response.settlements) - 1, 0))
         caption = caption.replace("   ·   ", "  ·  ")
-        frames.append({"caption": caption, "falling": frame.falling, "curve": frame.curve, "phase": phase})
+        gone = np.flatnonzero(increment.fallen).tolist()
+        frames.append(
+            {"caption": caption, "falling": frame.falling, "curve": frame.curve, "phase": phase, "gone": gone}
+        )
     return frames
 
 

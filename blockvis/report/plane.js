@@ -44,7 +44,8 @@
     const along = [[a0, b0], [a1, b1]].map(([p, r]) => (p[1] - r[1]) * nx - (p[0] - r[0]) * ny);
     const closer = Math.abs(across[0]) <= Math.abs(across[1]) ? 0 : 1;
     const apart = Math.min(norm(a0[0] - b0[0], a0[1] - b0[1]), norm(a1[0] - b1[0], a1[1] - b1[1]));
-    return { a, b, a0, a1, b0, b1, length, nx, ny, opening: Math.max(...across), slip: along[closer], apart, bent: Math.abs(at[3 * a + 2] - at[3 * b + 2]) };
+    const [opening, slip] = joined(a, b) ? [Math.max(...across), along[closer]] : [0, 0];
+    return { a, b, a0, a1, b0, b1, length, nx, ny, opening, slip, apart, bent: Math.abs(at[3 * a + 2] - at[3 * b + 2]) };
   }
 
   // Resultant of a joint on its block a: normal force, compression positive, and shear force; null where there is none.
@@ -110,8 +111,7 @@
   }
   const hatched = model.fill && tiled(model.fill.colours);
   function fillPieces(k) {
-    const gone = new Set(model.fill.gone[k]);
-    return model.fill.pieces.filter(([b]) => !gone.has(b)).map(([b, x0, y0, x1, y1, surface, base, weight, across]) => {
+    return model.fill.pieces.filter(([b]) => !gone[k].has(b)).map(([b, x0, y0, x1, y1, surface, base, weight, across]) => {
       const p = carried(shown, b, x0, y0), r = carried(shown, b, x1, y1), depth = Math.max(0, surface - Math.max(base, (p[1] + r[1]) / 2));
       // Along the outward normal, which is upwards.
       const up = p[0] - r[0], load = up > 0 ? weight * depth : 0;

@@ -43,6 +43,10 @@
   const DARK = { paper: "#17191c", ink: "#e6e6e6", grid: "#3a3d42", ghost: "#9a9a9a" };
   const theme = () => (dark.matches ? DARK : LIGHT);
 
+  // Blocks that have fallen or were taken away by each frame: their joints are no more, and they take the fill over them along.
+  const gone = model.frames.map((frame) => new Set(frame.gone));
+  const joined = (a, b) => { const now = gone[Math.min(Math.round(state.frame), nFrames - 1)]; return !now.has(a) && !now.has(b); };
+
   // SCENE
 
   const MARGIN = 36;

@@ -62,9 +62,9 @@
       if (Math.abs(gaps.at(-1)) < Math.abs(gaps[closest])) closest = gaps.length - 1;
     }
     const along = minus(onA[closest], onB[closest]), out = gaps[closest];
-    const slip = norm(along[0] - out * normal[0], along[1] - out * normal[1], along[2] - out * normal[2]);
     const bent = norm(...[3, 4, 5].map((i) => at[6 * a + i] - at[6 * b + i]));
-    return { a, b, onA, onB, gaps, normal, opening: Math.max(...gaps), nearest: Math.min(...gaps), slip, bent };
+    const [opening, slip] = joined(a, b) ? [Math.max(...gaps), norm(along[0] - out * normal[0], along[1] - out * normal[1], along[2] - out * normal[2])] : [0, 0];
+    return { a, b, onA, onB, gaps, normal, opening, nearest: Math.min(...gaps), slip, bent };
   }
 
   // Resultant of a joint on its block a: normal force, compression positive, and shear force; null where there is none.

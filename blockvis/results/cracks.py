@@ -141,9 +141,7 @@ def cracks_of(
         Blocks that have left for good, whose joints are no cracks.
     """
     joints = initial_joints(assembly) if joints is None else joints
-    moved = opening_and_slip(assembly, joints, pose)
-    if fallen is not None:
-        moved[fallen[joints.block_a] | fallen[joints.block_b]] = 0.0
+    moved = opening_and_slip(assembly, joints, pose, fallen)
     least = SMALLEST_OPENING * assembly.block_size
     # A stepped crack runs through bed joints that slide but stay shut.
     chosen = np.flatnonzero((moved[:, 0] > least) | (np.abs(moved[:, 1]) > least))

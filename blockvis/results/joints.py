@@ -41,14 +41,27 @@ class Faces:
     normals: np.ndarray
 
 
-def carried_faces(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> Faces:
-    """Carry the faces of joints to a pose."""
+def carried_faces(
+    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, fallen: np.ndarray | None = None
+) -> Faces:
+    """Carry the faces of joints to a pose.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    joints : InitialJoints
+    pose : solver.Pose
+    fallen : (n_blocks,) bool array, optional
+        Blocks that have fallen or were taken away by then: their joints are no more, and have neither gap nor slip.
+    """
     initial, rings = solver.Pose.initial(assembly), joints.rings
     on_a, on_b = (
         mechanics.carried(rings.points, block[rings.ring], initial, pose) for block in (joints.block_a, joints.block_b)
     )
     normals = mechanics.turned(joints.normals, pose.rotations[joints.block_b])
     apart, normal = on_a - on_b, normals[rings.ring]
+    if fallen is not None:
+        apart[(fallen[joints.block_a] | fallen[joints.block_b])[rings.ring]] = 0.0
     gaps = (apart * normal).sum(axis=1)
     return Faces(on_a, on_b, gaps, apart - gaps[:, None] * normal, normals)
 
@@ -58,9 +71,11 @@ def end_openings(assembly: solver.Assembly, joints: InitialJoints, pose: solver.
     return carried_faces(assembly, joints, pose).gaps.reshape(-1, 2)
 
 
-def opening_and_slip(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> np.ndarray:
-    """(n_joints, 2) array [m]: opening and slip of the joints of the layout, as in :class:`JointStates`."""
-    faces = carried_faces(assembly, joints, pose)
+def opening_and_slip(
+    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, fallen: np.ndarray | None = None
+) -> np.ndarray:
+    """(n_joints, 2) array [m]: opening and slip of the joints of the layout; arguments as of :func:`carried_faces`."""
+    faces = carried_faces(assembly, joints, pose, fallen)
     opening, along = _openings_and_slips(joints, faces)
     return np.stack([opening, _signed(along, faces.normals)], axis=1)
 
@@ -85,7 +100,8 @@ def _signed(along: np.ndarray, normals: np.ndarray) -> np.ndarray:
 class JointStates:
     """What joints do at one increment.
 
-    Those of the layout come first, in their order; pairs of blocks that have come to touch since follow.
+    Those of the layout come first, in their order; pairs of blocks that have come to touch since follow. Joints of
+    blocks that have fallen or were taken away have no gap, slip or force.
 
     Attributes
     ----------
@@ -140,7 +156,7 @@ class JointStates:
 def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment) -> JointStates:
     """Work out opening, slip and forces of all joints of an increment."""
     contacts = increment.contacts
-    faces = carried_faces(assembly, joints, increment.pose)
+    faces = carried_faces(assembly, joints, increment.pose, increment.fallen)
     rings = joints.rings.at((faces.on_a + faces.on_b) / 2.0)
     opening, along = _openings_and_slips(joints, faces)
     block_a, block_b, normals, gaps = joints.block_a, joints.block_b, faces.normals, faces.gaps
@@ -237,7 +253,7 @@ class LargestMovements:
 
     def add(self, increment: solver.Increment) -> None:
         """Take an increment in equilibrium into account."""
-        moved = opening_and_slip(self.assembly, self.joints, increment.pose)
+        moved = opening_and_slip(self.assembly, self.joints, increment.pose, increment.fallen)
         moved[:, 1] = np.abs(moved[:, 1])
         larger = moved > self._largest
         self._largest[larger] = moved[larger]

@@ -1,12 +1,25 @@
 """Joints as lines and as a table, and the shapes and units of the datasets that viewers open."""
 
 import csv
+import re
 
 import meshio
 import numpy as np
 import pytest
 import pyvista as pv
-from structures import BENT, arch_response, moved_and_turned, parted, posed, stacked, wall
+from structures import (
+    BENT,
+    arch_response,
+    box,
+    dropped_brick,
+    moved_and_turned,
+    parted,
+    posed,
+    rectangle,
+    report_of,
+    stacked,
+    wall,
+)
 
 import blockvis
 import solver
@@ -188,6 +201,50 @@ def test_a_joint_that_slips_far_stands_behind_those_that_are_open(tmp_path):
     openings, slips = (np.array([float(row[f"largest {what} [m]"]) for row in rows]) for what in ("opening", "slip"))
     assert slips.max() > openings.min()
     assert (np.diff(openings) <= 0.0).all()
+
+
+def taken_away_before_a_settlement(dimension):
+    """Two stones side by side, the right one with a third on it until that is taken away, on a support that sinks."""
+    places = [(-1, -0.5, 1, 0), (1, -0.5, 3, 0), (-1, 0, 1, 0.5), (1, 0, 3, 0.5), (2, 0.5, 3, 1)]
+    given = {"names": ["L", "R", "l", "r", "x"], "roles": ["fixed", "moving", "free", "free", "free"]}
+    if dimension == 2:
+        assembly = solver.Assembly.from_outlines([rectangle(*place) for place in places], **given)
+    else:
+        solids = [box((left, 0, low), (right, 1, high)) for left, low, right, high in places]
+        assembly = solver.Assembly.from_solids(solids, **given)
+    settlement = solver.Settlement([0.0] * (dimension - 1) + [-1.0], increment=0.05, limit=0.05)
+    change = solver.PhaseChange(1, removed=[False] * 4 + [True])
+    return solver.Structure(assembly, solver.Interfaces(solver.InterfaceLaw(0.6))).settle(
+        [settlement] * 2, changes=[change]
+    )
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_joints_of_a_stone_that_is_taken_away_have_no_opening(tmp_path, dimension):
+    response = taken_away_before_a_settlement(dimension)
+    last = response.path[-1]
+    assert last.pose.positions[3, -1] < response.path[0].pose.positions[3, -1] - 0.09, "r has gone down by itself"
+    for name in ("opening", "normal_force", "shear_force"):
+        assert np.abs(response.joints(-1)[name][response.joints(-1)["joint"] == "r | x"]).max() < 1e-9
+    out = blockvis.write(response, tmp_path / "out")
+    rows = csv.DictReader((out / "joints.csv").read_text(encoding="utf-8").splitlines())
+    assert {row["joint"]: float(row["largest opening [m]"]) for row in rows}["r | x"] < 1e-9
+    page = report_of(response)
+    if dimension == 3:
+        assert float(re.search(r'"widest_crack":([\d.e-]+)', page).group(1)) < 1e-6
+    assert '"gone":[4]' in page
+
+
+def test_joints_of_a_stone_that_is_lost_open_no_more(tmp_path):
+    response = dropped_brick(0.05)
+    lost = response.losses[0].settlement
+    assert lost < response.path[-1].parameter
+    out = blockvis.write(response, tmp_path / "out")
+    table = csv.DictReader((out / "joints.csv").read_text(encoding="utf-8").splitlines())
+    rows = [row for row in table if "brick" in row["joint"]]
+    assert len(rows) == 2
+    for row in rows:
+        assert float(row["settlement at largest slip [m]"]) <= lost
 
 
 def test_the_table_is_the_same_of_reopened_results(tmp_path):
