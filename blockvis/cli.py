@@ -814,11 +814,11 @@ def _say_range(options: argparse.Namespace, run: Run) -> None:
     from .results.fall_files import known_fall
     from .results.folder import RANGE
     from .runs.outputs import draw_curves, write_report_of
-    from .runs.path_range import find_range, wants_range
+    from .runs.path_range import UNFINISHED, find_range, wants_range
     from .runs.step_check import stored_case
 
     # What has no path has no range, and says why.
-    failed = run.response.stop in (solver.Status.NO_INITIAL_EQUILIBRIUM, solver.Status.SOLVER_FAILED)
+    failed = run.response.stop in (solver.Status.NO_INITIAL_EQUILIBRIUM, *UNFINISHED)
     stopped = failed or not run.response.path
     asked = options.range or wants_range(stored_case(run.folder))
     if stopped or not asked or (run.had_finished and not options.range and (run.folder / RANGE).is_file()):

@@ -44,7 +44,7 @@ class Traced:
     positions : (n, n_blocks, d) array [m]
         Of centroids.
     collapse : float, optional [m or rad]
-        Parameter at collapse.
+        Parameter at collapse; 0 of what does not stand as drawn.
     stop : str
     collapse_phase : int
         Number of the phase of the collapse, from 0.
@@ -129,12 +129,13 @@ def takes_steps(case: Case) -> bool:
 def traced(response: solver.Response) -> Traced:
     """Take from a response what is compared."""
     path, assembly = response.path, response.assembly
+    without = 0.0 if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM else None
     return Traced(
         phases=np.array([i.phase for i in path], dtype=int),
         parameters=np.array([i.parameter for i in path]),
         measured=np.array([i.measured for i in path]),
         positions=np.array([i.pose.positions for i in path]).reshape(-1, *assembly.centroids.shape),
-        collapse=None if response.collapse is None else response.collapse.displacement,
+        collapse=without if response.collapse is None else response.collapse.displacement,
         stop=str(response.stop),
         collapse_phase=collapse_phase(response) or 0,
     )

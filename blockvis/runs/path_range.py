@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+import solver
 from blockvis.cases.contents import Case
 from blockvis.results.folder import RANGE, add_to_summary
 from blockvis.results.reaction_range import COMPLIANCE, FRICTION, WORDS, ReactionRange
@@ -59,6 +60,10 @@ VARIATIONS = (
 )
 
 
+#: How runs end of which nobody knows whether they would have collapsed.
+UNFINISHED = (solver.Status.SOLVER_FAILED, solver.Status.INTERRUPTED)
+
+
 @dataclass(frozen=True)
 class PathRange:
     """Several runs of one case, the first as it is.
@@ -76,8 +81,8 @@ class PathRange:
 
     @property
     def followed(self) -> list[Traced]:
-        """Those that came to something."""
-        return [run for _, run in self.runs if run is not None]
+        """Those that came to an end."""
+        return [run for _, run in self.runs if run is not None and run.stop not in UNFINISHED]
 
     @property
     def falls(self) -> list[tuple[int, float]]:
@@ -128,8 +133,10 @@ class PathRange:
             alike = falls[0][0] == falls[-1][0]
             first = f"{falls[0][1]:.6g}" if alike else self._place(*falls[0])
             said = f"range of collapse {first} to {self._place(*falls[-1])}"
+        down = sum(run.stop == solver.Status.NO_INITIAL_EQUILIBRIUM for run in followed)
+        unstable = f"; {counted(down, 'run')} without an initial equilibrium" if down else ""
         nothing = f"; {counted(lost, 'run')} came to nothing" if lost else ""
-        return f"{said} ({WORDS}{nothing})"
+        return f"{said} ({WORDS}{unstable}{nothing})"
 
     def _place(self, phase: int, settlement: float) -> str:
         within = f" in phase {phase + 1}" if len(self.units) > 1 else ""
@@ -156,7 +163,7 @@ def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda 
     Raises
     ------
     ValueError
-        For a run without a case file, or that follows no settlement in steps.
+        For a run without a case file, that follows no settlement in steps, or that came to no end.
     """
     folder = Path(folder)
     case, response = stored_case(folder), open_results(folder)
@@ -165,6 +172,8 @@ def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda 
             f"'{folder}' has no range ({response.analysis}, {counted(len(response.path), 'increment')}); "
             "it takes a settlement whose increments are of Coulomb friction"
         )
+    if response.stop in UNFINISHED:
+        raise ValueError(f"'{folder}' has no range: its run ended as '{response.stop}'; go on with it first")
     at_once = min(cores(), len(VARIATIONS))
     waiting(len(VARIATIONS), at_once)
     others = _all_followed([variation.of(case) for variation in VARIATIONS], folder, at_once)

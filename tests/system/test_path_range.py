@@ -101,6 +101,21 @@ def test_the_range_says_how_many_collapse():
     assert none.numbers()["collapse"] is None
 
 
+def test_a_run_that_does_not_stand_collapses_at_nothing_and_one_that_fails_says_nothing():
+    stump = solver.Assembly.from_outlines(
+        [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0.9, 1], [2.9, 1], [2.9, 2], [0.9, 2]]], roles=["moving", "free"]
+    )
+    response = solver.settle(stump, solver.Settlement(direction=(1, 0), increment=0.1, limit=0.1))
+    assert response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM
+    falls, failed = traced(response), replace(path(0.2), stop="solver failed")
+    runs = [(Variation(), path(0.3, 0.35)), (Variation(0.95), falls), (Variation(1.05), failed)]
+    found = PathRange(runs, ["m"])
+    without = "1 run without an initial equilibrium; 1 run came to nothing)"
+    assert str(found) == f"range of collapse 0 to 0.35 m {ALL[:-1]}; {without}"
+    assert found.numbers()["collapse"] == [0.0, 0.35]
+    assert [run["collapse_phase"] for run in found.numbers()["runs"]] == [1, 1, None]
+
+
 def test_collapses_of_two_settlements_are_told_with_theirs():
     """What falls as the second begins has a displacement below that of what falls at the end of the first."""
     late = replace(path(0.1, 4e-6), collapse_phase=1)
