@@ -1044,15 +1044,15 @@ def _report(options: argparse.Namespace) -> int:
     written = ["report.html"]
     if options.pdf:
         from .report.pdf import write_pdf
-        from .results.folder import stored_case
         from .results.reaction_range import stored_range
+        from .results.record import read_record
         from .runs.step_check import stored_check
         from .runs.underlay import stored_underlay
 
         write_pdf(
             response,
             folder / "report.pdf",
-            stored_case(folder),
+            read_record(folder).case,
             fall=fall,
             error=str(stored_check(folder) or ""),
             band=stored_range(folder),

@@ -20,8 +20,9 @@ from blockvis.pictures.film import state_at
 from blockvis.report.page import summary_rows, tie_rows
 from blockvis.results.cracks import Crack, cracks_of
 from blockvis.results.fall_files import stored_fall
-from blockvis.results.folder import RESULTS, stored_case
+from blockvis.results.folder import RESULTS
 from blockvis.results.joints import initial_joints
+from blockvis.results.record import read_record
 from blockvis.runs.reopen import open_results
 from blockvis.text import force_text, quantity_text
 
@@ -244,7 +245,7 @@ def _opened(folder: Path, label: str) -> Side:
             f"'{folder}' has settlements in m and in rad, which share no axis; compare runs of which all settlements "
             "are movements along a direction, or all are rotations"
         )
-    text = stored_case(folder)
+    text = read_record(folder).case
     return Side(label, folder, response, stored_fall(folder), dict(_flat(tomllib.loads(text))) if text else {})
 
 

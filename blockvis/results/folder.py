@@ -426,15 +426,6 @@ def _stored_solids(stored: Mapping[str, np.ndarray]) -> list[tuple[np.ndarray, l
     ]
 
 
-def stored_case(folder: str | Path) -> str:
-    """Text of the case that a results folder was written from; empty where it was written from Python."""
-    for name in ("summary.json", RECORD):
-        file = Path(folder) / name
-        if file.is_file():
-            return str(read_json(file).get("case", ""))
-    return ""
-
-
 def add_to_summary(folder: Path, **found: Any) -> None:
     """Add to summary.json what becomes known after it is written.
 
@@ -502,7 +493,7 @@ def _collapse_of(
         bracket=(summary["collapse_bracket"][0], summary["collapse_bracket"][1]),
         reaction=summary["collapse_reaction"],
         mechanism=mechanism,
-        unit=summary.get("settlement_unit", "m"),
+        unit=summary["settlement_unit"],
         words=summary.get("mechanism") or "",
         lost=summary.get("collapse_lost", "equilibrium"),
     )

@@ -13,7 +13,7 @@ import numpy as np
 import solver
 from solver import mechanics
 
-from .about import collapse_mechanism, collapse_phase, least_reaction, loss_of, mechanism_text
+from .about import collapse_mechanism, collapse_phase, least_reaction, loss_of, mechanism_text, unit_in
 from .record import Record
 
 #: Measures of the certificate of an increment.
@@ -58,6 +58,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         What the kind of analysis adds.
     """
     path, collapse, phase = response.path, response.collapse, collapse_phase(response)
+    in_phase = phase if phase is not None else path[-1].phase if path else 0
     worst = mechanics.worst_of(i.certificate for i in path)
     return {
         "status": str(response.stop),
@@ -66,7 +67,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "collapse_displacement": collapse.displacement if collapse else None,
         "collapse_phase": None if phase is None else phase + 1,
         "collapse_bracket": list(collapse.bracket) if collapse else None,
-        "settlement_unit": response.settlements[-1].unit if response.settlements else response.parameter.unit,
+        "settlement_unit": unit_in(response, in_phase),
         "initial_reaction": _initial_reaction(response),
         "reaction_at_rest": finite(path[0].reaction) if path else None,
         "collapse_lost": collapse.lost if collapse else None,

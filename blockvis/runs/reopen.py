@@ -11,7 +11,6 @@ from blockvis.cases.build import case_changes, case_interfaces, case_loads
 from blockvis.cases.contents import Case
 from blockvis.cases.loads import with_moving_load
 from blockvis.kinds.kinds import KINDS
-from blockvis.results.about import collapse_phase, unit_in
 from blockvis.results.folder import stored_response
 from blockvis.results.given import with_given
 from blockvis.results.record import RECORD, read_record
@@ -44,10 +43,6 @@ def open_results(folder: str | Path) -> solver.Response:
     analysis = summary.get("analysis", case.analysis if case else response.analysis)
     kind = KINDS[analysis]
     response = kind.restored(replace(response, analysis=analysis), summary)
-    phase = collapse_phase(response)
-    if response.collapse is not None and phase is not None:
-        # Stored is the unit of the last settlement, which may turn where the one before moves.
-        response = replace(response, collapse=replace(response.collapse, unit=unit_in(response, phase)))
     if case is None:
         return with_given(folder, response)
     if "parameter" not in summary:

@@ -259,3 +259,18 @@ def test_files_of_a_folder_that_are_damaged_are_named_with_the_remedy(name, text
     message = capsys.readouterr().err
     assert message.startswith(f"blockvis: '{arch_results / name}' is not what a run wrote (")
     assert message.endswith("); run the case again with --force\n")
+
+
+def test_the_unit_in_the_summary_is_that_of_the_displacement_at_collapse(tmp_path):
+    """A stone falls between supports that part, before one of them turns."""
+    outlines = [[[-1, -0.5], [0, -0.5], [0, 0], [-1, 0]], [[1, -0.5], [3, -0.5], [3, 0], [1, 0]]]
+    outlines.append([[-0.3, 0], [1.3, 0], [1.3, 0.3], [-0.3, 0.3]])
+    assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "moving", "free"])
+    parts = solver.Settlement(direction=(1, 0), increment=0.05, limit=3.0)
+    turns = solver.Settlement(rotation=-1.0, rotation_centre=(2, 0), increment=0.01, limit=0.1)
+    response = solver.Structure(assembly, friction_coefficient=0.3).settle([parts, turns])
+    assert response.collapse.unit == "m"
+    out = blockvis.write(response, tmp_path / "out")
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert (summary["collapse_phase"], summary["settlement_unit"]) == (1, "m")
+    assert blockvis.open_results(out).collapse.unit == "m"
