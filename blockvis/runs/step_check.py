@@ -35,6 +35,9 @@ LEAST_REACTION = 0.05
 #: Error that is worth a warning, and the smallest that is reported, as a fraction and of positions [m].
 NOTABLE, SMALLEST, SMALLEST_PLACE = 0.01, 1e-4, 1e-5
 
+#: What may be unknown of a check: nan, and null in files.
+UNKNOWN = ("difference", "collapse", "position")
+
 #: Seconds between looks for Ctrl-C while waiting, and after which waiting is worth a word.
 LOOK, WORTH_A_WORD = 0.2, 2.0
 
@@ -49,7 +52,8 @@ class StepCheck:
         What the analysis measures, in words.
     difference : float
         Largest difference of what is measured at the same parameter, as a fraction of what is measured there, or of
-        ``LEAST_REACTION`` times the first where that is more.
+        ``LEAST_REACTION`` times the first where that is more; nan where only the state at rest, which takes no steps,
+        is in both.
     at : float [m or rad]
         Parameter where it is.
     unit : str
@@ -57,7 +61,7 @@ class StepCheck:
     collapse : float
         Difference of the displacements at collapse, as a fraction; nan unless both collapse.
     position : float [m]
-        Largest distance between the two places of a block at the same parameter.
+        Largest distance between the two places of a block at the same parameter; nan where the difference is.
     stop, stop_of_check : str
         How the run and the other ended.
     phase : int, optional
@@ -76,17 +80,14 @@ class StepCheck:
 
     @property
     def step_error(self) -> dict[str, float | None]:
-        """The error that follows of each: ``reaction`` and ``collapse`` as fractions, ``position`` in m."""
-        return {
-            "reaction": ERROR_OVER_DIFFERENCE * self.difference,
-            "collapse": None if np.isnan(self.collapse) else ERROR_OVER_DIFFERENCE * self.collapse,
-            "position": ERROR_OVER_DIFFERENCE * self.position,
-        }
+        """Error that follows of each, None of nan: ``reaction`` and ``collapse`` as fractions, ``position`` in m."""
+        found = {"reaction": self.difference, "collapse": self.collapse, "position": self.position}
+        return {what: None if np.isnan(apart) else ERROR_OVER_DIFFERENCE * apart for what, apart in found.items()}
 
     @property
     def error(self) -> float:
-        """The larger of the errors of what is measured and of the collapse."""
-        return ERROR_OVER_DIFFERENCE * float(np.nanmax([self.difference, self.collapse]))
+        """The larger of the errors of what is measured and of the collapse that are known, or 0."""
+        return ERROR_OVER_DIFFERENCE * float(np.nanmax([self.difference, self.collapse, 0.0]))
 
     def __str__(self) -> str:
         """Say it in a line."""
@@ -95,10 +96,15 @@ class StepCheck:
         phase = "" if self.phase is None else f" in phase {self.phase}"
         told = ERROR_OVER_DIFFERENCE * self.difference >= SMALLEST
         where = f" (at {self.at:.4g} {self.unit}{phase})" if told else ""
-        parts = [f"{self.what} {_percent(error['reaction'])}{where}"]
+        parts = []
+        if error["reaction"] is not None:
+            parts.append(f"{self.what} {_percent(error['reaction'])}{where}")
         if error["collapse"] is not None:
             parts.append(f"collapse {_percent(error['collapse'])}")
-        parts.append(f"blocks {_millimetres(error['position'])}")
+        if error["position"] is not None:
+            parts.append(f"blocks {_millimetres(error['position'])}")
+        else:
+            parts.append(f"{self.what} and blocks not known, as no increment is in both but that at rest")
         if self.stop != self.stop_of_check:
             ends = f"it ends as '{self.stop_of_check}', not '{self.stop}'"
             parts.append(f"but with a quarter of the step tolerance {ends}")
@@ -216,7 +222,8 @@ def stored_check(folder: Path) -> StepCheck | None:
         return None
     numbers = read_json(folder / STEP_CHECK)
     known = {field.name: numbers[field.name] for field in fields(StepCheck) if field.name in numbers}
-    return StepCheck(**{**known, "collapse": np.nan if known["collapse"] is None else known["collapse"]})
+    unknown = {name: np.nan for name in UNKNOWN if known[name] is None}
+    return StepCheck(**{**known, **unknown})
 
 
 def _finer(case: Case) -> Case:
@@ -224,12 +231,12 @@ def _finer(case: Case) -> Case:
     return replace(case, controls=replace(case.controls, step_tolerance=FINER * case.controls.step_tolerance))
 
 
-def _percent(part: float | None) -> str:
-    return "below 0.01 %" if part is None or part < SMALLEST else f"± {_two_digits(100.0 * part)} %"
+def _percent(part: float) -> str:
+    return "below 0.01 %" if part < SMALLEST else f"± {_two_digits(100.0 * part)} %"
 
 
-def _millimetres(length: float | None) -> str:
-    return "below 0.01 mm" if length is None or length < SMALLEST_PLACE else f"± {_two_digits(1e3 * length)} mm"
+def _millimetres(length: float) -> str:
+    return "below 0.01 mm" if length < SMALLEST_PLACE else f"± {_two_digits(1e3 * length)} mm"
 
 
 def _two_digits(value: float) -> str:
@@ -237,7 +244,7 @@ def _two_digits(value: float) -> str:
 
 
 def _written(folder: Path, check: StepCheck) -> StepCheck:
-    numbers = {**vars(check), "collapse": None if np.isnan(check.collapse) else check.collapse}
+    numbers = {**vars(check), **{name: None for name in UNKNOWN if np.isnan(getattr(check, name))}}
     write_atomic(folder / STEP_CHECK, json.dumps(numbers, indent=2) + "\n")
     add_to_summary(folder, step_error=check.step_error)
     return check
@@ -254,6 +261,8 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
     """
     ours = traced(response)
     mine, theirs = ours.same_places(other)
+    stepped = (ours.phases[mine] > 0) | (ours.parameters[mine] != 0.0)
+    mine, theirs = mine[stepped], theirs[stepped]
     a, b = ours.measured[mine], other.measured[theirs]
     first = LEAST_REACTION * np.abs(ours.measured[:1]).max(initial=0.0)
     apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), first), np.finfo(float).tiny)
@@ -268,11 +277,11 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
     phase = 0 if worst is None else int(ours.phases[worst])
     return StepCheck(
         what=response.measured.name,
-        difference=float(apart.max(initial=0.0)),
+        difference=float(apart.max(initial=0.0 if len(mine) else np.nan)),
         at=0.0 if worst is None else float(ours.parameters[worst]),
         unit=unit_in(response, phase),
         collapse=abs(ends[1] - ends[0]) / ends[0] if ends[0] > 0.0 else np.nan,
-        position=float(moved.max(initial=0.0)),
+        position=float(moved.max(initial=0.0 if len(mine) else np.nan)),
         stop=stops[0],
         stop_of_check=stops[1],
         phase=phase + 1 if len(response.settlements) > 1 else None,

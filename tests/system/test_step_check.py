@@ -254,6 +254,24 @@ def test_a_path_with_a_quarter_of_the_tolerance_says_the_errors(
     assert str(stored_check(tmp_path)) == str(check)
 
 
+def test_nothing_is_compared_where_only_the_state_at_rest_is_in_both(tmp_path, monkeypatch, settled):
+    ours = traced(settled)
+    check = compared(settled, replace(ours, parameters=ours.parameters * 0.9))
+    assert check.step_error == {"reaction": None, "collapse": None, "position": None}
+    unknown = "reaction and blocks not known, as no increment is in both but that at rest"
+    assert str(check) == f"error of the steps: {unknown}"
+    assert (check.error, check.warning) == (0.0, "")
+    fallen = replace(settled, collapse=SimpleNamespace(displacement=0.3, bracket=(0.3, 0.3)))
+    monkeypatch.setattr(step_check, "OnceMore", Done)
+    Done.path = replace(traced(fallen), parameters=ours.parameters * 0.9, collapse=0.303)
+    (tmp_path / "summary.json").write_text("{}", encoding="utf-8")
+    check = StepChecking(case_from(SHORT, tmp_path)).compared(tmp_path, fallen, 0.0)
+    assert str(check) == f"error of the steps: collapse ± 2 %, {unknown}"
+    assert (check.error, bool(check.warning)) == (pytest.approx(0.02), True)
+    assert str(stored_check(tmp_path)) == str(check)
+    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["step_error"]["reaction"] is None
+
+
 class Late:
     """Another path that does not come."""
 
