@@ -101,7 +101,7 @@ class Engine:
         arms: np.ndarray | None = None,
     ) -> None:
         self.removed = np.zeros(assembly.n_blocks, dtype=bool) if removed is None else removed
-        self.assembly, self.interfaces, self.pose = assembly, replace(interfaces, scatter=None), pose
+        self.assembly, self.interfaces, self.pose = assembly, interfaces, pose
         self.d, self.free, self.length = assembly.dimension, assembly.free, assembly.block_size
         self.mass = float(assembly.masses[self.free].mean())
         self.unit = float(np.sqrt(self.length / solver.GRAVITY))

@@ -589,3 +589,17 @@ def test_results_that_replace_those_of_a_collapse_have_no_fall(tmp_path):
     assert not list(folder.glob("fall*"))
     with pytest.raises(ValueError, match="nothing falls here"):
         blockvis.open_results(folder).fall(1.0)
+
+
+def test_a_stone_slides_as_far_as_the_scattered_friction_of_its_joint_lets_it():
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(0.0, 0.0, 1.0, 0.2), rectangle(-3.0, -0.5, 9.0, 0.0)], roles=["free", "fixed"]
+    )
+    half = solver.JointScatter(1, lambda p: np.full(len(p), 0.5))
+    laws, pose = solver.Interfaces(solver.InterfaceLaw(0.2), scatter=half), solver.Pose.initial(assembly)
+    velocity = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    engine = Engine(assembly, solver.self_weight(assembly).dead, laws, pose, velocity)
+    engine.advance(1.2)
+    far = engine.pose.positions[0, 0] - assembly.centroids[0, 0]
+    # By its friction alone: v² / (2 μ g).
+    assert far == pytest.approx(1.0 / (2.0 * 0.1 * solver.GRAVITY), rel=0.05)
