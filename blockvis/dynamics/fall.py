@@ -107,7 +107,7 @@ class Fall:
 
     def _before(self, time: float) -> int:
         """Return the number of the last pose that is kept until a time [s]."""
-        return int(np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self) - 1))
+        return max(int(np.searchsorted(self.times, time, side="right")) - 1, 0)
 
 
 def fall_of(

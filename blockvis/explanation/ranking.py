@@ -180,7 +180,7 @@ def _range_of(own: Sequence[Trial], share: np.ndarray) -> tuple[float, float, fl
     order = np.argsort(amounts)
     below = np.cumsum(mass[order])
     places = np.searchsorted(below, np.array(TAILS) * below[-1])
-    low, middle, high = amounts[order][np.minimum(places, len(amounts) - 1)].tolist()
+    low, middle, high = amounts[order][places].tolist()
     return low, middle, high
 
 

@@ -104,7 +104,7 @@ def fragility(settlement: ArrayLike, collapsed: ArrayLike) -> Fragility:
     steps, dead = np.unique(end[event], return_counts=True)
     # A run that did not collapse up to a settlement was at risk there.
     at_risk = len(end) - np.searchsorted(np.sort(end), steps, side="left")
-    standing = np.cumprod(1.0 - dead / np.maximum(at_risk, 1))
+    standing = np.cumprod(1.0 - dead / at_risk)
     last = dead == at_risk
     greenwood = np.cumsum(np.where(last, 0.0, dead / np.where(last, 1.0, at_risk * (at_risk - dead).astype(float))))
     with np.errstate(divide="ignore", invalid="ignore"):
