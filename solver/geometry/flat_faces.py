@@ -32,7 +32,8 @@ def renumbered(vertices: np.ndarray, faces: list[list[int]]) -> tuple[np.ndarray
 def merged_faces(surface: tuple[np.ndarray, list[list[int]]], flatness: float) -> tuple[np.ndarray, list[list[int]]]:
     """One face of neighbouring ones in one plane, up to the flatness [m], and no corner in the middle of an edge."""
     vertices, faces = surface
-    areas = np.array([_area(vertices[face]) for face in faces])
+    arms = (vertices[face[1:]] - vertices[face[0]] for face in faces)
+    areas = np.array([np.cross(arm[:-1], arm[1:]).sum(axis=0) / 2.0 for arm in arms])
     sizes = np.linalg.norm(areas, axis=1)
     owner = {edge: k for k, face in enumerate(faces) for edge in edges_of(face)}
     group = [-1] * len(faces)
@@ -58,11 +59,6 @@ def merged_faces(surface: tuple[np.ndarray, list[list[int]]], flatness: float) -
         outline = _outline([faces[k] for k in members])
         loops += [faces[k] for k in members] if outline is None else [outline]
     return renumbered(vertices, _without_straight_corners(vertices, loops))
-
-
-def _area(points: np.ndarray) -> np.ndarray:
-    arms = points - points[0]
-    return np.cross(arms[1:-1], arms[2:]).sum(axis=0) / 2.0
 
 
 def _outline(faces: list[list[int]]) -> list[int] | None:

@@ -138,12 +138,6 @@ class Solids(Bodies):
         return np.sqrt(dot(along, along))
 
     @cached_property
-    def longest_edges(self) -> np.ndarray:
-        """(n_faces,) int array: the longest edge of each face, the first of several."""
-        order = np.lexsort((-np.arange(len(self.corners)), self.edge_lengths, self.face_of_corner))
-        return order[self.face_offsets[1:] - 1]
-
-    @cached_property
     def shortest_edges(self) -> np.ndarray:
         """(n_faces,) array [m]: length of the shortest edge of each face."""
         return np.minimum.reduceat(self.edge_lengths, self.face_offsets[:-1])
@@ -154,7 +148,8 @@ class Solids(Bodies):
         points = vertices[self.corners]
         arms = points - np.repeat(points[starts], counts, axis=0)
         areas = np.add.reduceat(cross(arms, arms[self.next_corner]), starts)
-        longest = self.longest_edges
+        order = np.lexsort((-np.arange(len(self.corners)), self.edge_lengths, self.face_of_corner))
+        longest = order[self.face_offsets[1:] - 1]
         normals = unit(areas)
         along = points[self.next_corner[longest]] - points[longest]
         along = along - dot(along, normals)[:, None] * normals

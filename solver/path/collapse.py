@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -36,9 +36,11 @@ SLOW = 1e-3
 class Fall:
     """The motion of blocks from a place of the path that is not in equilibrium, with the supports fixed."""
 
-    def __init__(self, stepper: Stepper, checks: EquilibriumChecks, reports: Reports, n_frames: int) -> None:
+    def __init__(
+        self, stepper: Stepper, checks: EquilibriumChecks, reports: Reports, n_frames: int, on_step: Callable[[], None]
+    ) -> None:
         self.stepper, self.checks, self.reports, self.n_frames = stepper, checks, reports, n_frames
-        self.model, self.driver = stepper.model, stepper.driver
+        self.model, self.driver, self.on_step = stepper.model, stepper.driver, on_step
 
     def time_steps(
         self, place: Place, largest: float = LARGEST_MOVEMENT
@@ -48,17 +50,23 @@ class Fall:
         Yields places, motions in units of the program, the largest acceleration, in g, and speed, in √(block size · g).
         """
         # In units of √(block size / g).
-        place, time, idle = replace(place, velocity=None), 0.01, 0
+        place, time, idle, slow, stuck = replace(place, velocity=None), 0.01, 0, False, 0
         for _ in range(TIME_STEPS):
+            self.on_step()
             try:
                 new, motion, error = self.stepper.step(place, time, in_time=True)
                 moved = error.moved
             except NotSolved as failure:
                 new, moved = None, failure.moved
             if new is None or moved > largest:
+                # What creeps, and is refused longer steps again and again, does not come to rest.
+                stuck += slow
+                if stuck == 12:
+                    return
                 time *= min(0.5, 0.8 * np.sqrt(largest / max(moved, largest)))
                 continue
-            place = new
+            place, slow = new, moved < SLOW * time
+            stuck = stuck if slow else 0
             yield place, motion, error.turn / time**2, moved / time
             # Each is twice as long as the one before, so that forces out of balance would have moved the blocks, unless
             # friction that has yet to follow the normal forces holds them; steps that grow faster carry blocks past
@@ -140,7 +148,7 @@ class Fall:
         if self.model.live is not None:
             stepper = Stepper(replace(self.model, live=None), self.driver)
             reports = Reports(stepper, self.reports.number, self.reports.fell_at)
-            yield from Fall(stepper, EquilibriumChecks(stepper), reports, self.n_frames).frames(place)
+            yield from Fall(stepper, EquilibriumChecks(stepper), reports, self.n_frames, self.on_step).frames(place)
             return
         for least in (MECHANISM, *[0.1] * max(self.n_frames - 1, 0)):
             start, total = place, np.zeros_like(self.model.load)

@@ -75,7 +75,7 @@ class Path:
         controls: Controls,
         on_step: Callable[[PathState], None] | None = None,
     ) -> None:
-        self.on_step = on_step
+        self.on_step = on_step or (lambda _: None)
         self.full_model, self.driver, self.number = model, driver, number
         self.frames, self.local_loss = controls.falling_frames, controls.local_loss
         self._remove_blocks(np.zeros(0))
@@ -91,7 +91,7 @@ class Path:
         self.stepper = Stepper(self.model, self.driver)
         self.checks = EquilibriumChecks(self.stepper)
         self.reports = Reports(self.stepper, self.number, fell_at)
-        self.fall = Fall(self.stepper, self.checks, self.reports, self.frames)
+        self.fall = Fall(self.stepper, self.checks, self.reports, self.frames, lambda: self.on_step(self.tried))
 
     def increments(
         self, begin: Callable[[], PathState], resume: PathState | None
@@ -126,6 +126,7 @@ class Path:
                 fell_at = np.where(fallen, -np.inf, np.nan)
                 self._remove_blocks(fell_at)
             place = self.stepper.unloaded(start, self.number, ties_at, bonds_at)
+            self.tried = PathState(self.number, start, place, FIRST_STEP * self.stepper.unit)
             drawn = bonds_at is None
             resting = self._at_rest(place, drawn)
             if resting is None:
@@ -146,7 +147,7 @@ class Path:
 
         Where they do not, it is that from which they fall; :meth:`follow` finds that.
         """
-        state = begin()
+        self.tried = state = begin()
         if removed.any():
             fell_at = np.where(removed, -np.inf, state.fell_at if len(state.fell_at) else np.nan)
             self._remove_blocks(fell_at)
@@ -195,7 +196,7 @@ class Path:
 
         Of a resumed path the increment at the given state has been reported.
         """
-        self.state = state
+        self.state = self.tried = state
         if resumed:
             self._remove_blocks(state.fell_at)
             self.reported = state.place.s
@@ -326,8 +327,8 @@ class Path:
             if state.refined and width <= self.driver.tolerance * (1.0 + 1e-9):
                 return state, Ending(Status.FALLING)
             state, outcome = self._step(state, target)
-            if self.on_step is not None:
-                self.on_step(state)
+            self.tried = state
+            self.on_step(state)
             if outcome is not None:
                 return state, outcome
         return state, self.reports.no_step(state.place.s, f"{MOST_STEPS} were tried")
