@@ -18,11 +18,12 @@ from blockvis.layout.choice import Choice, look_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, passed_over
 from blockvis.layout.notes import CHANGED, UPRIGHT, Note, kind_of
-from blockvis.layout.outlines import FLAT, arc_points, filled, sagitta
+from blockvis.layout.outlines import FLAT, chords_of, filled
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import metres_per
 from blockvis.layout.views import VIEWS, axis_across, upright_note
 
+from .arcs import Arc, with_shared_corners
 from .bodies import Bodies
 from .dxf_bodies import DrawnMesh, drawn_mesh, is_mesh, layout_of_meshes, meshes_of_faces
 from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
@@ -67,6 +68,7 @@ class _Outlines:
     rows: list[dict[str, Any]] = field(default_factory=list)
     looks: list[tuple[str, ...]] = field(default_factory=list)
     offs: list[float] = field(default_factory=list)
+    arcs: list[tuple[Arc, ...]] = field(default_factory=list)
     loose: list[Line] = field(default_factory=list)
     skipped: Counter[str] = field(default_factory=Counter)
     hidden: Counter[str] = field(default_factory=Counter)
@@ -76,19 +78,26 @@ class _Outlines:
     meshes: list[DrawnMesh] = field(default_factory=list)
     faces: list[int] = field(default_factory=list)
 
-    def add(self, ring: np.ndarray, entity: Any, handle: str, off: float = 0.0) -> None:
-        """Add an outline (n, 3) whose chords are up to ``off`` from its curves."""
+    def add(self, ring: np.ndarray, entity: Any, handle: str, off: float = 0.0, arcs: tuple[Arc, ...] = ()) -> None:
+        """Add an outline (n, 3) whose chords are up to ``off`` from its curves, of which some are arcs."""
         self.rings.append(ring)
         self.offs.append(off)
+        self.arcs.append(arcs)
         self.layers.append(str(entity.dxf.layer))
         self.names.append(f"block {handle}")
         self.rows.append(_own_data(entity))
         self.looks.append(_looks(entity))
 
+    @property
+    def of_outlines(self) -> tuple[list[Any], ...]:
+        """Lists with an item for each outline."""
+        return self.rings, self.names, self.layers, self.rows, self.looks, self.offs, self.arcs
+
     def append(self, ring: np.ndarray, level: float, layer: str, name: str, looks: tuple[str, ...]) -> None:
         """Add an outline (n, 2) that lines make, at a level."""
         self.rings.append(np.column_stack([ring, np.full(len(ring), level)]))
         self.offs.append(0.0)
+        self.arcs.append(())
         self.layers.append(layer)
         self.names.append(name)
         self.rows.append({})
@@ -142,13 +151,13 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     if closed:
         found.meshes += closed
         for k in reversed(found.faces):
-            for each in (found.rings, found.names, found.layers, found.rows, found.looks, found.offs):
+            for each in found.of_outlines:
                 del each[k]
     meshes = _chosen_meshes(found, reading)
     if meshes:
         return layout_of_meshes(meshes, path, reading, stated, _faults(audit) + _skipped(found))
     found.notes += _turned(found, reading.view, path)
-    faces = _with_loose(found, reading)
+    faces = _with_loose(found, reading, tolerance)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
         seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
         listed = "; ".join(words for words in (nothing_closed(faces), seen) if words) or "nothing"
@@ -250,7 +259,12 @@ def _turned(found: _Outlines, view: str | None, path: Path) -> list[str]:
         return []
     order = [*VIEWS[chosen], axis_across(chosen)]
     found.rings = [ring[:, order] for ring in found.rings]
-    found.loose = [replace(line, points=line.points[:, order]) for line in found.loose]
+    turn, still = np.eye(3)[order], np.zeros(3)
+    found.arcs = [tuple(arc.mapped(turn, still) for arc in arcs) for arcs in found.arcs]
+    found.loose = [
+        replace(line, points=line.points[:, order], arcs=tuple(arc.mapped(turn, still) for arc in line.arcs))
+        for line in found.loose
+    ]
     found.left_out = [item.seen(order) for item in found.left_out]
     return [upright_note(chosen)]
 
@@ -387,7 +401,7 @@ def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | No
     if kind == "SPLINE":
         clamped = _clamped(entity.control_points, entity.weights, entity.knots, entity.dxf.degree)
         entity.control_points, entity.weights, entity.knots = clamped
-    points, off = _circular(entity, tolerance) or _points(make_path(entity), tolerance)
+    points, off, arcs = _circular(entity, tolerance) or (*_points(make_path(entity), tolerance), ())
     if len(points) < 2:
         found.skipped[f"{kind} without length"] += 1
         return
@@ -402,13 +416,14 @@ def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | No
         ring, miss = joined
         # A closed polyline may have a short last edge: it stays.
         short = closes and miss > CLOSES * float(np.ptp(points, axis=0).max())
-        found.add(points if short else ring, entity, handle, off)
+        found.add(points if short else ring, entity, handle, off, arcs)
         found.misses += [] if closes else [miss]
         return
     if closes and kind not in ("LINE", "ARC") and len(points) > 3:
-        found.add(points, entity, handle, off)
+        found.add(points, entity, handle, off, arcs)
         return
-    found.loose.append(Line(points, str(entity.dxf.layer), handle, kind not in ("LINE", "ARC"), _looks(entity), off))
+    layer, must_close = str(entity.dxf.layer), kind not in ("LINE", "ARC")
+    found.loose.append(Line(points, layer, handle, must_close, _looks(entity), off, arcs))
 
 
 def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, Any, Any]:
@@ -438,8 +453,8 @@ def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, A
     return (found[:, :-1] / found[:, -1:]).tolist(), found[:, -1].tolist() if len(weights) else [], ends.tolist()
 
 
-def _circular(entity: Any, tolerance: float | None) -> tuple[np.ndarray, float] | None:
-    """(n, 3) array: points of an entity of lines and circular arcs, and how far chords are off it; None for others.
+def _circular(entity: Any, tolerance: float | None) -> tuple[np.ndarray, float, tuple[Arc, ...]] | None:
+    """(n, 3) array: points of lines and circular arcs, how far chords are off, and the arcs; None for other entities.
 
     The chords are measured on the arcs themselves: ezdxf's paths replace an arc by a cubic first, which deviates from
     it by up to 2.7e-4 of the radius.
@@ -448,44 +463,59 @@ def _circular(entity: Any, tolerance: float | None) -> tuple[np.ndarray, float] 
     if kind == "SPLINE" and entity.dxf.degree == 1 and len(entity.control_points):
         # Straight from corner to corner: ezdxf would put a smooth curve through them.
         straight = np.array([(*point,) for point in entity.control_points])
-        return (np.concatenate([straight, straight[:1]]) if entity.closed else straight), 0.0
+        return (np.concatenate([straight, straight[:1]]) if entity.closed else straight), 0.0, ()
     if kind in ("CIRCLE", "ARC"):
-        start, end = (0.0, 360.0) if kind == "CIRCLE" else (entity.dxf.start_angle, entity.dxf.end_angle)
-        sweep = math.radians((end - start) % 360.0 or 360.0)
-        c, radius = entity.dxf.center, abs(float(entity.dxf.radius))
-        flat = arc_points(np.array([c.x, c.y]), radius, math.radians(start), sweep, tolerance)
-        off = sagitta(radius, sweep / (len(flat) - 1))
-        level = float(c.z)
+        begin, end = (0.0, 360.0) if kind == "CIRCLE" else (entity.dxf.start_angle, entity.dxf.end_angle)
+        start, sweep = math.radians(begin), math.radians((end - begin) % 360.0 or 360.0)
+        arc = _arc(0, entity.dxf.center, abs(float(entity.dxf.radius)), start, sweep, tolerance)
+        flat, arcs = arc.at(sweep * np.linspace(0.0, 1.0, arc.chords + 1)), [arc]
+        level = float(entity.dxf.center.z)
     elif kind == "LWPOLYLINE":
-        flat, off = _with_bulges([(x, y, b) for x, y, b in entity.get_points("xyb")], bool(entity.closed), tolerance)
+        flat, arcs = _with_bulges([(x, y, b) for x, y, b in entity.get_points("xyb")], bool(entity.closed), tolerance)
         level = float(entity.dxf.elevation)
     elif kind == "POLYLINE" and entity.is_2d_polyline and not entity.dxf.flags & 6:
         corners = [(v.dxf.location.x, v.dxf.location.y, float(v.dxf.bulge)) for v in entity.vertices]
-        flat, off = _with_bulges(corners, bool(entity.is_closed), tolerance)
+        flat, arcs = _with_bulges(corners, bool(entity.is_closed), tolerance)
         level = float(entity.dxf.elevation.z) if entity.dxf.hasattr("elevation") else 0.0
     else:
         return None
+    return _in_world(entity, flat, arcs, level)
+
+
+def _in_world(
+    entity: Any, flat: np.ndarray, arcs: list[Arc], level: float
+) -> tuple[np.ndarray, float, tuple[Arc, ...]]:
+    """Put points and arcs of an entity's own plane into space, and say how far chords are off."""
     system = entity.ocs()
-    return np.array([(*system.to_wcs((x, y, level)),) for x, y in flat]).reshape(-1, 3), off
+    own = np.array([(*system.to_wcs(axis),) for axis in np.eye(3).tolist()]).T
+    points = np.array([(*system.to_wcs((x, y, level)),) for x, y in flat]).reshape(-1, 3)
+    placed = tuple(arc.mapped(own[:, :2], level * own[:, 2]) for arc in arcs)
+    return points, max((arc.off for arc in arcs), default=0.0), placed
+
+
+def _arc(first: int, centre: Any, radius: float, start: float, sweep: float, tolerance: float | None) -> Arc:
+    """Make an arc of a circle."""
+    n = chords_of(sweep, radius, tolerance)
+    return Arc(first, n, np.array([centre.x, centre.y]), radius * np.eye(2), start, sweep)
 
 
 def _with_bulges(
     corners: list[tuple[float, float, float]], closed: bool, tolerance: float | None
-) -> tuple[np.ndarray, float]:
-    """(n, 2) array: points of a polyline, a closed one ends where it starts; how far the chords are off its arcs."""
+) -> tuple[np.ndarray, list[Arc]]:
+    """(n, 2) array: points of a polyline, a closed one ends where it starts; and its arcs."""
     from ezdxf.math import bulge_to_arc
 
-    points, off = [np.array(corner[:2]) for corner in corners[:1]], 0.0
+    points, arcs = [np.array(corner[:2]) for corner in corners[:1]], list[Arc]()
     following = [*corners[1:], *(corners[:1] if closed else [])]
     for (x, y, bulge), (u, v, _) in zip(corners, following, strict=False):
         if bulge and np.isfinite(bulge) and (x, y) != (u, v):
             centre, start, end, radius = bulge_to_arc((x, y), (u, v), bulge)
             sweep = (end - start) % (2 * math.pi)
-            arc = arc_points(np.array([centre.x, centre.y]), radius, start, sweep, tolerance)
-            off = max(off, sagitta(radius, sweep / (len(arc) - 1)))
-            points += list((arc if bulge > 0 else arc[::-1])[1:-1])
+            begin, turned = (start, sweep) if bulge > 0 else (end, -sweep)
+            arcs.append(_arc(len(points) - 1, centre, radius, begin, turned, tolerance))
+            points += [*arcs[-1].at(turned * np.linspace(0.0, 1.0, arcs[-1].chords + 1)[1:-1])]
         points.append(np.array([u, v]))
-    return np.array(points).reshape(-1, 2), off
+    return np.array(points).reshape(-1, 2), arcs
 
 
 def _looks(entity: Any) -> tuple[str, ...]:
@@ -503,8 +533,8 @@ def _looks(entity: Any) -> tuple[str, ...]:
     return (kind, "#{:02x}{:02x}{:02x}".format(*int2rgb(DXF_DEFAULT_COLORS[number])), str(number))
 
 
-def _hatch_rings(entity: Any, tolerance: float | None) -> list[tuple[np.ndarray, float]]:
-    """(n, 3) arrays: boundaries of a hatch, and how far their chords are off its curves."""
+def _hatch_rings(entity: Any, tolerance: float | None) -> list[tuple[np.ndarray, float, tuple[Arc, ...]]]:
+    """(n, 3) arrays: boundaries of a hatch, how far their chords are off its curves, and their arcs."""
     from ezdxf.math import Vec2
     from ezdxf.path import from_hatch
 
@@ -516,24 +546,23 @@ def _hatch_rings(entity: Any, tolerance: float | None) -> list[tuple[np.ndarray,
                     clamped = _clamped(edge.control_points, edge.weights, edge.knot_values, edge.degree)
                     edge.control_points, edge.weights, edge.knot_values = Vec2.list(clamped[0]), *clamped[1:]
             # Boundaries of separate edges may turn either way and contain splines: ezdxf orders them.
-            return [_points(curve, tolerance) for curve in from_hatch(entity)]
-        flat, off = _with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance)
-        system = entity.ocs()
+            return [(*_points(curve, tolerance), ()) for curve in from_hatch(entity)]
+        flat, arcs = _with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance)
         level = float(entity.dxf.elevation.z) if entity.dxf.hasattr("elevation") else 0.0
-        rings.append((np.array([(*system.to_wcs((x, y, level)),) for x, y in flat]).reshape(-1, 3), off))
+        rings.append(_in_world(entity, flat, arcs, level))
     return rings
 
 
 def _add_hatch(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
-    bounds = [(ring, off) for ring, off in _hatch_rings(entity, tolerance) if len(ring) > 2]
-    rings = [ring[:-1] if (ring[0] == ring[-1]).all() else ring for ring, _ in bounds]
+    bounds = [bound for bound in _hatch_rings(entity, tolerance) if len(bound[0]) > 2]
+    rings = [ring[:-1] if (ring[0] == ring[-1]).all() else ring for ring, *_ in bounds]
     if not rings:
         found.skipped["HATCH without boundary"] += 1
         return
     outlined = [(k, holes) for k, holes in filled(rings) if not _drawn_already(rings[k], found)]
     for number, (k, inside) in enumerate(outlined):
         if not inside:
-            found.add(rings[k], entity, handle if len(rings) == 1 else f"{handle}.{number}", bounds[k][1])
+            found.add(rings[k], entity, handle if len(rings) == 1 else f"{handle}.{number}", *bounds[k][1:])
             continue
         x, y = rings[inside[0]][:, :2].mean(axis=0)
         message = (
@@ -552,9 +581,13 @@ def _drawn_already(ring: np.ndarray, found: _Outlines) -> bool:
     return bool(np.abs(found.rings[-1].mean(0) - ring.mean(0)).max() <= CLOSES * float(np.ptp(ring, axis=0).max()))
 
 
-def _with_loose(found: _Outlines, reading: Reading) -> Faces:
-    """Add the faces between loose lines, and cut outlines along the lines within them."""
+def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> Faces:
+    """Let arcs share their corners, add the faces between loose lines, and cut outlines along the lines within them."""
     unwanted, wanted = _chosen_lines(found, reading)
+    curves, n = [*found.rings, *(line.points for line in wanted)], len(found.rings)
+    curves = with_shared_corners(curves, [*found.arcs, *(line.arcs for line in wanted)], tolerance)
+    found.rings = curves[:n]
+    wanted = [replace(line, points=points) for line, points in zip(wanted, curves[n:], strict=True)]
     ignored = {i for i, layer in enumerate(found.layers) if unwanted.takes([layer], found.looks[i])}
     faces = faces_of_lines(wanted, [ring[:, :2] for ring in found.rings], found.offs, ignored, reading.only)
     found.left_out += faces.left_out
@@ -562,7 +595,7 @@ def _with_loose(found: _Outlines, reading: Reading) -> Faces:
         level = float(found.rings[i][0, 2])
         for number, piece in enumerate(pieces):
             found.append(piece, level, found.layers[i], f"{found.names[i]}.{number}", found.looks[i])
-        for values in (found.rings, found.layers, found.names, found.rows, found.looks, found.offs):
+        for values in found.of_outlines:
             del values[i]
     for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
         found.append(ring, 0.0, layer, f"face {number}", ("face",))

@@ -15,6 +15,8 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import ring_width
 from solver.mechanics import counted
 
+from .arcs import Arc
+
 #: Lines are intersected on a grid of this fraction of the size of the drawing.
 GRID = 1e-6
 
@@ -47,6 +49,8 @@ class Line:
         Kind of entity and colour.
     off : float
         Largest distance of its chords from the curve for which they stand.
+    arcs : tuple of Arc
+        Its parts that are arcs.
     """
 
     points: np.ndarray
@@ -55,6 +59,7 @@ class Line:
     must_close: bool
     looks: tuple[str, ...] = ()
     off: float = 0.0
+    arcs: tuple[Arc, ...] = ()
 
 
 @dataclass

@@ -24,11 +24,12 @@ from blockvis.layout.choice import Choice
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, passed_over
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
-from blockvis.layout.outlines import LARGEST_CHORD, filled, sagitta
+from blockvis.layout.outlines import chords_of, filled
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import UNITS, metres_per
 from solver import mechanics
 
+from .arcs import Arc, with_shared_corners
 from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
@@ -63,11 +64,12 @@ MOST_CHORDS = 512
 
 
 class _Part(NamedTuple):
-    """A part of a shape: points, whether it is closed, and how far its chords are off its curves."""
+    """A part of a shape: points, whether it is closed, how far its chords are off its curves, and its arcs."""
 
     points: np.ndarray
     closed: bool
     off: float = 0.0
+    arcs: tuple[Arc, ...] = ()
 
 
 @dataclass
@@ -79,6 +81,7 @@ class _Outlines:
     labels: list[tuple[str, ...]] = field(default_factory=list)
     looks: list[tuple[str, ...]] = field(default_factory=list)
     offs: list[float] = field(default_factory=list)
+    arcs: list[tuple[Arc, ...]] = field(default_factory=list)
     loose: list[Line] = field(default_factory=list)
     loose_labels: list[tuple[str, ...]] = field(default_factory=list)
     misses: list[float] = field(default_factory=list)
@@ -123,7 +126,7 @@ def read(path: Path, reading: Reading) -> Layout:
     if stated and stated not in UNITS and reading.unit is None:
         found.notes.append(f"1 unit of the drawing is {stated}, by its width and its viewBox")
     _walk(root, _Context(np.eye(3), (), tolerance, path), found)
-    faces = _with_loose(found, reading)
+    faces = _with_loose(found, reading, tolerance)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
         rest = "; ".join(words for words in (nothing_closed(faces), *_pattern_fills(root)) if words)
         raise Refused(
@@ -159,9 +162,13 @@ def _root(path: Path) -> ElementTree.Element:
     return root
 
 
-def _with_loose(found: _Outlines, reading: Reading) -> Faces:
-    """Leave out what is not wanted, add the faces between loose lines, cut outlines along the lines within them."""
+def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> Faces:
+    """Leave out what is not wanted, let arcs share corners, add the faces of loose lines, cut outlines along them."""
     wanted, ignored = _wanted_lines(found, reading)
+    curves = [*found.rings, *(line.points for line in wanted)]
+    curves = with_shared_corners(curves, [*found.arcs, *(line.arcs for line in wanted)], tolerance)
+    found.rings = curves[: len(found.rings)]
+    wanted = [replace(line, points=points) for line, points in zip(wanted, curves[len(found.rings) :], strict=True)]
     faces = faces_of_lines(wanted, found.rings, found.offs, ignored, reading.only)
     found.left_out += faces.left_out
     for k in sorted({*faces.pieces, *ignored}, reverse=True):
@@ -361,24 +368,26 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
     kept = _kept(element, title, where, found)
     looks = (_tag(element), *_colour(where))
     labels = (*where.layers, *(x for x in (title.strip(), element.get(f"{_INKSCAPE}label"), element.get("id")) if x))
-    rings, offs = [], []
-    for points, closed, off in parts:
+    rings, offs, every_arc = [], [], []
+    for points, closed, off, of_part in parts:
         if len(points) < 2:
             continue
         if not np.isfinite(points).all():
             raise ValueError(f"'{where.path}': {_called(element)} has a point that is not a finite number; repair it")
         placed = points @ where.matrix[:2, :2].T + where.matrix[:2, 2]
-        off *= float(np.linalg.norm(where.matrix[:2, :2], 2))
+        arcs = tuple(arc.mapped(where.matrix[:2, :2], where.matrix[:2, 2]) for arc in of_part)
+        off = max([off * float(np.linalg.norm(where.matrix[:2, :2], 2)), *(arc.off for arc in arcs)])
         joined = joined_ends(placed)
         if joined is None and not (closed and len(placed) > 2):
             handle = name or f"<{_tag(element)}>"
-            found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks, off))
+            found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks, off, arcs))
             found.loose_labels.append(labels)
             continue
         # A closed path may have a short last edge: it stays.
         short = joined is None or (closed and joined[1] > 1e-6 * float(np.ptp(placed, axis=0).max()))
         rings.append(placed if short or joined is None else joined[0])
         offs.append(off)
+        every_arc.append(arcs)
         found.misses += [] if joined is None or closed else [joined[1]]
     for k, inside in filled(rings):
         called = name if len(rings) == 1 or not name else f"{name} {k + 1}"
@@ -393,6 +402,7 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
             continue
         found.rings.append(rings[k])
         found.offs.append(offs[k])
+        found.arcs.append(every_arc[k])
         found.rows.append(kept or _row(where.layer, called))
         found.labels.append(labels)
         found.looks.append(looks)
@@ -495,13 +505,12 @@ def _rectangle(element: ElementTree.Element, where: _Context) -> list[_Part]:
     radii = np.minimum([given[0], given[-1]], [w / 2.0, h / 2.0])
     if not (radii > 0).all():
         return [_Part(corners, True)]
-    points, off = list[np.ndarray](), 0.0
+    points, arcs = list[np.ndarray](), list[Arc]()
     for before, corner, after in zip(np.roll(corners, 1, axis=0), corners, np.roll(corners, -1, axis=0), strict=True):
         start, end = (corner + np.sign(other - corner) * radii for other in (before, after))
-        curve, apart = _arc(start, end, [*radii, 0.0, 0.0, 1.0], where)
-        points += [start, *curve]
-        off = max(off, apart)
-    return [_Part(np.array(points), True, off)]
+        points.append(start)
+        _add_arc(points, arcs, end, [*radii, 0.0, 0.0, 1.0], where)
+    return [_Part(np.array(points), True, 0.0, tuple(arcs))]
 
 
 def _ellipse(element: ElementTree.Element, where: _Context) -> list[_Part]:
@@ -515,7 +524,13 @@ def _ellipse(element: ElementTree.Element, where: _Context) -> list[_Part]:
     n = _chords(2 * math.pi, float(radii.max()), where)
     angles = 2 * math.pi * np.arange(n) / n
     points = centre + radii * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return [_Part(points, True, sagitta(float(radii.max()), 2 * math.pi / n))]
+    return [_Part(points, True, 0.0, (Arc(0, n, centre, np.diag(radii), 0.0, 2 * math.pi),))]
+
+
+def _chords(sweep: float, radius: float, where: _Context) -> int:
+    """Count the chords of an arc where it is drawn: transforms scale it."""
+    radius *= float(np.linalg.norm(where.matrix[:2, :2], 2))
+    return min(chords_of(sweep, radius, where.tolerance), MOST_CHORDS)
 
 
 def _polygon(element: ElementTree.Element, where: _Context) -> list[_Part]:
@@ -528,12 +543,6 @@ def _polygon(element: ElementTree.Element, where: _Context) -> list[_Part]:
 def _segment(element: ElementTree.Element, where: _Context) -> list[_Part]:
     ends = np.array([[_length(element, f"{axis}{end}") for axis in "xy"] for end in (1, 2)])
     return [_Part(ends, False)]
-
-
-def _chords(sweep: float, radius: float, where: _Context) -> int:
-    allowed = 1e-3 if where.tolerance is None else min(max(where.tolerance / radius, 1e-7), 1.0)
-    widest = min(LARGEST_CHORD, 2.0 * math.acos(1.0 - allowed))
-    return min(max(1, math.ceil(abs(sweep) / widest - 1e-9)), MOST_CHORDS)
 
 
 def _tokens(d: str) -> list[tuple[str, str]]:
@@ -554,6 +563,7 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
     tokens = _tokens(element.get("d", ""))
     parts: list[_Part] = []
     points: list[np.ndarray] = []
+    arcs: list[Arc] = []
     off = 0.0
     at = start = control = np.zeros(2)
     command, before, k = "", "", 0
@@ -566,16 +576,16 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
         v = _numbers_of(command, tokens[k : k + _TAKES[kind]])
         k += _TAKES[kind]
         if kind == "Z":
-            parts.append(_Part(np.array(points).reshape(-1, 2), True, off))
-            at, points, off = start, [start], 0.0
+            parts.append(_Part(np.array(points).reshape(-1, 2), True, off, tuple(arcs)))
+            at, points, arcs, off = start, [start], [], 0.0
             before = kind
             continue
         base = at if relative else np.zeros(2)
         if kind == "M":
             if len(points) > 1:
-                parts.append(_Part(np.array(points), False, off))
+                parts.append(_Part(np.array(points), False, off, tuple(arcs)))
             at = start = base + v
-            points, off = [at], 0.0
+            points, arcs, off = [at], [], 0.0
             command = "l" if relative else "L"
         elif kind in "LHV":
             if kind == "L":
@@ -585,9 +595,8 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
             points.append(at)
         elif kind == "A":
             end = base + v[5:]
-            curve, apart = _arc(at, end, v[:5], where)
-            points += curve
-            off, at = max(off, apart), end
+            _add_arc(points, arcs, end, v[:5], where)
+            at = end
         else:
             pairs = [base + pair for pair in np.array(v).reshape(-1, 2)]
             smooth = 2 * at - control if before in ("CS" if kind in "CS" else "QT") and before else at
@@ -598,7 +607,7 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
             control, at = pairs[-2], pairs[-1]
         before = kind
     if len(points) > 1:
-        parts.append(_Part(np.array(points), False, off))
+        parts.append(_Part(np.array(points), False, off, tuple(arcs)))
     return parts
 
 
@@ -625,17 +634,19 @@ def _bezier(controls: list[np.ndarray], where: _Context) -> tuple[list[np.ndarra
     return list(c[0]), most / n**2
 
 
-def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Context) -> tuple[list[np.ndarray], float]:
-    """Points of an elliptical arc after its start, how far chords are off it; SVG 1.1, appendix F.6.5 and F.6.6."""
-    rx, ry, turn = abs(v[0]), abs(v[1]), math.radians(v[2])
+def _add_arc(points: list[np.ndarray], arcs: list[Arc], end: np.ndarray, v: Sequence[float], where: _Context) -> None:
+    """Add an elliptical arc to points and arcs, and its end; SVG 1.1, appendix F.6.5 and F.6.6."""
+    rx, ry, turn, start = abs(v[0]), abs(v[1]), math.radians(v[2]), points[-1]
     if rx == 0 or ry == 0 or (start == end).all():
-        return [end], 0.0
+        points.append(end)
+        return
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     half = rotation.T @ (start - end) / 2.0 / [rx, ry]
     grow = float(half @ half)
     if not (math.isfinite(grow) and grow > 1e-24):
         # The ends coincide compared with the radii, or numbers overflow: a straight line.
-        return [end], 0.0
+        points.append(end)
+        return
     if grow > 1:
         rx, ry, half = rx * math.sqrt(grow), ry * math.sqrt(grow), half / math.sqrt(grow)
     factor = math.sqrt(max(0.0, 1.0 / float(half @ half) - 1.0)) * (-1.0 if bool(v[3]) == bool(v[4]) else 1.0)
@@ -648,10 +659,9 @@ def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Context) ->
     elif not v[4] and sweep > 0:
         sweep -= 2 * math.pi
     n = _chords(sweep, max(rx, ry), where)
-    angles = begin + sweep * np.linspace(0, 1, n + 1)[1:-1]
     middle = (start + end) / 2.0 + rotation @ (centre * [rx, ry])
-    local = np.stack([rx * np.cos(angles), ry * np.sin(angles)], axis=1)
-    return [*(middle + local @ rotation.T), end], sagitta(max(rx, ry), sweep / n)
+    arcs.append(Arc(len(points) - 1, n, middle, rotation * [rx, ry], begin, sweep))
+    points += [*arcs[-1].at(sweep * np.linspace(0.0, 1.0, n + 1)[1:-1]), end]
 
 
 _SHAPES: dict[str, Callable[[ElementTree.Element, _Context], list[_Part]]] = {

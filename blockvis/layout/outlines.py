@@ -24,6 +24,9 @@ WITHIN = 1e-6
 #: Largest angle of a chord, whatever the tolerance: twelve chords make a circle.
 LARGEST_CHORD = math.pi / 6.0
 
+#: Most chords of one arc: finer than any drawing, and a tolerance far below the radius cannot fill the memory.
+MOST_CHORDS = 4096
+
 
 def rectangle(left: float, low: float, right: float, high: float) -> np.ndarray:
     """(4, 2) array: corners of an upright rectangle, counter-clockwise from the lower left."""
@@ -313,31 +316,20 @@ def _fits(a: np.ndarray, dropped: np.ndarray, b: np.ndarray, limit: float) -> bo
     return bool((distance <= limit).all() and ordered)
 
 
-def arc_points(
-    centre: np.ndarray, radius: float, start: float, sweep: float, tolerance: float | None = None
-) -> np.ndarray:
-    """Replace an arc by chords that stay within a tolerance of it.
+def chords_of(sweep: float, radius: float, tolerance: float | None = None) -> int:
+    """Count the equal chords that stay within a tolerance of an arc.
 
     Parameters
     ----------
-    centre : (2,) array
+    sweep : float [rad]
     radius : float
-    start, sweep : float [rad]
-        First angle and signed opening, counter-clockwise positive.
+        Of an ellipse the larger half axis.
     tolerance : float, optional
         Largest distance between arc and chord; a thousandth of the radius by default.
-
-    Returns
-    -------
-    (n, 2) array
-        Points on the arc, both ends included.
     """
-    allowed = radius * 1e-3 if tolerance is None else tolerance
-    widest = LARGEST_CHORD if allowed >= radius else min(LARGEST_CHORD, 2.0 * math.acos(1.0 - allowed / radius))
-    # At most 4096 chords: finer than any drawing, and a tolerance far below the radius cannot fill the memory.
-    n = min(max(1, math.ceil(abs(sweep) / widest - 1e-9)), 4096)
-    angles = start + sweep * np.linspace(0.0, 1.0, n + 1)
-    return centre + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    allowed = 1e-3 if tolerance is None else min(max(tolerance / max(radius, 1e-300), 1e-12), 1.0)
+    widest = min(LARGEST_CHORD, 2.0 * math.acos(1.0 - allowed))
+    return min(max(1, math.ceil(abs(sweep) / widest - 1e-9)), MOST_CHORDS)
 
 
 def sagitta(radius: float, angle: float) -> float:

@@ -11,6 +11,7 @@ import solver
 from solver.mechanics import counted
 
 from .joints.close import Closing, FoldedOutline, close_joints, proposed
+from .joints.trimming import overlapping
 from .left_out import LeftOut
 
 #: Two outlines closer than this fraction of the size of a block, corner by corner, are one block drawn twice.
@@ -155,7 +156,9 @@ def repaired(
             f"closing the joints of block {error.block} ('{assembly.names[error.block]}') face by face folds its "
             f'outline; give closing = "voronoi", or a joint_thickness other than {thickness:g} m'
         ) from None
-    notes += _notes(closed, thickness, found, assembly, bool(mortar))
+    pairs = zip(*overlapping(closed.outlines, ROUNDING * width), strict=True)
+    left = [(int(i), int(j), float(d)) for i, j, d in pairs if not (anchored[i] and anchored[j])]
+    notes += _notes(closed, thickness, found, left, assembly, bool(mortar))
     return list(closed.outlines), notes
 
 
@@ -175,16 +178,20 @@ def _notes(
     closing: Closing,
     thickness: float,
     found: list[tuple[int, int, float]],
+    left: list[tuple[int, int, float]],
     assembly: solver.Assembly,
     drawn: bool,
 ) -> list[str]:
     notes = []
-    if found:
-        i, j, depth = found[0]
-        notes.append(
-            f"{len(found)} overlaps of up to {depth:.3g} m were cut away, the deepest between '{assembly.names[i]}' "
-            f"and '{assembly.names[j]}'; redraw them, or lower overlap_tolerance to have them refused"
-        )
+    still = {pair[:2] for pair in left}
+    gone = [pair for pair in found if pair[:2] not in still]
+    for pairs, what in ((gone, "were cut away"), (left, "could not be cut away")):
+        if pairs:
+            i, j, depth = max(pairs, key=lambda pair: pair[2])
+            notes.append(
+                f"{len(pairs)} overlaps of up to {depth:.3g} m {what}, the deepest between '{assembly.names[i]}' "
+                f"and '{assembly.names[j]}'; redraw them, or lower overlap_tolerance to have them refused"
+            )
     if thickness and closing.method == "voronoi":
         notes.append(
             f"joints of up to {thickness:g} m{', and the mortar as drawn,' if drawn else ''} were closed by giving the "

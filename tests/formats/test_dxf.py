@@ -63,6 +63,71 @@ def test_bulges_and_hatches_become_chords(tmp_path):
     assert len(fine.vertices) > 3 * len(coarse.vertices)
 
 
+def sector(begin, end, inner, outer):
+    """Corners (x, y, bulge) of a voussoir, angles in degrees."""
+    bulge = math.tan(math.radians(end - begin) / 4.0)
+    places = ((inner, begin, 0.0), (outer, begin, bulge), (outer, end, 0.0), (inner, end, -bulge))
+    return [(r * math.cos(math.radians(a)), r * math.sin(math.radians(a)), b) for r, a, b in places]
+
+
+#: Cuts [degrees] of two rings of voussoirs.
+CUTS = ((1.0, 1.3, range(0, 181, 20)), (1.3, 1.6, (0, 13, 29, 47, 61, 83, 104, 127, 150, 163, 180)))
+
+
+def two_rings(document, space, **attributes):
+    # A spandrel stone has a corner on the outer circle, and its border along it.
+    corners = [(0, 1.6, -math.tan(math.radians(50) / 4.0)), (*sector(40, 90, 1.6, 2)[0][:2], 0), (2, 1.9), (0, 1.9)]
+    space.add_lwpolyline(corners, format="xyb", close=True, dxfattribs=attributes)
+    for inner, outer, cuts in CUTS:
+        for begin, end in itertools.pairwise(cuts):
+            space.add_lwpolyline(sector(begin, end, inner, outer), format="xyb", close=True, dxfattribs=attributes)
+
+
+def turned_over(document, space):
+    two_rings(document, space, extrusion=(0, 0, -1))
+
+
+def upright(document, space):
+    two_rings(document, space, extrusion=(0, -1, 0))
+
+
+def hatched(document, space):
+    for inner, outer, cuts in CUTS:
+        for begin, end in itertools.pairwise(cuts):
+            space.add_hatch().paths.add_polyline_path(sector(begin, end, inner, outer), is_closed=True)
+
+
+@pytest.mark.parametrize("draw", [two_rings, turned_over, upright, hatched])
+@pytest.mark.parametrize("chord_tolerance", [None, 1e-4])
+def test_outlines_cut_at_other_places_of_a_circle_share_its_chords(tmp_path, draw, chord_tolerance):
+    layout = read_layout(saved(tmp_path, draw), chord_tolerance=chord_tolerance)
+    shapes = [shapely.Polygon(ring) for ring in layout.outlines]
+    union = shapely.union_all(shapes, grid_size=1e-12)
+    # Without overlaps and gaps between the rings.
+    assert union.area == pytest.approx(sum(shape.area for shape in shapes), abs=1e-11)
+    assert not union.interiors
+    cuts = 0.5 * math.pi * (1.6**2 - 1.0)
+    if draw is hatched:
+        assert union.area == pytest.approx(cuts, rel=2e-3 if chord_tolerance is None else 1e-4)
+
+
+def test_a_circle_gets_the_corners_of_what_lies_against_it(tmp_path):
+    def draw(document, space):
+        space.add_circle((0, 0), 1.0)
+        ring = [sector(a, a + 50, 1.0, 2.0)[0] for a in (203, 153)]
+        space.add_lwpolyline([*ring, (-2, 2), (-2, -2)], format="xyb", close=True)
+        space.add_lwpolyline([(1, -1), (2, -1), (2, 1), (1, 1)], close=True)
+        space.add_line((-3, 0), (-3, 1))
+
+    circle = read_layout(saved(tmp_path, draw)).outlines[0]
+    at = np.radians([153, 203])
+    wanted = np.stack([np.cos(at), np.sin(at)], axis=1)
+    assert np.hypot(*(circle[:, None] - wanted).T).min(axis=1) == pytest.approx([0.0, 0.0], abs=1e-12)
+    # All other chords are within a thousandth of the radius, and no corner stands beside another.
+    assert np.hypot(*(circle - np.roll(circle, 1, axis=0)).T).max() < 0.09
+    assert np.hypot(*circle.T) == pytest.approx(1.0)
+
+
 def test_a_hatch_on_its_own_outline_is_one_block(tmp_path):
     def draw(document, space):
         space.add_lwpolyline(SQUARE, close=True)

@@ -1,7 +1,11 @@
 """SVG: shapes, paths, transforms, layers, units; and what is refused."""
 
+import itertools
+import math
+
 import numpy as np
 import pytest
+import shapely
 
 import solver
 from blockvis import read, read_layout, save_layout
@@ -133,6 +137,37 @@ def test_entities_are_refused_before_parsing(tmp_path):
     path.write_text("<html/>", encoding="utf-8")
     with pytest.raises(ValueError, match="root <html>, not <svg>"):
         read(path)
+
+
+def rings_of_arcs(cut):
+    """Path data of two rings of voussoirs around (0, 0), with corners rounded to ``cut`` digits."""
+
+    def place(radius, angle):
+        return f"{radius * math.cos(math.radians(angle)):.{cut}f} {-radius * math.sin(math.radians(angle)):.{cut}f}"
+
+    for r, s, cuts in ((1000, 1300, range(0, 181, 12)), (1300, 1600, (0, 16, 33, 49, 65, 82, 98, 115, 131, 147, 180))):
+        for a, b in itertools.pairwise(cuts):
+            yield f"M{place(r, a)}L{place(s, a)}A{s} {s} 0 0 0 {place(s, b)}L{place(r, b)}A{r} {r} 0 0 1 {place(r, a)}Z"
+
+
+@pytest.mark.parametrize("transform", ["", "scale(1.2 0.7)", "rotate(20) skewX(15)"])
+@pytest.mark.parametrize("chord_tolerance", [None, 1e-4])
+def test_outlines_cut_at_other_places_of_an_ellipse_share_its_chords(tmp_path, transform, chord_tolerance):
+    body = "".join(f'<g transform="scale(2)"><path d="{d}" transform="scale(0.5)"/></g>' for d in rings_of_arcs(9))
+    path = saved(tmp_path, f'<g transform="{transform}">{body}</g>')
+    shapes = [shapely.Polygon(ring) for ring in read_layout(path, chord_tolerance=chord_tolerance).outlines]
+    union = shapely.union_all(shapes, grid_size=1e-12)
+    areas = [sum(shape.area for shape in shapes), shapely.Polygon(union.exterior).area]
+    assert [union.area] * 2 == pytest.approx(areas, abs=1e-9)
+
+
+def test_arcs_of_rounded_coordinates_share_their_corners(tmp_path):
+    path = saved(tmp_path, "".join(f'<path d="{d}"/>' for d in rings_of_arcs(2)))
+    shapes = [shapely.Polygon(ring) for ring in read_layout(path).outlines]
+    # Rounded by 5 µm; chords of their own would overlap by up to 1.6 mm.
+    i, j = shapely.STRtree(shapes).query(shapes, "intersects")
+    overlaps = shapely.intersection(np.array(shapes)[i[i < j]], np.array(shapes)[j[i < j]])
+    assert shapely.area(overlaps).max() < 4e-6
 
 
 def test_one_curve_has_a_bounded_number_of_chords(tmp_path):

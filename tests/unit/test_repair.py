@@ -1,5 +1,9 @@
 """Duplicates and overlaps."""
 
+import itertools
+import math
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from structures import drawn
@@ -31,3 +35,29 @@ def test_supports_may_overlap_each_other_and_keep_their_place(tmp_path):
 def test_tolerance_is_checked(tmp_path, tolerance):
     with pytest.raises(ValueError, match="overlap_tolerance is"):
         read(drawn(tmp_path / "a.json", [SQUARE]), overlap_tolerance=tolerance)
+
+
+def ring_of_chords(inner, outer, cuts):
+    """Voussoirs between two circles, each arc in chords of its own."""
+    for a, b in itertools.pairwise(cuts):
+        angles = np.radians(np.linspace(a, b, math.ceil((b - a) / 5.1257) + 1))
+        on_circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        yield np.concatenate([outer * on_circle, inner * on_circle[::-1]])
+
+
+def test_chords_of_one_circle_that_cross_each_other_are_parted(tmp_path):
+    # The edges of two chords that cross face each other nowhere for half of their length.
+    outer = [0, 13, 29, 47, 61, 83, 104, 127, 150, 163, 180]
+    rings = [*ring_of_chords(1.0, 1.3, np.linspace(0, 180, 10)), *ring_of_chords(1.3, 1.6, outer)]
+    with pytest.warns(UserWarning, match=r"18 overlaps of up to 0\.00105 m were cut away"):
+        assembly = read(drawn(tmp_path / "a.json", rings))
+    width = float(np.median(assembly.widths))
+    assert not len(assembly.shapes.overlaps(assembly.vertices, 1e-7 * width)[0])
+
+
+def test_overlaps_that_stay_are_not_said_to_be_cut(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        "blockvis.layout.repair.close_joints", lambda outlines, *_, **__: SimpleNamespace(outlines=outlines)
+    )
+    with pytest.warns(UserWarning, match=r"1 overlaps of up to 0\.01 m could not be cut away"):
+        read(drawn(tmp_path / "a.json", [SQUARE, SQUARE + np.array([0.99, 0.0])]))

@@ -251,7 +251,7 @@ def _between_faces(
     found = found.chosen(~(anchored[edges.block[found.edge_a]] & anchored[edges.block[found.edge_b]]))
     closed = CLOSED * scale
     n_open = int((np.abs(found.gaps).max(axis=1) > closed).sum()) if len(found) else 0
-    if n_open == 0:
+    if n_open == 0 and overlap == 0.0:
         return Closing(tuple(outlines), 0, 0, 0.0)
     lines, uncommon = common_lines(found, edges, anchored, closed)
     base = _without_repeats(moved_outlines(edges, lines, LONGEST_MITRE * max(thickness, overlap)), closed)
@@ -262,7 +262,7 @@ def _between_faces(
         outlines=tuple(outlines[i] if anchored[i] else ring + origin for i, ring in enumerate(final)),
         n_joints=n_open,
         n_cut=len(uncommon),
-        largest_gap=float(found.gaps.max()),
+        largest_gap=float(found.gaps.max(initial=0.0)),
     )
 
 
