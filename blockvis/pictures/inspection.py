@@ -146,7 +146,7 @@ def _findings(inspection: Inspection, deep: Sequence[tuple[int, int, float]]) ->
     size = " × ".join(f"{length:.4g}" for length in inspection.high - inspection.low)
     said = [f"{size} m"]
     thickness = f"joint_thickness {inspection.joint_thickness * 1e3:g} mm"
-    if len(inspection.joints):
+    if len(inspection.joints) and inspection.joint_thickness:
         said.append(f"{thickness} found")
     if inspection.open_joints:
         said.append(f"open joints: {len(inspection.open_joints)}, {thickness} closes them")

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from structures import drawn
 
 import solver
 from blockvis import inspect, save_layout
@@ -41,6 +42,20 @@ def test_numbers(layout):
     assert 'joint_thickness = 0.01   (m, or "auto")' in text
     assert "c = b" in text
     assert re.search(r"roles +'free' 3, 'fixed' 1", text)
+
+
+@pytest.mark.parametrize(("gaps", "proposed"), [((0.0, 0.0, 0.02, 0.02), 0.0), ((0.0, 0.02, 0.04, 0.06), 0.02)])
+def test_a_crack_in_a_wall_whose_joints_touch_is_no_mortar(tmp_path, gaps, proposed):
+    brick = np.array([[0, 0], [0.4, 0], [0.4, 0.2], [0, 0.2]])
+    # Straight through all courses, or all head joints open on bed joints that touch.
+    rings = [brick + np.array([0.4 * i + gaps[i], 0.2 * course]) for course in range(10) for i in range(4)]
+    wall = drawn(tmp_path / "wall.json", rings)
+    found = inspect(wall)
+    assert found.joint_thickness == pytest.approx(proposed)
+    assert ("proposed        nothing: gaps are 9." in str(found)) == (proposed == 0.0)
+    assert main(["new", str(wall), "-o", str(tmp_path / "wall.toml")]) == 0
+    written = '\njoint_thickness = "auto"' in (tmp_path / "wall.toml").read_text(encoding="utf-8")
+    assert written == (proposed > 0.0)
 
 
 def test_picture(layout, tmp_path):

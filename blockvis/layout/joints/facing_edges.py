@@ -267,3 +267,17 @@ def straight_share(outlines: Sequence[np.ndarray], found: Facing) -> float:
     narrower = np.minimum(widths[edges.block[found.edge_a]], widths[edges.block[found.edge_b]])
     straight = (cosine > math.cos(PARALLEL)) | (found.lengths > LONG * narrower)
     return float(found.lengths[straight].sum() / found.lengths.sum())
+
+
+def open_share(outlines: Sequence[np.ndarray], found: Facing) -> float:
+    """Share of the length of all joints, those that touch included, that stretches with a gap have; 1 without joints.
+
+    Parameters
+    ----------
+    outlines : sequence of (n, 2) arrays [m]
+    found : Facing
+        Stretches with a gap, as of :func:`proposed_thickness`.
+    """
+    touching = 10 * CLOSED * float(np.ptp(np.concatenate(outlines), axis=0).max())
+    every = float(found.lengths.sum() + facing_edges(outlines, touching, touching).lengths.sum())
+    return float(found.lengths.sum()) / every if every > 0.0 else 1.0
