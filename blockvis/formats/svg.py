@@ -47,8 +47,12 @@ _COMMENT = re.compile(r"/\*.*?\*/|<!--|-->", re.DOTALL)
 _AT_RULE = re.compile(r"@[^@{};]*(?:;|\{(?:[^{}]|\{[^{}]*\})*\})")
 _SELECTOR = re.compile(r"(\*|[a-zA-Z][\w-]*)?((?:[.#][\w-]+)*)")
 #: Properties by which shapes are read, chosen or left out.
-_READ = re.compile(r"(?:^|[;{])\s*(?:display|visibility|fill|stroke|transform)\s*:", re.IGNORECASE)
+_READ = re.compile(r"(?:^|[;{])\s*(?:display|visibility|opacity|fill|stroke|transform)\s*:", re.IGNORECASE)
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
+
+#: What paints nothing, and opacities of what nobody sees.
+_NO_PAINT = ("none", "transparent")
+_CLEAR = re.compile(r"0*\.?0+%?")
 
 #: Layer on which blocks are written that have no group, role as a support or material.
 _LAYER = "blocks"
@@ -128,7 +132,8 @@ def read(path: Path, reading: Reading) -> Layout:
     _walk(root, _Context(np.eye(3), (), tolerance, path), found)
     faces = _with_loose(found, reading, tolerance)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
-        rest = "; ".join(words for words in (nothing_closed(faces), *_pattern_fills(root)) if words)
+        said = (nothing_closed(faces), *passed_over(found.skipped), *_pattern_fills(root))
+        rest = "; ".join(words for words in said if words)
         raise Refused(
             f"'{path}' has no closed shape{f': {rest}' if rest else ''}; draw each block as a closed path or polygon",
             Layout((), (), unit=stated, left_out=tuple(item.mapped((1.0, -1.0)) for item in found.left_out)),
@@ -324,7 +329,7 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> No
     tag = _tag(element)
     if tag in ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata"):
         return
-    if _style(element, "display") == "none":
+    if _style(element, "display") == "none" or _CLEAR.fullmatch(_style(element, "opacity")):
         found.skipped[f"hidden <{tag}>"] += 1
         return
     if tag == "use":
@@ -346,7 +351,8 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> No
         where = replace(where, layers=(*where.layers, label) if label else where.layers, label=named or where.label)
     shape = _SHAPES.get(tag)
     found.clipped.update(f"<{tag}> with a {key}" for key in ("clip-path", "mask") if "url(" in _style(element, key))
-    if shape is not None and where.visibility != "visible":
+    unpainted = where.fill in _NO_PAINT and where.stroke in _NO_PAINT
+    if shape is not None and (where.visibility != "visible" or unpainted):
         found.skipped[f"hidden <{tag}>"] += 1
     elif shape is not None:
         try:
@@ -444,7 +450,7 @@ def _colour(where: _Context) -> tuple[str, ...]:
     """Give the colour of a shape as #rrggbb, that of its fill or else of its stroke; none where it has none."""
     from PIL import ImageColor
 
-    word = where.stroke if where.fill in ("none", "transparent") else where.fill
+    word = where.stroke if where.fill in _NO_PAINT else where.fill
     try:
         return ("#{:02x}{:02x}{:02x}".format(*ImageColor.getrgb(word)[:3]),)
     except ValueError:

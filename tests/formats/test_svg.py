@@ -111,6 +111,18 @@ def test_what_a_style_sheet_says_of_shapes_is_read(tmp_path):
     assert read_layout(path, ignore=["#E30613"]).n_blocks == 4
 
 
+def test_what_nobody_sees_is_no_block(tmp_path):
+    body = """<g style="fill:none"><rect width="9" height="9"/><rect y="10" width="9" height="9" stroke="red"/>
+        <rect y="20" width="9" height="9" style="stroke:transparent"/></g><rect y="30" width="9" height="9"/>
+        <g opacity="0.0"><rect y="40" width="9" height="9"/></g><path d="M0 50H9V59H0Z" style="opacity:0"/>
+        <rect y="60" width="9" height="9" opacity="0.05"/><rect y="70" width="9" height="9" fill="none"/>"""
+    layout = read_layout(saved(tmp_path, body, 'viewBox="0 0 200 100"'))
+    assert [ring[:, 1].max() for ring in layout.outlines] == [-10, -30, -60]
+    assert "skipped: 3 hidden <rect>, 1 hidden <g>, 1 hidden <path>" in layout.notes
+    with pytest.raises(ValueError, match="no closed shape: skipped: 1 hidden <rect>; draw each block"):
+        read_layout(saved(tmp_path, '<rect width="9" height="9" opacity="0%"/>'))
+
+
 def test_what_a_style_sheet_says_of_other_selectors_is_missed_in_a_note(tmp_path):
     sheet = (
         "<style>g > rect{display:none} @media print {.a{fill:red}} g text{font-size:2px} .a:hover{stroke:red}</style>"
