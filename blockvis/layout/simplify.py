@@ -7,6 +7,8 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from solver.mechanics import counted
+
 from .joints.trimming import overlapping, with_corners_on_edges
 from .linked import linked
 
@@ -40,7 +42,7 @@ def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[n
     -------
     outlines : list of (n, 2) arrays [m]
     note : str
-        What was dropped; "" for nothing.
+        What was dropped, and which blocks could not be simplified; "" for nothing.
 
     Notes
     -----
@@ -52,21 +54,22 @@ def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[n
         return list(outlines), ""
     points, around = _shared_corners(outlines)
     chains = [_chains(ids, points, nodes) for nodes in [_nodes(around, len(points))] for ids in around]
-    kept: set[int] = set()
-    for _ in range(4):
-        found = _shortened(chains, kept, points, tolerance)
-        bad = _spoilt(found, outlines, tolerance) - kept
-        if not bad:
-            break
+    kept = set[int]()
+    found = _shortened(chains, kept, points, tolerance)
+    # Blocks that keep their corners may now overlap others, which then keep theirs, too.
+    while bad := _spoilt(found, outlines, tolerance) - kept:
         kept |= bad
-    else:
-        return list(outlines), ""
+        found = _shortened(chains, kept, points, tolerance)
     after = sum(map(len, found))
+    spoilt = counted(len(kept), "block")
     if after >= before:
-        return list(outlines), ""
+        fine = f"outlines are finer than needed, {before} corners of {len(outlines)} blocks, and stay so: simplified "
+        said = f"{fine}within {tolerance:.2g} m (outline_tolerance) {spoilt} would fold or overlap others"
+        return list(outlines), said if kept and before > FINE * len(outlines) else ""
+    rest = f"; {spoilt} that would fold or overlap others kept all of them" if kept else ""
     return found, (
         f"outlines were finer than needed: {before} corners of {len(outlines)} blocks were simplified to {after} "
-        f"within {tolerance:.2g} m (outline_tolerance; 0 keeps every corner)"
+        f"within {tolerance:.2g} m (outline_tolerance; 0 keeps every corner){rest}"
     )
 
 

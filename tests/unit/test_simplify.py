@@ -63,6 +63,21 @@ def test_a_thin_block_is_not_folded(tmp_path):
     assert shapely.Polygon(found[0]).area > 0.8 * shapely.Polygon(arch).area
 
 
+def test_where_nothing_can_be_simplified_that_is_said(tmp_path):
+    def sector(inner, outer, begin, end):
+        angles = np.radians(np.linspace(begin, end, 2 + int((end - begin) / 0.2)))
+        on_circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        return np.concatenate([outer * on_circle, inner * on_circle[::-1]])
+
+    # Of chords that only nearly coincide each side would be simplified for itself, across the other one.
+    rings = [sector(1.0, 1.3, 0, 20), sector(1.3, 1.6, 0, 9), sector(1.3, 1.6, 9, 20)]
+    with pytest.warns(UserWarning, match=r"finer than needed, 412 corners of 3 blocks, and stay so: .* 3 blocks would"):
+        assert simplified(tmp_path, rings)[1] >= 412
+    apart = [*rings, sector(1.0, 1.6, 90, 120)]
+    with pytest.warns(UserWarning, match=r"716 corners .* simplified to 426 .*; 3 blocks that would fold or overlap"):
+        assert simplified(tmp_path, apart)[1] < 900
+
+
 def test_assembling_notes_it_and_the_caller_decides(tmp_path):
     path = drawn(tmp_path / "a.json", split_square(200))
     with pytest.warns(
