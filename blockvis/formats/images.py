@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,9 @@ MOST_SPECKS, SPECKS_OF_ONE = 200, 4
 
 #: Holes of no more than this fraction of a stone are filled.
 PINHOLES = 0.01
+
+#: A region of so many times the median area may be an opening; so many are named.
+MAYBE_OPENING, NAMED = 8.0, 3
 
 #: What makes masks of photographs.
 MASK_MAKERS = "by hand GIMP, labelme or CVAT, by a model SAM"
@@ -116,6 +119,8 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
     if filled:
         text = f"pinholes were filled, each less than {100 * PINHOLES:g} % of its stone, of {len(filled)}, the first "
         notes = (*notes, Note(CHANGED, f"{text}'{names[filled[0]]}'"))
+    if labels.is_mask and not (reading.ignore or reading.only):
+        notes = (*notes, *_maybe_openings(rings, names, holes))
     layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit, notes=notes)
     _check_holes(path, labels, regions, holes)
     around = {}
@@ -181,6 +186,33 @@ def _check_sizes(path: Path, regions: Regions, placement: Placement) -> None:
 def _hole_share(ring: np.ndarray, holes: tuple[np.ndarray, ...]) -> float:
     """Fraction of an outline that is holes."""
     return sum(abs(ring_area(hole)) for hole in holes) / abs(ring_area(ring))
+
+
+def _maybe_openings(rings: Sequence[np.ndarray], names: Sequence[str], holed: Collection[int]) -> list[str]:
+    """Doubt the largest regions of a mask: of a drawing of lines, on its paper, openings are regions as stones are."""
+    areas = np.array([abs(ring_area(ring)) for ring in rings])
+    stones = np.array([k for k in range(len(rings)) if k not in holed])
+    if not len(stones):
+        return []
+    paper, median = int(areas.argmax()), float(np.median(areas[stones]))
+    order = stones[np.argsort(-areas[stones])]
+    large = order[areas[order] >= MAYBE_OPENING * median]
+    if paper in holed:
+        why = f"paper around lines, '{names[paper]}', was left out, and blocks are what lines enclose, openings, too"
+        large = large if len(large) else order[:1]
+    elif len(large):
+        why = "regions far larger than others count as blocks"
+    else:
+        return []
+    listed = ", ".join(
+        f"'{names[k]}' around ({x:.4g}, {y:.4g}) of {areas[k] / median:.2g} times the median area"
+        for k in large[:NAMED].tolist()
+        for x, y in [(rings[k].min(axis=0) + rings[k].max(axis=0)) / 2.0]
+    )
+    more = f" and {len(large) - NAMED} more" if len(large) > NAMED else ""
+    remedy = f'leave out what is an opening: ignore = ["{names[large[0]]}"]'
+    text = f"{why}; the largest: {listed}{more}; {remedy}"
+    return [Note(CHANGED, text) if paper in holed else text]
 
 
 def _turned(ring: np.ndarray) -> np.ndarray:

@@ -364,6 +364,32 @@ def test_charts_and_shaded_drawings_are_refused_unless_their_specks_are_said(tmp
     assert read_layout(tmp_path / "chart.png", width=3.0, smallest=0.1).n_blocks == n
 
 
+def test_of_a_drawing_of_lines_the_largest_regions_may_be_openings(tmp_path):
+    image = Image.new("L", (340, 260), 255)
+    draw = ImageDraw.Draw(image)
+    stones = [(20 + 30 * i, 20 + 20 * j, 50 + 30 * i, 40 + 20 * j) for i in range(10) for j in range(11)]
+    door = (140, 120, 200, 240)
+    for box in [door, *(box for box in stones if not (140 <= box[0] < 200 and box[1] >= 120))]:
+        draw.rectangle(box, outline=0, width=2)
+    image.save(tmp_path / "lines.png")
+    layout = read_layout(tmp_path / "lines.png", pixel=0.01)
+    areas = [abs(float(np.cross(ring, np.roll(ring, -1, axis=0)).sum())) / 2.0 for ring in layout.outlines]
+    opening = layout.names[int(np.argmax(areas))]
+    (note,) = (note for note in layout.notes if "what lines enclose" in note)
+    assert note.startswith("paper around lines, 'stone 1', was left out")
+    assert f"the largest: '{opening}' around (1.705, 0.795)" in note
+    assert note.endswith(f'leave out what is an opening: ignore = ["{opening}"]')
+    with pytest.warns(UserWarning, match="paper around lines"):
+        read(tmp_path / "lines.png", pixel=0.01)
+    rest = read_layout(tmp_path / "lines.png", pixel=0.01, ignore=[opening])
+    assert rest.n_blocks == layout.n_blocks - 1
+    assert not any("what lines enclose" in note for note in rest.notes)
+    # Without paper around, as in a mask, it is a remark only.
+    image.crop((21, 21, 320, 240)).save(tmp_path / "cut.png")
+    notes = read_layout(tmp_path / "cut.png", pixel=0.01).notes
+    assert any(note.startswith("regions far larger than others count as blocks; the largest: '") for note in notes)
+
+
 def test_a_pinhole_does_not_lose_its_stone(tmp_path):
     image, n = drawn_wall()
     ImageDraw.Draw(image).rectangle((40, 30, 43, 33), fill=0)
