@@ -13,9 +13,9 @@ import numpy as np
 
 from blockvis.layout.outlines import chords_of, sagitta
 
-#: A corner lies on an arc within this fraction of the size of the drawing: thinner than any joint, more than what
-#: rounding of coordinates leaves.
-ON_ARC = 1e-5
+#: A corner lies on an arc within this fraction of the size of the median outline with arcs: less than the width of any
+#: joint, more than what rounding of coordinates leaves.
+ON_ARC = 1e-4
 
 #: Ellipses with half axes of a larger ratio are lines.
 FLATTEST = 1e6
@@ -87,7 +87,7 @@ def with_shared_corners(
     if not own:
         return list(curves)
     seen = [curve[:, :2] for curve in curves]
-    meets = ON_ARC * float(np.ptp(np.concatenate(seen), axis=0).max())
+    meets = ON_ARC * float(np.median([np.ptp(seen[k], axis=0).max() for k, _ in own]))
     corners = _corners(seen, arcs, meets)
     drawn = [
         shapely.LineString(np.take(seen[k], np.arange(arc.first, arc.first + arc.chords + 1), axis=0, mode="wrap"))
@@ -102,6 +102,7 @@ def with_shared_corners(
     along = (np.sign(sweep) * (np.arctan2(y, x) - np.array([arc.start for _, arc in own])[which])) % (2.0 * np.pi)
     ends = np.array([shapely.get_coordinates(line)[[0, -1]] for line in drawn])[which]
     apart = np.hypot(*np.moveaxis(corners[corner][:, None] - ends, -1, 0)).min(axis=1)
+    # Towards the centre, which of an ellipse is no less than the distance.
     beside = np.abs(1.0 - 1.0 / np.maximum(np.hypot(x, y), 1e-9)) * np.hypot(*outward.T)
     on = np.flatnonzero((beside <= meets) & (along < np.abs(sweep)) & (apart > meets))
     on = on[np.lexsort((along[on], which[on]))]
@@ -126,6 +127,6 @@ def _corners(curves: Sequence[np.ndarray], arcs: Sequence[Sequence[Arc]], meets:
     for curve, of_curve in zip(curves, arcs, strict=True):
         inner = [np.arange(arc.first + 1, arc.first + arc.chords) for arc in of_curve]
         kept.append(np.delete(curve, np.concatenate(inner), axis=0) if inner else curve)
-    corners = np.concatenate(kept)
+    corners = np.unique(np.concatenate(kept), axis=0)
     earlier, later = cKDTree(corners).query_pairs(meets, output_type="ndarray").T
     return np.delete(corners, np.maximum(earlier, later), axis=0)
