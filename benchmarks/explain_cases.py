@@ -26,7 +26,7 @@ import numpy as np
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.cases.profiles import Profile, cut_ground
+from blockvis.cases.profiles import Profile, bearing_points, by_bearing, cut_ground
 from blockvis.explanation.candidates import (
     IN_PLANE,
     Candidate,
@@ -172,7 +172,9 @@ def movement(structure: Structure, case: Case) -> tuple[solver.Assembly, Mapping
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             assembly = cut_ground(assembly, (), chosen=supports)
-        motions = motions.motions(assembly, np.flatnonzero(~assembly.free).tolist(), (0.0, -1.0))
+        supports = np.flatnonzero(~assembly.free).tolist()
+        rows = motions.motions(bearing_points(assembly, supports)[:, 0], (0.0, -1.0)).tolist()
+        motions = {assembly.names[i]: tuple(row) for i, row in zip(supports, rows, strict=True)}
     else:
         if isinstance(motions, tuple):
             motions = rotation_of(assembly, (motions[0],), (motions[1],))
@@ -195,7 +197,7 @@ def observed(structure: Structure, case: Case, seed: int) -> Rows:
     # The amount of a rotation is its angle.
     turn = abs(next(iter(motions.values()))[2])
     limit = case.amount / turn if isinstance(case.motion, tuple) else case.amount
-    settlement = solver.Settlement(profile=motions, increment=limit / INCREMENTS, limit=limit)
+    settlement = solver.Settlement(**by_bearing(assembly, motions), increment=limit / INCREMENTS, limit=limit)
     controls = solver.Controls(falling_frames=0)
     response = solver.settle(assembly, settlement, friction_coefficient=structure.friction[1], controls=controls)
     if response.stop is not solver.Status.LIMIT_REACHED:

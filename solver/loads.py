@@ -16,7 +16,6 @@ from .kinematics import (
     composed_rotations,
     cross_rows,
     dimension_of,
-    moved,
     rotation_count,
     turned,
     turned_moments,
@@ -62,12 +61,10 @@ class Loads:
 
     def with_forces(self, assembly: Assembly, forces: PointForces, kind: str = "dead") -> Loads:
         """Add forces at points that go with their blocks to the dead or, by ``kind``, the live loads."""
-        load, arms = forces.load(assembly), forces.arms(assembly)
-        if kind == "dead":
-            return replace(self, dead=self.dead + load, dead_arms=added(self.dead_arms, arms))
-        if kind != "live":
+        if kind not in ("dead", "live"):
             raise ValueError(f"kind of the forces is {kind!r}; it is 'dead' or 'live'")
-        return replace(self, live=self.live + load, live_arms=added(self.live_arms, arms))
+        arms = added(getattr(self, f"{kind}_arms"), forces.arms(assembly))
+        return replace(self, **{kind: getattr(self, kind) + forces.load(assembly), f"{kind}_arms": arms})
 
     def total(self, multiplier: float = 0.0) -> np.ndarray:
         """(n_blocks, n_dof) array: dead load + multiplier · live load."""
@@ -168,6 +165,8 @@ class Settlement:
     profile : mapping of str to (n_dof,) sequence, optional [m and rad]
         Instead of one motion for all: how each support, by its name, moves and turns about its own centroid. Only the
         proportions count: s is the largest displacement of a centroid, or the largest angle where none moves.
+    profile_arms : mapping of str to (d,) sequence, optional [m]
+        From the centroid of a support, as drawn, to the point that moves by the profile, and about which it turns.
 
     Raises
     ------
@@ -186,11 +185,12 @@ class Settlement:
     rotation_axis: Sequence[float] | None = None
     radial_from: Sequence[float] | None = None
     profile: Mapping[str, Sequence[float]] | None = None
+    profile_arms: Mapping[str, Sequence[float]] | None = None
 
     def __post_init__(self) -> None:
         """Check the values; make the direction a unit vector, and the rotation without one a sign."""
         make_plain(self)
-        if self.profile is not None:
+        if self.profile is not None or self.profile_arms is not None:
             self._check_profile()
         elif self.direction is None and self.rotation_centre is None and self.radial_from is None:
             raise ValueError("a settlement needs a direction, or a rotation_centre and rotation")
@@ -240,6 +240,11 @@ class Settlement:
         largest = 1.0 if abs(largest - 1.0) < 1e-12 else largest
         scaled = {name: tuple((motion / largest).tolist()) for name, motion in motions.items()}
         object.__setattr__(self, "profile", scaled)
+        arms = {name: numbers_of(arm, f"profile_arms of '{name}'") for name, arm in (self.profile_arms or {}).items()}
+        for name, arm in arms.items():
+            if name not in scaled or arm.shape != (d,) or not np.isfinite(arm).all():
+                raise ValueError(f"profile_arms of '{name}' are {arm.tolist()}; give {d} numbers, of a moving support")
+        object.__setattr__(self, "profile_arms", {name: tuple(arm.tolist()) for name, arm in arms.items()} or None)
 
     @property
     def unit(self) -> str:
@@ -261,17 +266,13 @@ class Settlement:
         blocks = self.blocks if self.profile is None else tuple(self.profile)
         if blocks is None:
             return assembly.moving
-        chosen = np.zeros(assembly.n_blocks, dtype=bool)
-        chosen[[assembly.index(name) for name in blocks]] = True
-        return chosen & assembly.moving
+        return chosen_blocks(assembly, [assembly.index(name) for name in blocks]) & assembly.moving
 
     def displaced(self, assembly: Assembly, start: Pose, s: float) -> Pose:
         """Displace the moving supports by s from where they are in ``start``.
 
         Rotations follow the true arc about the (travelling) centre.
         """
-        if self.profile is not None:
-            return moved(start, s * self.rate(assembly, start, s))
         part = self.taking_part(assembly)
         positions, rotations = start.positions.copy(), start.rotations.copy()
         travel, angle, centre = self._motion(assembly, start, part, s)
@@ -284,16 +285,10 @@ class Settlement:
         """(n_blocks, n_dof) array: velocity of each support per unit of s, at s; zero for other blocks."""
         part, d = self.taking_part(assembly), assembly.dimension
         rate = _no_load(assembly)
-        if self.profile is not None:
-            for name, motion in self.profile.items():
-                rate[assembly.index(name)] = motion
-            return np.where(part[:, None], rate, 0.0)
         _, angle, centre = self._motion(assembly, start, part, s)
-        rate[part, :d], spin, _ = self._motion(assembly, start, part, 1.0)
-        if self.rotation_centre is not None:
-            arm = turned(start.positions[part] - centre, np.broadcast_to(angle, (int(part.sum()), len(angle))))
-            rate[part, :d] += np.einsum("nrd,r->nd", cross_rows(arm), spin)
-            rate[part, d:] = spin
+        rate[part, :d], rate[part, d:], _ = self._motion(assembly, start, part, 1.0)
+        arm = turned(start.positions[part] - centre, np.broadcast_to(angle, rate[part, d:].shape))
+        rate[part, :d] += np.einsum("nrd,nr->nd", cross_rows(arm), rate[part, d:])
         return rate
 
     def check_dimension(self, assembly: Assembly) -> None:
@@ -308,8 +303,13 @@ class Settlement:
     def _motion(
         self, assembly: Assembly, start: Pose, part: np.ndarray, s: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Give the translation, one or (n_part, d), the rotation vector and its centre at s."""
+        """Give the translation, the rotation vector and its centre at s, each one or a row for each of the supports."""
         d = assembly.dimension
+        if self.profile is not None:
+            names, arms = [assembly.names[k] for k in np.flatnonzero(part)], self.profile_arms or {}
+            motion = s * np.reshape([self.profile[name] for name in names], (len(names), d + rotation_count(d)))
+            arm = np.reshape([arms.get(name, (0.0,) * d) for name in names], (len(names), d))
+            return motion[:, :d], motion[:, d:], start.positions[part] + turned(arm, start.rotations[part])
         travel, angle = np.zeros(d), np.zeros(rotation_count(d))
         if self.direction is not None:
             travel = s * np.asarray(self.direction)
@@ -406,13 +406,11 @@ def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: Array
     -------
     (n_blocks, n_dof) array [N, N·m]
     """
-    load, parts = _no_load(assembly), numbers_of(fraction, "a fraction of the weight")
+    load, parts, d = _no_load(assembly), numbers_of(fraction, "a fraction of the weight"), assembly.dimension
     chosen = slice(None) if blocks is None else chosen_blocks(assembly, blocks)
-    if parts.shape != (assembly.dimension,):
-        raise ValueError(
-            f"a fraction of the weight is {parts.tolist()}; give {assembly.dimension} numbers, one per axis"
-        )
-    load[chosen, : assembly.dimension] = (assembly.masses * GRAVITY)[chosen, None] * parts
+    if parts.shape != (d,):
+        raise ValueError(f"a fraction of the weight is {parts.tolist()}; give {d} numbers, one per axis")
+    load[chosen, :d] = (assembly.masses * GRAVITY)[chosen, None] * parts
     return load
 
 

@@ -76,28 +76,45 @@ class Profile:
         chord = values[0] + (values[-1] - values[0]) * np.linspace(0.0, 1.0, 101)
         return bool(np.abs(values - chord).max() > STRAIGHT * scale)
 
-    def motions(
-        self, assembly: solver.Assembly, blocks: Sequence[int], direction: tuple[float, float]
-    ) -> dict[str, tuple[float, float, float]]:
-        """Motion of each support: the value at its centroid along a direction, and the tilt of the ground there.
+    def motions(self, x: np.ndarray, direction: Sequence[float]) -> np.ndarray:
+        """(n, 3) array: the motion of ground at places x, (n,) [m]: its value along a unit vector, and its tilt."""
+        value, slope = self.value(x), self.slope(x)
+        return np.stack([value * direction[0], value * direction[1], slope * direction[1]], axis=1) + 0.0
 
-        Parameters
-        ----------
-        assembly : solver.Assembly
-        blocks : sequence of int
-            Supports.
-        direction : (float, float)
-            Unit vector in which the ground goes.
-        """
-        x = assembly.centroids[list(blocks), 0]
-        table = (
-            np.stack([self.value(x) * direction[0], self.value(x) * direction[1], self.slope(x) * direction[1]], 1)
-            + 0.0
-        )
-        return {
-            assembly.names[b]: (float(dx), float(dy), float(turn))
-            for b, (dx, dy, turn) in zip(blocks, table.tolist(), strict=True)
-        }
+
+def bearing_points(assembly: solver.Assembly, supports: Sequence[int | Sequence[int]]) -> np.ndarray:
+    """Find the middle of where free blocks stand on each support, or group of supports; of its top where none does.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    supports : sequence of int or of sequences of int
+
+    Returns
+    -------
+    (n, d) array [m]
+    """
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 2.0 * TOUCHING * assembly.block_size)
+    found = []
+    for one in supports:
+        on_a, on_b = np.isin(contacts.block_a, one), np.isin(contacts.block_b, one)
+        carrying = on_a & assembly.free[contacts.block_b] | on_b & assembly.free[contacts.block_a]
+        points, corners = contacts.points[carrying], assembly.vertices[np.isin(assembly.block_of_vertex, one)]
+        if not len(points):
+            points = np.stack([corners.min(axis=0), corners.max(axis=0)])
+            points[:, -1] = corners[:, -1].max()
+        found.append((points.min(axis=0) + points.max(axis=0)) / 2.0)
+    return np.array(found).reshape(-1, assembly.dimension)
+
+
+def by_bearing(assembly: solver.Assembly, motions: Mapping[str, Sequence[float]]) -> dict[str, Any]:
+    """Make the keywords of a :class:`solver.Settlement` whose supports move at :func:`bearing_points`, not centroids.
+
+    How deep a support is drawn then counts for nothing.
+    """
+    blocks = [assembly.index(name) for name in motions]
+    arms = bearing_points(assembly, blocks) - assembly.centroids[blocks]
+    return {"profile": motions, "profile_arms": dict(zip(motions, arms.tolist(), strict=True))}
 
 
 def _depth(table: Table, key: Key) -> float | None:
@@ -229,10 +246,11 @@ def with_profiles(
             found.append(_on_every_support(settlement, assembly, where))
             continue
         blocks = np.flatnonzero(settlement.taking_part(assembly)).tolist()
-        motions = profile.motions(assembly, blocks, settlement.direction)  # type: ignore[arg-type]
-        if not any(any(motion) for motion in motions.values()):
+        motions = profile.motions(bearing_points(assembly, blocks)[:, 0], settlement.direction or ())
+        if not motions.any():
             raise ValueError(f"{where} moves none of the {counted(len(blocks), 'support')}; look at its places x")
-        found.append(replace(settlement, direction=None, blocks=None, profile=motions))
+        by_name = dict(zip([assembly.names[b] for b in blocks], motions.tolist(), strict=True))
+        found.append(replace(settlement, direction=None, blocks=None, **by_bearing(assembly, by_name)))
     return tuple(found)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 import solver
 from blockvis.cases.explain_settings import DIRECTIONS, ExplainSettings
-from blockvis.cases.profiles import Profile, cut_ground
+from blockvis.cases.profiles import Profile, bearing_points, cut_ground
 from blockvis.layout.names import blocks_called
 from blockvis.text import nearest
 from solver import mechanics
@@ -69,7 +69,7 @@ class Candidate:
     cause : str
         In words; candidates of one cause differ in parameters that the cause leaves open.
     motions : mapping of str to (n_dof,) tuple [m and rad]
-        Motion of each support that takes part, as of :class:`solver.Settlement`.
+        Motion of each support that takes part, at the middle of where it carries something.
     prior : float
         Weight before anything was observed, relative to other causes; shared by the candidates of the cause.
     detail : str
@@ -309,15 +309,11 @@ def rotation_of(
 ) -> dict[str, tuple[float, ...]]:
     """Turn supports as one body about the middle of where they carry something, by a rotation (n_rot,)."""
     blocks = [assembly.index(piece) for piece in pieces]
-    contacts = _touching(assembly)
-    here = np.isin(contacts.block_a, blocks) | np.isin(contacts.block_b, blocks)
-    low, high = contacts.points[here].min(axis=0), contacts.points[here].max(axis=0)
-    middle = solver.Pose(
-        np.broadcast_to((low + high) / 2.0, (len(blocks), assembly.dimension)), np.zeros((len(blocks), len(spin)))
-    )
-    rate = np.concatenate([np.zeros_like(middle.positions), np.tile(spin, (len(blocks), 1))], axis=1)
-    speeds = mechanics.point_velocities(assembly.centroids[blocks], np.arange(len(blocks)), middle, rate)
-    return {assembly.names[i]: (*row, *spin) for i, row in zip(blocks, speeds.tolist(), strict=True)}
+    points, centre = bearing_points(assembly, blocks), bearing_points(assembly, [blocks])
+    middle = solver.Pose(np.repeat(centre, len(blocks), axis=0), np.zeros((len(blocks), len(spin))))
+    rate = np.concatenate([np.zeros_like(points), np.tile(spin, (len(blocks), 1))], axis=1)
+    speeds = mechanics.point_velocities(points, np.arange(len(blocks)), middle, rate) + 0.0
+    return {piece: (*row, *spin) for piece, row in zip(pieces, speeds.tolist(), strict=True)}
 
 
 def _troughs(ground: Ground, settings: ExplainSettings) -> list[Candidate]:
@@ -354,8 +350,9 @@ def trough(ground: Ground, centre: float, inflection: float, refines: str = "") 
 
 
 def _by_profile(ground: Ground, profile: Profile) -> Motions:
-    blocks = [ground.assembly.index(piece) for pieces in ground.pieces.values() for piece in pieces]
-    return profile.motions(ground.assembly, blocks, (0.0, -1.0))
+    names = [piece for pieces in ground.pieces.values() for piece in pieces]
+    x = bearing_points(ground.assembly, [ground.assembly.index(name) for name in names])[:, 0]
+    return dict(zip(names, map(tuple, profile.motions(x, (0.0, -1.0)).tolist()), strict=True))
 
 
 def refined(ground: Ground, best: Sequence[Candidate], known: Sequence[Candidate]) -> list[Candidate]:

@@ -15,6 +15,7 @@ import numpy as np
 import solver
 from blockvis.cases.build import case_interfaces, case_loads, case_ties
 from blockvis.cases.contents import Case
+from blockvis.cases.profiles import by_bearing
 from blockvis.kinds.kind import RunInput
 from blockvis.kinds.settlement import SettlementKind
 from blockvis.results.joints import initial_joints, opening_and_slip
@@ -178,11 +179,12 @@ def ordered(
     roles = assembly.roles.astype("<U6").copy()
     roles[[assembly.index(name) for name in motions]] = mechanics.MOVING
     moving = assembly.with_roles(roles)
-    lever = lever_of(moving, solver.Settlement(profile=motions))
+    profile = by_bearing(moving, motions)
+    lever = lever_of(moving, solver.Settlement(**profile))
     farthest = reach[0] / lever
     stops = tuple(farthest / LONGER**k for k in range(1, INCREMENTS))
     settlement = solver.Settlement(
-        profile=motions, increment=farthest, limit=farthest, stops=stops, tolerance=COLLAPSE * farthest
+        **profile, increment=farthest, limit=farthest, stops=stops, tolerance=COLLAPSE * farthest
     )
     friction = variant.friction
     factor = friction / case.friction_coefficient if case.friction_coefficient > 0.0 else 1.0

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.assembly import Assembly
+from solver.assembly import Assembly, find_contacts
 from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_count, rotation_matrices
 from solver.loads import Settlement, check_fits, check_steps, set_vectors
 from solver.words import make_plain
@@ -66,8 +66,10 @@ class SupportMotion(Driver):
     def __init__(self, assembly: Assembly, phase: Settlement, start: Pose) -> None:
         super().__init__(assembly, phase, start)
         self.phase, self.stops = phase, phase.stops
-        points, block = moved_vertices(assembly, start), assembly.block_of_vertex
-        self.lever = float(np.linalg.norm(point_velocities(points, block, start, self.rate(0.0)), axis=1).max())
+        # Where blocks are near it: how deep a support is drawn counts for nothing.
+        near = find_contacts(assembly, moved_vertices(assembly, start), assembly.block_size / 4.0)
+        speeds = [point_velocities(near.points, of, start, self.rate(0.0)) for of in (near.block_a, near.block_b)]
+        self.lever = float(np.linalg.norm(speeds, axis=2).max(initial=0.0)) or 1.0
 
     def supports(self, s: float) -> Pose:
         """Of the settlement."""

@@ -10,6 +10,7 @@ from structures import assembly_of, case_from, run_command
 import blockvis
 import solver
 from blockvis import cli
+from solver import mechanics
 
 NO_FALL = solver.Controls(falling_frames=0)
 
@@ -34,6 +35,19 @@ depth = 0.3
 [settlement]
 increment = 0.002
 limit = 0.004
+"""
+
+ON_OWN_GROUND = """
+[geometry]
+file = "wall.json"
+ignore = ["ground*"]
+[[supports]]
+name = "earth"
+role = "moving"
+outline = [[-0.1, -DEPTH], [0.85, -DEPTH], [0.85, 0.0], [-0.1, 0.0]]
+[settlement]
+increment = 0.002
+limit = 0.002
 """
 
 
@@ -135,6 +149,65 @@ def test_a_ground_of_one_block_is_cut_under_the_joints_of_the_first_course():
     whole = assembly_of(case_of(WALL, "{ points = [[-9.0, 0.0], [9.0, 1.0]] }"))
     assert "ground" in whole.names, "a straight profile tilts the ground as it is"
     assert assembly.areas[pieces].sum() == pytest.approx(whole.areas[whole.index("ground")])
+
+
+def test_how_deep_the_ground_is_drawn_counts_for_nothing(tmp_path):
+    found = []
+    cli.main(["layout", "wall", "bricks=3", "courses=2", "-o", str(tmp_path / "wall.json")])
+    for depth in (0.1, 1.0):
+        case = case_of(
+            ON_OWN_GROUND.replace("wall.json", (tmp_path / "wall.json").as_posix()).replace("DEPTH", f"{depth}"),
+            '{ kind = "gaussian", centre = 0.3, inflection = 0.3, depth = -1 }',
+        )
+        with pytest.warns(UserWarning, match="into 5 pieces"):
+            response = blockvis.run_case(case, tmp_path / f"{depth}", outputs=()).response
+        assembly, last = response.assembly, blockvis.open_results(tmp_path / f"{depth}").path[-1]
+        under = ~assembly.free[assembly.block_of_vertex] & np.isclose(assembly.vertices[:, 1], 0.0, atol=1e-12)
+        found.append((mechanics.moved_vertices(assembly, last.pose)[under], openings(response), last.reaction))
+        # What a brick stands on goes by the bell at its middle.
+        settlement, piece = response.settlements[0], assembly.index("earth 2")
+        middle = assembly.outline(piece)[:, 0].mean()
+        drawn = solver.Pose.initial(assembly)
+        after, top = settlement.displaced(assembly, drawn, 0.002), np.array([[middle, 0.0]])
+        goes = mechanics.carried(top, np.array([piece]), drawn, after)[0] - top[0]
+        largest = max(np.exp(-0.5 * ((x - 0.3) / 0.3) ** 2) for x in (0.125, 0.375))
+        np.testing.assert_allclose(goes, [0.0, 0.002 * np.exp(-0.5 * ((middle - 0.3) / 0.3) ** 2) / largest], atol=1e-9)
+    np.testing.assert_allclose(found[0][0], found[1][0], atol=1e-12)
+    np.testing.assert_allclose(found[0][1], found[1][1], atol=2e-5)
+    assert found[0][2] == pytest.approx(found[1][2], rel=5e-3)
+
+
+def test_a_support_moves_and_turns_at_the_end_of_its_arm():
+    arch = structures.arch_response().assembly
+    arms = {"right springer": (0.2, -0.1)}
+    motion = solver.Settlement(profile={"right springer": (1.0, 0.0, 2.0)}, profile_arms=arms)
+    assert solver.Settlement(profile=motion.profile, profile_arms=motion.profile_arms) == motion
+    start, springer = solver.Pose.initial(arch), arch.index("right springer")
+    point = arch.centroids[[springer]] + arms["right springer"]
+    halfway, after = (motion.displaced(arch, start, s) for s in (0.05, 0.1))
+    there = mechanics.carried(point, np.array([springer]), start, after)
+    np.testing.assert_allclose(there, point + np.array([0.1, 0.0]), atol=1e-14)
+    assert after.rotations[springer] == pytest.approx(0.2)
+    # From where it is already turned, the arm has turned with it.
+    again = motion.displaced(arch, halfway, 0.05)
+    np.testing.assert_allclose(again.positions, after.positions, atol=1e-14)
+    step = 1e-6
+    by_difference = (motion.displaced(arch, start, 0.1 + step).positions - after.positions)[springer] / step
+    np.testing.assert_allclose(motion.rate(arch, start, 0.1)[springer, :2], by_difference, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"profile": {"a": (1.0, 0.0, 0.0)}, "profile_arms": {"b": (0.0, 1.0)}}, "profile_arms of 'b'"),
+        ({"profile": {"a": (1.0, 0.0, 0.0)}, "profile_arms": {"a": (0.0, 1.0, 0.0)}}, "give 2 numbers"),
+        ({"direction": (0, -1), "profile_arms": {"a": (0.0, 1.0)}}, "with a profile"),
+        ({"profile_arms": {"a": (0.0, 1.0)}}, "moves no support"),
+    ],
+)
+def test_arms_without_their_support_are_refused(keys, words):
+    with pytest.raises(ValueError, match=words):
+        solver.Settlement(**keys)
 
 
 @pytest.mark.slow
