@@ -21,7 +21,7 @@ from blockvis.report.page import summary_rows, tie_rows
 from blockvis.results.cracks import Crack, cracks_of
 from blockvis.results.fall_files import stored_fall
 from blockvis.results.folder import RESULTS
-from blockvis.results.joints import initial_joints
+from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.results.record import read_record
 from blockvis.runs.reopen import open_results
 from blockvis.text import force_text, quantity_text
@@ -92,19 +92,19 @@ class Side:
 
 
 @dataclass(frozen=True)
-class CrackPair:
-    """The same crack in two runs.
+class ComparedJoint:
+    """The same joint in two runs.
 
     Attributes
     ----------
     place : str
-        The two blocks that part most, in the run where it is wider.
-    widths : (float, float) [m]
-        0 where the run has none there.
+        Its two blocks.
+    openings : (float, float) [m]
+        To the µm; nan where the run has no such joint, or a block of it has fallen.
     """
 
     place: str
-    widths: tuple[float, float]
+    openings: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -184,32 +184,20 @@ class Comparison:
             return False
         return bool(np.abs(one.vertices - other.vertices).max() <= SAME * one.block_size)
 
-    def cracks(self, at: float) -> list[CrackPair]:
-        """Pair the crack lines of both at a parameter, the widest first.
+    def cracks(self, at: float) -> list[ComparedJoint]:
+        """Compare the joints at which the crack lines of either run are widest, the widest first.
 
         Parameters
         ----------
         at : float [m or rad]
             Over all phases.
-
-        Notes
-        -----
-        Lines of one layout are the same that share most joints, and those of two layouts where they are widest at
-        the joint of the same two blocks.
         """
-        found = [_cracks_at(side, at) for side in self.sides]
-        alike = self.same_layout()
-        pairs, taken = [], set()
-        for crack in found[0]:
-            shared = [0 if k in taken else _shared(crack, other, alike) for k, other in enumerate(found[1])]
-            match = int(np.argmax(shared)) if any(shared) else None
-            if match is not None:
-                taken.add(match)
-            width = found[1][match].width if match is not None else 0.0
-            place = crack.widest if match is None or crack.width >= width else found[1][match].widest
-            pairs.append(CrackPair(place, (crack.width, width)))
-        pairs += [CrackPair(crack.widest, (0.0, crack.width)) for k, crack in enumerate(found[1]) if k not in taken]
-        return sorted(pairs, key=lambda pair: -max(pair.widths))[:MOST_CRACKS]
+        (lines, one), (more_lines, other) = (_cracks_at(side, at) for side in self.sides)
+        joints = [
+            ComparedJoint(crack.widest, (one.get(pair, np.nan), other.get(pair, np.nan)))
+            for pair, crack in {frozenset(line.widest.split(" | ")): line for line in [*more_lines, *lines]}.items()
+        ]
+        return sorted(joints, key=lambda joint: -np.nanmax(joint.openings))[:MOST_CRACKS]
 
 
 def compared(one: str | Path, other: str | Path) -> Comparison:
@@ -294,14 +282,15 @@ def _value_text(value: Any, unit: str) -> str:
     return str(value)
 
 
-def _cracks_at(side: Side, at: float) -> list[Crack]:
-    state = side.state(at)
-    assembly = side.response.assembly
-    return cracks_of(assembly, state.pose, initial_joints(assembly), state.fallen)
-
-
-def _shared(crack: Crack, other: Crack, same_layout: bool) -> int:
-    """Count the joints that two cracks share; of two layouts 1 where both are widest between the same blocks."""
-    if same_layout:
-        return int(np.isin(crack.joints, other.joints).sum())
-    return int(set(crack.widest.split(" | ")) == set(other.widest.split(" | ")))
+def _cracks_at(side: Side, at: float) -> tuple[list[Crack], dict[frozenset[str], float]]:
+    """Trace the crack lines of a run, and find the openings [m] of its joints by the names of their blocks."""
+    state, assembly = side.state(at), side.response.assembly
+    joints = initial_joints(assembly)
+    opening = np.maximum(np.round(opening_and_slip(assembly, joints, state.pose)[:, 0], 6), 0.0)
+    if state.fallen is not None:
+        opening[state.fallen[joints.block_a] | state.fallen[joints.block_b]] = np.nan
+    found: dict[frozenset[str], float] = {}
+    for a, b, width in zip(joints.block_a.tolist(), joints.block_b.tolist(), opening.tolist(), strict=True):
+        pair = frozenset((assembly.names[a], assembly.names[b]))
+        found[pair] = max(width, found.get(pair, 0.0))
+    return cracks_of(assembly, state.pose, joints, state.fallen), found

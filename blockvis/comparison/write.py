@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import math
 from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -93,8 +94,8 @@ def comparison_html(found: Comparison, curves: bytes, stations: bytes, film: str
     report = files("blockvis") / "report"
     heads = ("", *(side.label for side in found.sides))
     cracks = [
-        (pair.place, *("–" if width == 0.0 else width_text(width) for width in pair.widths))
-        for pair in found.cracks(found.common_end)
+        (joint.place, *("–" if math.isnan(opening) else width_text(opening) for opening in joint.openings))
+        for joint in found.cracks(found.common_end)
     ]
     where = found.place_text(found.common_end) if found.is_path else "the limit load"
     keys, unknown = found.changed_keys(), " and ".join(side.label for side in found.sides if not side.case)

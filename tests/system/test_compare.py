@@ -56,6 +56,21 @@ def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_p
         assert (np.abs(curves - np.array(colour)).sum(axis=2) == 0).sum() > 1000
 
 
+def test_a_crack_of_one_run_has_the_opening_of_its_joint_in_the_other(other, tmp_path):
+    settlement = solver.Settlement((0, -1), increment=0.02, limit=0.06)
+    sinking = solver.Structure(generators.arch(), friction_coefficient=2.0).settle(settlement)
+    folder = blockvis.write(sinking, tmp_path / "down-results")
+    assert main(["compare", str(folder), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    cracks = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "cracks")
+    assert cracks.pop("") == ["down", "sinking"]
+    names, known = sinking.assembly.names, [blockvis.open_results(at).joints(3) for at in (folder, other)]
+    rows = list(zip(known[0]["block_a"], known[0]["block_b"], *(one["opening"] for one in known), strict=False))
+    truth = {f"{names[a]} | {names[b]}": (1e3 * one, 1e3 * two) for a, b, one, two in rows}
+    found = {place: tuple(float(cell.removesuffix(" mm")) for cell in cells) for place, cells in cracks.items()}
+    assert found == {place: pytest.approx(truth[place], rel=0.05, abs=2e-3) for place in found}
+    assert any(min(openings) < 0.01 for openings in found.values()), "closed in one of them"
+
+
 def test_both_pictures_of_a_settlement_have_one_unit(arch_results, other, tmp_path, monkeypatch):
     """That of the run that goes further."""
     titles, blank = [], Image.new("RGB", (800, 620))
