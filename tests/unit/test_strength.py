@@ -343,6 +343,23 @@ def test_the_summary_tells_what_the_ground_carries(tmp_path, capsys):
         assert float(tilt) == pytest.approx(0.005, rel=0.03)
 
 
+def test_the_corner_that_slid_over_the_joint_of_two_grounds_has_the_area_of_its_brick(tmp_path, capsys):
+    """Its force is shared by two points, of which one has an area of some mm²."""
+    bricks = [rectangle(-1.0, 0.0, 0.0, 0.5), rectangle(0.0, 0.0, 1.0, 0.5), rectangle(-1.0, 0.5, 1.0, 1.0)]
+    drawn(tmp_path / "beam.json", bricks, names=["one", "other", "beam"])
+    text = GROUND.replace("2e6", "1e6").replace("-1.05, ", "-1.2, ").replace("-0.95, ", "0.0, ")
+    text = text.replace("[0.95, ", "[0.0, ").replace("[1.05, ", "[1.2, ")
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    assert run_command(tmp_path / "case.toml", "-o", tmp_path / "out") == 0
+    said = re.findall(
+        r": (\S+) N, pressure \S+ Pa in the mean and (\S+) Pa at most.* by (\S+) rad", capsys.readouterr().out
+    )
+    assert len(said) == 2
+    for force, most, tilt in said:
+        # On 1 m², and at the lower end of a brick of 1 m that has turned.
+        assert float(most) == pytest.approx(float(force) + 1e6 * float(tilt) / 2.0, rel=5e-3)
+
+
 def test_ground_gives_under_the_support_of_its_name_alone():
     """One that is numbered beside it is rigid, pieces into which a support was cut are not."""
     outlines = [rectangle(-1.0, -1.0, 0.5, 0.0), rectangle(0.5, -1.0, 2.0, 0.0), rectangle(0.0, 0.0, 1.0, 1.0)]
