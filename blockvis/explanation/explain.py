@@ -274,7 +274,10 @@ class _Search:
         """Follow candidates, others around the best of them, and the likeliest with other coefficients of friction."""
         self.follow([pair for one in first for pair in self.usual(one)], processes, bar)
         worth = [c for c in self.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
-        around = refined(self.ground, [cause.best.candidate for cause in worth], first)
+        # What opens the same cracks as a cause may have moved obliquely as well.
+        bests = [cause.best.shared for cause in worth]
+        alike = [trial.candidate for best in bests for trial in self.trials if trial.shared == best]
+        around = refined(self.ground, [cause.best.candidate for cause in worth] + alike, first)
         self.follow([pair for one in around for pair in self.usual(one)], processes, bar)
         self.follow([pair for one in _likeliest(self.ranked()) for pair in self.others(one)], processes, bar)
 
