@@ -21,6 +21,7 @@ from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import refuse_files
 from blockvis.runs.plan import refuse_ties
 from blockvis.runs.progress import RunsProgress
+from blockvis.text import place_text
 from solver import mechanics
 
 from .candidates import (
@@ -37,7 +38,7 @@ from .candidates import (
     unit_vector,
 )
 from .forward import Order, Run, Variant, all_followed, ordered, reach_of, workers_for
-from .likelihood import Comparison, Trial, Trust, tried
+from .likelihood import EXPLAINED, Comparison, Trial, Trust, tried
 from .observations import Observations, read_observations
 from .ranking import Cause, next_measurement, ranked, unexplained
 from .result import Explanation
@@ -111,14 +112,15 @@ def explain(
         _refuse_grounded(case_ties(case, drawn), case)
         needs_no_crushing(case)
         mechanics.check_settlement(*_any_settlement(drawn), case.controls)
-        observations = read_observations(observed, drawn)
         ground = ground_of(drawn, case.explain, case.source)
+        observations = read_observations(observed, ground.assembly, drawn)
     notes = [*(str(warning.message) for warning in caught), *ground.notes]
+    search = _Search(case, ground, observations, {} if runs is None else runs)
+    notes += _notes_of_frame(search.comparison)
     for note in notes:
         warnings.warn(note, stacklevel=2)
-    search = _Search(case, ground, observations, {} if runs is None else runs)
     first = candidates_of(ground, case.explain, case.source)
-    if not len(observations.points):
+    if not search.apart:
         first = [one for one in first if opens_cracks(ground.assembly, one)]
     if not first:
         raise ValueError(
@@ -152,6 +154,30 @@ def explain(
     if folder is not None:
         write_explanation(found, Path(folder))
     return found
+
+
+def _notes_of_frame(comparison: Comparison) -> list[str]:
+    """Say where displacements tell of supports against each other alone.
+
+    Raises
+    ------
+    ValueError
+        Where they tell of nothing.
+    """
+    common, given = comparison.common, comparison.observations
+    if common is None:
+        return []
+    words = f"{given.source}: every support that was surveyed has moved, "
+    apart = np.linalg.norm(given.displacements - common, axis=1)
+    if not (given.widths > 0.0).any() and (apart <= EXPLAINED * given.point_uncertainties).all():
+        raise ValueError(
+            f"{words}all by about {place_text(1e3 * common, 3)} mm, and what all have in common opens no joint; there "
+            "is nothing to explain: give displacements from a support that stands still, or cracks"
+        )
+    return [
+        f"{words}so displacements are compared but for what they have in common: how supports have moved against each "
+        "other; add the row of one that stands still where there is one"
+    ]
 
 
 def _refuse_phases(case: Case) -> None:
@@ -242,21 +268,20 @@ class _Search:
         #: What runs depend on besides movement, friction and heavier side, which [explain] chooses.
         self.structure = repr(plain), drawn.names, drawn.materials, *(values.tobytes() for values in arrays)
         place = 0.5 * size if settings.place_uncertainty is None else settings.place_uncertainty
-        self.comparison = Comparison(
-            ground.assembly, observations, Trust(settings.model_uncertainty, place, settings.outliers)
-        )
+        self.reach = reach_of(observations, settings.limit)
+        trust = Trust(settings.model_uncertainty, place, settings.outliers)
+        self.comparison = Comparison(ground.assembly, observations, trust, self.reach[0])
         own = case.friction_coefficient
         low, high = settings.friction or (FRICTIONS[0] * own, FRICTIONS[1] * own)
         middle = float(np.clip(own, low, high)) if settings.friction is None else 0.5 * (low + high)
         self.frictions = (low, middle, high)
         self.candidates: list[Candidate] = []
         self.trials: list[Trial] = []
-        self.reach = reach_of(observations, settings.limit)
 
     @property
     def apart(self) -> bool:
         """Whether the observations tell movements apart that differ by a translation of everything."""
-        return len(self.observations.points) > 0
+        return len(self.observations.points) > 0 and self.comparison.common is None
 
     def usual(self, candidate: Candidate) -> list[tuple[Candidate, Variant]]:
         """Pair a candidate with the variants in which it is looked at first."""

@@ -33,6 +33,9 @@ ELSEWHERE = 0.7
 #: A crack is made where the model opens by more than this fraction of its width.
 MADE = 0.25
 
+#: What was observed is explained where it is within so many standard deviations of what a cause makes.
+EXPLAINED = 3.0
+
 #: Observations of one structure share the errors of its model: more than this do not count as independent.
 INDEPENDENT = 20
 
@@ -59,20 +62,29 @@ class Trust:
 class Comparison:
     """Observations laid over the joints of a model.
 
-    An observation may be of any joint near its place: which of two neighbouring joints opens, the model cannot say, and
-    where the drawing has other blocks than the structure its joints lie elsewhere. Each observation is compared with
-    every joint near it, and what these comparisons say is averaged, the nearer ones counting more. Along a joint
-    nothing is left open: on which side it gapes tells one hinge from another.
+    An observation at x, y may be of any joint near its place: which of two neighbouring joints opens, the model cannot
+    say, and where the drawing has other blocks than the structure its joints lie elsewhere. Each of these is compared
+    with every joint near it, and what these comparisons say is averaged, the nearer ones counting more; one that names
+    its joint is of that. Along a joint nothing is left open: on which side it gapes tells one hinge from another.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    observations : Observations
+    trust : Trust
+    farthest : float [m]
+        How far a support goes that is looked at.
     """
 
-    def __init__(self, assembly: solver.Assembly, observations: Observations, trust: Trust) -> None:
+    def __init__(
+        self, assembly: solver.Assembly, observations: Observations, trust: Trust, farthest: float = 0.0
+    ) -> None:
         self.assembly, self.observations, self.trust = assembly, observations, trust
         self.joints: InitialJoints = initial_joints(assembly)
         given = observations
         away, weights = on_faces(given.places, self.joints)
-        certain = np.where(given.named, 0.0, trust.place)
-        beyond = np.maximum(away - certain[:, None], 0.0) / (NEIGHBOURHOOD * assembly.block_size)
-        chance = np.exp(-0.5 * beyond**2)
+        beyond = np.maximum(away - trust.place, 0.0) / (NEIGHBOURHOOD * assembly.block_size)
+        chance = np.where(given.named[:, None], 0.0, np.exp(-0.5 * beyond**2))
         n = len(given.places)
         #: (n_widths,) int array: the joint in which each place lies, or the nearest.
         self.own = away.argmin(axis=1) if n else np.zeros(0, dtype=int)
@@ -102,7 +114,19 @@ class Comparison:
         #: (n_widths,) and (m, 2) arrays [m]: sizes of which the model's errors are fractions.
         self.scales = _error_scales(given.widths), _error_scales(given.displacements)
         # How supports move is what a cause says, not what the model makes of it.
-        self.scales[1][~assembly.free[self.blocks]] = 0.0
+        on_supports = ~assembly.free[self.blocks]
+        self.scales[1][on_supports] = 0.0
+        #: (2,) array [m]: width of what observed widths and displacements may be where they have another cause.
+        # The part of strays would grow with the amounts that are looked at, were those of displacements not as wide.
+        self.spans = 2.0 * given.largest, 2.0 * max(farthest, given.largest)
+        far = np.linalg.norm(given.displacements, axis=1) > EXPLAINED * given.point_uncertainties
+        measured = self.blocks[on_supports]
+        #: (d,) array [m], or None: what displacements have in common, where they tell of supports against each other
+        #: alone: of those that were surveyed, two or more, none stands still.
+        self.common: np.ndarray | None = None
+        if len(np.unique(measured)) > 1 and far[on_supports].all():
+            self.common = np.median(given.displacements[on_supports], axis=0)
+        self.on_supports = on_supports
 
     def openings(self, moved: np.ndarray) -> np.ndarray:
         """(n, n_corners) array [m]: at the corners of the faces, where blocks move by (n, n_blocks, n_dof)."""
@@ -127,6 +151,13 @@ class Comparison:
         found = [mechanics.carried(points, self.blocks, drawn, pose_of(self.assembly, one)) for one in moved]
         return np.array(found).reshape(len(moved), *points.shape) - points
 
+    def in_frame(self, displacements: np.ndarray) -> np.ndarray:
+        """Give displacements (n, n_points, d) [m] what those observed have in common, where that opens nothing."""
+        if self.common is None:
+            return displacements
+        own = np.median(displacements[:, self.on_supports], axis=1, keepdims=True)
+        return np.asarray(displacements - own + self.common)
+
     def log_likelihood(self, widths: np.ndarray, displacements: np.ndarray) -> np.ndarray:
         """(n,) array: logarithm of the probability density of the observations.
 
@@ -138,23 +169,23 @@ class Comparison:
         Notes
         -----
         Each observation is normally distributed about what the model shows, with the variances of the measurement and
-        of the model added, or, with the probability of an outlier, evenly over twice the largest observed width.
+        of the model added, or, with the probability of an outlier, evenly over twice the largest observed width, or as
+        far both ways as supports may have gone.
         Observations beyond :data:`INDEPENDENT` sharpen nothing: all of them weigh less.
         """
         given = self.observations
         count = len(given.widths) + given.points.size
         weight = min(1.0, INDEPENDENT / count)
-        span = 2.0 * given.largest
-        strays = np.log(self.trust.outliers / span)
+        stray_widths, stray_points = np.log(self.trust.outliers / np.array(self.spans))
         total = np.zeros(len(widths))
         sigma, spread = self.deviations
         if len(self.seen):
             terms = _log_normal(widths - given.widths[self.seen], sigma[self.seen]) + self.log_chance
             fits = np.logaddexp.reduceat(terms, self.first, axis=1) + np.log1p(-self.trust.outliers)
-            total += np.logaddexp(fits, strays).sum(axis=1)
+            total += np.logaddexp(fits, stray_widths).sum(axis=1)
         if len(given.points):
             fits = _log_normal(displacements - given.displacements, spread) + np.log1p(-self.trust.outliers)
-            total += np.logaddexp(fits, strays).sum(axis=(1, 2))
+            total += np.logaddexp(fits, stray_points).sum(axis=(1, 2))
         return weight * total
 
     @property
@@ -186,8 +217,10 @@ class Comparison:
         given = self.observations
         opened = given.widths > 0.0
         makes = (widths[:, opened] > MADE * given.widths[opened]).any(axis=1)
-        along = (displacements * given.displacements).sum(axis=2)
-        return np.asarray(makes | (along > MADE * (given.displacements**2).sum(axis=1)).any(axis=1))
+        common = 0.0 if self.common is None else self.common
+        observed = given.displacements - common
+        along = ((displacements - common) * observed).sum(axis=2)
+        return np.asarray(makes | (along > MADE * (observed**2).sum(axis=1)).any(axis=1))
 
     def misfits(self, widths: np.ndarray, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Differences from the observed widths and points, in standard deviations: (n, n_widths), (n, n_points).
@@ -323,6 +356,7 @@ def tried(
     gaps = comparison.openings(run.moved)
     pairs = run.at(own, comparison.widths(gaps))
     displacements = run.at(own, comparison.displacements(run.moved)) + (amounts[:, None] * twin.travel)[:, None, :]
+    displacements = comparison.in_frame(displacements)
     found = comparison.log_likelihood(pairs, displacements)
     found[own > run.amounts[-1] * (1.0 + 1e-9)] = -np.inf
     chosen = comparison.likeliest(pairs)

@@ -17,6 +17,7 @@ from scipy.optimize import linear_sum_assignment
 
 import solver
 from blockvis.cases.block_at import distances_to
+from blockvis.cases.profiles import pieces_named
 from blockvis.cases.toml_table import Table, shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
@@ -45,6 +46,9 @@ FARTHEST_POINT = 0.3
 
 #: Blocks of a drawing that are paired by their shapes have moved by less than this, in block sizes, or are others.
 FARTHEST_BLOCK = 1.5
+
+#: An uncertainty of more than this, in largest widths or displacements, is a mistake in its unit.
+LEAST_CERTAIN = 2.0
 
 #: A width [m] below this nobody can measure.
 LEAST_WIDTH = 5e-5
@@ -101,7 +105,11 @@ class Observations:
         return float(max(self.widths.max(initial=0.0), moved.max(initial=0.0)))
 
 
-def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly: solver.Assembly) -> Observations:
+def read_observations(
+    source: str | Path | Sequence[Mapping[str, Any]],
+    assembly: solver.Assembly,
+    drawn: solver.Assembly | None = None,
+) -> Observations:
     """Read observations.
 
     Parameters
@@ -109,7 +117,9 @@ def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly
     source : str, Path or sequence of mappings
         A table (.csv), a drawing of the damaged state in any layout format, or the rows of a table.
     assembly : solver.Assembly
-        As drawn.
+        As drawn, or its ground cut: a name of a whole support is that of all its pieces.
+    drawn : solver.Assembly, optional
+        As drawn where the ground is cut: a drawing of the damaged state is beside it.
 
     Raises
     ------
@@ -118,7 +128,8 @@ def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly
     """
     if not isinstance(source, str | Path):
         rows = [{str(key): value for key, value in row.items()} for row in source]
-        return _of_rows(enumerate(rows, start=1), list(rows[0]) if rows else [], assembly, "observations", "row")
+        header = list(dict.fromkeys(key for row in rows for key in row))
+        return _of_rows(enumerate(rows, start=1), header, assembly, "observations", "row")
     path = Path(source)
     if not path.is_file():
         near = files_like(path, "*.csv", or_any=True)
@@ -128,7 +139,7 @@ def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly
         )
     known = FORMATS.get(path.suffix.lower())
     if known is not None and not known.alone:
-        return _of_drawing(path, assembly)
+        return _of_drawing(path, assembly if drawn is None else drawn)
     table = csv.reader(io.StringIO(text := _table_text(path)), delimiter=_mark_of(text))
     header = [cell.strip() for cell in next(table)]
     return _of_rows(_numbered(table, header, path), header, assembly, str(path), "line")
@@ -242,8 +253,9 @@ def _of_rows(
     joints = initial_joints(assembly)
     widths: list[tuple[np.ndarray, bool, bool, float, float, str]] = []
     points: list[tuple[np.ndarray, str, np.ndarray, float]] = []
+    given: list[_Cells] = []
     for number, row in rows:
-        cells = _Cells(row, columns, f"{where}, {counted} {number}")
+        given.append(cells := _Cells(row, columns, f"{where}, {counted} {number}"))
         width = cells.number("width")
         if width is not None:
             place, named, whole, label = _place(cells, assembly, joints)
@@ -259,6 +271,13 @@ def _of_rows(
     if not widths and not points:
         raise ValueError(f"{where}: has no observation; give a row for each crack or displaced point")
     found = _observations(widths, points, where, assembly.dimension)
+    for cells in given:
+        if (cells.number("uncertainty") or 0.0) > LEAST_CERTAIN * found.largest:
+            raise cells.error(
+                "uncertainty",
+                f"is {cells.number('uncertainty'):g} m, and the largest width or displacement {found.largest:.3g} m: "
+                "that leaves nothing certain; is it in mm? name the column uncertainty [mm]",
+            )
     _note_middles(found, joints)
     return found
 
@@ -361,9 +380,9 @@ def _between(
     names: Sequence[str], keys: Sequence[str], cells: _Cells, assembly: solver.Assembly, joints: InitialJoints
 ) -> np.ndarray:
     """(n_joints,) bool array: the joints between two blocks, which must touch."""
-    pair = [_block(name, key, cells, assembly) for name, key in zip(names, keys, strict=True)]
-    first_a, first_b = joints.block_a == pair[0], joints.block_b == pair[0]
-    between = (first_a & (joints.block_b == pair[1])) | (first_b & (joints.block_a == pair[1]))
+    one, other = (_blocks(name, key, cells, assembly) for name, key in zip(names, keys, strict=True))
+    first_a, first_b = np.isin(joints.block_a, one), np.isin(joints.block_b, one)
+    between = (first_a & np.isin(joints.block_b, other)) | (first_b & np.isin(joints.block_a, other))
     if not between.any():
         beside = np.unique(np.concatenate([joints.block_b[first_a], joints.block_a[first_b]]))
         others = ", ".join(f"'{assembly.names[k]}'" for k in beside) or "no block"
@@ -424,16 +443,18 @@ def _check_place(place: np.ndarray, away: float, what: str, cells: _Cells, assem
         )
 
 
-def _block(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> int:
-    meant = blocks_called(name, assembly.names) if name else []
-    if not meant:
-        problem = f"'{name}' is no block{nearest(name, assembly.names)}" if name else "names no block"
-        raise cells.error(key, f"{problem}; blockvis info lists the names")
+def _blocks(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> list[int]:
+    """Find the block of a name, or the pieces of a support that was cut."""
+    meant = blocks_called(name, assembly.names)
     if len(meant) > 1:
         raise cells.error(
             key, f"'{name}' is the name of {len(meant)} blocks; leave it out and give the place, x and y, in space z"
         )
-    return meant[0]
+    names = pieces_named((name,), assembly)
+    if not set(names) <= set(assembly.names):
+        problem = f"'{name}' is no block{nearest(name, assembly.names)}" if name else "names no block"
+        raise cells.error(key, f"{problem}; blockvis info lists the names")
+    return [assembly.index(one) for one in names]
 
 
 def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray, str, np.ndarray, float] | None:
@@ -446,13 +467,16 @@ def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray,
     place, name = [cells.number(axis) for axis in axes], cells.text("block")
     if not name and None in place:
         raise cells.error("block", f"is missing; give the block, or {_listed(axes)}, of the displaced point")
-    block = _block(name, "block", cells, assembly) if name else -1
+    blocks = _blocks(name, "block", cells, assembly) if name else list(range(assembly.n_blocks))
     if None in place:
-        point = assembly.centroids[block]
+        # Supports are cut in the plane alone.
+        weights = assembly.areas[blocks] if len(blocks) > 1 else None
+        point = np.average(assembly.centroids[blocks], axis=0, weights=weights)
     else:
         point = np.array(place, dtype=float)
-        away = distances_to(assembly, point)
-        block = block if name else int(np.argmin(away))
+    away = distances_to(assembly, point)
+    block = blocks[int(np.argmin(away[blocks]))]
+    if None not in place:
         _check_place(point, float(away[block]), f"'{name}'" if name else "any block", cells, assembly)
     if None not in there:
         displaced = np.array(there, dtype=float) - point

@@ -8,14 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from .likelihood import MADE, Comparison, Trial
+from .likelihood import EXPLAINED, MADE, Comparison, Trial
 from .observations import LEAST_UNCERTAINTY
 
 #: Causes less probable than the best by more than this factor are told apart from it.
 TOLD_APART = 10.0
-
-#: What was observed is explained where it is within so many standard deviations of what a cause makes.
-EXPLAINED = 3.0
 
 #: Shares of the probability below and above the range of an amount.
 TAILS = (0.05, 0.5, 0.95)
@@ -220,7 +217,7 @@ def unexplained(comparison: Comparison, causes: Sequence[Cause], trials: Sequenc
     slack = EXPLAINED * comparison.deviations[0]
     # What is within what is left of the model's own width is no sign of another cause.
     by_none = (widths > 0.0) & (reached < np.maximum(widths - slack, MADE * widths))
-    return by_best & (widths > 0.0) | by_none, by_none, points_by_best, nearest > EXPLAINED
+    return by_best | by_none, by_none, points_by_best, nearest > EXPLAINED
 
 
 def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measurement | None:

@@ -147,17 +147,18 @@ def fall_texts(found: Explanation) -> list[str]:
 def unexplained_texts(found: Explanation) -> list[str]:
     """Say which observations the best cause, or every candidate, leaves unexplained."""
     given = found.observations
-    widths = [
-        (f"{width_text(given.widths[k])} mm at {given.labels[k]}", k in found.made_by_none) for k in found.unexplained
+    first = "the first cause does not make it"
+    said = [
+        (f"{width_text(given.widths[k])} mm at {given.labels[k]}", first, k in found.made_by_none)
+        if given.widths[k] > 0.0
+        else (f"closed at {given.labels[k]}", "the first cause opens it", False)
+        for k in found.unexplained
     ]
-    points = [
-        (f"{vector_text(given.displacements[k])} mm of {point_text(given, k)}", k in found.points_made_by_none)
+    said += [
+        (f"{vector_text(given.displacements[k])} mm of {point_text(given, k)}", first, k in found.points_made_by_none)
         for k in found.unexplained_points
     ]
-    return [
-        f"unexplained: {what}; {'no candidate makes it' if by_none else 'the first cause does not make it'}"
-        for what, by_none in widths + points
-    ]
+    return [f"unexplained: {what}; {'no candidate makes it' if by_none else why}" for what, why, by_none in said]
 
 
 def point_text(given: Observations, k: int) -> str:

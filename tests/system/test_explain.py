@@ -240,7 +240,9 @@ def test_runs_of_another_case_are_not_taken_for_its_own(tmp_path):
 @pytest.mark.slow
 def test_a_point_that_no_candidate_moves_so_is_unexplained(tmp_path):
     (tmp_path / "case.toml").write_text(SINKING, encoding="utf-8")
-    rows = [{"block": "right springer", "dx": 0, "dy": -0.02}, {"block": "left springer", "dx": 0, "dy": 0.02}]
+    rows = [
+        {"block": f"{side} springer", "dx": 0, "dy": dy} for side, dy in (("right", -0.02), ("left", 0.02), ("left", 0))
+    ]
     found = blockvis.explain(tmp_path / "case.toml", rows, tmp_path / "out")
     assert (found.unexplained_points, found.points_made_by_none) == ((1,), (1,))
     words = "(0, 20) mm of left springer at "
@@ -293,6 +295,35 @@ def test_displaced_points_tell_which_springer_has_moved(folder):
     np.testing.assert_allclose(
         found.comparison.displacements(other.best.moved(other.at)[None])[0, :, 0].max(), 0.0, atol=2e-3
     )
+
+
+@pytest.mark.slow
+def test_mirror_images_have_one_answer(tmp_path):
+    """The right springer has gone down and right: what opens the same cracks as a likely cause comes under its name."""
+    (tmp_path / "arch.toml").write_text(CASE.replace('"down", "right"', '"left", "right"'), encoding="utf-8")
+    real = generators.segmental_arch(voussoirs=10)
+    pose = moved(real, (1.0, -0.4))
+    joints = posed(real, pose).joints(0)
+    sides = (np.asarray(joints.cell_data[side]) for side in ("block_a", "block_b", "opening"))
+    known = [(real.names[int(a)], real.names[int(b)], max(float(w), 0.0)) for a, b, w in zip(*sides, strict=True)]
+    other = {"left springer": "right springer", "right springer": "left springer"}
+    other |= {f"voussoir {k}": f"voussoir {11 - k}" for k in range(1, 11)}
+    turned = {"left": "right", "right": "left"}
+    found, runs = [], {}
+    for mirrored in (False, True):
+        rows = [
+            {"joint": " | ".join(other[n] if mirrored else n for n in names), "width": w if w > 3e-4 else 0.0}
+            for *names, w in known
+        ]
+        said = blockvis.explain(tmp_path / "arch.toml", rows, runs=runs)
+        found.append(
+            {
+                " ".join(turned.get(w, w) if mirrored else w for w in cause.name.split()): cause.probability
+                for cause in said.causes
+            }
+        )
+    oblique = "right springer moves down and right"
+    assert found[0][oblique] == pytest.approx(found[1][oblique], rel=0.05)
 
 
 @pytest.mark.slow

@@ -73,10 +73,39 @@ def test_rows_of_a_table_in_python():
     assert found.widths == pytest.approx([0.004])
 
 
+def test_every_row_of_python_may_have_its_own_keys():
+    rows = [
+        {"joint": CROWN, "width": 0.004},
+        {"joint": "voussoir 1 | voussoir 2", "width": 0.002, "uncertainty": 1e-4},
+        {"block": "right springer", "dx": 0.02, "dy": 0.0},
+    ]
+    for order in (rows, rows[::-1]):
+        found = read_observations(order, ARCH)
+        assert dict(zip(found.labels, found.uncertainties, strict=True))["voussoir 1 | voussoir 2"] == 1e-4
+        np.testing.assert_allclose(found.displacements, [[0.02, 0.0]])
+
+
+def test_a_support_that_is_cut_is_named_by_its_name_or_its_pieces():
+    outlines = [[(k, y), (k + 1, y), (k + 1, y + 1), (k, y + 1)] for y in (-1, 0) for k in (0, 1)]
+    wall = solver.Assembly.from_outlines(
+        outlines, names=["ground 1", "ground 2", "one", "two"], roles=["fixed", "fixed", "free", "free"]
+    )
+    rows = [{"joint": f"two | {name}", "width": 0.001} for name in ("ground 2", "ground")]
+    found = read_observations([*rows, {"block": "ground", "dx": 0.001, "dy": 0.0}], wall)
+    np.testing.assert_allclose(found.places, [[1.5, 0.0], [1.5, 0.0]])
+    np.testing.assert_allclose(found.points, [[1.0, -0.5]])
+    with pytest.raises(ValueError, match="'grounds' is no block"):
+        read_observations([{"joint": "two | grounds", "width": 0.001}], wall)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("", "is empty"),
+        (
+            "joint,width [mm],uncertainty\nvoussoir 1 | voussoir 2,6.2,0.3\n",
+            r"line 2: uncertainty is 0.3 m, and the largest .* 0.0062 m: .* name the column uncertainty \[mm\]",
+        ),
         ("joint,width\n", "has no observation"),
         ("joint\nvoussoir 3 | voussoir 4\n", "has no column 'width'; its columns are 'joint'"),
         ("width\n0.003\n", "has no column 'joint'"),
