@@ -300,8 +300,7 @@ class _Search:
         self.follow([pair for one in first for pair in self.usual(one)], processes, bar)
         worth = [c for c in self.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
         # What opens the same cracks as a cause may have moved obliquely as well.
-        bests = [cause.best.shared for cause in worth]
-        alike = [trial.candidate for best in bests for trial in self.trials if trial.shared == best]
+        alike = [trial.candidate for cause in worth for trial in self.trials if trial.candidate.cause in cause.also]
         around = refined(self.ground, [cause.best.candidate for cause in worth] + alike, first)
         self.follow([pair for one in around for pair in self.usual(one)], processes, bar)
         self.follow([pair for one in _likeliest(self.ranked()) for pair in self.others(one)], processes, bar)

@@ -51,6 +51,9 @@ DPI, FINE = 130, 260
 #: Views in which the cracks are as near to the eye as in the best, within this part of the structure, are equal.
 ALIKE = 0.02
 
+#: A joint has its largest width written, too, where that is so many times the one at an observed place.
+GAPES = 1.5
+
 #: Most widths that are written in a panel.
 MOST_LABELS = 24
 
@@ -76,7 +79,7 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     shown = [magnified(assembly, pose, factor) for pose, factor in zip(poses, factors, strict=True)]
     view = None if assembly.dimension == 2 else _view_of(found)
     if view is None:
-        frame = framed(assembly, [drawn, *shown])
+        frame = framed(assembly, [drawn, *shown], whole=WHOLE)
     else:
         frame = framed(assembly, [drawn, *shown], margin=0.05, supports=0.3, axes=view.axes[:2], whole=WHOLE)
     count = 1 + len(causes)
@@ -248,7 +251,8 @@ def _computed(
     """Draw what a cause makes; gives the labels, that of the next measurement first."""
     assembly, compared, given, panel = found.assembly, found.comparison, found.observations, canvas.panel
     rings = compared.joints.rings
-    opening = compared.largest_openings(cause.best.openings(np.array([cause.at])))[0]
+    openings = cause.best.openings(np.array([cause.at]))
+    opening = compared.largest_openings(openings)[0]
     faces = carried_faces(assembly, compared.joints, shown)
     start = np.flatnonzero((opening > SMALLEST_OPENING * assembly.block_size)[rings.ring])
     if assembly.dimension == 2:
@@ -258,11 +262,17 @@ def _computed(
     canvas.blocks(shown, [], [], filled)
     between = rings.at((faces.on_a + faces.on_b) / 2.0)
     labels: list[Annotation] = []
+    labelled = np.zeros(len(opening))
     if len(given.widths):
         pairs = cause.best.pairs[cause.at]
         corners = between.points[compared.corners[compared.joint[pairs]]]
         places = canvas.placed((corners * compared.weights[pairs][..., None]).sum(axis=1))
         labels = _labels(panel, places, cause.best.widths[cause.at], found, sizes=given.widths)
+        np.maximum.at(labelled, compared.joint[pairs], cause.best.widths[cause.at])
+    # Where nothing was observed at the end that gapes, the width at the other is not that of the crack.
+    wider = np.flatnonzero(opening > GAPES * labelled)
+    widest = compared.corners[wider, openings[0, compared.corners[wider]].argmax(axis=1)]
+    labels += _labels(panel, canvas.placed(between.points[widest]), opening[wider], found, sizes=opening[wider])
     measurement = found.next_measurement
     if measurement is not None:
         x, y = canvas.placed(between.middles()[[measurement.joint]])[0]

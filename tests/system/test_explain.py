@@ -136,6 +136,25 @@ def test_no_label_of_the_picture_covers_another(folder, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+def test_a_joint_that_gapes_where_nothing_was_seen_has_its_largest_width(folder, tmp_path, monkeypatch):
+    written = []
+    annotate = Axes.annotate
+
+    def noted(panel, text, *at, **options):
+        written.append((panel, text))
+        return annotate(panel, text, *at, **options)
+
+    monkeypatch.setattr(Axes, "annotate", noted)
+    rows = [{"block": "right springer", "dx [mm]": 10.0, "dy [mm]": 0.0}]
+    found = blockvis.explain(folder / "arch.toml", rows, tmp_path / "points")
+    first = written[-1][0].figure.axes[1]
+    numbers = [float(text) for panel, text in written if panel is first and re.fullmatch(r"[\d.]+", text)]
+    best = found.causes[0]
+    largest = found.comparison.largest_openings(best.best.openings(np.array([best.at])))[0]
+    assert max(numbers) == pytest.approx(1e3 * largest.max(), abs=0.051)
+
+
+@pytest.mark.slow
 def test_a_support_that_moves_down_has_its_arrow_in_the_picture(folder, monkeypatch):
     tips = []
     annotate = Axes.annotate
