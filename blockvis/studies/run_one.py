@@ -20,6 +20,7 @@ from blockvis.pictures.frame import Frame
 from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import collapse_phase, least_reaction, loss_in
+from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.results.swinging import swing_factors
 from blockvis.results.ties import known_ties
 from blockvis.runs.plan import planned
@@ -150,6 +151,10 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
         "total_weight": response.total_weight,
     }
     if path:
+        joints = initial_joints(assembly)
+        opening = opening_and_slip(assembly, joints, path[-1].pose)[:, 0]
+        left = path[-1].fallen[joints.block_a] | path[-1].fallen[joints.block_b]
+        found |= {"last_reaction": float(path[-1].reaction), "largest_opening": float(opening[~left].max(initial=0.0))}
         weights = assembly.masses * assembly.free
         found["lost_share"] = float(weights[path[-1].fallen & ~path[-1].removed].sum() / weights.sum())
     if collapse is not None and path:

@@ -29,8 +29,8 @@ from .sampling import Design, designed
 RESERVED = (
     "run", "status", "collapse_displacement", "bracket_low", "bracket_high", "last_settlement", "unit",
     "mechanism_class", "mechanism", "macro_blocks", "hinges", "sliding_joints", "initial_reaction",
-    "collapse_reaction", "total_weight", "falling_share", "lost_share", "increments", "programs", "seconds", "seed",
-    "message",
+    "collapse_reaction", "last_reaction", "largest_opening", "total_weight", "falling_share", "lost_share",
+    "increments", "programs", "seconds", "seed", "message",
 )  # fmt: skip
 
 #: Most runs of one study: their table is made in memory.

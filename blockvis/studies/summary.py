@@ -151,7 +151,10 @@ def in_words(summary: dict[str, Any]) -> str:
         ]
         lines.append(f"{summary['curve']}: {', '.join(quantiles)}")
     elif summary["n_stood"]:
-        farther = "what each parameter does is not known: let settlement.limit be larger"
+        farther = (
+            "what each parameter does to a collapse is not known: let settlement.limit be larger; last reactions and "
+            "largest openings are in table.csv"
+        )
         lines.append(f"no run collapsed up to {summary['furthest_settlement']:.4g} {unit}; {farther}")
     for swing in () if summary["line"] else summary["swings"]:
         (low_at, high_at), (low, high) = swing["at"], swing["mean"]

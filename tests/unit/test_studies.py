@@ -512,10 +512,13 @@ def test_a_study_in_which_nothing_collapses_says_nothing_of_a_collapse(tmp_path,
     path.write_text(STUDY.replace("runs = 8", "runs = 2"), encoding="utf-8")
     assert main(["sweep", str(path), "-o", str(tmp_path / "out"), "--workers", "1"]) == 0
     said = capsys.readouterr().out
-    assert (
-        "no run collapsed up to 0.001 m; what each parameter does is not known: let settlement.limit be larger" in said
-    )
+    unknown = "what each parameter does to a collapse is not known: let settlement.limit be larger; last reactions and"
+    assert f"no run collapsed up to 0.001 m; {unknown}" in said
     assert "average" not in said
+    table = pd.read_csv(tmp_path / "out" / "table.csv")
+    assert (table["last_reaction"] > 0.0).all()
+    assert table["collapse_reaction"].isna().all()
+    assert table["largest_opening"].between(1e-5, 2e-3).all()
     assert not (tmp_path / "out" / "sensitivity.png").exists()
 
 
