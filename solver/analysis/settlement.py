@@ -109,7 +109,7 @@ def _increments(
     # Numbers that pass from phase to phase are in the unit of the first.
     unit = model_of(assembly, loads_in(loads, changes, 0), interfaces, controls).force
     for number, phase in enumerate(phases[first:], start=first):
-        start = Pose.initial(assembly) if before is None else before.place.pose
+        start = Pose.initial(assembly) if before is None else before.history[0].pose
         start = start if resume is None else resume.start
         model = model_of(assembly, loads_in(loads, changes, number), interfaces, controls, ties=ties)
         model = replace(model, force=unit)

@@ -82,7 +82,8 @@ class Path:
         # Of contact points that may carry, in block sizes: viscosity retards joints that close.
         self.closed_gap = max(COMPUTED_GAP, min(CLOSING_GAP, driver.tolerance / self.stepper.unit))
         self.tolerance = controls.step_tolerance
-        self.disturbed = False
+        # What has stood before a phase collapses where it no longer does.
+        self.stood = number > 0
         self.reported = -np.inf
 
     def _remove_blocks(self, fell_at: np.ndarray) -> None:
@@ -117,10 +118,10 @@ class Path:
         """The state at the start of the phase: of a pose at rest, without fallen blocks, or after the phase before."""
         fell_at = np.zeros(0)
         if before is not None:
-            # Joints keep the forces of the phase before, blocks not their velocity.
-            place, fell_at = replace(before.place, s=0.0, velocity=None, works=(0.0, 0.0, 0.0, 0.0)), before.fell_at
+            # The equilibrium that was reported at its end: joints keep their forces, blocks not their velocity.
+            place, fell_at = replace(before.history[0], s=0.0, velocity=None, works=(0.0,) * 4), before.fell_at
             self._remove_blocks(fell_at)
-            place = self.stepper.members.installed(self._without_viscosity(place), self.number)
+            place = self.stepper.members.installed(place, self.number)
         else:
             if fallen is not None and np.any(fallen):
                 fell_at = np.where(fallen, -np.inf, np.nan)
@@ -157,7 +158,7 @@ class Path:
             lengths = state.place.tie_lengths.copy()
             lengths[[tie.name in ties for tie in self.model.ties]] = np.nan
             state = replace(state, place=replace(state.place, tie_lengths=lengths))
-        self.disturbed = True
+        self.stood = True
         if self._gives(state.place) or not self.checks.in_equilibrium(state.place):
             end, at_rest = self.fall.relax(state.place)
             settled = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
@@ -236,7 +237,7 @@ class Path:
         place, model = state.place, self.model
         check = self._check(place)
         bounds = check.bounds
-        if not bounds.in_equilibrium and self.disturbed:
+        if not bounds.in_equilibrium and self.stood:
             words = [text for _, text in self.reports.notes]
             ending = yield from self.fall.collapse(check, place, place.s, None)
             return replace(ending, message="; ".join([*words, ending.message]))

@@ -56,6 +56,16 @@ def test_what_a_prop_carried_goes_to_the_piers_when_it_is_taken_away() -> None:
     assert any("'prop' taken away before settlement 2" in note for note in response.notes)
 
 
+def test_a_phase_that_changes_nothing_begins_with_the_equilibrium_at_the_end_of_the_one_before() -> None:
+    # One long increment: viscosity retards joints that close, and what is reported has come to rest.
+    phase = solver.Settlement([-0.75, 0.67], increment=0.02, limit=0.02)
+    response = solver.Structure(build("portal", {}), friction_coefficient=0.67).settle([phase, phase])
+    assert response.stop is solver.Status.LIMIT_REACHED
+    _, end, begin, _ = response.path
+    assert (end.phase, begin.phase, begin.parameter) == (0, 1, 0.0)
+    assert begin.reaction == pytest.approx(end.reaction, rel=1e-6)
+
+
 @pytest.mark.parametrize("law", [solver.InterfaceLaw(0.6, normal_stiffness=2e6), solver.InterfaceLaw(0.6)])
 def test_springs_keep_what_has_compressed_them_when_something_apart_is_taken_away(law: solver.InterfaceLaw) -> None:
     pads = [rectangle(x - 0.05, -0.3, x + 0.05, 0.0) for x in (-1.0, 0.0, 1.0)]
