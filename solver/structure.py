@@ -177,7 +177,7 @@ class Structure(Shown):
         pose : Pose, optional
             Where to start, for instance after a settlement; the drawing by default. Displacements count from there.
         ties_at : TieForces, optional
-            ``ties`` of the increment that the pose is from; by default all are new, of whichever phase.
+            ``ties`` of the increment that the pose is from; by default all are new, and none may be of a later phase.
         bonds_at : Bonds, optional
             ``bonds`` of that increment: the strength that joints have left, and where elastic ones have no force,
             without which a pose with cohesion or elastic joints is refused.
@@ -260,8 +260,8 @@ class Structure(Shown):
             What a face of blocks in space resists when it turns in its own plane: what friction at its contact
             points does, or what it does under a uniform pressure, which is up to 1.85 times less.
         ties_at : TieForces, optional
-            ``ties`` of the increment that the pose is from, which tell what is broken; by default all carry up to
-            their strength.
+            ``ties`` of the increment that the pose is from, which tell what is broken, and what is slack and by how
+            much: that carries as an open joint does. By default all, none of a later phase, carry up to their strength.
         bonds_at : Bonds, optional
             ``bonds`` of that increment: the strength that joints have left, by default all of it in closed ones; and
             where elastic joints have no force, without which a pose with such joints is refused.

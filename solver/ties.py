@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -127,8 +127,11 @@ def held_ties(ties: Sequence[Tie], gone: np.ndarray) -> np.ndarray:
     return np.array([not any(b is not None and gone[b] for b in tie.blocks) for tie in ties], dtype=bool)
 
 
-def check_ties(ties: Sequence[Tie], assembly: Assembly, n_phases: int) -> None:
-    """Raise ``ValueError`` for blocks or phases that are not there, names used twice, or points of other dimensions."""
+def check_ties(ties: Sequence[Tie], assembly: Assembly, n_phases: float) -> None:
+    """Raise ``ValueError`` for blocks or phases that are not there, names used twice, or points of other dimensions.
+
+    Those of the drawing, with 0 phases, are the ones of phase 1; an increment, with infinitely many, tells of all.
+    """
     names = [tie.name for tie in ties]
     for tie in ties:
         for block in tie.blocks:
@@ -140,8 +143,9 @@ def check_ties(ties: Sequence[Tie], assembly: Assembly, n_phases: int) -> None:
             raise ValueError(
                 f"tie '{tie.name}' has points {tie.points}; give {assembly.dimension} coordinates, as the blocks have"
             )
-        if tie.phase > n_phases:
-            raise ValueError(f"tie '{tie.name}' has phase {tie.phase}, and there are {n_phases} settlements")
+        if tie.phase > max(n_phases, 1):
+            remedy = "leave it out, or give ties_at, the ties of an increment" if n_phases == 0 else "give one of these"
+            raise ValueError(f"tie '{tie.name}' has phase {tie.phase}, and there are {n_phases} settlements; {remedy}")
         if names.count(tie.name) > 1:
             raise ValueError(f"two ties are named '{tie.name}'; give each its own name")
 
@@ -219,21 +223,24 @@ def member_contacts(
     )
 
 
-def plastic_forces(
-    ties: Sequence[Tie], assembly: Assembly, pose: Pose, contacts: Contacts, forces: np.ndarray, before: np.ndarray
-) -> TieForces:
-    """Return what members do under forces (n_contacts, d) [N] at a limit load, where their elongation has no meaning.
+def ties_as_drawn(ties: Sequence[Tie], assembly: Assembly, pose: Pose) -> TieForces:
+    """Return members at a pose without a history: each is as long as it is, so that all carry."""
+    ends, none = tie_ends(ties, assembly, pose), np.zeros(len(ties))
+    return TieForces(none, none, tie_lengths(ends), np.full(len(ties), ELASTIC), ends)
 
-    What is absent or broken ``before``, (n_ties,) int as in :class:`TieForces`, stays it.
-    """
-    if not ties:
-        return TieForces()
-    force, ends = member_forces(contacts, forces, len(ties)), tie_ends(ties, assembly, pose)
-    strength = np.array([tie.strength for tie in ties])
-    state = member_states(np.abs(force), strength, float(np.abs(forces).max(initial=0.0)))
-    gone = np.isin(before, (ABSENT, BROKEN))
-    rest = np.where(gone, np.nan, tie_lengths(ends))
-    return TieForces(force, np.zeros(len(ties)), rest, np.where(gone, before, state), ends)
+
+def slack(members: Contacts, n_ties: int) -> np.ndarray:
+    """(n,) array [m]: how far contact points of members are from carrying; those of a bar are not, in either sense."""
+    number, least = members.features[:, 1], np.full(n_ties, np.inf)
+    np.minimum.at(least, number, members.gaps)
+    return np.asarray(np.maximum(least[number], 0.0))
+
+
+def plastic_forces(contacts: Contacts, forces: np.ndarray, ties: Sequence[Tie], before: TieForces) -> TieForces:
+    """Return what members do under forces (n_contacts, d) [N] at a limit load, at the geometry of ``before``."""
+    force, strength = member_forces(contacts, forces, len(ties)), np.array([tie.strength for tie in ties])
+    states = member_states(np.abs(force), strength, float(np.abs(forces).max(initial=0.0)))
+    return replace(before, forces=force, states=np.where(np.isnan(before.rest), before.states, states))
 
 
 def member_forces(contacts: Contacts, forces: np.ndarray, n_ties: int) -> np.ndarray:

@@ -28,7 +28,6 @@ from solver.results.response import LimitLoad, LimitStatus
 from solver.ties import (
     ABSENT,
     BROKEN,
-    ELASTIC,
     Tie,
     TieForces,
     check_ties,
@@ -37,8 +36,8 @@ from solver.ties import (
     member_contacts,
     plastic_forces,
     present_members,
-    tie_ends,
-    tie_lengths,
+    slack,
+    ties_as_drawn,
 )
 from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION, USED_UP
 from solver.words import checked, counted, plain
@@ -134,7 +133,7 @@ def find_limit_load(
     """
     _check_options(assembly, flow, torsion, ties)
     check_blocks(assembly, overlap_tolerance)
-    check_ties(ties, assembly, max([1, *(tie.phase for tie in ties)]))
+    check_ties(ties, assembly, 0 if ties_at is None else np.inf)
     if pose is not None and bonds_at is None:
         interfaces.refuse_pose_alone()
     left = remaining(assembly, fallen)
@@ -147,10 +146,11 @@ def find_limit_load(
         if not 0.0 <= plain(value, "float", name) < np.inf:
             raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
     gone = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else np.asarray(fallen)
-    states = np.full(len(ties), ELASTIC) if ties_at is None else ties_at.states
-    states = np.where(held_ties(ties, gone), states, ABSENT)
+    told = ties_as_drawn(ties, assembly, pose) if ties_at is None else ties_at
+    states = np.where(held_ties(ties, gone), told.states, ABSENT)
+    told = replace(told, rest=np.where(np.isin(states, (ABSENT, BROKEN)), np.nan, told.rest), states=states)
     problem = _Problem(
-        left, interfaces, loads, pose, closed_gap, displacement, torsion, tuple(ties), states, bonds_at, gone
+        left, interfaces, loads, pose, closed_gap, displacement, torsion, tuple(ties), told, bonds_at, gone
     )
     balanced, status = problem.balanced(with_live=False), LimitStatus.FOUND
     if balanced.falls:
@@ -212,11 +212,11 @@ class _Problem:
         displacement: float,
         torsion: str,
         ties: tuple[Tie, ...],
-        tie_states: np.ndarray,
+        ties_at: TieForces,
         bonds: Bonds | None,
         gone: np.ndarray,
     ) -> None:
-        self.assembly, self.pose, self.ties, self.tie_states, self.gone = assembly, pose, ties, tie_states, gone
+        self.assembly, self.pose, self.ties, self.ties_at, self.gone = assembly, pose, ties, ties_at, gone
         self.length, free, d = assembly.block_size, assembly.free, assembly.dimension
         reach = max(closed_gap, REACH * self.length) if displacement > 0.0 else closed_gap
         vertices = moved_vertices(assembly, pose)
@@ -233,16 +233,15 @@ class _Problem:
             contacts, gaps, cohesion, tension = contacts[number], gaps[number], cohesion[number], tension[number]
             crushing = np.where(is_open | (gaps <= closed_gap), crushing[number], 0.0)
         friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-        there = ~np.isin(tie_states, (ABSENT, BROKEN))
-        if there.any():
-            # Each is as long as it is, so that all carry.
-            rest = np.where(there, tie_lengths(tie_ends(ties, assembly, pose)), np.nan)
-            members = member_contacts(ties, assembly, pose, rest, present_members(ties, rest))
+        if ties:
+            members = member_contacts(ties, assembly, pose, ties_at.rest, present_members(ties, ties_at.rest))
+            apart = slack(members, len(ties))
+            members, apart = members[apart <= reach], apart[apart <= reach]
             contacts = joined_contacts([contacts, members])
             crushing = np.append(crushing, [ties[i].strength for i in members.features[:, 1]])
             none = np.zeros(len(members))
-            cohesion, friction, tension, gaps = (np.append(of, none) for of in (cohesion, friction, tension, gaps))
-            is_open = np.append(is_open, none > 0.0)
+            cohesion, friction, tension = (np.append(of, none) for of in (cohesion, friction, tension))
+            gaps, is_open = np.append(gaps, apart), np.append(is_open, apart > closed_gap)
         units = unit_lengths(loads.dead.shape[1], self.length)
         dead, live = loads.dead[free] / units, loads.live[free] / units
         size = float(np.abs(live).max())
@@ -488,7 +487,7 @@ class _Problem:
             velocity=mechanism,
             support_forces=np.where(self.assembly.free[:, None], 0.0, on_blocks),
             fell_at=np.where(self.gone, -np.inf, np.nan) if self.gone.any() else np.zeros(0),
-            ties=plastic_forces(self.ties, self.assembly, self.pose, self.contacts, forces, self.tie_states),
+            ties=plastic_forces(self.contacts, forces, self.ties, self.ties_at),
             crushing=at_strength[between] if np.isfinite(self.crushing[between]).any() else at_strength[:0],
         )
 

@@ -74,9 +74,7 @@ def pushover_increments(
             f"the checkpoint has {counted(len(resume.place.pose.rotations), 'block')}, the assembly "
             f"{assembly.n_blocks}: it belongs to another run"
         )
-    # There are no settlements that a tie could wait for.
-    ties = tuple(replace(tie, phase=1) for tie in ties)
-    check_ties(ties, assembly, 1)
+    check_ties(ties, assembly, 0 if ties_at is None else np.inf)
     origin = at_origin(assembly)
     near, loads, ties = without_origin(origin, assembly, loads, ties)
     if origin.any() and control.point is not None:

@@ -1,6 +1,6 @@
 import json
 import pkgutil
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -140,17 +140,26 @@ def test_what_has_fallen_is_marked():
     assert "no capacity is left" in response.message
 
 
-def test_ties_act_from_the_start_whichever_settlement_they_were_to_wait_for():
+def test_a_tie_of_a_later_phase_is_refused_unless_an_increment_tells_of_it():
     assembly = block()
     control = solver.ControlDisplacement("block", (1, 0), increment=0.005, limit=0.01)
-    found = []
-    for phase in (1, 2):
-        tie = solver.Tie("stay", (0, None), ((0.0, 1.0), (-1.0, 1.0)), stiffness=1e8, strength=500.0, phase=phase)
-        structure = solver.Structure(assembly, friction_coefficient=0.6, loads=sideways(assembly), ties=[tie])
-        found.append(structure.pushover(control).load_multiplier)
-    assert found[1].tolist() == found[0].tolist()
+    first, later = (
+        solver.Structure(
+            assembly,
+            friction_coefficient=0.6,
+            loads=sideways(assembly),
+            ties=[solver.Tie("stay", (0, None), ((0.0, 1.0), (-1.0, 1.0)), stiffness=1e8, strength=500.0, phase=phase)],
+        )
+        for phase in (1, 2)
+    )
+    for analysed in (later.limit_load, partial(later.pushover, control)):
+        with pytest.raises(ValueError, match=r"tie 'stay' has phase 2, and there are 0 settlements; .* give ties_at"):
+            analysed()
+    found = first.pushover(control)
+    again = later.pushover(control, ties_at=first.limit_load().state.ties)
+    assert again.load_multiplier.tolist() == found.load_multiplier.tolist()
     # It yields: W (b/2 - d/2) + F h = α W h/2, but for what the displacement d of the centroid has turned.
-    assert found[0][-1] == pytest.approx(0.2 + 2 * 500.0 / mechanics.total_weight(assembly), rel=0.1)
+    assert found.load_multiplier[-1] == pytest.approx(0.2 + 2 * 500.0 / mechanics.total_weight(assembly), rel=0.1)
 
 
 def test_far_from_the_origin_a_pushover_is_what_it_is_near():

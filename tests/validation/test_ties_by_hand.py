@@ -1,10 +1,12 @@
 """Ties, props and bars against statics by hand."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 import solver
-from solver import Tie
+from solver import Tie, mechanics
 
 
 def _box(x0, y0, x1, y1):
@@ -149,6 +151,34 @@ def test_a_tie_adds_its_strength_times_its_arm_to_the_acceleration_that_overturn
         # By then it yields, and the block has turned a little.
         assert pushed.increments[1].ties.forces[0] == pytest.approx(strength, rel=1e-3)
         assert found.multiplier - 0.05 < pushed.increments[1].load_multiplier < found.multiplier
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+def test_what_a_settlement_has_left_slack_carries_within_the_displacement_only(flow):
+    """A block with a prop behind it, whose buttress has moved away by 0.1 m."""
+    outlines = [_box(-1, -0.5, 1, 0), _box(0, 0, 0.4, 1.2), _box(1.2, -0.5, 2, 1.5)]
+    prop = Tie("prop", (1, 2), ((0.4, 1.0), (1.2, 1.0)), 1e7, kind="prop", strength=100.0)
+    structure = _structure(outlines, ["fixed", "free", "moving"], 2.0, [prop])
+    end = structure.settle(solver.Settlement((1, 0), increment=0.1, limit=0.1)).path[-1]
+    load = partial(structure.limit_load, acceleration=(1, 0), flow=flow)
+    bare, held = (pytest.approx((0.2 * 480.0 + held) / (480.0 * 0.6), rel=1e-9) for held in (0.0, 100.0))
+    assert load().multiplier == held
+    # It is worth S h / (W h / 2) of the load, and costs S g / (W δ): from a displacement δ of 0.06 m on it is reached.
+    for displacement in (0.0, 0.059):
+        found = load(pose=end.pose, ties_at=end.ties, displacement=displacement)
+        assert (found.multiplier, found.state.ties.states.tolist()) == (bare, [mechanics.SLACK])
+        assert found.state.ties.elongations == pytest.approx([0.1])
+    assert load(pose=end.pose, ties_at=end.ties, displacement=0.061).multiplier == held
+
+
+def test_a_bar_is_never_slack():
+    bar = Tie("bar", (1, None), ((0, 1.0), (-1, 1.0)), 1e4, kind="bar", strength=100.0)
+    structure = _structure([_box(-1, -0.5, 1, 0), _box(0, 0, 0.4, 1.2)], ["moving", "free"], 2.0, [bar])
+    for way in (1, -1):
+        end = structure.settle(solver.Settlement((way, 0), increment=5e-3, limit=5e-3)).path[-1]
+        assert end.ties.forces == pytest.approx([way * 50.0], rel=1e-3)
+        found = structure.limit_load(acceleration=(1, 0), pose=end.pose, ties_at=end.ties)
+        assert found.multiplier == pytest.approx((0.2 * 480.0 + 100.0) / (480.0 * 0.6), rel=1e-9)
 
 
 def test_a_block_hangs_in_space_and_far_from_the_origin():
