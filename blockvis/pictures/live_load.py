@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import solver
+from blockvis.results.ties import known_ties, ties_at
 from blockvis.text import force_text
 from solver import mechanics
 
@@ -66,7 +67,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
 
     Notes
     -----
-    It is found as what the contact forces balance beyond the dead load: the increment does not store the position of a
+    It is found as what contacts and ties balance beyond the dead load: the increment does not store the position of a
     load that moves.
     """
     standing = increment.status == solver.Status.EQUILIBRIUM or bool(response.limits)
@@ -76,6 +77,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
         nowhere = np.zeros((0, assembly.dimension))
         return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), _of(np.zeros(0, dtype=int), pose))
     live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + response.dead_at(increment))
+    live -= _of_ties(response, increment)
     live[~assembly.free] = 0.0
     forces = live[:, : assembly.dimension]
     size = np.linalg.norm(forces, axis=1)
@@ -91,6 +93,20 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     if len(blocks) > MOST_ARROWS:
         return _gathered(points, forces[blocks], blocks, pose, CELL * extent)
     return LiveLoad(points, forces[blocks], blocks, _of(blocks, pose))
+
+
+def _of_ties(response: solver.Response, increment: solver.Increment) -> np.ndarray:
+    """(n_blocks, n_dof) array [N, N·m]: what ties, props and bars do to the blocks."""
+    ties, assembly = known_ties(response), response.assembly
+    forces = ties_at(ties, assembly, increment).forces
+    lengths = np.where(forces == 0.0, np.nan, 1.0)
+    members = mechanics.member_contacts(
+        ties, assembly, increment.pose, lengths, mechanics.present_members(ties, lengths)
+    )
+    pushes = np.zeros(members.points.shape)
+    pushes[:, 0] = forces[members.features[:, 1]] * np.where(members.features[:, 2] == 1, -1.0, 1.0)
+    # Of the two senses of a bar one carries, as do a tie and a prop.
+    return mechanics.block_forces(members, increment.pose, np.maximum(pushes, 0.0))
 
 
 class LiveLoads:

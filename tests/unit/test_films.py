@@ -121,6 +121,28 @@ def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
     assert len(list(animate(response, tmp_path / "frames", size=SIZE, fps=5, seconds=1.0).iterdir())) == 5 + 4
 
 
+@pytest.mark.parametrize("kind", ["tie", "prop", "bar"])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_forces_of_ties_are_no_live_load(kind, dimension):
+    roles, names = ["free", "fixed"], ["pier", "ground"]
+    if dimension == 2:
+        outlines = [rectangle(0.0, 0.0, 0.5, 2.0), rectangle(-3.0, -0.5, 3.0, 0.0)]
+        assembly = solver.Assembly.from_outlines(outlines, roles=roles, names=names)
+    else:
+        solids = [box((0.0, -0.5, 0.0), (0.5, 0.5, 2.0)), box((-3.0, -1.0, -0.5), (3.0, 1.0, 0.0))]
+        assembly = solver.Assembly.from_solids(solids, roles=roles, names=names)
+    ends = np.zeros((2, dimension))
+    ends[:, 0], ends[:, -1] = (0.25, 1.5 if kind == "prop" else -1.5), 1.2
+    tie = solver.Tie("it", (0, None), ends, 1e7, kind=kind, strength=500.0)
+    structure = solver.Structure(assembly, friction_coefficient=1.0, ties=[tie])
+    limit = structure.limit_load(acceleration=np.eye(dimension)[0])
+    assert np.abs(limit.state.ties.forces) == pytest.approx([500.0])
+    loads = LiveLoads(limit.response, limit.response.path, 3.0)
+    assert loads.largest == pytest.approx(limit.multiplier * mechanics.total_weight(assembly))
+    (tip,) = loads.arrows(limit.response.path[0], limit.state.pose)[1]
+    assert tip[-1] == pytest.approx(1.0)
+
+
 def test_forces_between_increments_are_those_of_the_reaction_that_the_title_tells():
     response = arch_response()
     moving = int(np.flatnonzero(response.assembly.moving)[0])
