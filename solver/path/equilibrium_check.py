@@ -14,7 +14,7 @@ from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.program.admissible import EquilibriumBounds, StaticProgram
 from solver.program.model import Model
-from solver.tolerances import COMPUTED_GAP
+from solver.tolerances import COMPUTED_GAP, SMALLEST_RATE
 
 from .state import EquilibriumCheck, Place
 from .stepping import CARRIES, Stepper
@@ -142,6 +142,16 @@ class EquilibriumChecks:
         bounds = program.bounds()
         self.stepper.programs += program.programs
         return bounds
+
+    def moves_control(self, place: Place) -> bool:
+        """Whether the control displacement grows in the mechanism of the largest multiplier at a place."""
+        program, control = self._program(place, COMPUTED_GAP), self.driver.control(place.pose)
+        most = program.bound(-1.0, program.most_balanced()[0])
+        if most is None or control is None:
+            return False
+        motion = -most.row_dual[: program.rows]
+        grows = float(motion @ (control * self.model.lengths / self.model.length)[self.stepper.free].ravel())
+        return grows > SMALLEST_RATE * float(np.abs(motion).max())
 
     def _program(self, place: Place, gap: float, rate: np.ndarray | None = None) -> StaticProgram:
         contacts, friction = self._contacts_at(place)

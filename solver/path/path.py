@@ -255,7 +255,8 @@ class Path:
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, self.reports.nothing_carried())
         if model.live is not None:
             first_state, _ = self.advance(state, self._onset())
-            if first_state.place.multiplier <= 0.0:
+            # What has lost its capacity by then moves along the control all the same.
+            if first_state.place.multiplier <= 0.0 and not self.checks.moves_control(place):
                 raise ValueError(self.driver.misdirected())
         yield self._report(state, check)
         return None
