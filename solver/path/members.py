@@ -87,16 +87,27 @@ class Members:
 
     def after(self, contacts: Contacts, forces: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """(n_ties, 2) array: lengths after a step to contact points with these forces: what yields gives for good."""
-        members = is_member(contacts)
-        number, sense = contacts.features[members, 1], np.where(contacts.features[members, 2] == 1, -1.0, 1.0)
-        full = forces[members, 0] >= AT_STRENGTH * self.strength[number]
-        if not full.any():
+        full = self._at_strength(contacts, forces)
+        if not len(full):
             return lengths
-        number, lengths = number[full], lengths.copy()
-        give = -contacts.gaps[members][full] - self.strength[number] * self.compliance[number] * self.model.length
-        lengths[number, 1] += sense[full] * np.maximum(give, 0.0)
-        lengths[number[self.brittle[number]], 1] = np.nan
+        number, sense = contacts.features[full, 1], np.where(contacts.features[full, 2] == 1, -1.0, 1.0)
+        give = -contacts.gaps[full] - self.strength[number] * self.compliance[number] * self.model.length
+        lengths = lengths.copy()
+        lengths[number, 1] += sense * np.maximum(give, 0.0)
         return lengths
+
+    def without_broken(self, place: Place) -> Place:
+        """The place without brittle members at their strength: they carry it there, and break as they go on."""
+        if place.contacts is None or not self.brittle.any():
+            return place
+        number, lengths = place.contacts.features[self._at_strength(place.contacts, place.forces), 1], place.tie_lengths
+        broken = self.brittle & np.isin(np.arange(len(self.ties)), number)
+        return replace(place, tie_lengths=np.where(broken[:, None] & [False, True], np.nan, lengths))
+
+    def _at_strength(self, contacts: Contacts, forces: np.ndarray) -> np.ndarray:
+        """Numbers of the contact points of members whose forces are at their strength."""
+        members = np.flatnonzero(is_member(contacts))
+        return members[forces[members, 0] >= AT_STRENGTH * self.strength[contacts.features[members, 1]]]
 
     def told(self, contacts: Contacts, forces: np.ndarray, pose: Pose, lengths: np.ndarray) -> TieForces:
         """What the members do at a place, from forces in units of the program."""

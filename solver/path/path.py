@@ -60,6 +60,9 @@ STANDSTILL = 1e3
 #: Movement, in block sizes, of blocks that have fallen when the first one has moved farthest.
 FALLEN = 0.1
 
+#: Part by which the multiplier falls in the step after a peak that is reported, and by which that exceeds what was.
+DROP = 0.01
+
 #: Part of the first multiplier under which one may vanish within a bracket.
 VANISHING = 0.05
 
@@ -209,6 +212,9 @@ class Path:
             # What blocks that drop come to may be at a stop that has not been reported.
             state, outcome = self.advance(self.state, self.driver.next_stop(self.reported))
             self.state = state
+            if outcome.stop is Status.EQUILIBRIUM:
+                yield from self._report_peak(state)
+                continue
             if outcome.stop is Status.LIMIT_REACHED:
                 yield from self._report_reached(state)
                 continue
@@ -258,7 +264,10 @@ class Path:
             # What has lost its capacity by then moves along the control all the same.
             if first_state.place.multiplier <= 0.0 and not self.checks.moves_control(place):
                 raise ValueError(self.driver.misdirected())
-        yield self._report(state, check)
+        # Where joints or ground give, the first multiplier is not carried.
+        peak = 0.0 if model.live is None or model.interfaces.elastic else bounds.high
+        self.state = replace(state, peak=peak)
+        yield self._report(self.state, check)
         return None
 
     def _onset(self) -> float:
@@ -284,8 +293,17 @@ class Path:
         ended = place.s >= self.driver.limit * (1.0 - 1e-12)
         if is_far:
             state = self._continue_from(state, resting)
-        self.state = state = replace(state, history=(replace(resting, works=place.works),), ended=ended)
-        yield self._report(state, check if carries else self._check(resting, reaction))
+        check = check if carries else self._check(resting, reaction)
+        peak = max(state.peak, check.measured)
+        self.state = replace(state, history=(replace(resting, works=place.works),), ended=ended, peak=peak)
+        yield self._report(self.state, check)
+
+    def _report_peak(self, state: PathState) -> Iterator[Increment]:
+        """Report the place from which the multiplier falls as members or joints break, if that is in equilibrium."""
+        check = self._check(state.place)
+        self.state = replace(state, peak=state.place.multiplier, history=(state.place,))
+        if check.bounds.in_equilibrium and check.measured > state.peak:
+            yield self._report(self.state, check)
 
     def _without_viscosity(self, place: Place) -> Place:
         """The place once the supports have stood still: joints of given stiffness have given by their forces alone."""
@@ -328,9 +346,12 @@ class Path:
             width = state.upper_bound - state.place.s
             if state.refined and width <= self.driver.tolerance * (1.0 + 1e-9):
                 return state, Ending(Status.FALLING)
-            state, outcome = self._step(state, target)
+            before = state
+            state, outcome = self._step(before, target)
             self.tried = state
             self.on_step(state)
+            if outcome is None and self._falls_from_peak(before, state.place):
+                return before, Ending(Status.EQUILIBRIUM)
             if outcome is not None:
                 return state, outcome
         return state, self.reports.no_step(state.place.s, f"{MOST_STEPS} were tried")
@@ -374,6 +395,12 @@ class Path:
             until = s + ENCLOSED * self.driver.tolerance
             state = replace(state, upper_bound=np.inf, refined=False, refine_until=until)
         return state, None
+
+    def _falls_from_peak(self, state: PathState, new: Place) -> bool:
+        """Whether the multiplier falls at once in the step to a new place, from more than was reported."""
+        multiplier = state.place.multiplier
+        falls = new.s > state.place.s > self.reported and new.multiplier < (1.0 - DROP) * multiplier
+        return falls and multiplier > (1.0 + DROP) * state.peak
 
     def _shorten(self, state: PathState, length: float, failure: str) -> tuple[PathState, Ending | None]:
         """Shorten a step that was not solved, or end where it is the shortest."""

@@ -84,6 +84,8 @@ class PathState:
         Places before, oldest first, to go back to from one without equilibrium.
     ended : bool
         Whether the phase has reached its limit.
+    peak : float
+        Largest multiplier that was reported.
     fell_at : (n_blocks,) array
         As in :class:`solver.results.increment.State`.
     """
@@ -97,6 +99,7 @@ class PathState:
     refine_until: float = -np.inf
     history: tuple[Place, ...] = ()
     ended: bool = False
+    peak: float = 0.0
     fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 

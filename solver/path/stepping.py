@@ -334,6 +334,7 @@ class Stepper:
         model, free = self.model, self.free
         # A step in time is solved to a small part of such a movement.
         s, size = (place.s, 1e-3) if in_time else (place.s + length, length / self.unit)
+        place = self.members.without_broken(place)
         start = self.contacts_at(place) if candidates is None else candidates
         place = self.mortar.renamed(place, start)
         # A larger share alternates where the normal force falls as the bound grows.

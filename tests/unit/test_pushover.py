@@ -182,6 +182,25 @@ def test_what_breaks_within_the_first_increment_has_lost_its_capacity_whichever_
         structure.pushover(replace(down, direction=(0, 1)))
 
 
+def test_the_peak_at_which_a_tie_or_a_joint_breaks_is_told_however_long_increments_are():
+    assembly, control = block(), solver.ControlDisplacement("block", (1, 0), increment=0.01, limit=0.03)
+    loads, weight = sideways(assembly), mechanics.total_weight(assembly)
+    tie = solver.Tie("rod", (0, None), ((0.0, 1.0), (-1.0, 1.0)), stiffness=1e8, strength=500.0, brittle=True)
+    tied = {"interfaces": solver.Interfaces(solver.InterfaceLaw(2.0)), "ties": [tie]}
+    found = solver.Structure(assembly, loads=loads, **tied).pushover(control)
+    # It stands on its edge: W b/2 + S h = α W h/2.
+    assert found.load_multiplier[:2] == pytest.approx([0.2, 0.2 + 2 * 500.0 / weight], rel=2e-3)
+    assert [0.0, *found.settlement[2:]] == pytest.approx([0.0, 0.01, 0.02, 0.03])
+    assert [mechanics.BROKEN in i.ties.states for i in found.path] == [False, False, True, True, True]
+    whole = list(mechanics.pushover_increments(assembly, control, loads=loads, **tied))
+    resumed = list(mechanics.pushover_increments(assembly, control, loads=loads, resume=whole[1].checkpoint, **tied))
+    assert [i.load_multiplier for i in resumed] == [i.load_multiplier for i in whole[2:]]
+    law = solver.InterfaceLaw(2.0, cohesion=2e5, tensile_strength=1e5, normal_stiffness=1e9, shear_stiffness=5e8)
+    glued = solver.Structure(assembly, solver.Interfaces(law), loads)
+    # What opens first is the joint at its strength, as the limit load has it.
+    assert glued.pushover(control).load_multiplier[1] == pytest.approx(glued.limit_load().multiplier, rel=0.01)
+
+
 def test_far_from_the_origin_a_pushover_is_what_it_is_near():
     # Quarters of metres, which are as exact in both places.
     shift, found = np.array([524288.0, 5242880.0]), []
