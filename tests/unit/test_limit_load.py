@@ -1,4 +1,5 @@
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -76,6 +77,19 @@ def test_without_dilatancy_a_block_on_a_slope_carries_any_weight_below_its_angle
         limit = limit_load(assembly, loads=solver.Loads(down, down), friction_coefficient=friction, flow=flow)
         assert limit.status is solver.LimitStatus.UNBOUNDED
         assert limit.multiplier == np.inf
+
+
+def test_without_dilatancy_a_wall_has_the_limit_load_of_its_mirror_image_and_of_any_order_of_its_blocks():
+    # Many forces carry alike: of two corners on one stone either may press.
+    rows, found = [[0.0, 1.0, 2.0], [0.0, 0.5, 1.5, 2.0], [0.0, 1.0, 2.0]], []
+    bricks = [rectangle(0.4 * a, 0.2 * k, 0.4 * b, 0.2 * (k + 1)) for k, x in enumerate(rows) for a, b in pairwise(x)]
+    outlines, n = [*bricks, rectangle(-1.0, -0.5, 1.8, 0.0)], len(bricks)
+    for sense, order in ((1.0, range(n)), (-1.0, range(n)), (1.0, range(n)[::-1]), (1.0, (3, 0, 6, 2, 5, 1, 4))):
+        drawn = [np.multiply(outlines[k], [sense, 1.0])[:: int(sense)] for k in (*order, n)]
+        assembly = solver.Assembly.from_outlines(drawn, roles=["free"] * n + ["fixed"])
+        loads = pushed(assembly, solver.weight_fraction(assembly, (0.5 * sense, 0.47), np.arange(n)))
+        found.append(limit_load(assembly, loads=loads, friction_coefficient=0.85, flow="non-associative").multiplier)
+    assert found == pytest.approx([found[0]] * 4, rel=1e-6)
 
 
 def test_what_the_dead_load_brings_down_carries_nothing():
