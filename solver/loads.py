@@ -66,10 +66,6 @@ class Loads:
         arms = added(getattr(self, f"{kind}_arms"), forces.arms(assembly))
         return replace(self, **{kind: getattr(self, kind) + forces.load(assembly), f"{kind}_arms": arms})
 
-    def total(self, multiplier: float = 0.0) -> np.ndarray:
-        """(n_blocks, n_dof) array: dead load + multiplier · live load."""
-        return self.dead + multiplier * self.live
-
 
 def self_weight(assembly: Assembly) -> Loads:
     """Self-weight of all blocks as dead load, along -y in the plane and -z in space; no live load.

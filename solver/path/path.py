@@ -294,8 +294,8 @@ class Path:
         if is_far:
             state = self._continue_from(state, resting)
         check = check if carries else self._check(resting, reaction)
-        peak = max(state.peak, check.measured)
-        self.state = replace(state, history=(replace(resting, works=place.works),), ended=ended, peak=peak)
+        resting, peak = replace(resting, works=place.works), max(state.peak, resting.multiplier)
+        self.state = replace(state, history=(resting,), ended=ended, peak=peak)
         yield self._report(self.state, check)
 
     def _report_peak(self, state: PathState) -> Iterator[Increment]:
@@ -350,7 +350,8 @@ class Path:
             state, outcome = self._step(before, target)
             self.tried = state
             self.on_step(state)
-            if outcome is None and self._falls_from_peak(before, state.place):
+            last, new = before.place, state.place
+            if new.s > last.s > self.reported and (1.0 - DROP) * last.multiplier > max(state.peak, new.multiplier):
                 return before, Ending(Status.EQUILIBRIUM)
             if outcome is not None:
                 return state, outcome
@@ -395,12 +396,6 @@ class Path:
             until = s + ENCLOSED * self.driver.tolerance
             state = replace(state, upper_bound=np.inf, refined=False, refine_until=until)
         return state, None
-
-    def _falls_from_peak(self, state: PathState, new: Place) -> bool:
-        """Whether the multiplier falls at once in the step to a new place, from more than was reported."""
-        multiplier = state.place.multiplier
-        falls = new.s > state.place.s > self.reported and new.multiplier < (1.0 - DROP) * multiplier
-        return falls and multiplier > (1.0 + DROP) * state.peak
 
     def _shorten(self, state: PathState, length: float, failure: str) -> tuple[PathState, Ending | None]:
         """Shorten a step that was not solved, or end where it is the shortest."""

@@ -26,14 +26,6 @@ def test_self_weight():
     assert (loads.live == 0).all()
 
 
-def test_live_loads_are_multiplied():
-    live = solver.weight_fraction(ASSEMBLY, (0.1, 0), np.array([0]))
-    loads = solver.Loads(solver.self_weight(ASSEMBLY).dead, live)
-    total = loads.total(3.0)
-    assert total[0] == pytest.approx([0.3 * 2 * 19620, -2 * 19620, 0])
-    assert total[1:] == pytest.approx(loads.dead[1:])
-
-
 def test_weight_fraction_of_all_blocks():
     assert solver.weight_fraction(ASSEMBLY, (0.1, -0.2))[:, 1] == pytest.approx(-0.2 * ASSEMBLY.masses * 9.81)
 
