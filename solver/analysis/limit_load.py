@@ -63,7 +63,7 @@ FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE, NO_NEARER = 1e-6, 1e-8, 5
 CHANGE_COST, CHANGE_COST_IN_SPACE = 1e-8, 1e-5
 
 #: Non-associative flow in the plane: parts of that cost in which points differ, at most, by place along the resultants
-#: of the live and the dead load and by normal force at rest.
+#: of the live and the dead load and by normal force at rest: between equals the order of the rows would decide.
 UNLIKE = np.array([0.1, 0.037, 0.071])
 
 #: Non-associative flow: cost of unbalanced force, in multipliers, above that of any mechanism.
@@ -383,11 +383,7 @@ class _Problem:
         return self.result(nearest, status, "non-associative", programs)
 
     def _unlike(self, normal: np.ndarray) -> np.ndarray:
-        """(n,) array: factors in which contact points differ, by normal forces at rest and places along the loads.
-
-        Where changes of several points cost alike, the order of rows and columns would choose between them: an
-        optimum is a vertex. These turn and mirror with the structure, whatever the order of its blocks is.
-        """
+        """(n,) array: factors in which points differ whatever their order, by forces (n,) at rest and places."""
         points, blocks = self.contacts.points, (self.contacts.block_a, self.contacts.block_b)
         # Corners of two blocks on a third are at one place: what they belong to tells them apart.
         places = points + sum(np.where(block[:, None] < 0, points, self.pose.positions[block]) for block in blocks)

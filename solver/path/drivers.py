@@ -22,6 +22,8 @@ class Driver(ABC):
     what: str
     #: Largest displacement that it prescribes, per unit of it.
     lever = 1.0
+    #: Message where the multiplier has to change its sign for the parameter to grow; none where supports drive.
+    misdirected = ""
     #: Values that are reported, too.
     stops: Sequence[float] = ()
 
@@ -52,10 +54,6 @@ class Driver(ABC):
     def control(self, pose: Pose) -> np.ndarray | None:
         """(n_blocks, n_dof) array: gradient of the control displacement; None where supports drive."""
         return None
-
-    def misdirected(self) -> str:
-        """Message where the multiplier has to change its sign for the parameter to grow; none where supports drive."""
-        return ""
 
 
 class SupportMotion(Driver):
@@ -156,6 +154,10 @@ class ControlledLoad(Driver):
     def __init__(self, assembly: Assembly, chosen: ControlDisplacement, start: Pose) -> None:
         super().__init__(assembly, chosen, start)
         self.chosen, self.offset = chosen, chosen.displacement(assembly, start)
+        self.misdirected = (
+            f"the mechanism does not move block '{chosen.block}' along {chosen.direction or 'x'}; choose another "
+            "control block, point or direction"
+        )
 
     def supports(self, s: float) -> Pose:
         """As at the start."""
@@ -172,10 +174,3 @@ class ControlledLoad(Driver):
     def control(self, pose: Pose) -> np.ndarray:
         """Gradient of the displacement of the control point."""
         return self.chosen.weights(self.assembly, pose)
-
-    def misdirected(self) -> str:
-        """Message with the block and the direction."""
-        return (
-            f"the mechanism does not move block '{self.chosen.block}' along {self.chosen.direction or 'x'}; choose "
-            "another control block, point or direction"
-        )

@@ -263,7 +263,7 @@ class Path:
             first_state, _ = self.advance(state, self._onset())
             # What has lost its capacity by then moves along the control all the same.
             if first_state.place.multiplier <= 0.0 and not self.checks.moves_control(place):
-                raise ValueError(self.driver.misdirected())
+                raise ValueError(self.driver.misdirected)
         # Where joints or ground give, the first multiplier is not carried.
         peak = 0.0 if model.live is None or model.interfaces.elastic else bounds.high
         self.state = replace(state, peak=peak)
