@@ -402,10 +402,14 @@ def test_the_largest_multiplier_where_joints_give_is_one_that_is_carried(tmp_pat
     text = PUSHED.replace("friction_coefficient = 0.7", "friction_coefficient = 0.7\nnormal_stiffness = 2e6")
     _, summary = ran(text.replace("increment = 0.03", "increment = 0.03\nlimit = 0.15"), tmp_path)
     weight = 0.2 * 2000.0 * 9.81
-    by_hand = (2e6 * 0.2 * 0.2**2 / 4.0 / (weight * 0.5) - 1.0) * 0.09
+    at = summary["largest_load_multiplier_at"]
+    # Between the increments of 0.09 and 0.12, where the multiplier falls from a peak.
+    assert at == pytest.approx(weight / (2e6 * 0.2 * 0.1), rel=0.01)
+    by_hand = (2e6 * 0.2 * 0.2**2 / 4.0 / (weight * 0.5) - 1.0) * at
     assert summary["limit_load_multiplier"] == pytest.approx(0.2, abs=1e-6)
-    assert summary["largest_load_multiplier"] == pytest.approx(by_hand, rel=0.01)
-    assert summary["largest_load_multiplier_at"] == pytest.approx(0.09)
+    # What the end has lifted by then, and what small angles leave out, is missing.
+    assert summary["largest_load_multiplier"] == pytest.approx(by_hand, rel=0.04)
+    assert summary["largest_load_multiplier"] > 0.0985
     assert re.search(r"first multiplier .* at 0 m, .*, were joints and ground rigid\n", capsys.readouterr().out)
 
 
