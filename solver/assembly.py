@@ -79,7 +79,7 @@ class Assembly(Shown):
         ------
         ValueError
             For an outline with fewer than three corners, with coordinates that are not finite, without
-            area or crossing itself, an unknown role, a density or thickness that is not positive.
+            area, crossing or touching itself, an unknown role, a density or thickness that is not positive.
 
         Examples
         --------
@@ -104,8 +104,8 @@ class Assembly(Shown):
         for i, (j, k) in self_crossings(vertices, offsets).items():
             a, b = vertices[offsets[i] + j], vertices[offsets[i] + k]
             raise ValueError(
-                f"block {i} ('{names[i]}') crosses itself: the edges that start at ({a[0]:.6g}, {a[1]:.6g}) and "
-                f"({b[0]:.6g}, {b[1]:.6g}) meet; order its corners around the outline"
+                f"block {i} ('{names[i]}') crosses itself or doubles back: the edges that start at ({a[0]:.6g}, "
+                f"{a[1]:.6g}) and ({b[0]:.6g}, {b[1]:.6g}) meet; order its corners around the outline"
             )
         return cls(
             shapes=Polygons(vertices, offsets, _positive(thickness, "thickness", "m", names)),

@@ -127,7 +127,7 @@ def polygon_integrals(vertices: np.ndarray, offsets: np.ndarray) -> tuple[np.nda
 
 
 def self_crossings(vertices: np.ndarray, offsets: np.ndarray) -> dict[int, tuple[int, int]]:
-    """First pair of crossing edges of each polygon that crosses itself: {polygon: (edge, edge)}."""
+    """First pair of edges of each polygon that crosses or touches itself: {polygon: (edge, edge)}."""
     crossings: dict[int, tuple[int, int]] = {}
     every = np.arange(len(offsets) - 1)
     # Twice, as there are as many pairs of edges as the square of their number.
@@ -139,8 +139,9 @@ def self_crossings(vertices: np.ndarray, offsets: np.ndarray) -> dict[int, tuple
         ring = vertices[corners]
         end = np.roll(ring, -1, axis=1)
         a0, a1, b0, b1 = ring[:, first], end[:, first], ring[:, second], end[:, second]
-        # Each separates the ends of the other.
-        hit = (_side(a0, a1, b0) * _side(a0, a1, b1) < 0) & (_side(b0, b1, a0) * _side(b0, b1, a1) < 0)
+        # Each separates the ends of the other, or holds one; on one line all sides are 0, and boxes tell.
+        hit = (_side(a0, a1, b0) * _side(a0, a1, b1) <= 0) & (_side(b0, b1, a0) * _side(b0, b1, a1) <= 0)
+        hit &= ((np.minimum(a0, a1) <= np.maximum(b0, b1)) & (np.minimum(b0, b1) <= np.maximum(a0, a1))).all(axis=-1)
         for row in np.flatnonzero(hit.any(axis=1)):
             k = int(np.flatnonzero(hit[row])[0])
             crossings[int(chosen[row])] = int(first[k]), int(second[k])
@@ -194,8 +195,7 @@ def interior_points(vertices: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     along = vertices[following] - vertices
     length = np.hypot(*along.T)
     owner = np.repeat(n, np.diff(offsets))
-    # For a bent block: half-way between the middle of an edge and what the inward ray hits is at least a third
-    # of that distance inside; the longest edge is taken, stepping in by a tenth of the mean width.
+    # A fifth of the mean width inwards from the middle of the edge from which that leads deepest inside.
     width = areas / np.add.reduceat(length, offsets[:-1])
     inward = np.stack([-along[:, 1], along[:, 0]], axis=1) / length[:, None]
     candidate = vertices + along / 2.0 + inward * (0.2 * width[owner])[:, None]

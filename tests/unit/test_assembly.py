@@ -101,6 +101,19 @@ REFUSED = {
     "infinite": ([[[0, 0], [np.inf, 0], [1, 1]]], {}, "corner 1"),
     "a line": ([SQUARE, [[0, 0], [1, 0], [2, 0]]], {}, "'block 1'.*not a block"),
     "a bow tie": ([[[0, 0], [2, 1], [2, 0], [0, 2]]], {}, "'block 0'.*crosses itself"),
+    "a bow through a corner": (
+        [[[0, 0], [1, 0], [1, 1], [0.5, 1], [0.2, 1.3], [0.8, 1.3], [0.5, 1], [0, 1]]],
+        {},
+        r"'block 0'.*crosses itself",
+    ),
+    "a loop by a corner": ([[[0, 0], [1, 1], [1.5, 1.5], [1.5, 0.5], [1, 1], [0, 2]]], {}, "crosses itself"),
+    "a spike along an edge": (
+        [[[0, 0], [3, 0], [1, 0], [1, 1], [0, 1]]],
+        {},
+        r"doubles back: .* \(0, 0\) and \(1, 0\)",
+    ),
+    "an edge to and fro": ([[[0, 0], [2, 0], [1, 0], [3, 0], [3, 1], [0, 1]]], {}, "doubles back"),
+    "a corner on an edge": ([[[0, 0], [2, 0], [2, 1], [1, 0], [0, 1]]], {}, "crosses itself"),
     "ragged": (
         [SQUARE, [[0, 0], [1], [1, 1]]],
         {},
