@@ -247,7 +247,7 @@ class FlatScene(Scene):
     def image(self) -> Image.Image:
         """Draw the picture."""
         width, height = self.size
-        self._under = None if self._photograph is None else self._photograph.picture(self._shown)
+        self._under = None if self._photograph is None else self._photograph.picture(self._shown, self._gone)
         rows = max(1, min(height, BAND // width))
         if rows == height:
             return self._band(0, height)

@@ -85,8 +85,8 @@ class CarriedPhotograph:
         self._turn = np.diag([pixel, -pixel])
         self._corner = np.array([low[0], low[1] + pixel * size[1]])
 
-    def picture(self, pose: solver.Pose) -> np.ndarray:
-        """(height, width, 3) uint8 array: the photograph where its blocks are in a pose."""
+    def picture(self, pose: solver.Pose, gone: np.ndarray) -> np.ndarray:
+        """(height, width, 3) uint8 array: the photograph where its blocks are in a pose, but (n_blocks,) bool ones."""
         assembly, picture = self._assembly, self._around.copy()
         moved = mechanics.moved_vertices(assembly, pose)
         far = np.linalg.norm(moved - assembly.vertices, axis=1)
@@ -94,10 +94,10 @@ class CarriedPhotograph:
         moves = np.maximum.reduceat(far, assembly.offsets[:-1]) > STILL * self._pixel
         standing = Image.new("L", picture.size)
         draw = ImageDraw.Draw(standing)
-        for block in np.flatnonzero(~moves):
+        for block in np.flatnonzero(~moves & ~gone):
             draw.polygon([tuple(corner) for corner in rings[block].tolist()], fill=255)
         picture.paste(self._own, (0, 0), standing)
-        for block in np.flatnonzero(moves):
+        for block in np.flatnonzero(moves & ~gone):
             self._paste(picture, rings[block], int(block), pose)
         return np.asarray(picture)
 

@@ -11,16 +11,17 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, box, brick, case_from, dropped_brick, pixels, posed, rectangle
+from structures import alike, arch_response, box, brick, case_from, dropped_brick, pixels, posed, rectangle
 
 import blockvis
 import solver
 from blockvis import animate
-from blockvis.pictures import video
+from blockvis.pictures import palette, video
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of, state_at
 from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.solid_view import chosen_view
+from blockvis.pictures.underlay import Underlay
 from blockvis.pictures.video import write_film
 from blockvis.results.folder import VIDEO_SUFFIXES
 from blockvis.runs.outputs import Drawing
@@ -105,6 +106,38 @@ def test_a_film_tells_what_is_taken_away_apart_from_what_falls_with_it():
     drawer.picture = lambda state, badge=None: told.append(badge)
     list(film_of(drawer, 10.0, 4.0)[1])
     assert set(told) == {None, f"TAKEN AWAY · {assembly.names[3]}; LOST · 2 blocks"}
+
+
+def test_of_a_photograph_what_is_taken_away_is_left_pale():
+    outlines = [rectangle(-1.0, -0.5, 3.0, 0.0), *(brick(x, 0.0, 0.4, 0.5) for x in (0.0, 1.0, 2.0))]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["moving", *["free"] * 3])
+    aside = solver.Settlement((1, 0), increment=0.05, limit=0.05)
+    gone = np.arange(4) == 3
+    structure = solver.Structure(assembly, friction_coefficient=0.6)
+    response = structure.settle([aside, aside], changes=[solver.PhaseChange(1, gone)])
+    green = Underlay(np.full((100, 400, 3), (30, 120, 30), np.uint8), np.array([[0.01, 0, -1.0], [0, -0.01, 0.5]]))
+    last = response.path[-1]
+    drawer = Drawer(response, Look(forces="none"), SIZE, (last,), underlay=green)
+    picture, inside = np.asarray(drawer.picture(last)).astype(int), drawer.sheet.inside[:2]
+    stone, missing, beside = drawer.scene.at_pixel([*last.pose.positions[2:], (1.8, 0.25)]).astype(int) + inside
+    assert alike(picture[missing[1], missing[0]], picture[beside[1], beside[0]])
+    assert not alike(picture[stone[1], stone[0]], picture[beside[1], beside[0]])
+
+
+def test_what_a_limit_load_is_without_is_not_drawn_and_bears_no_load():
+    outlines = [rectangle(-1.0, -0.5, 3.0, 0.0), brick(-1.0, 0.0, 2.0, 0.5), brick(1.0, 0.0, 2.0, 0.5)]
+    assembly = solver.Assembly.from_outlines([*outlines, brick(2.0, 0.5, 1.0, 0.5)], roles=["fixed", *["free"] * 3])
+    live = np.zeros((4, 3))
+    live[2, 0] = 1000.0
+    limit = solver.Structure(assembly, friction_coefficient=0.6).with_live(live).limit_load(fallen=np.arange(4) == 3)
+    state = limit.response.path[0]
+    tails, tips = LiveLoads(limit.response, [state], 3.0).arrows(state, state.pose)
+    assert len(tips) == 1
+    assert tips[0, 1] == tails[0, 1]
+    drawer = Drawer(limit.response, Look(forces="none"), SIZE, (state,))
+    picture, inside = np.asarray(drawer.picture(state)).astype(int), drawer.sheet.inside[:2]
+    column, row = drawer.scene.at_pixel([(2.5, 0.75)])[0].astype(int) + inside
+    assert alike(picture[row, column], palette.PAPER)
 
 
 def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
