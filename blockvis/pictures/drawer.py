@@ -394,11 +394,10 @@ class Drawer:
         """
         increment = self._shown(increment)
         shown = self._drawn_at or magnified(self.assembly, increment.pose, self.look.magnification)
-        if self.response.changes:
-            if self._drawn_at is not None:
-                # A mechanism is that of what the last change has left.
-                increment = without_removed(increment, self.response.increments[-1].state.fell_at)
-            self.scene.hide(increment.removed)
+        if self._drawn_at is not None and self.response.changes:
+            # A mechanism is that of what the last change has left.
+            increment = without_removed(increment, self.response.increments[-1].state.fell_at)
+        self.scene.hide(increment.removed)
         self.scene.pose(shown, self._block_colours(increment.pose, increment))
         dots = np.zeros((0, self.assembly.dimension))
         if blocks_only:

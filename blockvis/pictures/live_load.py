@@ -70,7 +70,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     It is found as what contacts and ties balance beyond the dead load: the increment does not store the position of a
     load that moves.
     """
-    standing = increment.status == solver.Status.EQUILIBRIUM or bool(response.limits)
+    standing = increment.status == solver.Status.EQUILIBRIUM
     finite = np.isfinite(increment.load_multiplier) and increment.load_multiplier != 0.0
     assembly, pose = response.assembly, increment.pose
     if not (standing and finite):
@@ -78,7 +78,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
         return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), _of(np.zeros(0, dtype=int), pose))
     live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + response.dead_at(increment))
     live -= _of_ties(response, increment)
-    live[~assembly.free] = 0.0
+    live[~assembly.free | increment.fallen] = 0.0
     forces = live[:, : assembly.dimension]
     size = np.linalg.norm(forces, axis=1)
     blocks = np.flatnonzero(size > ROUNDING * np.abs(live).max(initial=0.0))
