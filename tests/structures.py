@@ -285,6 +285,19 @@ def equal_certificates(one: solver.Certificate, other: solver.Certificate) -> bo
     return np.array_equal(astuple(one), astuple(other), equal_nan=True)
 
 
+def partly_unbounded(positions):
+    """Give an envelope whose middle position has no limit."""
+    arch = generators.arch()
+    limit = solver.limit_load(arch, loads=replace(solver.self_weight(arch), live=solver.point_load(arch, 3, (0, -1))))
+    values = np.where(np.arange(positions) == positions // 2, np.inf, limit.multiplier)
+    states = [replace(limit.increment, parameter=float(x), measured=values[x]) for x in range(positions)]
+    return solver.Response(
+        assembly=arch, settlements=(), interfaces=solver.Interfaces(), loads=limit.response.loads,
+        increments=tuple(states), stop=solver.Status.COLLAPSED, analysis="limit load", limits=(limit,) * positions,
+        parameter=mechanics.LOAD_POSITION, measured=mechanics.LOAD_MULTIPLIER,
+    )  # fmt: skip
+
+
 def parted(assembly: solver.Assembly, path: int, fall: int, settlement: float = 0.1) -> solver.Response:
     """A made-up response, no mechanics in it: the right part of a wall sinks as one body, then drops.
 

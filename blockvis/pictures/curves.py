@@ -131,7 +131,7 @@ class CurvePanel:
         per_length, _ = parameter_unit(response)
         total = response.parameters
         factor, _ = force_unit(response)
-        values = np.nan_to_num(response.values / factor)
+        values = response.values / factor
         places = (
             axes.transData.transform(np.column_stack([total * per_length, values])) if len(total) else np.zeros((0, 2))
         )
@@ -150,6 +150,9 @@ class CurvePanel:
         if falling and not self._response.swings:
             at = self._total[-1]
         x, y = (float(np.interp(at, self._total, self._places[:, k])) for k in (0, 1))
+        if not np.isfinite(y):
+            # Unbounded, as the title says.
+            return picture
         r = 0.34 * self._text
         draw = ImageDraw.Draw(picture)
         draw.ellipse((x - r, y - r, x + r, y + r), fill=palette.WARNING if falling else palette.SETTLEMENT)

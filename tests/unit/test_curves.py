@@ -5,12 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import arch_response, case_from, parted, pixels, report_of, wall
+from structures import arch_response, case_from, parted, partly_unbounded, pixels, report_of, wall
 
 import blockvis
 import solver
-from blockvis import draw_curve, generators
-from solver import mechanics
+from blockvis import draw_curve
 
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):
@@ -234,16 +233,7 @@ def test_words_of_short_phases_stand_apart_and_above_the_plot(tmp_path):
 
 @pytest.mark.parametrize(("positions", "upright"), [(17, True), (5, False)])
 def test_what_is_unbounded_is_said_inside_its_band(positions, upright, tmp_path):
-    arch = generators.arch()
-    limit = solver.limit_load(arch, loads=replace(solver.self_weight(arch), live=solver.point_load(arch, 3, (0, -1))))
-    values = np.where(np.arange(positions) == positions // 2, np.inf, limit.multiplier)
-    states = [replace(limit.increment, parameter=float(x), measured=values[x]) for x in range(positions)]
-    response = solver.Response(
-        assembly=arch, settlements=(), interfaces=solver.Interfaces(), loads=limit.response.loads,
-        increments=tuple(states), stop=solver.Status.COLLAPSED, analysis="limit load", limits=(limit,) * positions,
-        parameter=mechanics.LOAD_POSITION, measured=mechanics.LOAD_MULTIPLIER,
-    )  # fmt: skip
-    text = draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
+    text = draw_curve(partly_unbounded(positions), tmp_path / "curve.svg").read_text(encoding="utf-8")
     found = re.search(r"<!-- unbounded -->\s*<g [^>]*translate\(([\d.]+) [\d.]+\)( rotate\(-90\))?", text)
     assert bool(found[2]) is upright
     # Baseline of what is upright; of what lies, its left end.

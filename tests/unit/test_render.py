@@ -11,7 +11,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from structures import BENT, alike, arch_response, box, parted, pixels, rectangle, report_of, wall
+from structures import BENT, alike, arch_response, box, parted, partly_unbounded, pixels, rectangle, report_of, wall
 
 import solver
 from blockvis import animate, draw_mechanism, draw_still, generators
@@ -448,3 +448,21 @@ def test_the_curve_beside_the_blocks_has_no_dot_for_a_phase_that_is_not_on_it():
     blank = panel.image(response.path[1])
     assert not alike(blank, palette.SETTLEMENT, 20).any()
     assert alike(panel.image(response.path[-1]), palette.SETTLEMENT, 20).any()
+
+
+def test_the_dot_is_where_the_curve_is():
+    response = partly_unbounded(5)
+    panel = CurvePanel(response, (300, 200), 14)
+    dots = [alike(panel.image(state), palette.SETTLEMENT, 20).any() for state in response.path]
+    assert dots == [True, True, False, True, True]
+
+
+def test_what_a_limit_load_is_without_is_not_drawn():
+    outlines = [rectangle(x, y, x + 1.0, y + 1.0) for x, y in ((0.0, -1.0), (0.0, 0.0), (0.0, 1.0))]
+    tower = solver.Assembly.from_outlines(outlines, roles=["fixed", "free", "free"])
+    structure = solver.Structure(tower, friction_coefficient=0.6)
+    limit = structure.limit_load(acceleration=(1, 0), fallen=np.arange(3) == 2)
+    state = limit.response.path[0]
+    drawer = Drawer(limit.response, Look(forces="none"), SMALL, (state,))
+    column, row = drawer.scene.at_pixel(np.array([(0.5, 1.5)]))[0].astype(int) + drawer.sheet.inside[:2]
+    assert alike(np.asarray(drawer.picture(state))[row, column], palette.PAPER)
