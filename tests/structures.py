@@ -285,11 +285,13 @@ def equal_certificates(one: solver.Certificate, other: solver.Certificate) -> bo
     return np.array_equal(astuple(one), astuple(other), equal_nan=True)
 
 
-def partly_unbounded(positions):
-    """Give an envelope whose middle position has no limit."""
+def partly_unbounded(positions, without=None):
+    """Give an envelope of which one position, by default the middle one, has no limit."""
     arch = generators.arch()
     limit = solver.limit_load(arch, loads=replace(solver.self_weight(arch), live=solver.point_load(arch, 3, (0, -1))))
-    values = np.where(np.arange(positions) == positions // 2, np.inf, limit.multiplier)
+    values = np.where(
+        np.arange(positions) == (positions // 2 if without is None else without), np.inf, limit.multiplier
+    )
     states = [replace(limit.increment, parameter=float(x), measured=values[x]) for x in range(positions)]
     return solver.Response(
         assembly=arch, settlements=(), interfaces=solver.Interfaces(), loads=limit.response.loads,

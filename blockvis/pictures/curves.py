@@ -178,7 +178,6 @@ def _draw(
     _style(axes, text)
     axes.margins(x=0.02, y=0.12)
     if len(known) == 0 and len(path) > 1:
-        axes.set_xlim(float(total.min()), float(total.max()))
         axes.set_ylim(0.0, 1.0)
         axes.text(0.5, 0.5, "unbounded everywhere", transform=axes.transAxes, ha="center", fontsize=text)
     if len(known):
@@ -189,6 +188,8 @@ def _draw(
     if not response.parameter.is_path and len(path) == 1:
         _draw_single(axes, response, known, text)
         return
+    # Also of what is unbounded.
+    axes.update_datalim(np.column_stack([total, total]), updatey=False)
     _draw_line(axes, response, total, values, text if events else None)
     axes.set_xlabel(parameter_label(response), fontsize=text)
     axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5, steps=[1, 2, 2.5, 5, 10]))
@@ -202,8 +203,8 @@ def _draw(
     if not response.parameter.is_path:
         _mark_unproved(axes, response, factor, text if events else None)
         _mark_lowest(axes, response, text, events)
-        if events and len(known):
-            _mark_unbounded(axes, total, values, text)
+    if events and len(known):
+        _mark_unbounded(axes, total, np.isinf([state.measured for state in path]), text)
     if response.collapse is not None and len(path):
         _mark_collapse(axes, response, total, values, text, events)
     if response.stop is solver.Status.SOLVER_FAILED:
@@ -351,9 +352,9 @@ def _draw_single(axes: Axes, response: solver.Response, known: np.ndarray, text:
     )
 
 
-def _mark_unbounded(axes: Axes, total: np.ndarray, values: np.ndarray, text: float) -> None:
+def _mark_unbounded(axes: Axes, total: np.ndarray, unbounded: np.ndarray, text: float) -> None:
     """Shade where no load is too much, as far as the neighbours that have a limit, and say so in each."""
-    grey, unbounded = palette.hexadecimal(palette.FAINT), ~np.isfinite(values)
+    grey = palette.hexadecimal(palette.FAINT)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], unbounded, [False]]).astype(int)))
     for first, stop in edges.reshape(-1, 2).tolist():
         low, high = total[max(first - 1, 0)], total[min(stop, len(total) - 1)]

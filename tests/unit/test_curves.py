@@ -239,3 +239,10 @@ def test_what_is_unbounded_is_said_inside_its_band(positions, upright, tmp_path)
     # Baseline of what is upright; of what lies, its left end.
     (band,) = re.findall(r'd="M ([\d.]+) [\d.]+ \nL [\d.]+ [\d.]+ \nL ([\d.]+) .*?opacity: 0.15', text, re.DOTALL)
     assert float(band[0]) < float(found[1]) < float(band[1])
+
+
+def test_a_capacity_that_is_unbounded_before_a_settlement_is_on_its_curve(tmp_path):
+    response = replace(partly_unbounded(5, without=0), parameter=mechanics.SETTLEMENT)
+    text = draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
+    assert "<!-- unbounded -->" in text
+    assert "<!-- 0 -->" in text[text.index('id="xtick_1"') : text.index('id="xtick_2"')]
