@@ -52,7 +52,7 @@ def left_rest(response: solver.Response, row: int = 0) -> float:
 
 def drops_at_start(response: solver.Response) -> bool:
     """Whether the reaction, or the multiplier, leaves that at rest at once, not along a line, and by so much."""
-    if not response.path:
+    if not response.path or not np.isfinite(response.path[0].measured):
         return False
     left = left_rest(response)
     return bool(np.isnan(left) or abs(left - response.path[0].measured) > NOTABLE * np.abs(response.values).max())

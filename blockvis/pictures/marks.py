@@ -44,8 +44,8 @@ WIDE_CRACK = 0.2
 #: Contact points turn about a hinge where they open slower than this part of the turning times the block size.
 ON_HINGE = 0.05
 
-#: Arrows of at most so many supports or blocks in space; of more, evenly chosen ones stand for all. In the plane, where
-#: supports lie side by side, the one in the middle does.
+#: Arrows of at most so many supports or blocks in space, and of supports in the plane; of more, evenly chosen ones
+#: stand for all, as they need not move alike.
 MOST_ARROWS, MOST_IN_PLANE = 24, 4
 
 #: A support that turns has two arrows, so far from its middle as a part of its extent.
@@ -376,16 +376,14 @@ def _own_axes(pose: solver.Pose, blocks: np.ndarray) -> np.ndarray:
 def _seen_places(
     assembly: solver.Assembly, blocks: np.ndarray, pose: solver.Pose, seen: Frame | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Blocks of the plane that are seen, of many the one in the middle; place inside and extent (n, 2) [m] of that.
+    """Blocks of the plane that are seen, of many evenly chosen ones; place inside and extent (n, 2) [m] of that.
 
     Extents are along the axes of the layout that turn with the block.
     """
     corners = mechanics.moved_vertices(assembly, pose)
     outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in blocks]
     shown = outlines if seen is None else shapely.intersection(outlines, shapely.box(*seen.low, *seen.high))
-    rows = [k for k, outline in enumerate(shown) if not outline.is_empty]
-    if len(rows) > MOST_IN_PLANE:
-        rows = [rows[len(rows) // 2]]
+    rows = evenly(np.flatnonzero(~shapely.is_empty(shown)), MOST_IN_PLANE)
     (places, extents), axes = np.zeros((2, len(rows), 2)), _own_axes(pose, blocks[rows])
     for row, k in enumerate(rows):
         extents[row] = np.ptp(shapely.get_coordinates(shown[k]) @ axes[row].T, axis=0)

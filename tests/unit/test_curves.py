@@ -10,6 +10,7 @@ from structures import arch_response, case_from, parted, partly_unbounded, pixel
 import blockvis
 import solver
 from blockvis import draw_curve
+from solver import mechanics
 
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):
