@@ -23,7 +23,7 @@ from .drawer import Drawer, Look
 from .film import film_of, poster_of
 from .swing import MOST_PARTS, shown_increments, swing_of
 from .underlay import Underlay
-from .video import write_film
+from .video import FASTEST_GIF, write_film
 
 STILL_SIZE = (1920, 1080)
 FILM_SIZE = (1280, 720)
@@ -185,7 +185,7 @@ def animate(
     size : (int, int)
         Width and height in pixels, both even.
     fps : float
-        Frames per second.
+        Frames per second; a .gif has 50 at most.
     seconds : float [s]
         Length of the part in equilibrium.
     magnification, colour_by, forces, joints, curve
@@ -209,6 +209,7 @@ def animate(
         fall = fall_of(response)
     shown = shown_increments(response) if fall is None else response.path
     drawer = Drawer(response, look, size, shown, curve=curve, fall=fall, underlay=underlay)
+    fps = min(fps, FASTEST_GIF) if Path(path).suffix.lower() == ".gif" else fps
     _, frames = film_of(drawer, fps, seconds, progress)
     film = write_film(frames, path, size=size, fps=fps)
     if poster is not None:

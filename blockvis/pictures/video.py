@@ -78,7 +78,7 @@ def write_film(
     size : (int, int)
         Width and height in pixels, both even.
     fps : float
-        Frames per second; a gif counts in hundredths of a second.
+        Frames per second, as they were planned; of a gif no more than ``FASTEST_GIF``.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def write_film(
     _open_for_writing(path)
     with atomic_file(path) as partial:
         try:
-            _encode(frames, partial, min(fps, FASTEST_GIF) if suffix == ".gif" else fps)
+            _encode(frames, partial, fps)
         except OSError as error:
             raise _not_written(path, error) from None
         if partial.is_file() and not _reaches_its_end(partial):

@@ -270,6 +270,15 @@ def test_films_have_their_frames(tmp_path, suffix, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
+def test_a_gif_of_too_many_frames_per_second_has_fewer_and_lasts_as_long(tmp_path, monkeypatch):
+    planned = []
+    monkeypatch.setattr("blockvis.pictures.render.film_of", lambda drawer, fps, *rest: (planned.append(fps), []))
+    monkeypatch.setattr("blockvis.pictures.render.write_film", lambda frames, path, *, fps, **rest: planned.append(fps))
+    for name in ("film.gif", "film.mp4"):
+        animate(parted(wall(6, 5), 4, 3), tmp_path / name, size=SMALL, fps=100.0)
+    assert planned == [50.0, 50.0, 100.0, 100.0]
+
+
 @pytest.mark.slow
 def test_the_scale_of_displacements_tells_that_a_fall_goes_further(tmp_path, monkeypatch):
     """The last tick has a sign beside its number."""
