@@ -151,9 +151,9 @@ def two_leaf_wall(
     cavity : float [m]
         Between the leaves; the headers reach across it.
     header_courses : int
-        Every so many courses have headers, the first of them at that height.
+        Every so many courses have headers, the first of them at that height; at most ``courses``.
     header_spacing : int
-        In these courses every so many bricks are replaced by two headers side by side.
+        In these courses every so many whole bricks, from the first on, are replaced by two headers side by side.
     brick_length, brick_height : float [m]
         A brick is half as wide as it is long.
     density : float [kg/m³]
@@ -170,12 +170,17 @@ def two_leaf_wall(
     ['fixed', 'moving']
     """
     n, every = whole("bricks", bricks, 2), whole("header_courses", header_courses, 1)
-    spacing = whole("header_spacing", header_spacing, 1)
+    spacing, total = whole("header_spacing", header_spacing, 1), whole("courses", courses, 1)
+    if every > total:
+        raise ValueError(
+            f"header_courses is {every} and courses {total}, so that none has headers; give header_courses of at most "
+            f"{total}"
+        )
     length, height, width = _brick(brick_length, brick_height)
     gap = at_least_zero("cavity", cavity)
     deep = 2.0 * width + gap
     stones: list[tuple[str, Solid]] = []
-    for course in range(whole("courses", courses, 1)):
+    for course in range(total):
         low, high = course * height, (course + 1) * height
         cuts = [0.0, *(length * (k + (0.5 if course % 2 else 1.0)) for k in range(n)), n * length]
         cuts = sorted({round(x, 12) for x in cuts if x <= n * length + 1e-12})
@@ -184,7 +189,8 @@ def two_leaf_wall(
         number = 0
         for k, (a, b) in enumerate(pairs):
             whole_brick = b - a > 0.75 * length
-            if tied and whole_brick and k % spacing == 0:
+            # Every other course begins with half a brick.
+            if tied and whole_brick and (k - course % 2) % spacing == 0:
                 middle = (a + b) / 2.0
                 for start, end in ((a, middle), (middle, b)):
                     number += 1

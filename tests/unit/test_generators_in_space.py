@@ -98,6 +98,14 @@ def test_headers_tie_both_leaves():
 
 
 @pytest.mark.parametrize(
+    ("bricks", "every", "spacing", "headers"), [(3, 2, 3, 8), (6, 2, 6, 8), (4, 1, 1, 64), (5, 9, 9, 2)]
+)
+def test_headers_come_in_all_their_courses_however_far_apart(bricks, every, spacing, headers):
+    wall = generators.two_leaf_wall(bricks=bricks, header_courses=every, header_spacing=spacing)
+    assert sum(name.startswith("header") for name in wall.names) == headers
+
+
+@pytest.mark.parametrize(
     ("name", "parameters", "reason"),
     [
         ("cross vault", {"width": 4.0}, "width is 4 m, but the supports of the vault reach"),
@@ -108,6 +116,11 @@ def test_headers_tie_both_leaves():
         ("pavilion vault", {"bonded": 1}, "bonded is 1; give true or false"),
         ("barrel vault", {"stones": 0}, "stones is 0; give a whole number of at least 1"),
         ("two-leaf wall", {"cavity": -0.1}, "cavity is -0.1"),
+        (
+            "two-leaf wall",
+            {"header_courses": 12},
+            "header_courses is 12 and courses 9, .* give header_courses of at most 9",
+        ),
     ],
 )
 def test_impossible_dimensions_are_named(name, parameters, reason):
