@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+import shapely.affinity
 
 import solver
 from blockvis.layout.outlines import rectangle
@@ -343,8 +344,8 @@ def _on_joints(bond: Bond, opening: Opening) -> Opening:
 
 
 def _check_room(bond: Bond, rings: Sequence[np.ndarray], width: float, height: float) -> None:
-    """Refuse openings that leave the wall, leave less than a brick above or below, or overlap, heads included."""
-    least = LOWEST_BRICK * bond.brick_height
+    """Refuse openings that leave the wall, or less than a brick above, below or between them, or overlap by heads."""
+    least, narrowest = LOWEST_BRICK * bond.brick_height, SHORTEST_BRICK * bond.brick_length
     small = 1e-9 * max(width, height)
     for number, ring in enumerate(rings, start=1):
         low, high = ring.min(axis=0), ring.max(axis=0)
@@ -366,6 +367,14 @@ def _check_room(bond: Bond, rings: Sequence[np.ndarray], width: float, height: f
             raise ValueError(
                 f"opening {i + 1} and opening {j + 1} overlap by {shared:.3g} m², heads included; move them apart"
             )
+        rest = shapes[i].distance(shapes[j])
+        for way in ((-narrowest, 0.0), (narrowest, 0.0), (0.0, -least), (0.0, least)):
+            met = shapely.affinity.translate(shapes[i], *way).intersection(shapes[j])
+            if rest > small and met.area > small * max(width, height):
+                raise ValueError(
+                    f"opening {i + 1} and opening {j + 1} leave {rest:.4g} m of wall between them, heads included; "
+                    f"leave at least {max(map(abs, way)):g} m, or nothing"
+                )
 
 
 def _ground(width: float, brick_length: float, settling: Sequence[float] | None) -> list[tuple[str, str, np.ndarray]]:

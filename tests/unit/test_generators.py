@@ -375,3 +375,12 @@ def test_openings_that_overlap_with_their_heads_are_both_named():
     openings = [{"x": x, "y": 0.1, "width": 0.5, "height": 0.3} for x in (1.0, 1.6)]
     with pytest.raises(ValueError, match=r"opening 1 and opening 2 overlap by 0\.03 m², heads included; move them"):
         generators.wall(**WALL, openings=openings)
+
+
+@pytest.mark.parametrize(("place", "least"), [((1.501, 0.1), "0.05"), ((1.0, 0.401), "0.03")])
+def test_openings_that_leave_a_needle_between_them_are_refused(place, least):
+    openings = [{"x": x, "y": y, "width": 0.5, "height": 0.3, "head": "none"} for x, y in ((1.0, 0.1), place)]
+    with pytest.raises(ValueError, match=rf"1 and opening 2 leave 0.001 m of wall .*; leave at least {least} m"):
+        generators.wall(**WALL, openings=openings)
+    openings[1] |= {"x": round(place[0], 1), "y": round(place[1], 1)}
+    assert generators.wall(**WALL, openings=openings).n_blocks > 50
