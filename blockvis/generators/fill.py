@@ -18,7 +18,7 @@ from .bonds import BRICKWORK
 from .bricks import LOWEST_BRICK, NARROWEST
 from .dimensions import MOST_BLOCKS, above_zero, at_least_zero, choice, whole
 from .heads import HEADS, LESS, Units, head_of, top_of
-from .patterns import PATTERNS, bedded, coursed, rubble
+from .patterns import LEANS, PATTERNS, bedded, coursed, rubble
 from .slivers import in_simple_pieces, without_slivers
 
 #: What is cut of a brick is joined to its neighbour if it is smaller than this fraction of a brick.
@@ -253,6 +253,11 @@ def filled(
     if pattern.joint and mortar:
         stones = _with_mortar(stones, pattern.joint)
     notes = tuple(_note(what, shapes, corner) for what, shapes in lacking.items())
+    if pattern.quoins and not quoins:
+        x, y = corner + wall.centroid.coords[0]
+        ends = f"upright, to {1e3 * LEANS:g} mm in a metre, {2.0 * pattern.quoins[1]:g} m high and free of openings"
+        said = f"bond: the wall around ({x:.6g}, {y:.6g}) has no quoins: no end is {ends}; give smaller ones"
+        notes += (Note(CHANGED, said),)
     return Layout(
         blocks=tuple(without_collinear(np.array(shape.exterior.coords)[:-1], 1e-9) + corner for _, shape in stones),
         names=tuple(name for name, _ in stones),
@@ -333,16 +338,23 @@ def _quoins(solid: shapely.Polygon, rest: shapely.Geometry, pattern: Pattern, gr
     found: list[shapely.Polygon] = []
     for (x, y), (u, v) in zip(ring[:-1].tolist(), ring[1:].tolist(), strict=True):
         # Counter-clockwise, the wall lies on the left of an edge that rises and on the right of one that falls.
-        if abs(x - u) > 1e-6 * abs(y - v) or abs(y - v) < 2.0 * height:
+        if abs(x - u) >= LEANS * abs(y - v) or abs(y - v) < 2.0 * height:
             continue
         low, n = min(y, v), max(1, round(abs(y - v) / height - 0.2))
         levels = [*(low + height * np.arange(n)), max(y, v)]
         inwards = -1.0 if v > y else 1.0
         for k in range(n):
-            reach = x + inwards * (length if k % 2 == 0 else length / 2.0)
-            box = shapely.box(min(x, reach), levels[k], max(x, reach), levels[k + 1])
+            middle = x + (u - x) * ((levels[k] + levels[k + 1]) / 2.0 - y) / (v - y)
+            reach = middle + inwards * (length if k % 2 == 0 else length / 2.0)
+            # The edge cuts it, as drawn.
+            beyond = middle - inwards * abs(x - u)
+            box = shapely.box(min(beyond, reach), levels[k], max(beyond, reach), levels[k + 1])
             clipped = shapely.intersection(box, rest, grid_size=grid)
-            if clipped.area > 0.95 * box.area and clipped.geom_type == "Polygon" and not len(clipped.interiors):
+            if (
+                clipped.area > 0.95 * abs(reach - middle) * (levels[k + 1] - levels[k])
+                and clipped.geom_type == "Polygon"
+                and not len(clipped.interiors)
+            ):
                 found.append(clipped)
     return found
 

@@ -24,6 +24,9 @@ JITTER, ROUNDS, SHORT_EDGE = 0.3, 3, 0.2
 #: Steepest joint that reaches an upright rim: a mason does not lay a stone there that may slide out.
 STEEPEST = 0.2
 
+#: An edge is upright that leans by no more than this fraction of its height.
+LEANS = 1e-3
+
 
 def coursed(kind: str, width: float, height: float, brick: tuple[float, float], seed: int) -> list[shapely.Polygon]:
     """Lay the bricks of a bond over a rectangle from (0, 0), course by course; the last course may reach beyond it.
@@ -191,5 +194,5 @@ def _upright(wall: shapely.Geometry) -> shapely.MultiLineString:
     edges = []
     for part in shapely.get_parts(wall.boundary):
         ends = shapely.get_coordinates(part)
-        edges += [(a, b) for a, b in pairwise(ends.tolist()) if abs(a[0] - b[0]) < 1e-3 * abs(a[1] - b[1])]
+        edges += [(a, b) for a, b in pairwise(ends.tolist()) if abs(a[0] - b[0]) < LEANS * abs(a[1] - b[1])]
     return shapely.MultiLineString(edges)

@@ -183,6 +183,20 @@ def test_quoins_are_long_and_short_in_turn():
     assert sorted(set(np.round(lengths, 6))) == [0.25, 0.5]
 
 
+def test_ends_of_a_wall_that_are_traced_have_quoins_too():
+    traced = shapely.Polygon([(0, 0), (4, 0), (3.999, 2), (0.001, 2)])
+    layout = generators.bond(traced, quoins=(0.5, 0.3))
+    checked(layout, traced.area)
+    assert sum("quoin" in name for name in layout.names) == 12
+    assert not layout.notes
+
+
+@pytest.mark.parametrize("outline", [[(0, 0), (4, 0), (3.9, 2), (0.1, 2)], [(0, 0), (4, 0), (4, 0.5), (0, 0.5)]])
+def test_a_wall_that_has_no_room_for_quoins_tells(outline):
+    (said,) = generators.bond(outline, quoins=(0.5, 0.3)).notes
+    assert "has no quoins: no end is upright, to 1 mm in a metre, 0.6 m high" in said
+
+
 def test_mortar_is_left_open_between_stones_and_not_along_the_rim():
     layout = generators.bond(WALL, brick=(0.5, 0.25), joint=0.01)
     stone = next(ring for name, ring in zip(layout.names, layout.outlines, strict=True) if name == "brick 1-2")
