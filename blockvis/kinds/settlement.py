@@ -19,6 +19,8 @@ from blockvis.results.about import (
     least_reaction,
     loss_of,
     mechanism_text,
+    reaction_size,
+    told_reaction,
     unit_in,
 )
 from blockvis.results.bearing import bearings
@@ -30,9 +32,8 @@ from .kind import AnalysisKind, AnalysisRun, Course, RunInput, needs_no_crushing
 #: The methods in words, as ``[analysis] increments`` has them.
 COULOMB, LINEAR_PROGRAM = mechanics.INCREMENTS
 
-#: Difference of two reactions, in weights, of moments at a block's length, that is worth a line, and a reaction that is
-#: the rounding of none.
-NOTABLE, NOTHING = 1e-3, 1e-8
+#: Difference of two reactions, in weights, of moments at a block's length, that is worth a line.
+NOTABLE = 1e-3
 
 
 class SettlementKind(AnalysisKind):
@@ -108,8 +109,9 @@ class SettlementKind(AnalysisKind):
         path, weight = response.path, response.total_weight
 
         def reaction(value: float, phase: int) -> str:
-            value = value if abs(value) > NOTHING * _size(response, phase) else 0.0
-            if _is_moment(response, phase):
+            moment = _is_moment(response, phase)
+            value = told_reaction(value, response, moment)
+            if moment:
                 return f"{value:12.6g} N·m"
             return f"{value:12.6g} N   {value / weight:.6f} W"
 
@@ -168,6 +170,7 @@ class SettlementKind(AnalysisKind):
 
         def reaction(value: float, phase: int) -> str:
             moment = _is_moment(response, phase)
+            value = told_reaction(value, response, moment)
             over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
             return force_text(value, moment) + over
 
@@ -244,7 +247,7 @@ def _is_idle(response: solver.Response) -> bool:
 
 def _size(response: solver.Response, phase: int) -> float:
     """Weight of the structure [N], at a block's length [N·m] where what resists the supports is a moment."""
-    return response.total_weight * (response.assembly.block_size if _is_moment(response, phase) else 1.0)
+    return reaction_size(response, _is_moment(response, phase))
 
 
 def _is_moment(response: solver.Response, phase: int) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.dynamics.fall import CAPTION
-from blockvis.results.about import collapse_phase, least_reaction, loss_of
+from blockvis.results.about import collapse_phase, least_reaction, loss_of, told_reaction
 from blockvis.text import force_text, padded_text
 from solver import mechanics
 
@@ -20,9 +20,6 @@ MECHANISM_BADGE = "MECHANISM · pseudo-motion"
 
 #: Warning on pictures of runs that the solver could not follow to their end.
 FAILED_BADGE = "SOLVER FAILED"
-
-#: Reactions below this part of the weight [1, or m of a moment] are rounding.
-ROUNDING = 1e-9
 
 #: Multipliers above this many times the lowest of an envelope are not shown: over a support a load may grow nearly
 #: without limit.
@@ -213,8 +210,7 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
         return f"{name} –"
     if measured.is_force:
         moment = measured.unit == "N·m"
-        # Rounding is no reaction.
-        force = increment.measured if abs(increment.measured) > ROUNDING * response.total_weight else 0.0
+        force = told_reaction(increment.measured, response, moment)
         text = f"{name} {force_text(force, moment, padded=True)}"
         return text if moment else f"{text} = {force / response.total_weight:.4f} W"
     if not np.isfinite(increment.measured):

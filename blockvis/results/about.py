@@ -18,6 +18,9 @@ from .record import Record, read_json, read_record, versions
 #: A mechanism that takes less than this share of the weight with it is the loss of a few blocks: the structure stands.
 LOCAL = 0.05
 
+#: A reaction below this part of the weight, of moments at a block's length, is the rounding of none.
+NOTHING = 1e-8
+
 
 @dataclass(frozen=True)
 class About:
@@ -89,6 +92,16 @@ def in_phase(response: solver.Response, phase: int) -> str:
         Number of the settlement, from 0.
     """
     return f" in phase {phase + 1}" if len(response.settlements) > 1 else ""
+
+
+def reaction_size(response: solver.Response, moment: bool) -> float:
+    """Weight of the structure [N], at a block's length [N·m] where what resists the supports is a moment."""
+    return response.total_weight * (response.assembly.block_size if moment else 1.0)
+
+
+def told_reaction(value: float, response: solver.Response, moment: bool) -> float:
+    """Give a reaction [N, or N·m of a moment] as it is told: 0 where it is the rounding of none."""
+    return value if abs(value) > NOTHING * reaction_size(response, moment) else 0.0
 
 
 def unit_in(response: solver.Response, phase: int) -> str:

@@ -298,6 +298,17 @@ def test_words_of_phases_in_other_units():
     assert any(re.fullmatch(r"last reaction +[\d.]+ N·m", line) for line in lines)
 
 
+def test_lines_rows_and_pictures_round_a_reaction_alike():
+    kind, response = KINDS["settlement"], lifted_brick()
+    *others, last = response.increments
+    tiny = -6e-9 * response.total_weight
+    ended = replace(response, increments=(*others, replace(last, reaction=tiny, measured=tiny)))
+    assert ended.path[-1].reaction == tiny
+    assert any(re.fullmatch(r"last reaction +0 N   0\.000000 W", line) for line in kind.lines(ended))
+    assert dict(kind.rows(ended))["last reaction"].startswith("0 N = 0.0000 W")
+    assert state_text(ended.path[-1], ended).endswith("0 N = 0.0000 W")
+
+
 def test_rounding_of_a_reaction_is_none_and_unknown_bounds_make_no_linear_program():
     kind, response = KINDS["settlement"], lifted_brick()
     first, *others = response.increments
