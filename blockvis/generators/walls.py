@@ -15,6 +15,7 @@ import solver
 from blockvis.layout.outlines import rectangle
 from solver import mechanics
 
+from .arches import segmental_joints
 from .bonds import BONDS, SHORTEST_BRICK
 from .bricks import LOWEST_BRICK, Bond, brick_outline, cut_bricks, lay_bricks
 from .dimensions import MOST_BLOCKS, above_zero, choice, finite, pair, whole
@@ -189,8 +190,9 @@ def facade(
             f"bricks is {n}, too few for {windows} windows of {span:g} bricks with a brick between them; give at least "
             f"{int(np.ceil(windows * span + windows + 1))}"
         )
+    arch, _ = segmental_joints(length * span, rise, length, whole("voussoirs", voussoirs, 2))
     # A storey up to the crown of its arches, in courses.
-    storey_high = sill + high + (rise + length) / course
+    storey_high = sill + high + arch[:, 1, 1].max() / course
     if windows and (storeys - 1) * (rows // storeys) + storey_high > rows * (1.0 + 1e-9):
         raise ValueError(
             f"courses is {rows}, too few for {storeys} storeys of {storey_high:.4g} courses to the crown of their "
@@ -210,7 +212,15 @@ def facade(
         for storey in range(storeys)
         for i in range(windows)
     ]
+    over = rows - (storeys - 1) * (rows // storeys) - storey_high
+    if windows and 1e-6 < over < LOWEST_BRICK:
+        raise ValueError(
+            f"rise_courses is {rise_courses:g}, so that the arches leave {over:.3g} of a course of wall over them; give "
+            f"at most {rise_courses + over - LOWEST_BRICK:.4g}, or other courses"
+        )
     start = 2.0 / 3.0 * n * length if settling_from is None else finite("settling_from", settling_from)
+    if start >= n * length:
+        raise ValueError(f"settling_from is {start:g} m; give an x left of the end of the façade at {n * length:g} m")
     return wall(
         bricks=n,
         courses=rows,

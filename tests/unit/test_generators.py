@@ -296,7 +296,7 @@ WALL = {"bricks": 12, "courses": 12}
         ("wal", {}, "there is no layout 'wal' .did you mean 'wall'"),
         ("portal", {"spam": 1}, "layout 'portal' has no 'spam' .did you mean 'span'"),
         ("portal", {"span": "wide"}, "span is 'wide'; give a finite number in m"),
-        ("facade", {"storeys": 3}, "courses is 48, too few for 3 storeys of 21.5 courses .*; give at least 66"),
+        ("facade", {"storeys": 3}, "courses is 48, too few for 3 storeys of 21.49 courses .*; give at least 66"),
         ("portal", {"span": -2}, "span is -2 m; give a number above 0"),
         ("column", {"blocks": 2.5}, "blocks is 2.5; give a whole number of at least 1"),
         ("arch", {"embrace": 200}, "embrace is 200 degrees"),
@@ -323,6 +323,9 @@ WALL = {"bricks": 12, "courses": 12}
         ("wall", {"settling": 2}, "settling is 2; give two numbers"),
         ("wall", {"openings": {"x": 1}}, "give a list of tables"),
         ("facade", {"window_bricks": 1, "rise_courses": 5}, "rise_courses is 5, 0.625 m over windows of 0.25 m"),
+        ("facade", {"settling_from": 20}, "settling_from is 20 m; give an x left of the end of the façade at 10 m"),
+        ("facade", {"window_bricks": 9.6, "rise_courses": 4.75}, "rise_courses is 4.75, .* give at most 4.726"),
+        ("facade", {"voussoirs": 1}, "^voussoirs is 1"),
         ("facade", {"bricks": 16}, "bricks is 16, too few for 2 windows of 8 bricks .* give at least 19"),
     ],
 )
