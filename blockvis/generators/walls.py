@@ -215,7 +215,7 @@ def facade(
     over = rows - (storeys - 1) * (rows // storeys) - storey_high
     if windows and 1e-6 < over < LOWEST_BRICK:
         raise ValueError(
-            f"rise_courses is {rise_courses:g}, so that the arches leave {over:.3g} of a course of wall over them; give "
+            f"rise_courses is {rise_courses:g}, so that the arches leave {over:.3g} of a course over them; give "
             f"at most {rise_courses + over - LOWEST_BRICK:.4g}, or other courses"
         )
     start = 2.0 / 3.0 * n * length if settling_from is None else finite("settling_from", settling_from)
