@@ -35,6 +35,9 @@ TIE_RADIUS = 0.03
 #: Rotation that turns z upwards into y upwards, as glTF has it.
 UPRIGHT = Rotation.from_euler("x", -90, degrees=True)
 
+#: Name of the frame of trimesh in which all nodes lie: one that no block can have, which would hold the others.
+BASE = "\0world"
+
 #: Component type of single precision in glTF, and the tags of its two chunks.
 FLOAT, JSON, BIN = 5126, 0x4E4F534A, 0x004E4942
 
@@ -79,7 +82,7 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     channels: list[dict[str, Any]] = []
     sizes = np.repeat(stands[:, :, None].astype(float), 3, axis=2)
     rods = _rods(response, ties, poses, tied)
-    names = [*_node_names(response.assembly), *map(_rod_name, ties)]
+    names = [*response.assembly.names, *map(_rod_name, ties)]
     for what, of_blocks, of_rods in zip(
         ("translation", "rotation", "scale"), (places, turns, sizes), rods, strict=True
     ):
@@ -177,11 +180,6 @@ def _as_gltf(pose: solver.Pose, dimension: int) -> tuple[np.ndarray, np.ndarray]
     return np.hstack([pose.positions, flat]), Rotation.from_rotvec(spins).as_quat()
 
 
-def _node_names(assembly: solver.Assembly) -> list[str]:
-    names = list(assembly.names)
-    return [name if names.index(name) == k else f"{name} ({k})" for k, name in enumerate(names)]
-
-
 def _still(assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> bytes:
     """Write the blocks about their centroids as .glb, each a node with its row in the extras, and rods for ties."""
     import trimesh
@@ -193,8 +191,8 @@ def _still(assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> bytes:
         depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
         solids = [prism(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)]
     colours = palette.block_colours(assembly.materials, assembly.free)
-    scene = trimesh.Scene()
-    rows = zip(_node_names(assembly), solids, rows_of(layout), colours, strict=True)
+    scene = trimesh.Scene(base_frame=BASE)
+    rows = zip(assembly.names, solids, rows_of(layout), colours, strict=True)
     for number, (name, (points, faces), row, colour) in enumerate(rows):
         about = points.copy()
         about[:, : assembly.dimension] -= assembly.centroids[number]

@@ -172,6 +172,17 @@ def test_an_animation_of_a_load_that_moves_begins_at_0_seconds(tmp_path):
     assert {tuple(one["min"]) for one in times} == {(0.0,)}
 
 
+def test_a_block_called_as_the_scene_moves_alone(tmp_path):
+    outlines = [rectangle(-1.0, -1.0, 1.0, 0.0), rectangle(-1.0, 0.0, 0.0, 1.0), rectangle(0.0, 0.0, 1.0, 1.0)]
+    assembly = solver.Assembly.from_outlines(outlines, names=["ground", "a", "world"], roles=["moving", "free", "free"])
+    aside = solver.Settlement((1, 0), increment=0.02, limit=0.04)
+    response = solver.Structure(assembly, friction_coefficient=0.6).settle(aside)
+    data = converted(blockvis.write(response, tmp_path / "out"), tmp_path / "moves.glb").read_bytes()
+    nodes = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])["nodes"]
+    assert [node["name"] for node in nodes if "mesh" in node] == list(assembly.names)
+    assert not any("children" in node for node in nodes if "mesh" in node)
+
+
 @pytest.mark.slow
 def test_lost_blocks_are_left_out_of_the_deformed_layout(tmp_path, capsys):
     folder = blockvis.write(dropped_brick(0.05), tmp_path / "out")
