@@ -152,9 +152,10 @@ def repaired(
             outlines, thickness, overlap=depth, anchored=anchored, method=closing, mortar=mortar, laid=laid
         )
     except FoldedOutline as error:
+        remedy = f'give closing = "voronoi", or a joint_thickness other than {thickness:g} m'
         raise ValueError(
             f"closing the joints of block {error.block} ('{assembly.names[error.block]}') face by face folds its "
-            f'outline; give closing = "voronoi", or a joint_thickness other than {thickness:g} m'
+            f"outline; {remedy if thickness else 'redraw what overlaps it, or give a smaller overlap_tolerance'}"
         ) from None
     pairs = zip(*overlapping(closed.outlines, ROUNDING * width), strict=True)
     left = [(int(i), int(j), float(d)) for i, j, d in pairs if not (anchored[i] and anchored[j])]

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from structures import drawn
+from structures import drawn, rectangle
 
 from blockvis import inspect, read
 
@@ -61,3 +61,10 @@ def test_overlaps_that_stay_are_not_said_to_be_cut(tmp_path, monkeypatch):
     )
     with pytest.warns(UserWarning, match=r"1 overlaps of up to 0\.01 m could not be cut away"):
         read(drawn(tmp_path / "a.json", [SQUARE, SQUARE + np.array([0.99, 0.0])]))
+
+
+def test_a_plate_that_overlaps_would_fold_is_refused(tmp_path):
+    outlines = [rectangle(0.0, low, 1.0, high) for low, high in ((0.0, 0.5), (0.496, 0.506), (0.502, 1.0))]
+    path = drawn(tmp_path / "plate.json", outlines)
+    with pytest.raises(ValueError, match=r"block 1 .* folds its outline; redraw what overlaps it, or .* overlap_tol"):
+        read(path, overlap_tolerance=0.02)

@@ -182,9 +182,10 @@ def close_joints(
         if method == "faces":
             closing = _between_faces(outlines, thickness, overlap, anchored, laid)
             whole = _folded(outlines, closing.outlines) is None
-            if not thickness or (whole and _pockets(outlines, closing.outlines, thickness) <= POCKETS):
+            if whole and (not thickness or _pockets(outlines, closing.outlines, thickness) <= POCKETS):
                 return closing
-        method = "voronoi"
+        # Without gaps there is nothing to share out.
+        method = "voronoi" if thickness else "faces"
     if method == "voronoi":
         # Pockets between stones of a bond are none of mortar.
         return _to_nearest_stone(outlines, thickness, overlap, anchored if laid is None else anchored | laid, mortar)
