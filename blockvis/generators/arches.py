@@ -11,7 +11,7 @@ import solver
 from blockvis.layout.outlines import without_collinear
 from solver import mechanics
 
-from .dimensions import MOST_VOUSSOIRS, above_zero, thickness_over_radius, whole
+from .dimensions import MOST_VOUSSOIRS, above_zero, whole
 
 
 def arch(
@@ -54,7 +54,9 @@ def arch(
     if embrace > 180.0:
         raise ValueError(f"embrace is {embrace:g} degrees; give an angle above 0 and up to 180")
     voussoirs = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)
-    thickness_ratio = thickness_over_radius(thickness_ratio)
+    thickness_ratio = above_zero("thickness_ratio", thickness_ratio, "")
+    if thickness_ratio >= 2.0:
+        raise ValueError(f"thickness_ratio is {thickness_ratio:g}; give thickness / radius between 0 and 2")
     half = math.radians(embrace) / 2.0
     angles = np.linspace(math.pi / 2 + half, math.pi / 2 - half, voussoirs + 1)
     thickness = thickness_ratio * radius

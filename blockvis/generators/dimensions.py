@@ -45,14 +45,6 @@ def at_least_zero(name: str, value: Any) -> float:
     return number
 
 
-def thickness_over_radius(value: float) -> float:
-    """Return the thickness of a shell over the radius of its middle as a float if its inner radius is above zero."""
-    ratio = above_zero("thickness_ratio", value, "")
-    if ratio >= 2.0:
-        raise ValueError(f"thickness_ratio is {ratio:g}; give thickness / radius between 0 and 2")
-    return ratio
-
-
 def whole(name: str, value: Any, least: int, most: int = MOST_BLOCKS) -> int:
     """Return the value as an int if it is a whole number from ``least`` to ``most``."""
     number = finite(name, value, "")

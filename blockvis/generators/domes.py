@@ -10,7 +10,7 @@ import solver
 from blockvis.layout.solids import Solid, between
 from solver import mechanics
 
-from .dimensions import above_zero, thickness_over_radius, true_or_false, whole
+from .dimensions import above_zero, true_or_false, whole
 from .solids import assembled
 
 #: Most stones around a dome.
@@ -59,7 +59,7 @@ def dome(
     >>> dome(lunes=8, courses=6).n_blocks
     57
     """
-    radius, thickness = above_zero("radius", radius), thickness_over_radius(thickness_ratio) * radius
+    radius, thickness = above_zero("radius", radius), above_zero("thickness_ratio", thickness_ratio, "") * radius
     if thickness > radius:
         raise ValueError(
             f"thickness_ratio is {thickness_ratio:g}; give at most 1: the springers, twice as thick as the dome, end "

@@ -475,7 +475,7 @@ class SolidScene(Scene):
 def blocks_picture(assembly: solver.Assembly, size: tuple[int, int], fill: np.ndarray) -> Image.Image:
     """Draw blocks in space where the layout has them, ``size`` pixels wide and high, in colours (n_blocks, 3) uint8."""
     view = View(AROUND[0], ABOVE)
-    frame = framed(assembly, [solver.Pose.initial(assembly)], margin=0.04, supports=1.0, axes=view.axes[:2])
+    frame = framed(assembly, [solver.Pose.initial(assembly)], supports=1.0, axes=view.axes[:2])
     scene = SolidScene(assembly, view, frame, size, fill)
     picture = scene.image()
     scene.close()

@@ -70,11 +70,7 @@ class Proposal:
     @property
     def note(self) -> str:
         """What is uncertain about the thickness, or ""."""
-        wider = (
-            self.stretches.gaps.max(axis=1) > 1.0001 * self.thickness
-            if len(self.stretches)
-            else np.zeros(0, dtype=bool)
-        )
+        wider = self.stretches.gaps.max(axis=1) > 1.0001 * self.thickness
         if self.thickness >= LIMIT * self.reach:
             return (
                 f"gaps were looked for up to {self.reach:.3g} m, and there are joints of that width: wider ones stay "
@@ -235,7 +231,7 @@ def _to_nearest_stone(
 ) -> Closing:
     found = facing_edges(outlines, thickness, overlap)
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
-    n_open = int((np.abs(found.gaps).max(axis=1) > CLOSED * scale).sum()) if len(found) else 0
+    n_open = int((np.abs(found.gaps).max(axis=1) > CLOSED * scale).sum())
     closed = share_out(outlines, thickness, anchored, mortar)
     return Closing(tuple(closed), n_open, 0, float(found.gaps.max(initial=0.0)), "voronoi")
 
@@ -251,7 +247,7 @@ def _between_faces(
     found = facing_edges(rings, thickness, overlap, laid)
     found = found.chosen(~(anchored[edges.block[found.edge_a]] & anchored[edges.block[found.edge_b]]))
     closed = CLOSED * scale
-    n_open = int((np.abs(found.gaps).max(axis=1) > closed).sum()) if len(found) else 0
+    n_open = int((np.abs(found.gaps).max(axis=1) > closed).sum())
     if n_open == 0 and overlap == 0.0:
         return Closing(tuple(outlines), 0, 0, 0.0)
     lines, uncommon = common_lines(found, edges, anchored, closed)

@@ -105,12 +105,14 @@ def share_out(
     """
     import shapely
 
+    if anchored.all():
+        return list(outlines)
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
     # A power of ten, from a round origin: round coordinates stay what they are.
     grid = float(10.0 ** np.floor(np.log10(GRID * scale)))
     origin = np.round(np.concatenate(outlines).mean(axis=0) / (1e6 * grid)) * (1e6 * grid)
     shapes = np.array([_shape(ring - origin) for ring in outlines])
-    growing = np.flatnonzero(~anchored) if not anchored.all() else np.arange(len(shapes))
+    growing = np.flatnonzero(~anchored)
     gaps = gaps_between(shapes, SPACING * thickness)
     masonry = _with_mortar(shapes, gaps, thickness, growing)
     masonry = shapely.union_all([masonry, *(_surface(item, origin, shapes) for item in mortar)])
@@ -124,7 +126,7 @@ def share_out(
     cells = [_joined_faces(faces[holder == i], shapes[i], grid) for i in range(len(shapes))]
     size = float(np.median(np.sqrt(shapely.area(shapes[growing]))))
     simple = shapely.coverage_simplify(np.array(cells), SIMPLER * size)
-    if anchored.any() and not anchored.all():
+    if anchored.any():
         simple = _along_anchored(simple, np.array(cells), np.flatnonzero(anchored), grid)
     rings = [np.array(shapely.orient_polygons(cell).exterior.coords)[:-1] for cell in simple]
     fixed = np.concatenate([np.zeros((0, 2)), *(rings[i] for i in np.flatnonzero(anchored))])

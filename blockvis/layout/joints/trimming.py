@@ -108,8 +108,6 @@ def _extended_edges(
         extended, straight = (
             (a, b) if (anchored[edges.block[b]], size[b]) >= (anchored[edges.block[a]], size[a]) else (b, a)
         )
-        if anchored[edges.block[extended]]:
-            extended, straight = straight, extended
         normal, level = _outward_form(edges, lines, straight)
         target = found.midline[k] + (level - found.midline[k] @ normal)[:, None] * normal
         own_normal, own_level = _outward_form(edges, lines, extended)
