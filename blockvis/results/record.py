@@ -93,7 +93,7 @@ def read_record(folder: Path) -> Record:
     """
     path = folder / RECORD
     if not path.is_file():
-        what = f"'{folder}' holds no run that could go on (no {RECORD} in it)"
+        what = f"'{folder}' holds no run (no {RECORD} in it, which says what was run)"
         what = what if folder.is_dir() else f"there is no folder '{folder}'"
         raise ValueError(f"{what}; start a run with blockvis run CASE.toml -o {folder}")
     try:

@@ -180,11 +180,11 @@ def resume_run(
     outputs = (Drawing(),) if outputs is None else outputs
     finished = _finished(folder)
     if finished is not None:
-        response = open_results(folder)
-        if restore_grids(folder, response.assembly, response.increments, viewer_format(case)):
-            write_end(folder, response, viewer_format(case))
-        absent = [output for output in outputs if not output.is_written(case, folder)]
         with _resumable(folder):
+            response = open_results(folder)
+            if restore_grids(folder, response.assembly, response.increments, viewer_format(case)):
+                write_end(folder, response, viewer_format(case))
+            absent = [output for output in outputs if not output.is_written(case, folder)]
             missing = _made(absent, case, response, folder, Clock())
         return Run(response, folder, finished, missing, had_finished=True)
     for note in record.changes(checksum_of_files):

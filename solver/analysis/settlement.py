@@ -49,7 +49,8 @@ def settlement_increments(
         Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
         for bit as if the loop had not been interrupted.
     on_step : callable, optional
-        Called with the :class:`PathState` after every step within an increment.
+        Called with the :class:`PathState` after every step within an increment, and with the last one again at every
+        step in time in which blocks come to rest or fall.
     """
     controls = checked(Controls() if controls is None else controls, Controls, "controls")
     check_settlement(assembly, phases, controls, changes, ties)

@@ -257,7 +257,7 @@ class Stepper:
         share = np.divide(contacts.areas, joint_area, out=np.full(n, 0.5), where=joint_area > 0.0)
         of_joint = factor * np.array([COMPLIANCE] + [SHEAR_COMPLIANCE] * (d - 1))
         # Points of tiny tributary areas keep a finite compliance, however many share the joint.
-        least = np.minimum(0.05, 0.2 / np.bincount(joint)[joint])
+        least = np.minimum(0.05, 1.0 / np.bincount(joint)[joint])
         return of_joint / np.maximum(share, least)[:, None]
 
     def transferred(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

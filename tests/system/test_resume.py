@@ -331,7 +331,7 @@ def test_files_that_changed_are_named_and_not_read_again(whole, tmp_path, monkey
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--resume", "nowhere"], "holds no run"),
+        (["--resume", "nowhere"], "there is no folder 'nowhere'"),
         (["--resume", "nowhere", "-o", "out"], "takes the results folder alone"),
         (["case.toml", "--resume", "nowhere"], "takes the results folder alone"),
         ([], "name a case file"),

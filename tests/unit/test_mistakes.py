@@ -132,7 +132,7 @@ def test_a_direction_of_no_length_is_told_without_a_word_twice(tmp_path, capsys)
 
 def test_there_is_nothing_to_go_on_with_where_there_is_no_folder(tmp_path, capsys):
     """And no advice to overwrite what a mistyped name may stand for."""
-    for folder, said in ((tmp_path / "nowhere", "there is no folder"), (tmp_path, "holds no run that could go on")):
+    for folder, said in ((tmp_path / "nowhere", "there is no folder"), (tmp_path, "holds no run")):
         assert main(["run", "--resume", str(folder)]) == 2
         told = capsys.readouterr().err
         assert said in told
