@@ -1045,14 +1045,14 @@ def _report(options: argparse.Namespace) -> int:
     if options.pdf:
         from .report.pdf import write_pdf
         from .results.reaction_range import stored_range
-        from .results.record import read_record
+        from .results.record import case_text
         from .runs.step_check import stored_check
         from .runs.underlay import stored_underlay
 
         write_pdf(
             response,
             folder / "report.pdf",
-            read_record(folder).case,
+            case_text(folder),
             fall=fall,
             error=str(stored_check(folder) or ""),
             band=stored_range(folder),

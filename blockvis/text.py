@@ -170,13 +170,13 @@ def _inline(value: Any) -> Any:
     return float(f"{value:.12g}") if isinstance(value, float) else value
 
 
-def nearest(word: str, known: Sequence[str]) -> str:
+def nearest(word: str, known: Sequence[str], likeness: float = 0.5) -> str:
     """Write a hint at the known word most similar to the given one.
 
     Returns
     -------
     str
-        Empty if no known word is similar.
+        Empty if no known word is similar, by a likeness of 0 to 1.
 
     Examples
     --------
@@ -187,7 +187,7 @@ def nearest(word: str, known: Sequence[str]) -> str:
     """
     # A word of a longer name counts as much as the name: who writes "frction" means friction_coefficient.
     whole = {part: name for name in reversed(known) for part in name.split("_")} | {name: name for name in known}
-    near = difflib.get_close_matches(word, list(whole), n=1, cutoff=0.5)
+    near = difflib.get_close_matches(word, list(whole), n=1, cutoff=likeness)
     return f" (did you mean '{whole[near[0]]}'?)" if near else ""
 
 

@@ -184,7 +184,7 @@ def _note_kept(case: Case, sketch: layout.Layout) -> None:
         ("[geometry] thickness", case.thickness, sketch.thickness, "m", "change it there, or leave the key out"),
     ):
         own = np.zeros(0) if given is None or drawn is None else drawn[np.isfinite(drawn) & ~laid]
-        if (own != given).any():
+        if given is not None and not np.allclose(own, given, rtol=1e-5):
             warnings.warn(
                 f"{case.source}: {key} = {given:g} is that of {counted(sketch.n_blocks - len(own), 'block')}; "
                 f"{len(own)} of {sketch.n_blocks} keep what '{case.file.name}' says, {own.min():g} to {own.max():g} "

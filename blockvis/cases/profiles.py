@@ -259,7 +259,9 @@ def _on_every_support(settlement: solver.Settlement, assembly: solver.Assembly, 
     if settlement.profile is None:
         return settlement
     given, names = dict(settlement.profile), assembly.names
-    motions = {names[i]: motion for name, motion in given.items() for i in blocks_called(name, names)} | given
+    called = {name: [i for i in blocks_called(name, names) if not assembly.free[i]] for name in given}
+    motions = {names[i]: motion for name, motion in given.items() for i in called[name]}
+    motions |= {name: motion for name, motion in given.items() if name in names or not called[name]}
     for name in motions:
         _check_support(name, assembly, where)
     return replace(settlement, profile=motions)
@@ -321,6 +323,8 @@ def pieces_named(names: Sequence[str], assembly: solver.Assembly) -> tuple[str, 
     found: dict[str, None] = {}
     for name in names:
         hits = sorted({*blocks_called(name, assembly.names), *blocks_called(name, uncut)})
+        # Free blocks may be drawn with the name of a support.
+        hits = [i for i in hits if not assembly.free[i]] or hits
         found |= dict.fromkeys([assembly.names[i] for i in hits] or [name])
     return tuple(found)
 

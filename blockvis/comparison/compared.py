@@ -22,7 +22,7 @@ from blockvis.results.cracks import Crack, cracks_of
 from blockvis.results.fall_files import stored_fall
 from blockvis.results.folder import RESULTS
 from blockvis.results.joints import initial_joints, opening_and_slip
-from blockvis.results.record import read_record
+from blockvis.results.record import case_text
 from blockvis.runs.reopen import open_results
 from blockvis.text import force_text, quantity_text
 
@@ -233,7 +233,7 @@ def _opened(folder: Path, label: str) -> Side:
             f"'{folder}' has settlements in m and in rad, which share no axis; compare runs of which all settlements "
             "are movements along a direction, or all are rotations"
         )
-    text = read_record(folder).case
+    text = case_text(folder)
     return Side(label, folder, response, stored_fall(folder), dict(_flat(tomllib.loads(text))) if text else {})
 
 

@@ -142,7 +142,8 @@ def rows_of_cells(
     """
     for key in TABLE_ARRAYS:
         values = np.asarray(data.get(key, ()))
-        if values.shape != owner.shape:
+        # Numbers of groups or materials of other programs are not read.
+        if values.shape != owner.shape or (key in TABLE_ARRAYS[:4] and values.dtype.kind not in "SUO"):
             continue
         if values.dtype.kind == "f":
             # Rounding of a program that writes them with seven digits.

@@ -197,9 +197,8 @@ def _maybe_openings(rings: Sequence[np.ndarray], names: Sequence[str], holed: Co
     paper, median = int(areas.argmax()), float(np.median(areas[stones]))
     order = stones[np.argsort(-areas[stones])]
     large = order[areas[order] >= MAYBE_OPENING * median]
-    if paper in holed:
+    if paper in holed and len(large):
         why = f"paper around lines, '{names[paper]}', was left out, and blocks are what lines enclose, openings, too"
-        large = large if len(large) else order[:1]
     elif len(large):
         why = "regions far larger than others count as blocks"
     else:

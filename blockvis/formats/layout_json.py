@@ -34,6 +34,9 @@ from .reading import Reading
 
 FORMAT = "blockvis layout"
 
+#: Likeness of a key to one that is known from which on it is a slip in that: others have keys of their own.
+SLIP = 0.8
+
 #: Keys of a file, and of each block beside those of its shape.
 KEYS = ("format", "version", "unit", "blocks")
 BLOCK_KEYS = ("name", "group", "role", "material", "density")
@@ -85,9 +88,9 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
 
 
 def _not_read(given: Mapping[str, Any], known: Sequence[str], where: str) -> list[str]:
-    """List keys that are not known; raises ``ValueError`` for one that is like one of these, which it was to be."""
+    """List keys that are not known; raises ``ValueError`` for one that is a slip in one of these."""
     more = [key for key in given if key not in known]
-    refuse_unknown((key for key in more if nearest(key, known)), known, where)
+    refuse_unknown((key for key in more if nearest(key, known, SLIP)), known, where)
     return more
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import LEFT_OUT, Note
 from solver.mechanics import counted
 
@@ -30,7 +32,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     _check_text(path)
     suffix = path.suffix.lower()
     cards = _abaqus_cards(path) if suffix == ".inp" else []
-    _check_members(cards, path)
+    strange = passed_over(_strange_members(cards), "members of sets that are neither a cell nor a set before it")
     said = io.StringIO()
     try:
         # meshio prints to the terminal, and raises SystemExit for some files.
@@ -67,7 +69,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         bodies = _bodies(points, cells, data, path)
         flat = [cell for block in mesh.cells if block.type in MESHIO for cell in block.data]
         notes += flat_beside([nodes for _, nodes in cells], flat)
-        return replace(bodies, notes=bodies.notes + notes)
+        return replace(bodies, notes=(*bodies.notes, *notes, *strange))
     rings: list[np.ndarray] = []
     chosen = []
     for k, block in enumerate(mesh.cells):
@@ -78,7 +80,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         chosen.append((k, len(block.data)))
     data, notes = _cell_data(mesh, chosen, sets)
     found = layout_of_cells(points, rings, data, path, reading.view)
-    return replace(found, notes=found.notes + notes)
+    return replace(found, notes=(*found.notes, *notes, *strange))
 
 
 def _groups(mesh: Any) -> dict[str, list[np.ndarray]]:
@@ -265,20 +267,24 @@ def _set_name(parameters: str) -> str:
     return found[1].strip() if found else ""
 
 
-def _check_members(cards: Sequence[tuple[str, str, str]], path: Path) -> None:
-    """Refuse a set of cells that names another one which is not there."""
+def _members(line: str) -> list[str]:
+    """Split a line of a set: "Part-1-1.Stone 1" names that of an instance."""
+    words = (word.strip().rpartition(".")[2].strip('"').upper() for word in line.split(","))
+    return [word for word in words if word]
+
+
+def _strange_members(cards: Sequence[tuple[str, str, str]]) -> Counter[str]:
+    """Count members of sets of cells that are neither a cell nor a set before it."""
     known: set[str] = set()
+    strange: Counter[str] = Counter()
     for word, parameters, data in cards:
         if word not in ("ELEMENT", "ELSET"):
             continue
+        members = [one for line in data.splitlines() for one in _members(line)] if word == "ELSET" else []
         name = _set_name(parameters)
-        members = data.replace(",", " ").split() if word == "ELSET" else []
-        strange = next((one for one in members if not one.isdigit() and one.upper() not in known), None)
-        if strange is not None:
-            raise ValueError(
-                f"'{path}': set '{name}' names '{strange}', which is neither a cell nor a set before it; repair it"
-            )
+        strange.update(f"'{one}' in '{name}'" for one in members if not one.isdigit() and one not in known)
         known.add(name.upper())
+    return strange
 
 
 def _mesh_alone(cards: Sequence[tuple[str, str, str]]) -> str:
@@ -312,12 +318,12 @@ def _abaqus_sets(cards: Sequence[tuple[str, str, str]], blocks: Sequence[Any]) -
         if word == "ELEMENT" or not name:
             continue
         own = sets.setdefault(name.upper(), [])
-        rows = [line.replace(",", " ").split() for line in data.splitlines() if line.strip()]
+        rows = [_members(line) for line in data.splitlines() if line.strip()]
         if re.search(r"(?i)\bgenerate\b", parameters):
             ranges = [(int(row[0]), int(row[1]), int(row[2]) if len(row) > 2 else 1) for row in rows]
             own += [every[(every >= a) & (every <= b) & ((every - a) % step == 0)] for a, b, step in ranges]
         else:
-            words = [one.upper() for row in rows for one in row]
+            words = [one for row in rows for one in row]
             own.append(np.array([one for one in words if one.isdigit()], dtype=np.int64))
             own += [part for one in words for part in (*sets.get(one, ()), *of_elements.get(one, ()))]
     found = {}

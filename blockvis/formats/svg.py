@@ -94,6 +94,7 @@ class _Outlines:
     clipped: Counter[str] = field(default_factory=Counter)
     notes: list[str] = field(default_factory=list)
     left_out: list[LeftOut] = field(default_factory=list)
+    sheets_missed: bool = False
 
 
 @dataclass(frozen=True)
@@ -126,9 +127,12 @@ def read(path: Path, reading: Reading) -> Layout:
     tolerance = None
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
-    found = _Outlines(notes=[*doubts, *_styled(root), *_pattern_fills(root)])
+    styled = _styled(root)
+    found = _Outlines(notes=[*doubts, *styled, *_pattern_fills(root)])
     if stated and stated not in UNITS and reading.unit is None:
         found.notes.append(f"1 unit of the drawing is {stated}, by its width and its viewBox")
+    # What sheets that are not read say may paint a shape.
+    found.sheets_missed = len(styled) > 0
     _walk(root, _Context(np.eye(3), (), tolerance, path), found)
     faces = _with_loose(found, reading, tolerance)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
@@ -351,7 +355,7 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> No
         where = replace(where, layers=(*where.layers, label) if label else where.layers, label=named or where.label)
     shape = _SHAPES.get(tag)
     found.clipped.update(f"<{tag}> with a {key}" for key in ("clip-path", "mask") if "url(" in _style(element, key))
-    unpainted = where.fill in _NO_PAINT and where.stroke in _NO_PAINT
+    unpainted = where.fill in _NO_PAINT and where.stroke in _NO_PAINT and not found.sheets_missed
     if shape is not None and (where.visibility != "visible" or unpainted):
         found.skipped[f"hidden <{tag}>"] += 1
     elif shape is not None:

@@ -121,4 +121,15 @@ def moved_notes(moved: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) ->
         notes.append(
             Note(CHANGED, f"layers of supports were changed ({listed(held)}): {says}; [roles] can say otherwise")
         )
+    lost = [
+        f"'{row.get('name', '')}' on '{row['group']}' was {old[key]}"
+        for old, row in moved
+        for key in ("role", "material")
+        if old.get(key) not in (None, "", row.get(key), mechanics.FREE)
+    ]
+    if lost:
+        words = ", ".join(lost[:6]) + (f" and {len(lost) - 6} more" if len(lost) > 6 else "")
+        notes.append(
+            Note(CHANGED, f"layers were changed, and with them roles or materials ({words}); [roles] gives roles")
+        )
     return notes

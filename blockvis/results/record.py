@@ -102,6 +102,11 @@ def read_record(folder: Path) -> Record:
         raise damaged(path, error) from None
 
 
+def case_text(folder: Path) -> str:
+    """Read the text of the case of a results folder: empty for a run from Python, and where no record is left."""
+    return read_record(folder).case if (folder / RECORD).is_file() else ""
+
+
 def read_json(path: Path) -> Any:
     """Read a file of JSON that a run has written; raises ``ValueError`` with its name where it is damaged."""
     try:

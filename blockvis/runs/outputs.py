@@ -16,7 +16,7 @@ from blockvis.kinds.kinds import KINDS
 from blockvis.results.fall_files import stored_fall, write_fall
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.reaction_range import stored_range
-from blockvis.results.record import read_record
+from blockvis.results.record import case_text
 from blockvis.results.viewer_files import ViewerFormat
 from solver import mechanics
 
@@ -199,7 +199,7 @@ def write_report_of(response: solver.Response, folder: Path, fall: Fall | None) 
     from blockvis.report.page import write_report
 
     error, band = str(stored_check(folder) or ""), stored_range(folder)
-    write_report(response, folder / "report.html", read_record(folder).case, fall=fall, error=error, band=band)
+    write_report(response, folder / "report.html", case_text(folder), fall=fall, error=error, band=band)
 
 
 def viewer_format(case: Case) -> ViewerFormat:

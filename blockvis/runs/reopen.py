@@ -13,13 +13,13 @@ from blockvis.cases.loads import with_moving_load
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import stored_response
 from blockvis.results.given import with_given
-from blockvis.results.record import RECORD, read_record
+from blockvis.results.record import RECORD, case_text, read_record
 
 
 def case_of(folder: Path) -> Case | None:
     """Read the case of a results folder, which is named by the file it was run from; None for a run from Python."""
-    record = read_record(folder)
-    return parse_case(record.case, Path(record.case_file or folder / RECORD)) if record.case else None
+    text = case_text(folder)
+    return parse_case(text, Path(read_record(folder).case_file or folder / RECORD)) if text else None
 
 
 def open_results(folder: str | Path) -> solver.Response:

@@ -176,7 +176,7 @@ def resume_run(
     changed are named in a warning, and not read again. Of a run that has finished, what is not drawn yet is drawn.
     """
     folder = Path(folder)
-    case, record = stored_case(folder), read_record(folder)
+    record, case = read_record(folder), stored_case(folder)
     outputs = (Drawing(),) if outputs is None else outputs
     finished = _finished(folder)
     if finished is not None:

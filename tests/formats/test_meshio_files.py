@@ -192,5 +192,7 @@ def test_small_and_capital_letters_of_set_names_are_the_same(tmp_path):
     assert drawing.names == ("Stone1", "a", "b", "c")
     assert read(path).roles.tolist() == ["fixed", "free", "free", "free"]
     path.write_text(strip(f"{stones}\n*ELSET, ELSET=fixed\nSTONE7"), encoding="utf-8")
-    with pytest.raises(ValueError, match="set 'fixed' names 'STONE7', which is neither a cell nor a set before it"):
-        read(path)
+    with pytest.warns(UserWarning, match="neither a cell nor a set before it: 1 'STONE7' in 'fixed'"):
+        assert read(path).roles.tolist() == ["free"] * 4
+    path.write_text(strip(f'{stones}\n*ELSET, ELSET=fixed\nPart-1-1."Stone1"'), encoding="utf-8")
+    assert read(path).roles.tolist() == ["fixed", "free", "free", "free"]

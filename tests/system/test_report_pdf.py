@@ -70,8 +70,8 @@ def test_keys_that_are_not_in_use_are_not_on_paper(arch_results, monkeypatch):
         '# An arch.\n[geometry]\nfile = "arch#1.msh"\n# [material]\n# density = 2000.0  # kg/m³\n\n\n\n'
         "[settlement]\ndirection = [1, 0]\nlimit = 0.5  # m\n"
     )
-    summary = arch_results / "summary.json"
-    summary.write_text(json.dumps(json.loads(summary.read_text(encoding="utf-8")) | {"case": case}), encoding="utf-8")
+    record = arch_results / "run.json"
+    record.write_text(json.dumps(json.loads(record.read_text(encoding="utf-8")) | {"case": case}), encoding="utf-8")
     assert main(["report", str(arch_results), "--pdf"]) == 0
     assert listed == ['[geometry]\nfile = "arch#1.msh"\n\n[settlement]\ndirection = [1, 0]\nlimit = 0.5  # m']
 
