@@ -149,9 +149,11 @@ def _check_lengths(
     for name, length in given.items():
         if length is not None and not 0.0 <= float(length) < np.inf:
             raise ValueError(f"{name} is {length:g} m; it must be a length of at least 0")
-    in_space = layout.dimension == 3
+    joint, in_space = given.get("joint_thickness") or 0.0, layout.dimension == 3
+    if joint == 0.0 or not layout.n_blocks:
+        return
     widths = [width_of(*solid) for solid in layout.solids] if in_space else list(map(ring_width, layout.outlines))
-    width, joint = float(np.median(widths or [np.inf])), given.get("joint_thickness") or 0.0
+    width = float(np.median(widths))
     if joint > THICKEST_JOINT * width:
         raise ValueError(
             f"joint_thickness is {joint:g} m, more than {THICKEST_JOINT:g} times the width of a typical block "

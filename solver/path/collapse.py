@@ -20,8 +20,9 @@ from .reports import Reports
 from .state import EquilibriumCheck, Place
 from .stepping import Stepper
 
-#: Steps in time, with those that are refused.
-TIME_STEPS = 200
+#: Steps in time, with those that are refused; and refusals of longer ones between steps in which blocks only creep,
+#: after which they are not waited for.
+TIME_STEPS, REFUSALS = 200, 12
 
 #: Movement, in block sizes, that is large against the compliance of the joints: that of the first frame of a fall.
 MECHANISM = 1e-3
@@ -61,7 +62,7 @@ class Fall:
             if new is None or moved > largest:
                 # What creeps, and is refused longer steps again and again, does not come to rest.
                 stuck += slow
-                if stuck == 12:
+                if stuck == REFUSALS:
                     return
                 time *= min(0.5, 0.8 * np.sqrt(largest / max(moved, largest)))
                 continue
