@@ -24,9 +24,12 @@ from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
 
 #: Names of the cell array that numbers the blocks, in order of preference.
 BLOCK_ARRAYS = (
-    "block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags", "nastran:ref",
+    "block_id", "BlockId", "block", "cell set", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags", "nastran:ref",
     "netgen:index", "avsucd:material", "ugrid:ref",
 )  # fmt: skip
+
+#: Those that number blocks; the others number parts of a model, of which one may be many blocks.
+OF_BLOCKS = BLOCK_ARRAYS[:3]
 
 #: Names of the cell arrays that say what a block is.
 TABLE_ARRAYS = ("name", "group", "material", "role_name", "role", "thickness", "density")
@@ -36,7 +39,7 @@ def block_array(data: Mapping[str, np.ndarray]) -> str | None:
     """Name of the cell array that numbers the blocks; None if there is none."""
     numbered = [name for name in BLOCK_ARRAYS if name in data and np.ndim(data[name]) == 1]
     # An array with one value everywhere, as some programs write by default, does not distinguish blocks.
-    return next((name for name in numbered if name == "block_id" or (data[name] != data[name][0]).any()), None)
+    return next((name for name in numbered if name in ("block_id", "cell set") or (data[name] != data[name][0]).any()), None)
 
 
 def layout_of_cells(
@@ -78,8 +81,11 @@ def layout_of_cells(
     flat, note = flattened(points, f"'{path}'", view)
     if key is not None:
         ids, owner = np.unique(np.asarray(data[key]), return_inverse=True)
-        names = [f"block {value}" for value in ids.tolist()]
-        how = f"{counted(len(ids), 'block')}, one per value of the cell array '{key}'"
+        names, how = [f"block {value}" for value in ids.tolist()], f"one per value of the cell array '{key}'"
+        if key not in OF_BLOCKS:
+            names, owner = _in_pieces(rings, names, owner)
+            how = f"one per connected piece of a value of the cell array '{key}'" if len(names) > len(ids) else how
+        how = f"{counted(len(names), 'block')}, {how}"
     elif any(len(ring) > 3 for ring in rings):
         owner = np.arange(len(rings))
         names = [f"block {k}" for k in owner]
@@ -94,6 +100,21 @@ def layout_of_cells(
     layout = Layout(blocks=tuple(outlines), names=tuple(names), unit="", notes=notes)
     layout = with_rows(layout, [with_role(row) for row in rows_of_cells(data, owner, names, path)])
     return layout.leaving_out(unusable)
+
+
+def _in_pieces(
+    rings: Sequence[np.ndarray], names: Sequence[str], owner: np.ndarray
+) -> tuple[list[str], np.ndarray]:
+    """Names of the connected pieces of parts, numbered where a part has several, and that of each cell."""
+    corners = np.column_stack([np.repeat(owner, [len(ring) for ring in rings]), np.concatenate(list(rings))])
+    own = np.unique(corners, axis=0, return_inverse=True)[1].ravel()
+    ends = np.cumsum([len(ring) for ring in rings])
+    pairs = np.column_stack([owner, components(np.split(own, ends[:-1]), int(own.max()) + 1)])
+    pieces, piece = np.unique(pairs, axis=0, return_inverse=True)
+    parts, several = pieces[:, 0], np.bincount(pieces[:, 0]) > 1
+    numbers = np.arange(len(parts)) - np.searchsorted(parts, parts) + 1
+    pairs_of = zip(parts.tolist(), numbers.tolist(), strict=True)
+    return [f"{names[part]} {k}" if several[part] else names[part] for part, k in pairs_of], piece.ravel()
 
 
 def _enclosed(

@@ -224,7 +224,7 @@ def _arrays_of_sets(sets: Mapping[str, np.ndarray], total: int) -> tuple[dict[st
     names = [name for name, _ in blocks]
     unused = f"the cell sets {_listed(cutting)} were not used: they cut blocks"
     notes = (Note(LEFT_OUT, unused),) if cutting else ()
-    return {"block_id": owner, "name": np.array(names)[owner], "group": np.array(groups)[owner]}, notes
+    return {"cell set": owner, "name": np.array(names)[owner], "group": np.array(groups)[owner]}, notes
 
 
 def _dividing(sets: Sequence[tuple[str, np.ndarray]], total: int) -> list[tuple[str, np.ndarray]]:

@@ -221,7 +221,7 @@ def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> tuple[
     if len(rings) == 1:
         return ring, None
     x, y = rings[1].mean(axis=0)
-    if _contains(rings[0], rings[1][0]):
+    if len(filled(rings)) == 1:
         message = (
             f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
         )
@@ -254,14 +254,6 @@ def _loops(edges: list[tuple[int, int]]) -> tuple[list[list[int]], int | None]:
             previous, node = node, (other if one == previous else one)
         loops.append(loop)
     return loops, None
-
-
-def _contains(ring: np.ndarray, point: np.ndarray) -> bool:
-    a, b = ring, np.roll(ring, -1, axis=0)
-    straddles = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
-    a, b = a[straddles], b[straddles]
-    x = a[:, 0] + (point[1] - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
-    return bool((x > point[0]).sum() % 2)
 
 
 def without_collinear(ring: np.ndarray, tolerance: float = COLLINEAR) -> np.ndarray:

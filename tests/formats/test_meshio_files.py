@@ -41,6 +41,23 @@ def test_groups_of_flac3d_name_the_blocks_and_their_roles(tmp_path):
     np.testing.assert_allclose(drawing.volumes, 1.0)
 
 
+def test_stones_of_one_set_that_touch_are_blocks_whichever_corner_comes_first(tmp_path):
+    """A stone on another is no hole in it; of a set, as of one in space, each connected piece is a block."""
+    corners = [(0, 0), (1, 0), (1, 0.3), (0, 0.3), (0.3, 0.7), (0.3, 0.3), (0.7, 0.3), (0.7, 0.7)]
+    corners += [(0.2, 0.7), (0.8, 0.7), (0.8, 1.1), (0.2, 1.1)]
+    sets = {"fixed ground": [np.array([0])], "stones": [np.array([1, 2])]}
+    mesh = meshio.Mesh(np.array([(x, y, 0.0) for x, y in corners]), [("quad", np.arange(12).reshape(3, 4))])
+    for cells in (mesh.cells, [("quad", np.array([[0, 1, 2, 3], [5, 6, 7, 4], [8, 9, 10, 11]]))]):
+        meshio.write(tmp_path / "a.inp", meshio.Mesh(mesh.points, cells, cell_sets=sets))
+        layout = read_layout(tmp_path / "a.inp")
+        assert (layout.n_blocks, layout.roles, layout.left_out) == (3, ("fixed", "", ""), ())
+    meshio.write(tmp_path / "a.vtu", meshio.Mesh(mesh.points, cells, cell_data={"block_id": [np.array([0, 1, 1])]}))
+    with pytest.raises(ValueError, match="'block 1' is in 2 separate pieces"):
+        read_layout(tmp_path / "a.vtu")
+    meshio.write(tmp_path / "b.vtu", meshio.Mesh(mesh.points, cells, cell_data={"CellEntityIds": [np.array([1, 5, 5])]}))
+    assert read_layout(tmp_path / "b.vtu").names == ("block 1", "block 5 1", "block 5 2")
+
+
 QUADS = np.array([[0, 1, 2, 3], [1, 4, 5, 2], [4, 6, 7, 5]])
 CORNERS = np.array([[x, y, 0.0] for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (2, 1), (4, 0), (4, 1))])
 
