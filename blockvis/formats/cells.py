@@ -22,10 +22,13 @@ from solver.mechanics import counted
 from .bodies import Bodies, Body, with_role
 from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
 
+#: Our name of the number of the named set of each cell.
+CELL_SET = "cell set"
+
 #: Names of the cell array that numbers the blocks, in order of preference.
 BLOCK_ARRAYS = (
-    "block_id", "BlockId", "block", "cell set", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags", "nastran:ref",
-    "netgen:index", "avsucd:material", "ugrid:ref",
+    "block_id", "BlockId", "block", CELL_SET, "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags",
+    "nastran:ref", "netgen:index", "avsucd:material", "ugrid:ref",
 )  # fmt: skip
 
 #: Those that number blocks; the others number parts of a model, of which one may be many blocks.
@@ -39,7 +42,8 @@ def block_array(data: Mapping[str, np.ndarray]) -> str | None:
     """Name of the cell array that numbers the blocks; None if there is none."""
     numbered = [name for name in BLOCK_ARRAYS if name in data and np.ndim(data[name]) == 1]
     # An array with one value everywhere, as some programs write by default, does not distinguish blocks.
-    return next((name for name in numbered if name in ("block_id", "cell set") or (data[name] != data[name][0]).any()), None)
+    named = (BLOCK_ARRAYS[0], CELL_SET)
+    return next((name for name in numbered if name in named or (data[name] != data[name][0]).any()), None)
 
 
 def layout_of_cells(
@@ -102,9 +106,7 @@ def layout_of_cells(
     return layout.leaving_out(unusable)
 
 
-def _in_pieces(
-    rings: Sequence[np.ndarray], names: Sequence[str], owner: np.ndarray
-) -> tuple[list[str], np.ndarray]:
+def _in_pieces(rings: Sequence[np.ndarray], names: Sequence[str], owner: np.ndarray) -> tuple[list[str], np.ndarray]:
     """Names of the connected pieces of parts, numbered where a part has several, and that of each cell."""
     corners = np.column_stack([np.repeat(owner, [len(ring) for ring in rings]), np.concatenate(list(rings))])
     own = np.unique(corners, axis=0, return_inverse=True)[1].ravel()

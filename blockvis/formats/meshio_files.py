@@ -19,7 +19,7 @@ from blockvis.layout.notes import LEFT_OUT, Note
 from solver.mechanics import counted
 
 from .bodies import Bodies
-from .cells import block_array, flat_beside, layout_of_cells, rows_of_cells
+from .cells import CELL_SET, block_array, flat_beside, layout_of_cells, rows_of_cells
 from .node_order import MESHIO, ring_of_nodes
 from .reading import Reading
 from .volumes import MESHIO_SOLIDS, Faces, bodies_of_cells
@@ -224,7 +224,7 @@ def _arrays_of_sets(sets: Mapping[str, np.ndarray], total: int) -> tuple[dict[st
     names = [name for name, _ in blocks]
     unused = f"the cell sets {_listed(cutting)} were not used: they cut blocks"
     notes = (Note(LEFT_OUT, unused),) if cutting else ()
-    return {"cell set": owner, "name": np.array(names)[owner], "group": np.array(groups)[owner]}, notes
+    return {CELL_SET: owner, "name": np.array(names)[owner], "group": np.array(groups)[owner]}, notes
 
 
 def _dividing(sets: Sequence[tuple[str, np.ndarray]], total: int) -> list[tuple[str, np.ndarray]]:

@@ -54,7 +54,8 @@ def test_stones_of_one_set_that_touch_are_blocks_whichever_corner_comes_first(tm
     meshio.write(tmp_path / "a.vtu", meshio.Mesh(mesh.points, cells, cell_data={"block_id": [np.array([0, 1, 1])]}))
     with pytest.raises(ValueError, match="'block 1' is in 2 separate pieces"):
         read_layout(tmp_path / "a.vtu")
-    meshio.write(tmp_path / "b.vtu", meshio.Mesh(mesh.points, cells, cell_data={"CellEntityIds": [np.array([1, 5, 5])]}))
+    entities = {"CellEntityIds": [np.array([1, 5, 5])]}
+    meshio.write(tmp_path / "b.vtu", meshio.Mesh(mesh.points, cells, cell_data=entities))
     assert read_layout(tmp_path / "b.vtu").names == ("block 1", "block 5 1", "block 5 2")
 
 
