@@ -17,11 +17,10 @@ from blockvis.layout.block_table import layer_of, moved_notes, on_layer, rows_of
 from blockvis.layout.choice import Choice, look_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, passed_over
-from blockvis.layout.notes import CHANGED, UPRIGHT, Note, kind_of
-from blockvis.layout.outlines import FLAT, chords_of, filled
+from blockvis.layout.notes import CHANGED, Note, kind_of
+from blockvis.layout.outlines import chords_of, drawing_plane, filled
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import metres_per
-from blockvis.layout.views import VIEWS, axis_across, upright_note
 
 from .arcs import Arc, with_shared_corners
 from .bodies import Bodies
@@ -166,7 +165,7 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
             "polyline",
             Layout((), (), unit=stated, left_out=tuple(found.left_out)),
         )
-    found.notes += _faults(audit) + _elevations(found, reading.view)
+    found.notes += _faults(audit)
     return _layout(found, faces, stated)
 
 
@@ -189,7 +188,7 @@ def _layout(found: _Outlines, faces: Faces, stated: str) -> Layout:
         names=tuple(found.names),
         unit=stated,
         notes=tuple(notes),
-        left_out=tuple(item.seen([0, 1]) for item in found.left_out),
+        left_out=tuple(item.turned(np.eye(item.points.shape[1])[:2]) for item in found.left_out),
         looks=tuple(found.looks),
     )
     moved = [
@@ -230,43 +229,24 @@ def _faults(audit: Any) -> list[str]:
     return [Note(CHANGED, f"{faults} faults of the file were repaired or passed over")] if faults else []
 
 
-def _elevations(found: _Outlines, view: str | None) -> list[str]:
-    """Say in a note that a drawing in space was read as a plane one."""
-    upright = any(kind_of(note) == UPRIGHT for note in found.notes)
-    if not any(abs(ring[:, 2] - (ring[0, 2] if upright else 0.0)).max() > 0 for ring in found.rings):
-        return []
-    seen = "from above" if view in (None, "xy") else f"along {'xyz'[axis_across(view)]}"
-    remedy = "; 3DFACEs of a layer are read as bodies in space where they close one" if found.faces else ""
-    return [Note(CHANGED, f"elevations were ignored: the drawing was read as seen {seen}{remedy}")]
-
-
 def _turned(found: _Outlines, view: str | None, path: Path) -> list[str]:
-    """Turn a drawing that stands upright into the plane of x and y, and return the note on it.
-
-    Of a drawing that lies in no plane, that of x and y is taken unless the caller asks for another.
-    """
+    """Turn a drawing that stands upright into the plane of x and y, and say what that changes."""
     every = [*found.rings, *(line.points for line in found.loose)]
     if not every or not all(np.isfinite(points).all() for points in every):
         return []
-    spread = np.ptp(np.concatenate(every), axis=0)
-    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
-    if view is not None and flat and view not in flat:
-        raise ValueError(
-            f"'{path}' lies in {flat[0]}: seen as {view} it has no area; give view = \"{flat[0]}\", or none"
-        )
-    chosen = view or (flat[0] if flat else "xy")
-    if chosen == "xy":
-        return []
-    order = [*VIEWS[chosen], axis_across(chosen)]
-    found.rings = [ring[:, order] for ring in found.rings]
-    turn, still = np.eye(3)[order], np.zeros(3)
+    turn, notes = drawing_plane(np.concatenate(every), f"'{path}'", view)
+    still = np.zeros(3)
+    found.rings = [ring @ turn.T for ring in found.rings]
     found.arcs = [tuple(arc.mapped(turn, still) for arc in arcs) for arcs in found.arcs]
     found.loose = [
-        replace(line, points=line.points[:, order], arcs=tuple(arc.mapped(turn, still) for arc in line.arcs))
+        replace(line, points=line.points @ turn.T, arcs=tuple(arc.mapped(turn, still) for arc in line.arcs))
         for line in found.loose
     ]
-    found.left_out = [item.seen(order) for item in found.left_out]
-    return [upright_note(chosen)]
+    found.left_out = [item.turned(turn) for item in found.left_out]
+    if found.faces:
+        remedy = "; 3DFACEs of a layer are read as bodies in space where they close one"
+        notes = [Note(CHANGED, f"{note}{remedy}") if kind_of(note) == CHANGED else note for note in notes]
+    return notes
 
 
 def _bounded(entities: Any, path: Path, frozen: Set[str]) -> Iterator[tuple[Any, str]]:

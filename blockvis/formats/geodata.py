@@ -21,9 +21,8 @@ from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches, passed_over
 from blockvis.layout.notes import CHANGED, Note
-from blockvis.layout.outlines import FLAT, ring_area, spread_of
+from blockvis.layout.outlines import drawing_plane, ring_area
 from blockvis.layout.units import DOUBTED, UNITS
-from blockvis.layout.views import VIEWS, axis_across, upright_note
 from blockvis.system.extras import require
 from solver import mechanics
 
@@ -303,22 +302,23 @@ def layout_of_features(
     if not len(every):
         seen = skips[0] if skips else "found: nothing"
         raise ValueError(f"'{path}' has no polygon ({seen}); draw each block as one polygon")
-    order, notes = _order(every, reading.view, path)
+    turn, notes = drawing_plane(every, f"'{path}'", reading.view)
+    turn = turn[:2]
     rows = _rows(features)
     strange = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)
     if strange:
         listed_roles = ", ".join(f"'{role}'" for role in strange)
         notes.append(Note(CHANGED, f"roles were left out ({listed_roles}): roles are {', '.join(mechanics.ROLES)}"))
-    rings = [ring[:, order] for ring in found.rings]
-    outlines = [*rings, *(holed[0][:, order] for holed, _ in found.holed)]
-    far = not (unit or degrees or lengths) and list(order) == [0, 1]
+    rings = [ring @ turn.T for ring in found.rings]
+    outlines = [*rings, *(holed[0] @ turn.T for holed, _ in found.holed)]
+    far = not (unit or degrees or lengths) and (turn == np.eye(3)[:2]).all()
     _check_degrees(outlines, path, reading, degrees, notes, far=far)
     notes += passed_over(found.skipped)
     kinds = _parts(rows, found.of)
-    wanted, unwanted = _lines(found, rows, order, reading)
+    wanted, unwanted = _lines(found, rows, turn, reading)
     faces = faces_of_lines(wanted, rings, [0.0] * len(rings), only=reading.only)
     _replace_cut(rings, kinds, faces)
-    holes = [_hole(*(ring[:, order] for ring in holed), row=rows[k]) for holed, k in found.holed]
+    holes = [_hole(*(ring @ turn.T for ring in holed), row=rows[k]) for holed, k in found.holed]
     left_out = [*holes, *unwanted, *faces.left_out]
     if not rings and all(item.kind == "open" for item in left_out):
         raise ValueError(f"'{path}' has no polygon: {nothing_closed(faces)}; draw each block as one polygon")
@@ -335,12 +335,12 @@ def layout_of_features(
 
 
 def _lines(
-    found: _Found, rows: Sequence[Mapping[str, Any]], order: list[int], reading: Reading
+    found: _Found, rows: Sequence[Mapping[str, Any]], turn: np.ndarray, reading: Reading
 ) -> tuple[list[Line], list[LeftOut]]:
     """Name the open lines after the features that have them, and leave out those that are not wanted."""
     wanted, left_out = [], []
     for points, k in found.lines:
-        line = Line(points[:, order], rows[k].get("group", ""), rows[k]["name"], must_close=len(points) > 2)
+        line = Line(points @ turn.T, rows[k].get("group", ""), rows[k]["name"], must_close=len(points) > 2)
         if reading.wants([line.layer, line.handle]):
             wanted.append(line)
         else:
@@ -402,21 +402,6 @@ def _points(line: Any) -> np.ndarray:
     points = shapely.get_coordinates(line, include_z=True)
     points[:, 2] = np.nan_to_num(points[:, 2])
     return np.asarray(points)
-
-
-def _order(points: np.ndarray, view: str | None, path: Path) -> tuple[list[int], list[str]]:
-    """Choose the two coordinates in which the outlines lie, and say what that changes."""
-    spread = spread_of(points, f"'{path}'")
-    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
-    if view is not None and flat and view not in flat:
-        raise ValueError(
-            f"'{path}' lies in {flat[0]}: seen as {view} it has no area; give view = \"{flat[0]}\", or none"
-        )
-    chosen = view or (flat[0] if flat else "xy")
-    notes = [] if chosen == "xy" else [upright_note(chosen)]
-    seen = "from above" if chosen == "xy" else f"along {'xyz'[axis_across(chosen)]}"
-    notes += [] if flat else [Note(CHANGED, f"elevations were ignored: the drawing was read as seen {seen}")]
-    return list(VIEWS[chosen]), list(notes)
 
 
 def _check_degrees(

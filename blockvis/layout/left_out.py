@@ -72,9 +72,9 @@ class LeftOut:
         holes = tuple(ring * np.asarray(factors) for ring in self.holes)
         return replace(self, points=self.points * np.asarray(factors), holes=holes)
 
-    def seen(self, order: Sequence[int]) -> LeftOut:
-        """Take these of its coordinates, in this order."""
-        return replace(self, points=self.points[:, order], holes=tuple(ring[:, order] for ring in self.holes))
+    def turned(self, turn: np.ndarray) -> LeftOut:
+        """Take the directions in the rows of a matrix for its coordinates."""
+        return replace(self, points=self.points @ turn.T, holes=tuple(ring @ turn.T for ring in self.holes))
 
     @property
     def place(self) -> np.ndarray:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .left_out import LeftOut
+from .notes import CHANGED, UPRIGHT, Note
 from .views import VIEWS, axis_across, upright_note
 
 #: A point this close to the line between its neighbours, as a fraction of the size of the block, lies on it: in files
@@ -17,6 +18,9 @@ COLLINEAR = 1e-6
 
 #: Spread of the third coordinate, as a fraction of the size of the drawing, that still counts as flat.
 FLAT = 1e-6
+
+#: Relief of a drawing, as a fraction of its smaller extent, and sine of its lean, with which it still is a plane one.
+RELIEF = 0.05
 
 #: Part of an outline that may stick out of another one in which it lies, or by which it may be smaller and the same.
 WITHIN = 1e-6
@@ -90,6 +94,64 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
     chosen = view or flat[0]
     note = "" if chosen == "xy" else upright_note(chosen)
     return points[:, VIEWS[chosen]], note
+
+
+def drawing_plane(points: np.ndarray, where: str, view: str | None = None) -> tuple[np.ndarray, list[str]]:
+    """Find the plane of a drawing of lines, which may have a relief: walls are traced on scans, at any angle.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    where : str
+        The file, for messages.
+    view : {"xy", "xz", "yz"}, optional
+        The coordinates to take of a drawing that lies in no plane, by default x and y; those of one that does.
+
+    Returns
+    -------
+    turn : (3, 3) array
+        Its rows: the directions of x, y and across the drawing.
+    notes : list of str
+        What that changes.
+
+    Raises
+    ------
+    ValueError
+        For coordinates that are not finite, and for a drawing without area in the view.
+    """
+    spread = spread_of(points, where)
+    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
+    if view is not None and flat and view not in flat:
+        raise ValueError(f'{where} lies in {flat[0]}: seen as {view} it has no area; give view = "{flat[0]}", or none')
+    chosen = view or (flat[0] if flat else "xy")
+    turn, notes = np.eye(3)[[*VIEWS[chosen], axis_across(chosen)]], [] if chosen == "xy" else [upright_note(chosen)]
+    if flat:
+        return turn, list(notes)
+    upright = None if view == "xy" else _upright(points)
+    if upright is None:
+        seen = "from above" if chosen == "xy" else f"along {'xyz'[axis_across(chosen)]}"
+        return turn, [*notes, Note(CHANGED, f"elevations were ignored: the drawing was read as seen {seen}")]
+    first, relief = upright
+    angle = math.degrees(math.atan2(first[1], first[0]))
+    text = f"the drawing stands upright at {angle:.3g}° to x: its lengths in that direction and z were read as (x, y)"
+    ignored = f"; its relief of {relief:.3g} across was ignored" if relief > FLAT * spread.max() else ""
+    return np.array([first, [0.0, 0.0, 1.0], [first[1], -first[0], 0.0]]), [Note(UPRIGHT, text + ignored)]
+
+
+def _upright(points: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """Direction of x and relief of a drawing that stands upright; None for one that does not, or lies in no plane."""
+    _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    _, second, third = np.ptp(points @ axes.T, axis=0)
+    across = axes[2]
+    if third > RELIEF * second or abs(across[2]) > RELIEF:
+        return None
+    # As the views of x and z, and of y and z, mirror nothing.
+    axis = np.eye(3)[int(abs(across[0]) > abs(across[1]))]
+    own = np.array([-across[1], across[0], 0.0]) / np.hypot(*across[:2])
+    own *= np.sign(own @ axis)
+    reliefs = [float(np.ptp(points @ [first[1], -first[0], 0.0])) for first in (axis, own)]
+    # A wall along an axis stays there, whichever way its relief leans.
+    return (own, reliefs[1]) if reliefs[1] < 0.5 * reliefs[0] else (axis, reliefs[0])
 
 
 def share_in(inner: Any, outer: Any) -> float:

@@ -15,7 +15,7 @@ from .joints.trimming import overlapping
 from .left_out import LeftOut
 
 #: Two outlines closer than this fraction of the size of a block, corner by corner, are one block drawn twice.
-SAME = 1e-6
+SAME = 1e-3
 
 #: Deepest overlap that is resolved unless the caller says otherwise, as a fraction of the width of a typical block.
 DEFAULT_OVERLAP = 0.04

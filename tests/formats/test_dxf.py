@@ -280,13 +280,30 @@ def test_a_drawing_that_stands_upright(tmp_path):
         read(path, view="xy")
 
 
-def test_the_view_of_a_drawing_in_space(tmp_path):
-    def draw(document, space):
-        space.add_polyline3d([(0, 0, 0), (1, 0.2, 0), (1, 0.2, 2), (0, 0, 2)], close=True)
+def test_an_upright_drawing_keeps_its_lengths_at_any_angle_and_with_relief(tmp_path):
+    """A wall at 60° to x, and one traced on a scan, are no plans, nor are their widths those seen along an axis."""
 
-    path = saved(tmp_path, draw)
-    layout = read_layout(path, view="xz")
-    assert read(path, view="xz").areas == pytest.approx([2])
+    def turned(document, space):
+        for x in (0, 1):
+            corners = [(x, 0), (x + 1, 0), (x + 1, 2), (x, 2)]
+            space.add_polyline3d([(450000 + 0.5 * u, 5400000 + 0.75**0.5 * u, z) for u, z in corners], close=True)
+
+    def traced(document, space):
+        off = iter(0.01 * np.random.default_rng(1).uniform(-1, 1, 8))
+        for x in (0, 1):
+            space.add_polyline3d([(x + u, next(off), z) for u, z in [(0, 0), (1, 0), (1, 2), (0, 2)]], close=True)
+
+    def slanting(document, space):
+        space.add_polyline3d([(0, 0, 0), (2, 0, 0.5), (2, 2, 1), (0, 2, 0.5)], close=True)
+
+    for view in (None, "xz", "yz"):
+        assert read(saved(tmp_path, turned), view=view).areas == pytest.approx([2, 2])
+        assert read(saved(tmp_path, traced), view=view).areas == pytest.approx([2, 2])
+    notes = " ".join(read_layout(saved(tmp_path, turned)).notes)
+    assert "stands upright at 60° to x" in notes
+    assert not {"relief", "elevations"} & set(notes.split())
+    assert "its relief of 0.0" in " ".join(read_layout(saved(tmp_path, traced)).notes)
+    layout = read_layout(saved(tmp_path, slanting), view="xz")
     assert any("elevations were ignored: the drawing was read as seen along y" in note for note in layout.notes)
 
 

@@ -139,7 +139,8 @@ def test_a_facade_that_stands_upright_is_turned(tmp_path):
     assert any("upright" in note for note in layout.notes)
     slanting = [[[0.8 * x, 7 + 0.6 * x, z] for x, z in ring] for ring in SQUARES]
     seen = blockvis.read_layout(geojson(tmp_path / "facade.geojson", [polygon(ring) for ring in slanting]), view="xz")
-    assert "elevations were ignored: the drawing was read as seen along y" in seen.notes
+    assert np.ptp(seen.points, axis=0) == pytest.approx([0.8, 0.4])
+    assert any("stands upright at 36.9° to x" in note for note in seen.notes)
 
 
 def test_degrees_are_refused_with_the_command_that_makes_them_metres(tmp_path):

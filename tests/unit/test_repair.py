@@ -14,13 +14,22 @@ SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
 
 
 def test_duplicates_in_any_order_of_corners_and_within_rounding(tmp_path):
-    rings = [SQUARE, SQUARE[::-1], np.roll(SQUARE, 2, axis=0) + 1e-7, SQUARE + 1e-3, 1.1 * SQUARE]
+    rings = [SQUARE, SQUARE[::-1], np.roll(SQUARE, 2, axis=0) + 1e-7, SQUARE + 3e-3, 1.1 * SQUARE]
     assert inspect(drawn(tmp_path / "a.json", rings)).twins == ((0, 1), (0, 2))
 
 
 def test_of_many_copies_one_is_left(tmp_path):
     with pytest.warns(UserWarning, match="99 of 100 blocks are drawn twice"):
         assert read(drawn(tmp_path / "a.json", [SQUARE] * 100)).n_blocks == 1
+
+
+def test_a_block_drawn_again_in_rounded_coordinates_is_drawn_twice(tmp_path):
+    """A hatch over its outline has other digits; two stones do not share all of their corners."""
+    ring = np.array([[1 / 3, 1 / 7], [4 / 3, 1 / 7], [4 / 3, 5 / 7], [1 / 3, 5 / 7]])
+    with pytest.warns(UserWarning, match="1 of 2 blocks are drawn twice"):
+        assert read(drawn(tmp_path / "a.json", [ring, np.round(ring, 4)])).n_blocks == 1
+    with pytest.raises(ValueError, match=r"overlaps block 1 .* by 0.01"):
+        read(drawn(tmp_path / "b.json", [ring, ring + [0.99, 0.0]]), overlap_tolerance=1e-3)
 
 
 def test_supports_may_overlap_each_other_and_keep_their_place(tmp_path):
