@@ -29,7 +29,7 @@ def test_a_block_drawn_again_in_rounded_coordinates_is_drawn_twice(tmp_path):
     with pytest.warns(UserWarning, match="1 of 2 blocks are drawn twice"):
         assert read(drawn(tmp_path / "a.json", [ring, np.round(ring, 4)])).n_blocks == 1
     with pytest.raises(ValueError, match=r"overlaps block 1 .* by 0.01"):
-        read(drawn(tmp_path / "b.json", [ring, ring + [0.99, 0.0]]), overlap_tolerance=1e-3)
+        read(drawn(tmp_path / "b.json", [ring, np.add(ring, [0.99, 0.0])]), overlap_tolerance=1e-3)
 
 
 def test_supports_may_overlap_each_other_and_keep_their_place(tmp_path):
