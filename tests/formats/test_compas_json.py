@@ -79,6 +79,18 @@ def version_2():
     return {"dtype": "compas_assembly.datastructures/Assembly", "data": {"attributes": {}, "graph": wrapped}}
 
 
+def assembly_of_parts():
+    """An assembly of COMPAS itself: its nodes hold parts, and these the meshes, in place."""
+    node = {}
+    for k, part in enumerate(parts()):
+        part["attributes"]["is_support"] = k < 2
+        geometry = {"dtype": "compas.datastructures/Mesh", "data": part, "name": part["attributes"]["name"]}
+        data = {"attributes": {"name": f"part {k}", "geometry": geometry}, "key": k, "features": []}
+        node[str(k)] = {"part": {"dtype": "compas.datastructures/Part", "data": data}}
+    graph = {"default_node_attributes": {"x": 0.0, "y": 0.0, "z": 0.0}, "node": node, "edge": {}}
+    return {"dtype": "compas.datastructures/Assembly", "data": {"graph": graph, "attributes": {"name": "Assembly"}}}
+
+
 def element(k, part, **more):
     geometry = {"dtype": "compas.datastructures/Mesh", "data": part, "guid": f"mesh {k}"}
     data = {"transformation": None, "features": [], "name": "Block", "geometry": geometry, "is_support": k < 2, **more}
@@ -119,7 +131,7 @@ def saved(tmp_path, content):
     return path
 
 
-@pytest.mark.parametrize("content", [before_1_0, version_1, version_2, block_model, problem])
+@pytest.mark.parametrize("content", [before_1_0, version_1, version_2, assembly_of_parts, block_model, problem])
 def test_assemblies_and_models_of_every_version(tmp_path, content):
     path = saved(tmp_path, content())
     layout = read_layout(path)
