@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +39,8 @@ class Assembly(Shown):
         Of the blocks as drawn: :class:`Polygons` in the plane, :class:`Polyhedra` in space.
     names : tuple of str
         One name per block, all different.
+    drawn_names : tuple of str
+        As given; blocks drawn with one name are ``"pier"``, ``"pier #2"`` in ``names``.
     roles : (n_blocks,) str array
         ``"free"``, ``"fixed"`` or ``"moving"``.
     density : (n_blocks,) array [kg/m³]
@@ -47,6 +50,7 @@ class Assembly(Shown):
 
     shapes: Shapes
     names: tuple[str, ...]
+    drawn_names: tuple[str, ...]
     roles: np.ndarray
     density: np.ndarray
     materials: tuple[str, ...]
@@ -88,7 +92,8 @@ class Assembly(Shown):
         >>> float(solver.Assembly.from_outlines([block]).areas[0])
         2.0
         """
-        names, roles_array, materials = _labels(len(outlines), "outlines", names, roles, materials)
+        labels = _labels(len(outlines), "outlines", names, roles, materials)
+        names = labels["names"]
         rings = [_checked_ring(outline, name) for outline, name in zip(outlines, names, strict=True)]
         offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
         drawn = Outlines(np.concatenate(rings), offsets, np.ones(len(rings)))
@@ -109,10 +114,8 @@ class Assembly(Shown):
             )
         return cls(
             shapes=Polygons(vertices, offsets, _positive(thickness, "thickness", "m", names)),
-            names=names,
-            roles=roles_array,
             density=_positive(density, "density", "kg/m³", names),
-            materials=materials,
+            **labels,
         )
 
     @classmethod
@@ -154,14 +157,9 @@ class Assembly(Shown):
         >>> float(solver.Assembly.from_solids([tetrahedron]).shapes.volumes[0])
         1.0
         """
-        names, roles_array, materials = _labels(len(solids), "solids", names, roles, materials)
-        return cls(
-            shapes=polyhedra_of(solids, names),
-            names=names,
-            roles=roles_array,
-            density=_positive(density, "density", "kg/m³", names),
-            materials=materials,
-        )
+        labels = _labels(len(solids), "solids", names, roles, materials)
+        names = labels["names"]
+        return cls(shapes=polyhedra_of(solids, names), density=_positive(density, "density", "kg/m³", names), **labels)
 
     def __repr__(self) -> str:
         """One line with the number of blocks by role."""
@@ -343,11 +341,12 @@ def _labels(
     names: Sequence[str] | None,
     roles: Sequence[str] | None,
     materials: Sequence[str] | None,
-) -> tuple[tuple[str, ...], np.ndarray, tuple[str, ...]]:
+) -> dict[str, Any]:
     """Names, roles and materials of n blocks, checked, with their defaults."""
     if n == 0:
         raise ValueError("an assembly needs at least one block; none was given")
-    names = _unique_names([f"block {i}" for i in range(n)] if names is None else list(map(str, names)))
+    drawn_names = tuple(f"block {i}" for i in range(n)) if names is None else tuple(map(str, names))
+    names = unique_names(drawn_names)
     roles = [FREE] * n if roles is None else list(roles)
     roles_array = np.array(roles, dtype="<U6")
     materials = ("",) * n if materials is None else tuple(map(str, materials))
@@ -359,7 +358,7 @@ def _labels(
     for name, role in zip(names, roles, strict=True):
         if role not in ROLES:
             raise ValueError(f"block '{name}' has role '{role}'; roles are {', '.join(ROLES)}")
-    return names, roles_array, materials
+    return {"names": names, "drawn_names": drawn_names, "roles": roles_array, "materials": materials}
 
 
 def _checked_ring(outline: ArrayLike, name: str) -> np.ndarray:
@@ -381,7 +380,8 @@ def _refuse_half_characters(words: Sequence[str], what: str) -> None:
             )
 
 
-def _unique_names(names: list[str]) -> tuple[str, ...]:
+def unique_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Make names different: the second block drawn as "pier" is "pier #2"."""
     taken, unique = set(names), []
     following: dict[str, int] = {}
     for name in names:

@@ -3,7 +3,7 @@
 from .analysis.increments import Increments
 from .analysis.pushover import pushover_increments
 from .analysis.settlement import check_settlement, model_of, settlement_increments
-from .assembly import FIXED, FREE, MOVING, ROLES, Shapes, find_contacts
+from .assembly import FIXED, FREE, MOVING, ROLES, Shapes, find_contacts, unique_names
 from .contact_step.minimise import minimise
 from .contact_step.problem import ContactProblem
 from .contact_step.stiffness import ContactRows
@@ -70,12 +70,12 @@ __all__ = [
     "ABSENT", "BAR", "BROKEN", "CONTROL_DISPLACEMENT", "ELASTIC", "FIXED", "FREE", "INCREMENTS", "LOAD_MULTIPLIER",
     "LOAD_POSITION", "MOVING", "PROP", "REACTION", "ROLES", "SETTLEMENT", "SLACK", "TIE", "TIE_KINDS", "YIELDING",
     "Bonds", "ContactProblem", "ContactRows", "ContactState", "Contacts", "Control", "Ending", "Increments",
-    "Mechanism", "NotSolved", "PathState", "Place", "Polygons", "Polyhedra", "Quantity", "Shapes", "State",
-    "Stepper", "StoredState", "TieForces", "block_forces", "carried", "carried_between", "check_settlement",
-    "corners_and_edges", "counted", "falling_blocks", "features_of", "find_contacts", "is_member",
-    "joined_contacts", "lowest", "matched_contacts", "mechanism_of", "member_contacts",
-    "member_forces", "member_states", "minimise", "model_of", "motion_size", "moved", "moved_vertices",
-    "overlap_depths", "path_parameters", "point_velocities", "present_members", "pushover_increments", "reaction_to",
-    "rigid_parts", "rotation_matrices", "settlement_in", "settlement_increments", "steep_note", "swung", "tie_ends",
-    "tie_lengths", "total_weight", "turned", "turned_moments", "with_motion", "worst_of", "wrench_matrix"
+    "Mechanism", "NotSolved", "PathState", "Place", "Polygons", "Polyhedra", "Quantity", "Shapes", "State", "Stepper",
+    "StoredState", "TieForces", "block_forces", "carried", "carried_between", "check_settlement", "corners_and_edges",
+    "counted", "falling_blocks", "features_of", "find_contacts", "is_member", "joined_contacts", "lowest",
+    "matched_contacts", "mechanism_of", "member_contacts", "member_forces", "member_states", "minimise", "model_of",
+    "motion_size", "moved", "moved_vertices", "overlap_depths", "path_parameters", "point_velocities",
+    "present_members", "pushover_increments", "reaction_to", "rigid_parts", "rotation_matrices", "settlement_in",
+    "settlement_increments", "steep_note", "swung", "tie_ends", "tie_lengths", "total_weight", "turned",
+    "turned_moments", "unique_names", "with_motion", "worst_of", "wrench_matrix"
 ]  # fmt: skip

@@ -10,7 +10,6 @@ import numpy as np
 
 import solver
 from blockvis.layout.left_out import matches
-from blockvis.layout.names import drawn_names
 from blockvis.text import nearest
 
 from .extrados import SLIVER, extrados
@@ -151,7 +150,7 @@ def _chosen(over: Sequence[str], assembly: solver.Assembly, where: str) -> np.nd
     for pattern in over:
         meant = [
             matches(filter(None, labels), [pattern])
-            for labels in zip(names, drawn_names(names), assembly.materials, strict=True)
+            for labels in zip(names, assembly.drawn_names, assembly.materials, strict=True)
         ]
         if not any(meant):
             known = [*names, *sorted(set(assembly.materials) - {""})]

@@ -190,14 +190,10 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
         new = _on_rails(positions, drawn, rails, place, assembly.next_vertex)
 
     try:
-        return solver.Assembly.from_outlines(
-            np.split(new[place], assembly.offsets[1:-1]),
-            names=assembly.names,
-            roles=list(map(str, assembly.roles)),
-            density=assembly.density,
-            thickness=assembly.thickness,
-            materials=assembly.materials,
+        moved = solver.Assembly.from_outlines(
+            np.split(new[place], assembly.offsets[1:-1]), names=assembly.names, thickness=assembly.thickness
         )
+        return replace(assembly, shapes=moved.shapes)
     except ValueError as error:
         raise ValueError(f"with imperfections of kind 'vertices' {error}; give smaller ones") from None
 

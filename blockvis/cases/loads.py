@@ -206,7 +206,7 @@ def _loaded(load: LoadCase, named: np.ndarray, gone: np.ndarray, assembly: solve
 
 
 def _named(load: LoadCase, assembly: solver.Assembly, gone: np.ndarray, where: str) -> np.ndarray:
-    named = blocks_matching(load.blocks, assembly.names)
+    named = blocks_matching(load.blocks, assembly)
     chosen = [i for i in named if assembly.free[i]]
     if not chosen and named:
         raise ValueError(f"{where} '{load.blocks}' matches supports only; loads act on free blocks: name one")

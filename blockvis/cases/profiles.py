@@ -259,7 +259,7 @@ def _on_every_support(settlement: solver.Settlement, assembly: solver.Assembly, 
     if settlement.profile is None:
         return settlement
     given, names = dict(settlement.profile), assembly.names
-    called = {name: [i for i in blocks_called(name, names) if not assembly.free[i]] for name in given}
+    called = {name: [i for i in blocks_called(name, assembly) if not assembly.free[i]] for name in given}
     motions = {names[i]: motion for name, motion in given.items() for i in called[name]}
     motions |= {name: motion for name, motion in given.items() if name in names or not called[name]}
     for name in motions:
@@ -315,18 +315,23 @@ def _bent_supports(assembly: solver.Assembly, profiles: Sequence[Profile | None]
 
 def pieces_named(names: Sequence[str], assembly: solver.Assembly) -> tuple[str, ...]:
     """Put the names of all blocks drawn with a name in its place, those of the pieces that :func:`cut_ground` cut."""
-    parts = [name.rpartition(" ") for name in assembly.names]
-    uncut = [
-        first if number.isdigit() and first not in assembly.names else name
-        for name, (first, _, number) in zip(assembly.names, parts, strict=True)
-    ]
+    uncut = uncut_names(assembly)
     found: dict[str, None] = {}
     for name in names:
-        hits = sorted({*blocks_called(name, assembly.names), *blocks_called(name, uncut)})
+        hits = sorted({*blocks_called(name, assembly), *(i for i, whole in enumerate(uncut) if whole == name)})
         # Free blocks may be drawn with the name of a support.
         hits = [i for i in hits if not assembly.free[i]] or hits
         found |= dict.fromkeys([assembly.names[i] for i in hits] or [name])
     return tuple(found)
+
+
+def uncut_names(assembly: solver.Assembly) -> list[str]:
+    """Name each block as it was called before :func:`cut_ground` cut it."""
+    parts = [name.rpartition(" ") for name in assembly.names]
+    return [
+        first if number.isdigit() and first not in assembly.names else name
+        for name, (first, _, number) in zip(assembly.names, parts, strict=True)
+    ]
 
 
 def _with_pieces(assembly: solver.Assembly, pieces: Mapping[int, Sequence[np.ndarray]]) -> solver.Assembly:
@@ -337,7 +342,7 @@ def _with_pieces(assembly: solver.Assembly, pieces: Mapping[int, Sequence[np.nda
         names = [f"{assembly.names[i]} {k}" for k in range(1, len(parts) + 1)] if i in pieces else [assembly.names[i]]
         rows += [(outline, i, name) for outline, name in zip(parts, names, strict=True)]
     owner = [i for _, i, _ in rows]
-    return solver.Assembly.from_outlines(
+    cut = solver.Assembly.from_outlines(
         [outline for outline, _, _ in rows],
         names=[name for _, _, name in rows],
         roles=assembly.roles[owner].tolist(),
@@ -345,6 +350,7 @@ def _with_pieces(assembly: solver.Assembly, pieces: Mapping[int, Sequence[np.nda
         thickness=assembly.thickness[owner],
         materials=[assembly.materials[i] for i in owner],
     )
+    return replace(cut, drawn_names=tuple(assembly.drawn_names[i] for i in owner))
 
 
 def _cut(assembly: solver.Assembly, support: int) -> list[np.ndarray]:

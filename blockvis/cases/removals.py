@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 import solver
-from blockvis.layout.names import blocks_matching
+from blockvis.layout.names import blocks_matching, named_like
 from blockvis.text import nearest
 
 from .key import TEXTS, Key, Section, whole
@@ -64,7 +64,8 @@ def removed_blocks(removal: Removal, assembly: solver.Assembly) -> np.ndarray:
     ValueError
         For a name that no block has.
     """
-    return np.isin(assembly.names, _matching(removal.blocks, assembly.names, f"{removal.where} blocks", "block"))
+    found = {pattern: blocks_matching(pattern, assembly) for pattern in removal.blocks}
+    return np.isin(assembly.names, _matching(found, assembly.names, f"{removal.where} blocks", "block"))
 
 
 def gone_in(removals: Sequence[Removal], assembly: solver.Assembly, phase: int) -> np.ndarray:
@@ -81,7 +82,9 @@ def removed_ties(removal: Removal, ties: Sequence[solver.Tie]) -> tuple[str, ...
     ValueError
         For a name that no tie has, and a tie that is installed later.
     """
-    chosen = _matching(removal.ties, [tie.name for tie in ties], f"{removal.where} ties", "tie")
+    names = [tie.name for tie in ties]
+    found = {pattern: named_like(pattern, names) for pattern in removal.ties}
+    chosen = _matching(found, names, f"{removal.where} ties", "tie")
     late = next((tie for tie in ties if tie.name in chosen and tie.phase >= removal.phase), None)
     if late is not None:
         raise ValueError(
@@ -91,14 +94,13 @@ def removed_ties(removal: Removal, ties: Sequence[solver.Tie]) -> tuple[str, ...
     return tuple(chosen)
 
 
-def _matching(patterns: Sequence[str], names: Sequence[str], where: str, what: str) -> list[str]:
-    """Names that match patterns, each at least one."""
+def _matching(found: Mapping[str, list[int]], names: Sequence[str], where: str, what: str) -> list[str]:
+    """Names that match patterns, each at least one; ``found`` are their numbers by the pattern."""
     chosen = []
-    for pattern in patterns:
-        found = [names[i] for i in blocks_matching(pattern, names)]
-        if not found:
+    for pattern, numbers in found.items():
+        if not numbers:
             listed = f"the {what}s are {', '.join(names[:12])}" if names else f"the case has no {what}s"
             more = " ..." if len(names) > 12 else ""
             raise ValueError(f"{where}: no {what} is named '{pattern}'{nearest(pattern, names)}; {listed}{more}")
-        chosen += found
+        chosen += [names[i] for i in numbers]
     return chosen

@@ -373,7 +373,7 @@ def _holding(
     if end.fixed:
         return None
     if end.block:
-        meant = np.array(blocks_called(end.block, assembly.names))
+        meant = np.array(blocks_called(end.block, assembly))
         if not len(meant):
             near = nearest(end.block, assembly.names)
             raise ValueError(

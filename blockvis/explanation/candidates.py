@@ -12,7 +12,6 @@ import numpy as np
 import solver
 from blockvis.cases.explain_settings import DIRECTIONS, ExplainSettings
 from blockvis.cases.profiles import Profile, bearing_points, cut_ground
-from blockvis.layout.names import blocks_called
 from blockvis.text import nearest
 from solver import mechanics
 
@@ -215,8 +214,12 @@ def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> li
                 )
     found: list[Candidate] = []
     directions = _directions(ground, settings, source)
-    called = {name: [names[i] for i in blocks_called(name, names)] for group in settings.supports for name in group}
-    asked = [tuple(dict.fromkeys(one for name in group for one in called[name])) for group in settings.supports]
+    # A support is called as it was drawn, too, and its pieces with it.
+    drawn = {one: ground.assembly.drawn_names[ground.assembly.index(ground.pieces[one][0])] for one in names}
+    asked = [
+        tuple(dict.fromkeys(one for name in group for one in names if name in (one, drawn[one])))
+        for group in settings.supports
+    ]
     for group in asked or _groups(ground):
         pieces = [piece for name in group for piece in ground.pieces[name]]
         if not _bearing(ground.assembly, pieces):

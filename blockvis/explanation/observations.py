@@ -17,7 +17,7 @@ from scipy.optimize import linear_sum_assignment
 
 import solver
 from blockvis.cases.block_at import distances_to
-from blockvis.cases.profiles import pieces_named
+from blockvis.cases.profiles import pieces_named, uncut_names
 from blockvis.cases.toml_table import Table, shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
@@ -445,7 +445,8 @@ def _check_place(place: np.ndarray, away: float, what: str, cells: _Cells, assem
 
 def _blocks(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> list[int]:
     """Find the block of a name, or the pieces of a support that was cut."""
-    meant = blocks_called(name, assembly.names)
+    uncut = uncut_names(assembly)
+    meant = {uncut[i] for i in blocks_called(name, assembly)}
     if len(meant) > 1:
         raise cells.error(
             key, f"'{name}' is the name of {len(meant)} blocks; leave it out and give the place, x and y, in space z"

@@ -182,7 +182,7 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
     """Find the one free block that a [control] names, of several with its name the one that holds the point."""
     control: solver.ControlDisplacement = case.settings
     where, free = f"{case.source}: [control]", np.flatnonzero(assembly.free)
-    meant = np.intersect1d(blocks_called(control.block, assembly.names), free)
+    meant = np.intersect1d(blocks_called(control.block, assembly), free)
     if not len(meant):
         names = [assembly.names[i] for i in free]
         what = "is a support" if control.block in assembly.names else "is no block of the layout"

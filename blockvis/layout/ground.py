@@ -15,7 +15,6 @@ from solver import mechanics
 
 from .inspect import Inspection
 from .layout import Layout
-from .names import drawn_names
 from .outlines import without_collinear
 from .repair import repaired
 from .simplify import default_tolerance, simplified
@@ -487,6 +486,6 @@ def _can_be_named(found: Inspection, block: int) -> bool:
 def _names_of(layout: Layout, kept: Iterable[int], chosen: Sequence[int]) -> list[str]:
     """Names that as keys of roles stand for these blocks and no other; none where they cannot be told by names."""
     names = dict.fromkeys(layout.names[i] for i in chosen)
-    labels = list(zip(layout.names, drawn_names(layout.names), layout.groups, layout.materials, strict=True))
+    labels = list(zip(layout.names, mechanics.unique_names(layout.names), layout.groups, layout.materials, strict=True))
     others = {label for i in kept if i not in set(chosen) for label in labels[i]}
     return [] if "" in names or others.intersection(names) else list(names)

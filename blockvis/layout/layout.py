@@ -183,8 +183,10 @@ class Layout:
 def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> Layout:
     """Make a layout of an assembly, with its blocks as drawn or as displaced in a pose."""
     vertices = assembly.vertices if pose is None else mechanics.moved_vertices(assembly, pose)
+    # A file with the names as drawn is read with the same ones again, unless blocks were cut or left out.
+    as_drawn = mechanics.unique_names(assembly.drawn_names) == assembly.names
     shared: dict[str, Any] = {
-        "names": assembly.names,
+        "names": assembly.drawn_names if as_drawn else assembly.names,
         "roles": tuple(map(str, assembly.roles)),
         "materials": assembly.materials,
         "density": assembly.density,

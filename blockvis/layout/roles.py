@@ -10,7 +10,6 @@ from solver import mechanics
 
 from .layout import Layout
 from .left_out import matches
-from .names import drawn_names
 
 
 def checked_role(role: str, whose: str) -> str:
@@ -29,7 +28,7 @@ def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True
     for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):
         said = (role, group.strip().lower(), name.strip().lower())
         found.append(next((word for word in said if word in mechanics.ROLES), mechanics.FREE))
-    drawn = drawn_names(layout.names)
+    own = mechanics.unique_names(layout.names)
     labels = list(zip(layout.names, layout.groups, layout.materials, strict=True))
     # Of keys that hold for one block a pattern has the first word, and the block's own name the last.
     ranked: tuple[list[tuple[list[int], str]], ...] = [], [], [], []
@@ -38,8 +37,8 @@ def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True
         hits = [
             [],
             [i for i, (_, group, material) in enumerate(labels) if key in (group, material)],
-            [i for i, name in enumerate(drawn) if name == key],
             [i for i, name in enumerate(layout.names) if name == key],
+            [i for i, name in enumerate(own) if name == key],
         ]
         if not any(hits):
             hits[0] = [i for i, words in enumerate(labels) if matches(filter(None, words), [key])]

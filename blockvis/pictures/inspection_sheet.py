@@ -240,6 +240,7 @@ def _unchecked(layout: Layout) -> solver.Assembly:
     return solver.Assembly(
         shapes=mechanics.Polyhedra.of_surfaces([(points, list(faces)) for points, faces in layout.solids]),
         names=layout.names,
+        drawn_names=layout.names,
         roles=np.array([role or mechanics.FREE for role in layout.roles]),
         density=np.ones(layout.n_blocks),
         materials=layout.materials,

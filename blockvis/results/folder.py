@@ -10,7 +10,7 @@ import json
 import os
 import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -393,19 +393,25 @@ def stored_assembly(folder: Path) -> solver.Assembly:
     try:
         stored = checked_arrays(folder / "assembly.npz")
         names, roles, materials = (list(map(str, stored[key])) for key in ("names", "roles", "materials"))
+        # Folders of before have none.
+        drawn = tuple(map(str, stored.get("drawn_names", names)))
+        if len(drawn) != len(names):
+            raise ValueError(f"{len(names)} names but {len(drawn)} drawn_names")
         # Checked like a layout: the file may come from anywhere.
         if "corners" in stored:
-            return solver.Assembly.from_solids(
+            assembly = solver.Assembly.from_solids(
                 _stored_solids(stored), names=names, roles=roles, density=stored["density"], materials=materials
             )
-        return solver.Assembly.from_outlines(
-            [stored["vertices"][first:last] for first, last in pairwise(stored["offsets"].tolist())],
-            names=names,
-            roles=roles,
-            density=stored["density"],
-            thickness=stored["thickness"],
-            materials=materials,
-        )
+        else:
+            assembly = solver.Assembly.from_outlines(
+                [stored["vertices"][first:last] for first, last in pairwise(stored["offsets"].tolist())],
+                names=names,
+                roles=roles,
+                density=stored["density"],
+                thickness=stored["thickness"],
+                materials=materials,
+            )
+        return replace(assembly, drawn_names=drawn)
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise ValueError(f"'{folder / 'assembly.npz'}' cannot be read ({error}); run the case again") from None
 

@@ -21,9 +21,10 @@ PUSHED = '[[loads]]\nkind = "live"\nforce = [1, 0]\nblocks = "beam"\n[analysis]\
 @pytest.fixture
 def response(tmp_path):
     """A function that runs a beam on three piers, under two stones; two names are there twice."""
-    drawn(tmp_path / "names.json", BLOCKS, NAMES, role=["moving"] * 3 + ["free"] * 3)
+    role = ["moving"] * 3 + ["free"] * 3
 
-    def run(text):
+    def run(text, names=NAMES):
+        drawn(tmp_path / "names.json", BLOCKS, names, role=role)
         (tmp_path / "case.toml").write_text(f'[geometry]\nfile = "names.json"\n{text}', encoding="utf-8")
         return blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", overwrite=True, outputs=()).response
 
@@ -80,12 +81,30 @@ def test_fill_lies_over_all_blocks_with_its_name(response):
 
 
 def test_a_role_by_the_drawn_name_gives_way_to_that_of_one_block(tmp_path):
-    """As in a layout that was written with names of its own for every block."""
-    names = ["pier", "mid", "pier #2", "beam", "stone #2", "cap #2"]
-    path = drawn(tmp_path / "written.json", BLOCKS, names)
+    """As in a layout that was written, too."""
+    names = ["pier", "mid", "pier", "beam", "stone #2", "cap #2"]
+    path = tmp_path / "written.json"
+    blockvis.save_layout(blockvis.read(drawn(tmp_path / "drawn.json", BLOCKS, names)), path)
     read = blockvis.read(path, roles={"pier #2": "moving", "pier": "fixed"})
     assert read.roles.tolist() == ["fixed", "free", "moving", "free", "free", "free"]
     assert blockvis.read(path, roles={"pier": "fixed"}).roles.tolist() == ["fixed", "free", "fixed", *["free"] * 3]
+    assert blockvis.read(path, roles={"pier #2": "fixed"}).roles.tolist() == ["free", "free", "fixed", *["free"] * 3]
     # Numbers that were drawn are part of a name.
     with pytest.raises(ValueError, match="'stone' matches no block"):
         blockvis.read(path, roles={"stone": "fixed"})
+
+
+def test_a_name_that_was_drawn_with_a_number_is_that_of_one_block(response):
+    """Also in the results of the run, and in the next case."""
+    drawn_so = [f"{name} #2" if k == 2 else name for k, name in enumerate(NAMES)]
+    found = response(f'{STEP}direction = [0, -1]\nblocks = ["pier"]', drawn_so)
+    gone = found.path[-1].pose.positions - found.assembly.centroids
+    np.testing.assert_allclose(gone[:3], [[0.0, -0.001], [0.0, 0.0], [0.0, 0.0]], atol=1e-12)
+    assert found.assembly.names[2] == found.assembly.drawn_names[2] == "pier #2"
+
+
+def test_results_keep_the_names_that_were_drawn(response, tmp_path):
+    found = response(f'{SETTLES}[[remove]]\nphase = 1\nblocks = ["cap"]\n')
+    again = blockvis.open_results(tmp_path / "out").assembly
+    assert again.drawn_names == found.assembly.drawn_names == tuple(NAMES)
+    assert again.names == found.assembly.names == ("pier", "mid", "pier #2", "beam", "cap", "cap #2")
