@@ -16,7 +16,7 @@ from solver.mechanics import counted
 from .facing import Facing as FacedJoints
 from .facing import faced, facing_tolerance
 from .joints.close import Proposal, proposed
-from .joints.facing_edges import Facing, open_share, rounded_up
+from .joints.facing_edges import Facing, open_shares, rounded_up
 from .layout import Layout
 from .refusal import carrying
 from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
@@ -31,8 +31,9 @@ CLASSES = 8
 #: narrower ones are rounding of coordinates.
 SMALLEST_JOINT, WIDEST_JOINT = 1e-3, 0.2
 
-#: Gaps along less than this share of the length of all joints are openings, cracks or wedges, and stay as drawn.
-MORTAR_SHARE = 0.15
+#: Gaps are mortar where this share of the length of all joints is open, or where this share of the open length has
+#: as much on the other side of its block; else they are openings, cracks or wedges, and stay as drawn.
+MORTAR_SHARE = 0.5
 
 #: Density of blocks for which the layout has none [kg/m³], as of a run.
 DENSITY = 2000.0
@@ -202,22 +203,25 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
     outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
     finer = simplified(outlines, default_tolerance(outlines))[1]
     proposal = proposed(outlines, laid=np.array(layout.laid))
-    smallest, share = SMALLEST_JOINT * width, open_share(outlines, proposal.stretches)
+    smallest = SMALLEST_JOINT * width
+    shares = open_shares(outlines, proposal.stretches, smallest)
     return {
         "sizes": assembly.areas,
         "overlapping": overlaps(assembly, ROUNDING * width),
         "overlap_tolerance": DEFAULT_OVERLAP * width,
-        "joint_thickness": proposal.thickness if proposal.thickness >= smallest and share >= MORTAR_SHARE else 0.0,
+        "joint_thickness": proposal.thickness
+        if proposal.thickness >= smallest and max(shares) >= MORTAR_SHARE
+        else 0.0,
         "joints": proposal.stretches,
         "rows": (("corners", f"{sum(map(len, layout.outlines))}" + (f"; in a run {finer}" if finer else "")),),
-        "joint_rows": _mortar_rows(proposal, smallest, share),
+        "joint_rows": _mortar_rows(proposal, smallest, shares),
     }
 
 
-def _mortar_rows(proposal: Proposal, rounding: float, share: float) -> tuple[Row, ...]:
+def _mortar_rows(proposal: Proposal, rounding: float, shares: tuple[float, float]) -> tuple[Row, ...]:
     """Report mortar joints by their thickness, and how they can be closed; thinner ones than rounding [m] are none.
 
-    Where gaps are a small share of the length of joints nothing is proposed.
+    Where gaps are a small share of the length of joints, and on one side of blocks, nothing is proposed.
     """
     joints = proposal.stretches
     if not len(joints):
@@ -241,8 +245,9 @@ def _mortar_rows(proposal: Proposal, rounding: float, share: float) -> tuple[Row
     ]
     for k in np.flatnonzero(counts):
         rows.append(("", f"{edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {counts[k]:6d} stretches  {metres[k]:9.3f} m"))
-    if share < MORTAR_SHARE:
-        said = f"nothing: gaps are {100.0 * share:.2g} % of the length of joints, as cracks and openings are"
+    if max(shares) < MORTAR_SHARE:
+        said = f"nothing: gaps are {100.0 * shares[0]:.2g} % of the length of joints"
+        said += ", most on one side of blocks only, as cracks and openings are"
         return (*rows, ("proposed", f"{said}; joint_thickness = {proposal.thickness:g} closes them"))
     rows.append(("proposed", f'joint_thickness = {proposal.thickness:g}   (m, or "auto")'))
     if proposal.method == "voronoi":

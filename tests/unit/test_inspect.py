@@ -58,6 +58,30 @@ def test_a_crack_in_a_wall_whose_joints_touch_is_no_mortar(tmp_path, gaps, propo
     assert written == (proposed > 0.0)
 
 
+def _running_bond(moved):
+    """Outlines [m] of a wall, turned by 0.02; ``moved`` changes the brick i of a course, by i and the course."""
+    turn = np.array([[np.cos(0.02), np.sin(0.02)], [-np.sin(0.02), np.cos(0.02)]])
+    brick = np.array([[0, 0], [0.4, 0], [0.4, 0.2], [0, 0.2]])
+    numbers = [(i, course) for course in range(10) for i in range(6)]
+    return [moved(brick, i, c) @ turn + np.array([0.4 * i + 0.2 * (c % 2), 0.2 * c]) @ turn for i, c in numbers]
+
+
+@pytest.mark.parametrize("digits", [4, 3, 12])
+def test_a_crack_in_rounded_coordinates_is_no_joint(tmp_path, digits):
+    rings = _running_bond(lambda brick, i, _: brick + np.array([0.02 * (i > 2), 0.0]))
+    found = inspect(drawn(tmp_path / "wall.json", [np.round(ring, digits) for ring in rings]))
+    assert found.joint_thickness == 0.0
+    assert "most on one side of blocks only, as cracks and openings are; joint_thickness = 0.02" in str(found)
+
+
+@pytest.mark.parametrize("digits", [4, 12])
+def test_mortar_in_a_part_of_a_dry_wall_is_proposed(tmp_path, digits):
+    inwards = np.array([[0.005, 0.005], [-0.005, 0.005], [-0.005, -0.005], [0.005, -0.005]])
+    rings = _running_bond(lambda brick, i, course: brick + inwards * (1 < i < 4 and 3 < course < 6))
+    found = inspect(drawn(tmp_path / "wall.json", [np.round(ring, digits) for ring in rings]))
+    assert found.joint_thickness == pytest.approx(0.01, abs=1e-3)
+
+
 def test_picture(layout, tmp_path):
     path = tmp_path / "found.png"
     assert main(["info", str(layout), "--picture", str(path)]) == 0

@@ -269,15 +269,30 @@ def straight_share(outlines: Sequence[np.ndarray], found: Facing) -> float:
     return float(found.lengths[straight].sum() / found.lengths.sum())
 
 
-def open_share(outlines: Sequence[np.ndarray], found: Facing) -> float:
-    """Share of the length of all joints, those that touch included, that stretches with a gap have; 1 without joints.
+def open_shares(outlines: Sequence[np.ndarray], found: Facing, rounding: float) -> tuple[float, float]:
+    """Share of the length of all joints that is open, and of the open length how much has as much opposite of it.
+
+    Mortar lies on both sides of a block, a crack on one of them.
 
     Parameters
     ----------
     outlines : sequence of (n, 2) arrays [m]
     found : Facing
         Stretches with a gap, as of :func:`proposed_thickness`.
+    rounding : float [m]
+        Gaps up to this width count as closed.
+
+    Returns
+    -------
+    open_share, opposite_share : float
+        1 and 1 without joints.
     """
-    touching = 10 * CLOSED * float(np.ptp(np.concatenate(outlines), axis=0).max())
-    every = float(found.lengths.sum() + facing_edges(outlines, touching, touching).lengths.sum())
-    return float(found.lengths.sum()) / every if every > 0.0 else 1.0
+    wide = found.chosen(found.gaps.max(axis=1) > rounding)
+    length = float(wide.lengths.sum())
+    every = length + float(facing_edges(outlines, rounding, rounding).lengths.sum())
+    if not length:
+        return (0.0, 0.0) if every else (1.0, 1.0)
+    edges = edges_of(outlines)
+    sides, lengths = np.concatenate([wide.edge_a, wide.edge_b]), np.tile(wide.lengths, 2)
+    along = [np.bincount(edges.block[sides], lengths * axis) for axis in edges.directions[sides].T]
+    return length / every, 1.0 - float(np.hypot(*along).sum() / lengths.sum())
