@@ -54,7 +54,7 @@ def draw_cracks(
     size : (int, int)
         Width and height in pixels.
     view, section
-        Of blocks in space, as of :func:`blockvis.draw_still`.
+        Of blocks in space, as of :func:`blockvis.draw_still`. Cracks that the section cuts away are counted, no more.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def draw_cracks(
     increment = numbered(increments, number)
     joints = initial_joints(assembly)
     cracks = cracks_of(assembly, increment.pose, joints, increment.fallen)
-    widest = width_text(cracks[0].width) if cracks else ""
+    shown = cracks
     sheet = Sheet(size)
     if assembly.dimension == 2:
         if view is not None or section is not None:
@@ -79,17 +79,24 @@ def draw_cracks(
 
         thickness = "the widest "
         drawing = CracksInSpace(response, increment, joints, sheet, *seen_from(view, section))
-        main = main_cracks(cracks)
+        shown = drawing.left_by_section(cracks)
+        main = main_cracks(shown)
         picture = drawing.image(main, _numbers(main, cracks))
         keys, pixel = drawing.keys, drawing.pixel
     none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
-    counts = [mechanics.counted(len(cracks), "crack"), *phase_words(response, increment), *loss_words(increment)]
+    of_them = "" if len(shown) == len(cracks) else f", of which the section shows {len(shown) or 'none'}"
+    counts = [
+        mechanics.counted(len(cracks), "crack") + of_them,
+        *phase_words(response, increment),
+        *loss_words(increment),
+    ]
+    counts += [thickness + width_text(shown[0].width)] if shown else []
     counted = "   ·   ".join(counts)
     page = sheet.composed(
         picture,
         title=f"Cracks   ·   {state_text(increment, response)}",
-        detail=f"{counted}   ·   {thickness}{widest}   ·   drawn on the layout" if cracks else none,
-        keys=keys if cracks else [],
+        detail=f"{counted}   ·   drawn on the layout" if cracks else none,
+        keys=keys if shown else [],
         pixel=pixel,
     )
     with atomic_file(path) as partial:

@@ -65,15 +65,23 @@ class CracksInSpace:
         self._roles = palette.role_colours(assembly, bool(response.settlements))
         motion = swing.displaced.positions - swing.increment.pose.positions
         self._views = views_of(response, motion, joints, sight, cut)
-        self._sheet, self._joints = sheet, joints
-        self._pieces, self._openings, self._owner = _opened(assembly, joints, increment)
+        self._sheet = sheet
+        plane = plane_of(assembly, cut, self._views[0])
+        opened = _opened(assembly, joints, increment)
+        kept = _kept(opened[0].mean(axis=1), plane)
+        self._pieces, self._openings, self._owner = (of_pieces[kept] for of_pieces in opened)
+        self._joints_kept = joints.rings.ring[_kept(joints.rings.points, plane)]
         limits = class_limits(float(self._openings.max(initial=0.0)))
         colours = [palette.rgb(colour) for colour in palette.crack_colours(len(limits) + 1)]
-        self._scenes = self._drawn(assembly, limits, colours, plane_of(assembly, cut, self._views[0]), increment.fallen)
+        self._scenes = self._drawn(assembly, limits, colours, plane, increment.fallen)
         self.pixel = self._scenes[0].pixel
         texts = [width_text(limit) for limit in limits]
         words = [*(f"to {text}" for text in texts), f"above {texts[-1]}" if texts else "open joint"]
         self.keys = [Key("line", text, colour) for text, colour in zip(words, colours, strict=True)]
+
+    def left_by_section(self, cracks: Sequence[Crack]) -> list[Crack]:
+        """Choose the cracks of which the section leaves something."""
+        return [crack for crack in cracks if np.isin(crack.joints, self._joints_kept).any()]
 
     def _drawn(
         self,
@@ -154,6 +162,11 @@ def class_limits(widest: float) -> list[float]:
     power = 10.0 ** np.floor(np.log10(widest)) if widest > 0.0 else 1.0
     every = [step * factor * power for factor in (0.01, 0.1, 1.0) for step in STEPS]
     return [float(f"{limit:.3g}") for limit in every if limit < 0.999 * widest][-(MOST_CLASSES - 1) :] if widest else []
+
+
+def _kept(points: np.ndarray, plane: np.ndarray | None) -> np.ndarray:
+    """(n,) bool array: points, (n, 3) [m], on the side of a plane that is kept, as of :func:`plane_of`."""
+    return np.ones(len(points), dtype=bool) if plane is None else (points - plane[0]) @ plane[1] >= 0.0
 
 
 def _opened(

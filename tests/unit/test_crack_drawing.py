@@ -85,6 +85,27 @@ def test_cracks_in_space_are_darker_where_they_are_wider(tmp_path, monkeypatch):
     assert not any(covered(at_rest, colour) for colour in palette.crack_colours(4))
 
 
+@pytest.mark.slow
+def test_cracks_that_a_section_cuts_away_are_not_shown(tmp_path, monkeypatch):
+    """Three boxes in a row, of two joints the one that is open by 20 mm is cut away."""
+    assembly = solver.Assembly.from_solids([box((x, 0, 0), (x + 1, 1, 1)) for x in (0, 1, 2)])
+    pose = solver.Pose.initial(assembly)
+    pose.positions[:, 0] += -0.005, 0.0, 0.02
+    details = []
+    sheet, composed = crack_drawing.Sheet, crack_drawing.Sheet.composed
+    monkeypatch.setattr(
+        sheet, "composed", lambda *args, **given: (details.append(given["detail"]), composed(*args, **given))[1]
+    )
+    for section, view in (("x = 1.5", "left"), ("x = 1.5", "right"), ("y = 0.5", "front"), ("x = 0.5", "right")):
+        draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE, section=section, view=view)
+    assert ["   ·   ".join(detail.split("   ·   ")[:2]) for detail in details] == [
+        "2 cracks, of which the section shows 1   ·   the widest 20 mm",
+        "2 cracks, of which the section shows 1   ·   the widest 5 mm",
+        "2 cracks   ·   the widest 20 mm",
+        "2 cracks, of which the section shows none   ·   drawn on the layout",
+    ]
+
+
 def test_labels_stand_at_the_widest_point_of_a_joint(monkeypatch):
     """A joint that opens at one end has its label there, not at its middle."""
     seen = []
