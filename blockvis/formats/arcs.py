@@ -1,24 +1,32 @@
-"""Arcs of circles and ellipses in drawings: corners of other outlines on an arc are its corners, too.
+"""Arcs and Bézier curves in drawings: corners of other outlines on a curve are its corners, too.
 
-Two outlines that share an arc cut it at different places, as voussoirs do under spandrel stones. Chords from one cut to
-the next are the same on both sides then: neither gaps nor overlaps are between them.
+Two outlines that share a curve cut it at different places, as voussoirs do under spandrel stones. Chords from one cut
+to the next are the same on both sides then: neither gaps nor overlaps are between them.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from blockvis.layout.outlines import chords_of, sagitta
 
-#: A corner lies on an arc within this fraction of the size of the median outline with arcs: less than the width of any
-#: joint, more than what rounding of coordinates leaves.
-ON_ARC = 1e-4
+#: A corner lies on a curve within this fraction of the size of the median outline with curves: less than the width of
+#: any joint, more than what rounding of coordinates leaves.
+ON_CURVE = 1e-4
 
 #: Ellipses with half axes of a larger ratio are lines.
 FLATTEST = 1e6
+
+#: Most chords of one curve: finer than any drawing, and a bound on the memory that a small file can fill.
+MOST_CHORDS = 512
+
+#: Points of a Bézier curve among which the one next to a corner is looked for, and steps of Newton's method from there.
+SAMPLES, STEPS = 33, 8
 
 
 @dataclass(frozen=True)
@@ -53,29 +61,134 @@ class Arc:
         """Largest distance of its chords from it."""
         return sagitta(self.radius, self.sweep / self.chords)
 
+    @property
+    def is_line(self) -> bool:
+        """Whether it is none that is seen along z."""
+        return not np.linalg.cond(self.axes[:2]) < FLATTEST
+
     def mapped(self, matrix: np.ndarray, origin: np.ndarray) -> Arc:
         """Map it linearly: ``matrix`` is (d, d), ``origin`` where the origin goes."""
-        return Arc(self.first, self.chords, matrix @ self.centre + origin, matrix @ self.axes, self.start, self.sweep)
+        return replace(self, centre=matrix @ self.centre + origin, axes=matrix @ self.axes)
 
-    def at(self, angles: np.ndarray) -> np.ndarray:
-        """(n, d) array: its points at angles [rad] from its start."""
-        own = self.start + angles
+    def backwards(self, corners: int) -> Arc:
+        """Where an outline of so many corners, the last one included, is drawn backwards."""
+        first = corners - 1 - self.first - self.chords
+        return replace(self, first=first, start=self.start + self.sweep, sweep=-self.sweep)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """(n, d) array: its points at parameters from 0 to 1."""
+        own = self.start + self.sweep * t
         return self.centre + np.stack([np.cos(own), np.sin(own)], axis=1) @ self.axes.T
+
+    def located(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Parameters, above 1 beyond its end, at which it is next to (n, 2) points, and how far away these are."""
+        outward = points - self.centre[:2]
+        x, y = np.linalg.solve(self.axes[:2], outward.T)
+        along = (np.sign(self.sweep) * (np.arctan2(y, x) - self.start)) % (2.0 * np.pi)
+        # Towards the centre, which of an ellipse is no less than the distance.
+        beside = np.abs(1.0 - 1.0 / np.maximum(np.hypot(x, y), 1e-9)) * np.hypot(*outward.T)
+        return along / abs(self.sweep), beside
+
+    def chords_between(self, start: float, end: float, tolerance: float | None) -> int:
+        """Count the chords of its part between two parameters."""
+        return chords_of(self.sweep * (end - start), self.radius, tolerance)
+
+
+@dataclass(frozen=True)
+class Bezier:
+    """Part of an outline that is a Bézier curve, drawn by chords of equal parts of its parameter.
+
+    Attributes
+    ----------
+    first, chords : int
+        Number of the corner at which it starts, and of its chords.
+    controls : (n, d) array
+        Its control points, both ends included.
+    """
+
+    first: int
+    chords: int
+    controls: np.ndarray
+
+    @property
+    def off(self) -> float:
+        """Largest distance of its chords from it."""
+        return _bend(self.controls) / self.chords**2
+
+    @property
+    def is_line(self) -> bool:
+        """Whether it is none that is seen along z."""
+        return not _bend(self.controls[:, :2]) > 0.0
+
+    def mapped(self, matrix: np.ndarray, origin: np.ndarray) -> Bezier:
+        """Map it linearly: ``matrix`` is (d, d), ``origin`` where the origin goes."""
+        return replace(self, controls=self.controls @ matrix.T + origin)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """(n, d) array: its points at parameters from 0 to 1."""
+        return _between(self.controls, [t] * (len(self.controls) - 1))
+
+    def located(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Parameters at which it is next to (n, 2) points, and how far away these are."""
+        flat = replace(self, controls=self.controls[:, :2])
+        slope = (len(self.controls) - 1) * np.diff(flat.controls, axis=0)
+        t = np.linspace(0.0, 1.0, SAMPLES)
+        t = t[((points[:, None] - flat.at(t)) ** 2).sum(axis=2).argmin(axis=1)]
+        for _ in range(STEPS):
+            along = _between(slope, [t] * (len(slope) - 1))
+            t = t + ((points - flat.at(t)) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300)
+            t = np.clip(t, 0.0, 1.0)
+        return t, np.hypot(*(points - flat.at(t)).T)
+
+    def chords_between(self, start: float, end: float, tolerance: float | None) -> int:
+        """Count the chords of its part between two parameters."""
+        degree = len(self.controls) - 1
+        ends = ([np.array([start])] * (degree - i) + [np.array([end])] * i for i in range(degree + 1))
+        return bezier_chords(np.concatenate([_between(self.controls, at) for at in ends]), tolerance)
+
+
+#: A curve of an outline.
+Curve = Arc | Bezier
+
+
+def bezier_chords(controls: np.ndarray, tolerance: float | None) -> int:
+    """Count the chords of a Bézier curve with control points (n, d) that stay within a tolerance of it.
+
+    The tolerance is a thousandth of its size by default.
+    """
+    size, bend = float(np.ptp(controls, axis=0).max()), _bend(controls)
+    allowed = 1e-3 * size if tolerance is None else max(tolerance, 1e-6 * size)
+    # To a ninth digit, or two curves that share a part would have other numbers of chords there.
+    return min(max(math.ceil(math.sqrt(bend / allowed) - 1e-9), 1), MOST_CHORDS) if bend > 0.0 else 1
+
+
+def _bend(controls: np.ndarray) -> float:
+    """Wang's bound: n chords of equal parts of a Bézier curve stay within this over n² of it."""
+    degree = len(controls) - 1
+    return degree * (degree - 1) / 8.0 * float(np.linalg.norm(np.diff(controls, 2, axis=0), axis=1).max(initial=0.0))
+
+
+def _between(controls: np.ndarray, parameters: Sequence[np.ndarray]) -> np.ndarray:
+    """(n, d) array: the polar form of a Bézier curve at as many parameters (n,) as its degree; its points at one."""
+    found = np.repeat(controls[:, None], len(parameters[0]), axis=1)
+    for t in parameters:
+        found = found[:-1] + t[:, None] * np.diff(found, axis=0)
+    return found[0]
 
 
 def with_shared_corners(
-    curves: Sequence[np.ndarray], arcs: Sequence[Sequence[Arc]], tolerance: float | None
+    outlines: Sequence[np.ndarray], curves: Sequence[Sequence[Curve]], tolerance: float | None
 ) -> list[np.ndarray]:
-    """Give arcs a corner wherever a corner of a drawing lies on them.
+    """Give curves a corner wherever a corner of a drawing lies on them.
 
     Parameters
     ----------
-    curves : sequence of (n, 2) or (n, 3) arrays
-        Outlines, closed or open, with the chords of their arcs; in space as seen along z.
-    arcs : sequence of sequences of Arc
+    outlines : sequence of (n, 2) or (n, 3) arrays
+        Closed or open, with the chords of their curves; in space as seen along z.
+    curves : sequence of sequences of Curve
         Those of each outline in its order.
     tolerance : float or None
-        Largest distance of an arc from its chords, as of :func:`blockvis.layout.outlines.chords_of`.
+        Largest distance of a curve from its chords, as of :func:`blockvis.layout.outlines.chords_of`.
 
     Returns
     -------
@@ -83,50 +196,53 @@ def with_shared_corners(
     """
     import shapely
 
-    own = [(k, arc) for k, of_curve in enumerate(arcs) for arc in of_curve if np.linalg.cond(arc.axes[:2]) < FLATTEST]
+    own = [(k, curve) for k, of_outline in enumerate(curves) for curve in of_outline if not curve.is_line]
     if not own:
-        return list(curves)
-    seen = [curve[:, :2] for curve in curves]
-    meets = ON_ARC * float(np.median([np.ptp(seen[k], axis=0).max() for k, _ in own]))
-    corners = _corners(seen, arcs, meets)
+        return list(outlines)
+    seen = [outline[:, :2] for outline in outlines]
+    meets = ON_CURVE * float(np.median([np.ptp(seen[k], axis=0).max() for k, _ in own]))
+    corners = _corners(seen, curves, meets)
     drawn = [
-        shapely.LineString(np.take(seen[k], np.arange(arc.first, arc.first + arc.chords + 1), axis=0, mode="wrap"))
-        for k, arc in own
+        np.take(seen[k], np.arange(curve.first, curve.first + curve.chords + 1), axis=0, mode="wrap")
+        for k, curve in own
     ]
-    reach = np.array([arc.off for _, arc in own]) + meets
-    which, corner = shapely.STRtree(shapely.points(corners)).query(drawn, "dwithin", reach)
-    inverse = np.linalg.inv([arc.axes[:2] for _, arc in own])[which]
-    outward = corners[corner] - np.array([arc.centre[:2] for _, arc in own])[which]
-    x, y = np.einsum("nij,nj->ni", inverse, outward).T
-    sweep = np.array([arc.sweep for _, arc in own])[which]
-    along = (np.sign(sweep) * (np.arctan2(y, x) - np.array([arc.start for _, arc in own])[which])) % (2.0 * np.pi)
-    ends = np.array([shapely.get_coordinates(line)[[0, -1]] for line in drawn])[which]
-    apart = np.hypot(*np.moveaxis(corners[corner][:, None] - ends, -1, 0)).min(axis=1)
-    # Towards the centre, which of an ellipse is no less than the distance.
-    beside = np.abs(1.0 - 1.0 / np.maximum(np.hypot(x, y), 1e-9)) * np.hypot(*outward.T)
-    on = np.flatnonzero((beside <= meets) & (along < np.abs(sweep)) & (apart > meets))
-    on = on[np.lexsort((along[on], which[on]))]
-    found = list(curves)
-    # From the last arc of an outline to the first: corners that come before keep their numbers.
-    for here in np.split(on, np.flatnonzero(np.diff(which[on])) + 1)[::-1] if len(on) else ():
-        k, arc = own[which[here[0]]]
-        cuts = np.sign(arc.sweep) * np.array([0.0, *along[here], abs(arc.sweep)])
-        chords = [chords_of(angle, arc.radius, tolerance) for angle in np.diff(cuts)]
-        angles = [np.linspace(cuts[i], cuts[i + 1], n + 1)[1:] for i, n in enumerate(chords)]
-        points = arc.at(np.concatenate(angles)[:-1])
-        points[np.cumsum(chords)[:-1] - 1, :2] = corners[corner[here]]
-        found[k] = np.concatenate([found[k][: arc.first + 1], points, found[k][arc.first + arc.chords :]])
+    reach = np.array([curve.off for _, curve in own]) + meets
+    lines = [shapely.LineString(chords) for chords in drawn]
+    which, near = shapely.STRtree(shapely.points(corners)).query(lines, "dwithin", reach)
+    near = near[np.argsort(which, kind="stable")]
+    ends = np.cumsum(np.bincount(which, minlength=len(own)))
+    found = list(outlines)
+    # From the last curve of an outline to the first: corners that come before keep their numbers.
+    for n in range(len(own) - 1, -1, -1):
+        k, curve = own[n]
+        points = corners[near[ends[n - 1] if n else 0 : ends[n]]]
+        apart = np.hypot(*(points[:, None] - drawn[n][[0, -1]]).T).min(axis=0)
+        points = points[apart > meets]
+        if not len(points):
+            continue
+        t, beside = curve.located(points)
+        on = np.flatnonzero((beside <= meets) & (t > 0.0) & (t < 1.0))
+        on = on[np.argsort(t[on])]
+        if not len(on):
+            continue
+        parts = list(pairwise([0.0, *t[on].tolist(), 1.0]))
+        chords = [curve.chords_between(a, b, tolerance) for a, b in parts]
+        ends_at = [np.linspace(a, b, m + 1)[1:] for (a, b), m in zip(parts, chords, strict=True)]
+        inner = curve.at(np.concatenate(ends_at)[:-1])
+        inner[np.cumsum(chords)[:-1] - 1, :2] = points[on]
+        before, after = found[k][: curve.first + 1], found[k][curve.first + curve.chords :]
+        found[k] = np.concatenate([before, inner, after])
     return found
 
 
-def _corners(curves: Sequence[np.ndarray], arcs: Sequence[Sequence[Arc]], meets: float) -> np.ndarray:
+def _corners(outlines: Sequence[np.ndarray], curves: Sequence[Sequence[Curve]], meets: float) -> np.ndarray:
     """(n, 2) array: the corners of outlines that are none of chords alone, of those that meet the first one."""
     from scipy.spatial import cKDTree
 
     kept = []
-    for curve, of_curve in zip(curves, arcs, strict=True):
-        inner = [np.arange(arc.first + 1, arc.first + arc.chords) for arc in of_curve]
-        kept.append(np.delete(curve, np.concatenate(inner), axis=0) if inner else curve)
+    for outline, of_outline in zip(outlines, curves, strict=True):
+        inner = [np.arange(curve.first + 1, curve.first + curve.chords) for curve in of_outline]
+        kept.append(np.delete(outline, np.concatenate(inner), axis=0) if inner else outline)
     corners = np.unique(np.concatenate(kept), axis=0)
     earlier, later = cKDTree(corners).query_pairs(meets, output_type="ndarray").T
     return np.delete(corners, np.maximum(earlier, later), axis=0)

@@ -6,7 +6,7 @@ import json
 import logging
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,9 @@ NEVER_DRAWN = "Defpoints"
 
 #: Outlines closer than this fraction of their size are the same.
 CLOSES = 1e-6
+
+#: An arc of a smaller opening [rad] is a whole ellipse.
+WHOLE_TURN = 1e-9
 
 #: Colours of an entity that stand for that of its layer or of the inserted block, and what nobody gave a colour.
 BY_LAYER, BY_BLOCK, WHITE = 256, 0, 7
@@ -239,7 +242,7 @@ def _turned(found: _Outlines, view: str | None, path: Path) -> list[str]:
     found.rings = [ring @ turn.T for ring in found.rings]
     found.arcs = [tuple(arc.mapped(turn, still) for arc in arcs) for arcs in found.arcs]
     found.loose = [
-        replace(line, points=line.points @ turn.T, arcs=tuple(arc.mapped(turn, still) for arc in line.arcs))
+        replace(line, points=line.points @ turn.T, curves=tuple(arc.mapped(turn, still) for arc in line.curves))
         for line in found.loose
     ]
     found.left_out = [item.turned(turn) for item in found.left_out]
@@ -444,11 +447,16 @@ def _circular(entity: Any, tolerance: float | None) -> tuple[np.ndarray, float, 
         # Straight from corner to corner: ezdxf would put a smooth curve through them.
         straight = np.array([(*point,) for point in entity.control_points])
         return (np.concatenate([straight, straight[:1]]) if entity.closed else straight), 0.0, ()
+    if kind == "ELLIPSE":
+        # It lies in the world, not in a plane of its own.
+        axes = np.array([(*axis,) for axis in (entity.dxf.major_axis, entity.minor_axis)]).T
+        arc = _ellipse(np.array((*entity.dxf.center,)), axes, entity.dxf.start_param, entity.dxf.end_param, tolerance)
+        return _on(arc), arc.off, (arc,)
     if kind in ("CIRCLE", "ARC"):
         begin, end = (0.0, 360.0) if kind == "CIRCLE" else (entity.dxf.start_angle, entity.dxf.end_angle)
         start, sweep = math.radians(begin), math.radians((end - begin) % 360.0 or 360.0)
         arc = _arc(0, entity.dxf.center, abs(float(entity.dxf.radius)), start, sweep, tolerance)
-        flat, arcs = arc.at(sweep * np.linspace(0.0, 1.0, arc.chords + 1)), [arc]
+        flat, arcs = _on(arc), [arc]
         level = float(entity.dxf.center.z)
     elif kind == "LWPOLYLINE":
         flat, arcs = _with_bulges([(x, y, b) for x, y, b in entity.get_points("xyb")], bool(entity.closed), tolerance)
@@ -479,6 +487,18 @@ def _arc(first: int, centre: Any, radius: float, start: float, sweep: float, tol
     return Arc(first, n, np.array([centre.x, centre.y]), radius * np.eye(2), start, sweep)
 
 
+def _ellipse(centre: np.ndarray, axes: np.ndarray, start: float, end: float, tolerance: float | None) -> Arc:
+    """Make an arc of an ellipse with half axes (d, 2) between two parameters [rad], counter-clockwise."""
+    sweep = (end - start) % (2.0 * math.pi)
+    sweep = sweep if sweep > WHOLE_TURN else 2.0 * math.pi
+    return Arc(0, chords_of(sweep, float(np.linalg.norm(axes, 2)), tolerance), centre, axes, start, sweep)
+
+
+def _on(arc: Arc) -> np.ndarray:
+    """(n, d) array: the ends of its chords."""
+    return arc.at(np.linspace(0.0, 1.0, arc.chords + 1))
+
+
 def _with_bulges(
     corners: list[tuple[float, float, float]], closed: bool, tolerance: float | None
 ) -> tuple[np.ndarray, list[Arc]]:
@@ -493,7 +513,7 @@ def _with_bulges(
             sweep = (end - start) % (2 * math.pi)
             begin, turned = (start, sweep) if bulge > 0 else (end, -sweep)
             arcs.append(_arc(len(points) - 1, centre, radius, begin, turned, tolerance))
-            points += [*arcs[-1].at(turned * np.linspace(0.0, 1.0, arcs[-1].chords + 1)[1:-1])]
+            points += [*_on(arcs[-1])[1:-1]]
         points.append(np.array([u, v]))
     return np.array(points).reshape(-1, 2), arcs
 
@@ -515,22 +535,98 @@ def _looks(entity: Any) -> tuple[str, ...]:
 
 def _hatch_rings(entity: Any, tolerance: float | None) -> list[tuple[np.ndarray, float, tuple[Arc, ...]]]:
     """(n, 3) arrays: boundaries of a hatch, how far their chords are off its curves, and their arcs."""
-    from ezdxf.math import Vec2
-    from ezdxf.path import from_hatch
-
     rings = []
     for boundary in entity.paths:
-        if not hasattr(boundary, "vertices"):
-            for edge in (one for path in entity.paths for one in getattr(path, "edges", ())):
-                if hasattr(edge, "knot_values"):
-                    clamped = _clamped(edge.control_points, edge.weights, edge.knot_values, edge.degree)
-                    edge.control_points, edge.weights, edge.knot_values = Vec2.list(clamped[0]), *clamped[1:]
-            # Boundaries of separate edges may turn either way and contain splines: ezdxf orders them.
-            return [(*_points(curve, tolerance), ()) for curve in from_hatch(entity)]
-        flat, arcs = _with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance)
+        if hasattr(boundary, "vertices"):
+            loops = [_Loop(*_with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance))]
+        else:
+            loops = _loops_of([_edge(edge, tolerance) for edge in boundary.edges])
         level = float(entity.dxf.elevation.z) if entity.dxf.hasattr("elevation") else 0.0
-        rings.append(_in_world(entity, flat, arcs, level))
+        for loop in loops:
+            points, off, arcs = _in_world(entity, loop.points, loop.arcs, level)
+            rings.append((points, max(off, loop.off), arcs))
     return rings
+
+
+@dataclass(frozen=True)
+class _Loop:
+    """Points (n, 2) of edges of a hatch that follow each other, their arcs, and how far chords are off other curves."""
+
+    points: np.ndarray
+    arcs: list[Arc]
+    off: float = 0.0
+
+    def backwards(self) -> _Loop:
+        """Turn round."""
+        return replace(
+            self, points=self.points[::-1], arcs=[arc.backwards(len(self.points)) for arc in self.arcs[::-1]]
+        )
+
+    def then(self, other: _Loop, near: float) -> _Loop:
+        """Put edges behind it, which begin at its end or after a gap."""
+        meets = math.dist(self.points[-1], other.points[0]) <= near
+        n = len(self.points) - meets
+        arcs = [*self.arcs, *(replace(arc, first=arc.first + n) for arc in other.arcs)]
+        return _Loop(np.concatenate([self.points, other.points[int(meets) :]]), arcs, max(self.off, other.off))
+
+
+def _edge(edge: Any, tolerance: float | None) -> _Loop:
+    """Read one edge of a hatch boundary, in the plane of the hatch."""
+    from ezdxf.math import BSpline, fit_points_to_cad_cv
+    from ezdxf.path import Path as Drawn
+    from ezdxf.path import add_spline
+
+    kind = edge.EDGE_TYPE
+    if kind == "LineEdge":
+        return _Loop(np.array([(*edge.start,), (*edge.end,)])[:, :2], [])
+    if kind == "SplineEdge":
+        if len(edge.control_points):
+            points, weights, knots = _clamped(edge.control_points, edge.weights, edge.knot_values, edge.degree)
+            curve = BSpline(points, edge.degree + 1, knots, weights or None)
+        elif len(edge.fit_points) > 1:
+            given = edge.start_tangent and edge.end_tangent
+            curve = fit_points_to_cad_cv(edge.fit_points, (edge.start_tangent, edge.end_tangent) if given else None)
+        else:
+            return _Loop(np.zeros((0, 2)), [])
+        drawn = Drawn()
+        add_spline(drawn, curve, reset=True)
+        flat, off = _points(drawn, tolerance)
+        return _Loop(flat[:, :2], [], off)
+    if kind == "ArcEdge":
+        axes, start, end = edge.radius * np.eye(2), math.radians(edge.start_angle), math.radians(edge.end_angle)
+    else:
+        x, y = edge.major_axis.x, edge.major_axis.y
+        axes, start, end = np.array([[x, -edge.ratio * y], [y, edge.ratio * x]]), edge.start_param, edge.end_param
+    if not axes.any():
+        return _Loop(np.zeros((0, 2)), [])
+    arc = _ellipse(np.array([edge.center.x, edge.center.y]), axes, start, end, tolerance)
+    return _Loop(_on(arc), [arc])
+
+
+def _loops_of(edges: Sequence[_Loop]) -> list[_Loop]:
+    """Put edges of a boundary together, which may turn either way; gaps are closed by lines, closed loops are whole."""
+    edges = [edge for edge in edges if len(edge.points) > 1]
+    if not edges:
+        return []
+    near = CLOSES * float(np.ptp(np.concatenate([edge.points for edge in edges]), axis=0).max())
+    loops = [edges[0]]
+    for edge in edges[1:]:
+        loop = loops[-1]
+        if math.dist(loop.points[0], loop.points[-1]) <= near:
+            loops.append(edge)
+            continue
+        ways = [(one, other) for one in (loop, loop.backwards()) for other in (edge, edge.backwards())]
+        gaps = [math.dist(one.points[-1], other.points[0]) for one, other in ways]
+        # Edges that do not meet are drawn in their sense.
+        one, other = ways[int(np.argmin(gaps))] if min(gaps) <= near else ways[0]
+        loops[-1] = one.then(other, near)
+    return [_shut(loop, near) for loop in loops]
+
+
+def _shut(loop: _Loop, near: float) -> _Loop:
+    """End a loop exactly where it begins."""
+    ends = math.dist(loop.points[0], loop.points[-1]) <= near
+    return replace(loop, points=np.concatenate([loop.points[:-1] if ends else loop.points, loop.points[:1]]))
 
 
 def _add_hatch(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
@@ -565,7 +661,7 @@ def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> 
     """Let arcs share their corners, add the faces between loose lines, and cut outlines along the lines within them."""
     unwanted, wanted = _chosen_lines(found, reading)
     curves, n = [*found.rings, *(line.points for line in wanted)], len(found.rings)
-    curves = with_shared_corners(curves, [*found.arcs, *(line.arcs for line in wanted)], tolerance)
+    curves = with_shared_corners(curves, [*found.arcs, *(line.curves for line in wanted)], tolerance)
     found.rings = curves[:n]
     wanted = [replace(line, points=points) for line, points in zip(wanted, curves[n:], strict=True)]
     ignored = {i for i, layer in enumerate(found.layers) if unwanted.takes([layer], found.looks[i])}

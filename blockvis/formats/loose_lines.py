@@ -15,7 +15,7 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import ring_width
 from solver.mechanics import counted
 
-from .arcs import Arc
+from .arcs import Curve
 
 #: Lines are intersected on a grid of this fraction of the size of the drawing.
 GRID = 1e-6
@@ -49,8 +49,8 @@ class Line:
         Kind of entity and colour.
     off : float
         Largest distance of its chords from the curve for which they stand.
-    arcs : tuple of Arc
-        Its parts that are arcs.
+    curves : tuple of Curve
+        Its parts that are curves.
     """
 
     points: np.ndarray
@@ -59,7 +59,7 @@ class Line:
     must_close: bool
     looks: tuple[str, ...] = ()
     off: float = 0.0
-    arcs: tuple[Arc, ...] = ()
+    curves: tuple[Curve, ...] = ()
 
 
 @dataclass

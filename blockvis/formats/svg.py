@@ -29,7 +29,7 @@ from blockvis.layout.refusal import Refused
 from blockvis.layout.units import UNITS, metres_per
 from solver import mechanics
 
-from .arcs import Arc, with_shared_corners
+from .arcs import MOST_CHORDS, Arc, Bezier, Curve, bezier_chords, with_shared_corners
 from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
@@ -63,17 +63,13 @@ _TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7
 #: Groups nested deeper than this are refused.
 DEEPEST = 200
 
-#: Most chords of one curve: finer than any drawing, and a bound on the memory that a small file can fill.
-MOST_CHORDS = 512
-
 
 class _Part(NamedTuple):
-    """A part of a shape: points, whether it is closed, how far its chords are off its curves, and its arcs."""
+    """A part of a shape: points, whether it is closed, and its curves."""
 
     points: np.ndarray
     closed: bool
-    off: float = 0.0
-    arcs: tuple[Arc, ...] = ()
+    curves: tuple[Curve, ...] = ()
 
 
 @dataclass
@@ -85,7 +81,7 @@ class _Outlines:
     labels: list[tuple[str, ...]] = field(default_factory=list)
     looks: list[tuple[str, ...]] = field(default_factory=list)
     offs: list[float] = field(default_factory=list)
-    arcs: list[tuple[Arc, ...]] = field(default_factory=list)
+    curves: list[tuple[Curve, ...]] = field(default_factory=list)
     loose: list[Line] = field(default_factory=list)
     loose_labels: list[tuple[str, ...]] = field(default_factory=list)
     misses: list[float] = field(default_factory=list)
@@ -172,12 +168,12 @@ def _root(path: Path) -> ElementTree.Element:
 
 
 def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> Faces:
-    """Leave out what is not wanted, let arcs share corners, add the faces of loose lines, cut outlines along them."""
+    """Leave out what is not wanted, let curves share corners, add the faces of loose lines, cut outlines along them."""
     wanted, ignored = _wanted_lines(found, reading)
-    curves = [*found.rings, *(line.points for line in wanted)]
-    curves = with_shared_corners(curves, [*found.arcs, *(line.arcs for line in wanted)], tolerance)
-    found.rings = curves[: len(found.rings)]
-    wanted = [replace(line, points=points) for line, points in zip(wanted, curves[len(found.rings) :], strict=True)]
+    drawn = [*found.rings, *(line.points for line in wanted)]
+    drawn = with_shared_corners(drawn, [*found.curves, *(line.curves for line in wanted)], tolerance)
+    found.rings = drawn[: len(found.rings)]
+    wanted = [replace(line, points=points) for line, points in zip(wanted, drawn[len(found.rings) :], strict=True)]
     faces = faces_of_lines(wanted, found.rings, found.offs, ignored, reading.only)
     found.left_out += faces.left_out
     for k in sorted({*faces.pieces, *ignored}, reverse=True):
@@ -378,26 +374,26 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
     kept = _kept(element, title, where, found)
     looks = (_tag(element), *_colour(where))
     labels = (*where.layers, *(x for x in (title.strip(), element.get(f"{_INKSCAPE}label"), element.get("id")) if x))
-    rings, offs, every_arc = [], [], []
-    for points, closed, off, of_part in parts:
+    rings, offs, every_curve = [], [], []
+    for points, closed, of_part in parts:
         if len(points) < 2:
             continue
         if not np.isfinite(points).all():
             raise ValueError(f"'{where.path}': {_called(element)} has a point that is not a finite number; repair it")
         placed = points @ where.matrix[:2, :2].T + where.matrix[:2, 2]
-        arcs = tuple(arc.mapped(where.matrix[:2, :2], where.matrix[:2, 2]) for arc in of_part)
-        off = max([off * float(np.linalg.norm(where.matrix[:2, :2], 2)), *(arc.off for arc in arcs)])
+        curves = tuple(curve.mapped(where.matrix[:2, :2], where.matrix[:2, 2]) for curve in of_part)
+        off = max((curve.off for curve in curves), default=0.0)
         joined = joined_ends(placed)
         if joined is None and not (closed and len(placed) > 2):
             handle = name or f"<{_tag(element)}>"
-            found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks, off, arcs))
+            found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks, off, curves))
             found.loose_labels.append(labels)
             continue
         # A closed path may have a short last edge: it stays.
         short = joined is None or (closed and joined[1] > 1e-6 * float(np.ptp(placed, axis=0).max()))
         rings.append(placed if short or joined is None else joined[0])
         offs.append(off)
-        every_arc.append(arcs)
+        every_curve.append(curves)
         found.misses += [] if joined is None or closed else [joined[1]]
     for k, inside in filled(rings):
         called = name if len(rings) == 1 or not name else f"{name} {k + 1}"
@@ -412,7 +408,7 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
             continue
         found.rings.append(rings[k])
         found.offs.append(offs[k])
-        found.arcs.append(every_arc[k])
+        found.curves.append(every_curve[k])
         found.rows.append(kept or _row(where.layer, called))
         found.labels.append(labels)
         found.looks.append(looks)
@@ -515,12 +511,12 @@ def _rectangle(element: ElementTree.Element, where: _Context) -> list[_Part]:
     radii = np.minimum([given[0], given[-1]], [w / 2.0, h / 2.0])
     if not (radii > 0).all():
         return [_Part(corners, True)]
-    points, arcs = list[np.ndarray](), list[Arc]()
+    points, curves = list[np.ndarray](), list[Curve]()
     for before, corner, after in zip(np.roll(corners, 1, axis=0), corners, np.roll(corners, -1, axis=0), strict=True):
         start, end = (corner + np.sign(other - corner) * radii for other in (before, after))
         points.append(start)
-        _add_arc(points, arcs, end, [*radii, 0.0, 0.0, 1.0], where)
-    return [_Part(np.array(points), True, 0.0, tuple(arcs))]
+        _add_arc(points, curves, end, [*radii, 0.0, 0.0, 1.0], where)
+    return [_Part(np.array(points), True, tuple(curves))]
 
 
 def _ellipse(element: ElementTree.Element, where: _Context) -> list[_Part]:
@@ -532,9 +528,8 @@ def _ellipse(element: ElementTree.Element, where: _Context) -> list[_Part]:
     if not (radii > 0).all():
         return []
     n = _chords(2 * math.pi, float(radii.max()), where)
-    angles = 2 * math.pi * np.arange(n) / n
-    points = centre + radii * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return [_Part(points, True, 0.0, (Arc(0, n, centre, np.diag(radii), 0.0, 2 * math.pi),))]
+    arc = Arc(0, n, centre, np.diag(radii), 0.0, 2 * math.pi)
+    return [_Part(arc.at(np.arange(n) / n), True, (arc,))]
 
 
 def _chords(sweep: float, radius: float, where: _Context) -> int:
@@ -573,8 +568,7 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
     tokens = _tokens(element.get("d", ""))
     parts: list[_Part] = []
     points: list[np.ndarray] = []
-    arcs: list[Arc] = []
-    off = 0.0
+    curves: list[Curve] = []
     at = start = control = np.zeros(2)
     command, before, k = "", "", 0
     while k < len(tokens):
@@ -586,16 +580,16 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
         v = _numbers_of(command, tokens[k : k + _TAKES[kind]])
         k += _TAKES[kind]
         if kind == "Z":
-            parts.append(_Part(np.array(points).reshape(-1, 2), True, off, tuple(arcs)))
-            at, points, arcs, off = start, [start], [], 0.0
+            parts.append(_Part(np.array(points).reshape(-1, 2), True, tuple(curves)))
+            at, points, curves = start, [start], []
             before = kind
             continue
         base = at if relative else np.zeros(2)
         if kind == "M":
             if len(points) > 1:
-                parts.append(_Part(np.array(points), False, off, tuple(arcs)))
+                parts.append(_Part(np.array(points), False, tuple(curves)))
             at = start = base + v
-            points, arcs, off = [at], [], 0.0
+            points, curves = [at], []
             command = "l" if relative else "L"
         elif kind in "LHV":
             if kind == "L":
@@ -605,19 +599,19 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
             points.append(at)
         elif kind == "A":
             end = base + v[5:]
-            _add_arc(points, arcs, end, v[:5], where)
+            _add_arc(points, curves, end, v[:5], where)
             at = end
         else:
             pairs = [base + pair for pair in np.array(v).reshape(-1, 2)]
             smooth = 2 * at - control if before in ("CS" if kind in "CS" else "QT") and before else at
             pairs = [smooth, *pairs] if kind in "ST" else pairs
-            curve, apart = _bezier([at, *pairs], where)
-            points += curve
-            off = max(off, apart)
+            curve = _bezier(len(points) - 1, np.array([at, *pairs]), where)
+            curves.append(curve)
+            points += [*curve.at(np.linspace(0.0, 1.0, curve.chords + 1)[1:-1]), pairs[-1]]
             control, at = pairs[-2], pairs[-1]
         before = kind
     if len(points) > 1:
-        parts.append(_Part(np.array(points), False, off, tuple(arcs)))
+        parts.append(_Part(np.array(points), False, tuple(curves)))
     return parts
 
 
@@ -628,24 +622,15 @@ def _numbers_of(command: str, taken: Sequence[tuple[str, str]]) -> list[float]:
     return [float(token[1]) for token in taken]
 
 
-def _bezier(controls: list[np.ndarray], where: _Context) -> tuple[list[np.ndarray], float]:
-    """Points of a quadratic or cubic Bézier curve after its start, and how far the chords are off it."""
-    c = np.array(controls)
-    degree = len(c) - 1
-    size = float(np.ptp(c, axis=0).max())
-    bend = float(np.abs(np.diff(c, 2, axis=0)).max(initial=0.0))
-    allowed = 1e-3 * size if where.tolerance is None else max(where.tolerance, 1e-6 * size)
-    # Wang's bound: chords of n equal parts stay within degree·(degree - 1)/8·bend/n² of the curve.
-    most = degree * (degree - 1) / 8.0 * bend
-    n = min(max(math.ceil(math.sqrt(most / allowed)) if bend > 0 else 1, 1), MOST_CHORDS)
-    t = np.linspace(0.0, 1.0, n + 1)[1:, None]
-    while len(c) > 1:
-        c = c[:-1, None] * (1 - t) + c[1:, None] * t if c.ndim == 2 else c[:-1] * (1 - t) + c[1:] * t
-    return list(c[0]), most / n**2
+def _bezier(first: int, controls: np.ndarray, where: _Context) -> Bezier:
+    """Make a quadratic or cubic Bézier curve with as many chords as it needs where it is drawn."""
+    return Bezier(first, bezier_chords(controls @ where.matrix[:2, :2].T, where.tolerance), controls)
 
 
-def _add_arc(points: list[np.ndarray], arcs: list[Arc], end: np.ndarray, v: Sequence[float], where: _Context) -> None:
-    """Add an elliptical arc to points and arcs, and its end; SVG 1.1, appendix F.6.5 and F.6.6."""
+def _add_arc(
+    points: list[np.ndarray], curves: list[Curve], end: np.ndarray, v: Sequence[float], where: _Context
+) -> None:
+    """Add an elliptical arc to points and curves, and its end; SVG 1.1, appendix F.6.5 and F.6.6."""
     rx, ry, turn, start = abs(v[0]), abs(v[1]), math.radians(v[2]), points[-1]
     if rx == 0 or ry == 0 or (start == end).all():
         points.append(end)
@@ -670,8 +655,8 @@ def _add_arc(points: list[np.ndarray], arcs: list[Arc], end: np.ndarray, v: Sequ
         sweep -= 2 * math.pi
     n = _chords(sweep, max(rx, ry), where)
     middle = (start + end) / 2.0 + rotation @ (centre * [rx, ry])
-    arcs.append(Arc(len(points) - 1, n, middle, rotation * [rx, ry], begin, sweep))
-    points += [*arcs[-1].at(sweep * np.linspace(0.0, 1.0, n + 1)[1:-1]), end]
+    curves.append(Arc(len(points) - 1, n, middle, rotation * [rx, ry], begin, sweep))
+    points += [*curves[-1].at(np.linspace(0.0, 1.0, n + 1)[1:-1]), end]
 
 
 _SHAPES: dict[str, Callable[[ElementTree.Element, _Context], list[_Part]]] = {

@@ -97,7 +97,32 @@ def hatched(document, space):
             space.add_hatch().paths.add_polyline_path(sector(begin, end, inner, outer), is_closed=True)
 
 
-@pytest.mark.parametrize("draw", [two_rings, turned_over, upright, hatched])
+def hatched_by_edges(document, space):
+    """Boundaries of lines and arcs, which begin anywhere and of which some turn the other way."""
+    for inner, outer, cuts in CUTS:
+        for number, (begin, end) in enumerate(itertools.pairwise(cuts)):
+            path = space.add_hatch().paths.add_edge_path()
+            a, b, c, d = ((x, y) for x, y, _ in sector(begin, end, inner, outer))
+            for k in range(number, number + 4):
+                if k % 4 == 0:
+                    path.add_line(a, b)
+                elif k % 4 == 1:
+                    path.add_arc((0, 0), outer, begin, end)
+                elif k % 4 == 2:
+                    path.add_line(*((c, d) if number % 2 else (d, c)))
+                elif number % 3:
+                    path.add_arc((0, 0), inner, begin, end, ccw=number % 2 == 0)
+                else:
+                    path.add_ellipse((0, 0), (0, inner), 1.0, begin - 90, end - 90)
+
+
+def stretched(document, space):
+    block = document.blocks.new("rings")
+    two_rings(document, block)
+    space.add_blockref("rings", (3.0, 1.0), dxfattribs={"xscale": 1.5, "rotation": 20.0})
+
+
+@pytest.mark.parametrize("draw", [two_rings, turned_over, upright, hatched, hatched_by_edges, stretched])
 @pytest.mark.parametrize("chord_tolerance", [None, 1e-4])
 def test_outlines_cut_at_other_places_of_a_circle_share_its_chords(tmp_path, draw, chord_tolerance):
     layout = read_layout(saved(tmp_path, draw), chord_tolerance=chord_tolerance)
@@ -107,7 +132,7 @@ def test_outlines_cut_at_other_places_of_a_circle_share_its_chords(tmp_path, dra
     assert union.area == pytest.approx(sum(shape.area for shape in shapes), abs=1e-11)
     assert not union.interiors
     cuts = 0.5 * math.pi * (1.6**2 - 1.0)
-    if draw is hatched:
+    if draw in (hatched, hatched_by_edges):
         assert union.area == pytest.approx(cuts, rel=2e-3 if chord_tolerance is None else 1e-4)
 
 
