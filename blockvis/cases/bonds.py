@@ -34,8 +34,8 @@ BOND = Section(
             "stays a block then", ["A-WIN*", "A-DOOR*"], otherwise="holes, and all outlines in the walls", default=()),
         Key("bond", one_of(PATTERNS), "Pattern; the lengths of the stones of ashlar are random, and the outlines of "
             "rubble", "flemish", default=_DEFAULT.bond),
-        Key("brick", _SIZE, "Length and height of a brick with its joint; of ashlar the mean length",
-            [0.25, 0.075], "m", _DEFAULT.brick),
+        Key("brick", _SIZE, "Length and height of a brick with its joint; of ashlar the mean length, of rubble no "
+            "height", [0.25, 0.075], "m", _DEFAULT.brick),
         Key("joint", NOT_NEGATIVE, "Thickness of the mortar that blockvis bond leaves open between stones; a run "
             "closes joints to their middle, so that stones touch", 0.01, "m", _DEFAULT.joint),
         Key("heads", one_of(HEADS), 'Heads over openings: "auto" is a ring of voussoirs around a curved top and a '
@@ -123,7 +123,10 @@ def bonded(
             openings = [shapely.Polygon(one.exterior) for one in shapely.get_parts(shapely.union_all(region.openings))]
             stones = _filled(region, openings, bonding.pattern, f"{where}: bond", mortar)
             names = [f"wall {number} {name}" if several else name for name in stones.names]
-            notes += [*stones.notes, _told(region, len(openings), stones, bonding.pattern)]
+            notes += [
+                *(note for note in stones.notes if note not in notes),
+                _told(region, len(openings), stones, bonding.pattern),
+            ]
             more: dict[str, Any] = {"thickness": [bonding.thickness or np.nan] * stones.n_blocks}
             more["laid"] = [True] * stones.n_blocks
             layers = [region.layer] * stones.n_blocks

@@ -258,6 +258,10 @@ def filled(
         ends = f"upright, to {1e3 * LEANS:g} mm in a metre, {2.0 * pattern.quoins[1]:g} m high and free of openings"
         said = f"bond: the wall around ({x:.6g}, {y:.6g}) has no quoins: no end is {ends}; give smaller ones"
         notes += (Note(CHANGED, said),)
+    if pattern.bond == "rubble" and pattern.brick != Pattern.brick:
+        said = f"bond: stones of rubble are {length:g} m long and {height:.3g} m high in the mean, by flatness"
+        remedy = f"give stone = {length:g} and flatness = {length / pattern.brick[1]:.3g} for this height"
+        notes += (Note(CHANGED, f"{said}; the height of brick, {pattern.brick[1]:g} m, is not used: {remedy}"),)
     return Layout(
         blocks=tuple(without_collinear(np.array(shape.exterior.coords)[:-1], 1e-9) + corner for _, shape in stones),
         names=tuple(name for name, _ in stones),

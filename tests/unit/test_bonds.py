@@ -122,6 +122,15 @@ def test_holes_notches_and_openings_at_the_rim_get_heads():
     assert {"voussoir 1-1", "lintel 2"} <= set(layout.names)
 
 
+def test_the_height_of_a_brick_is_not_that_of_rubble():
+    said = (
+        "bond: stones of rubble are 0.5 m long and 0.312 m high in the mean, by flatness; the height of brick, 0.2 m, "
+    )
+    said += "is not used: give stone = 0.5 and flatness = 2.5 for this height"
+    assert generators.bond(WALL, bond="rubble", brick=(0.5, 0.2)).notes == (said,)
+    assert not generators.bond(WALL, bond="rubble", stone=0.5, flatness=2.5).notes
+
+
 def test_no_closer_is_shorter_than_three_tenths_of_a_brick():
     layout = generators.bond(WALL, OPENINGS, brick=(0.25, 0.125))
     bricks = [shape for name, shape in zip(layout.names, shapes_of(layout), strict=True) if name.startswith("brick")]
