@@ -22,6 +22,7 @@ import numpy as np
 import pyvista as pv
 
 import solver
+from solver.mechanics import counted
 
 from .formats.gmsh_mesh import holds_flat_blocks
 from .formats.pyvista_files import dataset_of, layout_of_dataset
@@ -98,7 +99,8 @@ class BlockvisAccessor:
 
     def __repr__(self) -> str:
         """One line: how many blocks there are, and what can be done with them."""
-        return f"<{self.layout().n_blocks} blocks: plot(), assembly(), structure(), settle(), limit_load(), save()>"
+        blocks = counted(self.layout().n_blocks, "block")
+        return f"<{blocks}: plot(), assembly(), structure(), settle(), limit_load(), save()>"
 
     def layout(self, dimension: int | None = None) -> Layout:
         """Read the blocks as a layout, lengths in m, in 2 or 3 dimensions; as they are drawn by default."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import solver
+from solver.mechanics import counted
 
 from .contents import Case
 from .role_places import INTO_SPACE
@@ -28,8 +29,8 @@ def check_coordinates(case: Case, assembly: solver.Assembly) -> None:
         if numbers is not None and len(numbers) != d:
             wanted = "three numbers [x, y, z]" if d == 3 else f"two numbers [x, y], {INTO_SPACE}"
             raise ValueError(
-                f"{case.source}: [{table}] {key} has {len(numbers)} numbers, but the blocks are {_where(d)}; give "
-                f"{wanted}"
+                f"{case.source}: [{table}] {key} has {counted(len(numbers), 'number')}, but the blocks are "
+                f"{_where(d)}; give {wanted}"
             )
     if d == 3:
         _refuse_plane_keys(case)

@@ -14,6 +14,7 @@ from blockvis.layout.left_out import LeftOut, in_words, matches
 from blockvis.layout.names import blocks_called
 from blockvis.text import nearest, place_text
 from solver import mechanics
+from solver.mechanics import counted
 
 from .block_at import ON_EDGE, block_at, distances_to, note_outside
 from .key import NOT_NEGATIVE, POSITIVE, TEXT, TRUE_OR_FALSE, VECTOR, Key, Section, ValueKind, one_of, whole
@@ -259,7 +260,7 @@ def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tu
         )
     said = in_words(lines)
     words = [
-        f"ties: {sum(item.layer == layer for item in lines)} lines on layer '{layer}'"
+        f"ties: {counted(sum(item.layer == layer for item in lines), 'line')} on layer '{layer}'"
         for layer in dict.fromkeys(item.layer for item in lines)
     ]
     notes = (*(note for note in sketch.notes if note not in said), *words)

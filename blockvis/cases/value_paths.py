@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from blockvis.text import nearest
+from solver.mechanics import counted
 
 _STEP = re.compile(r'\.?(?:([A-Za-z0-9_-]+)|"([^"]*)"|\[(\d+)\])')
 
@@ -81,7 +82,10 @@ def put(values: dict[str, Any], path: Sequence[str | int], value: Any) -> None:
             if not isinstance(here, list):
                 raise ValueError(f"{trail} is no list, so that [{step}] leads nowhere")
             if step >= len(here):
-                raise ValueError(f"{trail} has {len(here)} entries, counted from 0, so that [{step}] leads nowhere")
+                raise ValueError(
+                    f"{trail} has {counted(len(here), 'entry', 'entries')}, counted from 0, so that [{step}] leads "
+                    "nowhere"
+                )
         elif isinstance(here, list):
             raise ValueError(f"{trail} is a list of {len(here)}; say which entry, for instance {trail}[0].{step}")
         elif not isinstance(here, dict):

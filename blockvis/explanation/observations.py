@@ -173,7 +173,7 @@ def _numbered(table: Any, header: Sequence[str], path: Path) -> Iterator[tuple[i
             cells = [re.sub(r"^(\s*[-+]?\d*),(\d+\s*)$", r"\1.\2", cell) for cell in cells]
         if any(cell.strip() for cell in cells[len(header) :]):
             raise ValueError(
-                f"{path}, line {table.line_num}: has {len(cells)} cells, and the first line {len(header)}; "
+                f"{path}, line {table.line_num}: has {counted(len(cells), 'cell')}, and the first line {len(header)}; "
                 "where numbers have a decimal comma, put semicolons between the columns"
             )
         yield table.line_num, dict(zip(header, cells, strict=False))
@@ -507,7 +507,9 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
         raise ValueError(f"{path}: draws blocks in space; give a drawing in the plane, as the case is")
     partner = _partners(layout.names, layout.outlines, assembly)
     if not partner:
-        raise ValueError(f"{path}: none of its {layout.n_blocks} blocks is one of the case, by its name or its shape")
+        raise ValueError(
+            f"{path}: of its {counted(layout.n_blocks, 'block')} none is one of the case, by its name or its shape"
+        )
     pose = solver.Pose.initial(assembly)
     for block, drawn in partner.items():
         pose.positions[block], pose.rotations[block] = _moved(assembly, block, np.asarray(layout.outlines[drawn]))

@@ -116,8 +116,9 @@ def verdict(found: Explanation) -> str:
 def in_words(found: Explanation) -> str:
     """Sum up an explanation for the command line."""
     n_open, n = int((found.observations.widths > 0.0).sum()), len(found.observations.widths)
-    about = [f"{n_open} open and {n - n_open} closed joints"] if n else []
-    about += [f"{len(found.observations.points)} displaced points"] if len(found.observations.points) else []
+    about = [f"{n_open} open and {counted(n - n_open, 'closed joint')}"] if n else []
+    points = len(found.observations.points)
+    about += [counted(points, "displaced point")] if points else []
     lines = [
         f"{' and '.join(about)}, {counted(len(found.causes), 'cause')}, {counted(len(found.runs), 'run')}",
         verdict(found),
@@ -127,7 +128,7 @@ def in_words(found: Explanation) -> str:
         if cause.also:
             lines.append(f"{'':41}or, with the same cracks: {', '.join(cause.also)}")
     if len(found.causes) > LISTED:
-        lines.append(f"and {len(found.causes) - LISTED} less probable causes")
+        lines.append(f"and {counted(len(found.causes) - LISTED, 'less probable cause')}")
     lines += [*fall_texts(found), *unexplained_texts(found)]
     if len(found.causes) > 1:
         lines.append(f"measure next: {measurement_text(found)}")

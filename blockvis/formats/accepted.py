@@ -64,9 +64,9 @@ def bent_note(bent: Sequence[tuple[float, float, str, np.ndarray]], n_blocks: in
     return (
         Note(
             CHANGED,
-            f"bent faces of {len(bent)} of {n_blocks} blocks were cut into triangles: a corner up to {bend:.3g} in the "
-            f"file's unit, {100.0 * bend / width:.2g} % of the block, out of the plane of the others, of '{name}' at "
-            f"({place}); draw plane faces if the stone has some",
+            f"bent faces of {len(bent)} of {counted(n_blocks, 'block')} were cut into triangles: a corner up to "
+            f"{bend:.3g} in the file's unit, {100.0 * bend / width:.2g} % of the block, out of the plane of the "
+            f"others, of '{name}' at ({place}); draw plane faces if the stone has some",
         ),
     )
 

@@ -15,6 +15,7 @@ import numpy as np
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import LARGEST_CHORD
+from solver.mechanics import counted
 
 from .image_scale import Placement, placement_of
 from .pixels import STAIRS, outlined, regions_of
@@ -164,7 +165,7 @@ def _notes(found: _Annotated, placement: Placement, several: int) -> tuple[str, 
         f"({placement.source})"
     ]
     if several:
-        notes.append(f"{several} annotations are in several pieces; each piece is a block")
+        notes.append(f"{counted(several, 'annotation is', 'annotations are')} in several pieces; each piece is a block")
     if found.dropped:
         listed = ", ".join(f"{n} {kind}" for kind, n in found.dropped.items())
         notes.append(Note(LEFT_OUT, f"left out: {listed}, which outline nothing"))

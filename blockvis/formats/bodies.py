@@ -286,8 +286,8 @@ def _plane_faces_said(
     if warped:
         most, name, place = max(warped, key=lambda one: one[0])
         said.append(
-            f"planes were fitted to warped faces of {len(warped)} of {len(changed)} blocks: up to {most:.3g} in the "
-            f"file's unit, of '{name}' at ({', '.join(f'{x:.6g}' for x in place)})"
+            f"planes were fitted to warped faces of {len(warped)} of {counted(len(changed), 'block')}: up to "
+            f"{most:.3g} in the file's unit, of '{name}' at ({', '.join(f'{x:.6g}' for x in place)})"
         )
     coarser = [one for one in changed if abs(one[0]) > NOTED_VOLUME]
     if coarser:
@@ -340,7 +340,7 @@ def _labels(row: Mapping[str, Any]) -> list[str]:
 def _accepted(bodies: Sequence[Body]) -> tuple[Note, ...]:
     """Say which bodies had holes that were closed, and which objects became several blocks."""
     pieces = pieces_note([body.piece_of for body in bodies if body.piece_of], sum(not one.piece_of for one in bodies))
-    holed = [f"'{body.name}' ({body.n_hole_edges} edges)" for body in bodies if body.n_hole_edges]
+    holed = [f"'{body.name}' ({counted(body.n_hole_edges, 'edge')})" for body in bodies if body.n_hole_edges]
     if not holed:
         return pieces
     more = f" and {len(holed) - 6} more" if len(holed) > 6 else ""

@@ -14,6 +14,7 @@ from blockvis.layout.outlines import FLAT
 from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.solids import area_vectors, fans
 from blockvis.layout.surfaces import same_points, turned_faces
+from solver.mechanics import counted
 
 from .bodies import Bodies, Body, as_drawn
 from .reading import Reading
@@ -93,7 +94,8 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
     if (counts == 1).any():
         x, y, z = points[unique[counts == 1][0]].mean(axis=0)
         raise OpenSurface(
-            f"'{path}': body '{name}' is not closed: {int((counts == 1).sum())} edges belong to one face only, "
+            f"'{path}': body '{name}' is not closed: "
+            f"{counted(int((counts == 1).sum()), 'edge belongs', 'edges belong')} to one face only, "
             f"one around ({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies, or leave it out (ignore)"
         )
     if (counts > 2).any():

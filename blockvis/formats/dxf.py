@@ -21,6 +21,7 @@ from blockvis.layout.notes import CHANGED, Note, kind_of
 from blockvis.layout.outlines import chords_of, drawing_plane, filled
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import metres_per
+from solver.mechanics import counted
 
 from .arcs import Arc, with_shared_corners
 from .bodies import Bodies
@@ -229,7 +230,7 @@ def _skipped(found: _Outlines) -> list[str]:
 def _faults(audit: Any) -> list[str]:
     """Count the faults that ezdxf found in a note."""
     faults = len(audit.fixes) + len(audit.errors)
-    return [Note(CHANGED, f"{faults} faults of the file were repaired or passed over")] if faults else []
+    return [Note(CHANGED, f"repaired or passed over: {counted(faults, 'fault')} of the file")] if faults else []
 
 
 def _turned(found: _Outlines, view: str | None, path: Path) -> list[str]:

@@ -12,6 +12,7 @@ import numpy as np
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import FLAT, spread_of
 from blockvis.layout.solids import fans
+from solver.mechanics import counted
 
 from .bodies import Bodies
 from .cells import layout_of_cells
@@ -129,8 +130,8 @@ def layout_of_meshes(
         first = curved[0]
         raise ValueError(
             f"'{path}': {first.curved} '{first.name}' on layer '{first.layer}' has faces of the ACIS kernel that are "
-            f"not read ({len(curved)} of {len(meshes)} bodies): export the bodies as .stl (AutoCAD: STLOUT) or .step, "
-            "or leave it out (ignore)"
+            f"not read ({len(curved)} of {counted(len(meshes), 'body', 'bodies')}): export the bodies as .stl "
+            "(AutoCAD: STLOUT) or .step, or leave it out (ignore)"
         )
     every = np.concatenate([mesh.points for mesh in meshes])
     spread = spread_of(every, f"'{path}'")

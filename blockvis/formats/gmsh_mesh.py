@@ -134,7 +134,7 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
         "a surface in no physical group may be missing from the file"
     ]
     if "" in groups:
-        notes.append(f"{groups.count('')} of {len(tags)} surfaces are in no physical group")
+        notes.append(f"in no physical group: {groups.count('')} of {counted(len(tags), 'surface')}")
     notes += [note] if note else []
     layout = Layout(
         blocks=tuple(outlines),
@@ -195,9 +195,9 @@ def _bodies(mesh: _Mesh, path: Path) -> Bodies:
         "a volume in no physical group may be missing from the file"
     ]
     if len(bodies) > len(tags):
-        notes = [f"{len(bodies)} bodies, the pieces of {len(tags)} meshed volumes"]
+        notes = [f"{len(bodies)} bodies, the pieces of {counted(len(tags), 'meshed volume')}"]
     if "" in groups:
-        notes.append(f"{groups.count('')} of {len(tags)} volumes are in no physical group")
+        notes.append(f"in no physical group: {groups.count('')} of {counted(len(tags), 'volume')}")
     return Bodies(tuple(bodies), tuple(rows), notes=tuple(notes))
 
 

@@ -15,6 +15,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
 from blockvis.layout.outlines import ring_area
+from solver.mechanics import counted
 
 from .image_labels import Labels, Photograph, labels_of
 from .image_scale import Placement, placement_of
@@ -126,7 +127,8 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
     around = {}
     for k, inner in holes.items():
         placed = tuple(placement.placed(hole * [1.0, -1.0]) for hole in inner)
-        message = f"'{names[k]}' has {len(placed)} holes; fill them, or give what lies around the stones as background"
+        message = f"'{names[k]}' has {counted(len(placed), 'hole')}; fill them, or give what lies around the stones as "
+        message += "background"
         around[k] = LeftOut("hole", rings[k], message, holes=placed)
     return layout.leaving_out(around)
 
@@ -170,7 +172,7 @@ def _check_sizes(path: Path, regions: Regions, placement: Placement) -> None:
     n, (specks, _) = len(regions.areas), regions.specks
     small = np.sort(regions.areas)[: n // 2].sum() / regions.areas.sum()
     if specks > max(MOST_SPECKS, SPECKS_OF_ONE * n):
-        why = f"it has {specks} specks beside {n} regions"
+        why = f"it has {counted(specks, 'speck')} beside {counted(n, 'region')}"
     elif n >= FEWEST_OF_CHART and small < LEAST_OF_SMALL:
         why = f"{n // 2} of its {n} regions hold {100.0 * small:.2g} % of the area, as letters and strokes do"
     else:
@@ -238,7 +240,7 @@ def _named(labels: Labels, regions: Regions) -> tuple[tuple[str, ...], tuple[str
 def _notes(labels: Labels, regions: Regions, found: Outlined, placement: Placement) -> tuple[str, ...]:
     """Say how the image was read, and what was dropped."""
     height, width = labels.numbers.shape
-    of = f"{len(set(regions.labels.tolist()))} labels" if labels.names else "labels of a noisy image"
+    of = counted(len(set(regions.labels.tolist())), "label") if labels.names else "labels of a noisy image"
     what = "a mask of stones" if labels.is_mask else of
     share = f"{100.0 * np.mean(labels.numbers == 0):.3g} % ({labels.background})" if labels.background else "none"
     notes: list[str] = [
@@ -247,11 +249,13 @@ def _notes(labels: Labels, regions: Regions, found: Outlined, placement: Placeme
     ]
     if labels.moved:
         share = f"{100.0 * labels.moved / labels.numbers.size:.2g} %"
-        text = f"{labels.moved} pixels ({share}) have no label's value, as at antialiased or lossy borders; "
-        notes.append(Note(LEFT_OUT, text + "they went to the nearest label"))
+        text = (
+            f"{counted(labels.moved, 'pixel')} ({share}) without a label's value, as at antialiased or lossy borders, "
+        )
+        notes.append(Note(LEFT_OUT, text + "went to the nearest label"))
     count, area = regions.specks
     if count:
         size = regions.smallest * placement.pixel
-        text = f"{count} specks of {area} pixels in all, each less than {size:.3g} m across (smallest), "
-        notes.append(Note(LEFT_OUT, text + "went to what is around them"))
+        text = f"{counted(count, 'speck')} of {counted(area, 'pixel')} in all, each less than {size:.3g} m across "
+        notes.append(Note(LEFT_OUT, text + "(smallest), went to what is around them"))
     return tuple(notes)

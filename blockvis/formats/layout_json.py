@@ -25,6 +25,7 @@ from blockvis.layout.left_out import passed_over
 from blockvis.layout.solids import Solid
 from blockvis.layout.surfaces import cleaned
 from blockvis.text import nearest, refuse_unknown
+from solver.mechanics import counted
 
 from . import compas_json, geodata
 from .annotations import program_of
@@ -136,7 +137,11 @@ def _read_solids(content: dict[str, Any], path: Path) -> Layout:
             ) from None
         outside = [corner for face in faces for corner in face if not 0 <= corner < len(points)]
         if outside or len(faces) < 4 or any(len(face) < 3 for face in faces):
-            what = f"a face uses point {outside[0]} of {len(points)}" if outside else f"it has {len(faces)} faces"
+            what = (
+                f"a face uses point {outside[0]} of {len(points)}"
+                if outside
+                else f"it has {counted(len(faces), 'face')}"
+            )
             raise ValueError(f"'{path}': block '{name}' is no closed block: {what}; repair it")
         if not np.isfinite(points).all():
             raise ValueError(f"'{path}': block '{name}' has a point that is not finite; repair it")

@@ -252,9 +252,9 @@ def faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
     """Say that blocks are what loose lines enclose."""
     return Note(
         CHANGED,
-        f"{counted(len(faces.rings), 'block is a face', 'blocks are faces')} between {len(lines)} loose lines; "
-        "an opening enclosed by lines "
-        "counts as a block too: erase it or draw closed outlines",
+        f"{counted(len(faces.rings), 'block is a face', 'blocks are faces')} between "
+        f"{counted(len(lines), 'loose line')}; an opening enclosed by lines counts as a block too: "
+        "erase it or draw closed outlines",
     )
 
 
@@ -309,7 +309,8 @@ def _joined(flat: Sequence[np.ndarray], n: int, offs: Sequence[float], size: flo
             moved.append(distance)
     far = [distance for distance in moved if distance > GRID * size]
     if far:
-        said = f"joined: {len(far)} ends of lines that missed another by up to {max(far):.3g} units"
+        missed = counted(len(far), "end of a line", "ends of lines")
+        said = f"joined: {missed} that missed another by up to {max(far):.3g} units"
         found.notes.append(Note(CHANGED, said))
     # On the grid an end and a slanted line that it meets would be rounded apart.
     return _with_corners(flat, n, dict.fromkeys(range(len(flat)), 0.0), GRID * size, 0.0)

@@ -301,7 +301,7 @@ def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | 
     gone = _gone(grid)
     if gone.all():
         raise ValueError(
-            f"'{path}': all {len(gone)} blocks are gone by the cell array '{GONE}'; give a file before that"
+            f"'{path}': {counted(len(gone), 'block')}, all gone by the cell array '{GONE}'; give a file before that"
         )
     note = (Note(LEFT_OUT, f"left out: {counted(int(gone.sum()), 'block')} taken away or lost (array '{GONE}')"),)
     notes: tuple[str, ...] = note if gone.any() else ()

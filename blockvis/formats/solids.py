@@ -71,7 +71,8 @@ def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> En
             found = enclosed([(path.name, points, faces)], size, path, reading)
         except ValueError:
             raise error from None
-        said = f"the names of {len(drawn.parts)} groups, which are not closed by themselves; name blocks by 'o' lines"
+        groups = counted(len(drawn.parts), "name of a group", "names of groups")
+        said = f"{groups}, not closed by themselves; name blocks by 'o' lines"
         return replace(found, notes=[*found.notes, Note(LEFT_OUT, f"not read: {said}")])
 
 
@@ -139,7 +140,8 @@ def _scene(path: Path) -> dae.Drawn:
     text = path.read_bytes() if suffix == ".stl" else b""
     begun, ended = (len(re.findall(rb"(?im)^\s*%s\b" % word, text)) for word in (b"solid", b"endsolid"))
     if begun > ended and re.search(rb"(?i)\bvertex\s", text):
-        raise ValueError(f"'{path}' breaks off: {begun} bodies begin and {ended} end (endsolid); export it again")
+        bodies = counted(begun, "body begins", "bodies begin")
+        raise ValueError(f"'{path}' breaks off: {bodies} and {ended} end (endsolid); export it again")
     try:
         scene = trimesh.load_scene(str(path), process=False)
         parts = [

@@ -14,6 +14,7 @@ import shapely.affinity
 import solver
 from blockvis.layout.outlines import rectangle
 from solver import mechanics
+from solver.mechanics import counted
 
 from .arches import segmental_joints
 from .bonds import BONDS, SHORTEST_BRICK
@@ -187,16 +188,16 @@ def facade(
     pier = (n - windows * span) / (windows + 1)
     if pier < 1.0:
         raise ValueError(
-            f"bricks is {n}, too few for {windows} windows of {span:g} bricks with a brick between them; give at least "
-            f"{int(np.ceil(windows * span + windows + 1))}"
+            f"bricks is {n}, too few for {counted(windows, 'window')} of {span:g} bricks with a brick on either "
+            f"side; give at least {int(np.ceil(windows * span + windows + 1))}"
         )
     arch, _ = segmental_joints(length * span, rise, length, whole("voussoirs", voussoirs, 2))
     # A storey up to the crown of its arches, in courses.
     storey_high = sill + high + arch[:, 1, 1].max() / course
     if windows and (storeys - 1) * (rows // storeys) + storey_high > rows * (1.0 + 1e-9):
         raise ValueError(
-            f"courses is {rows}, too few for {storeys} storeys of {storey_high:.4g} courses to the crown of their "
-            f"arches; give at least {storeys * int(np.ceil(storey_high))}"
+            f"courses is {rows}, too few for {counted(storeys, 'storey')} of {storey_high:.4g} courses to the crown "
+            f"of their arches; give at least {storeys * int(np.ceil(storey_high))}"
         )
     openings = [
         {

@@ -196,8 +196,9 @@ def _crossings(assembly: solver.Assembly) -> str:
     n = int((np.abs(excess) > CROSSING).sum())
     if not n:
         return ""
+    crossing = "surface of 1 block crosses itself" if n == 1 else f"surfaces of {n} blocks cross themselves"
     return (
-        f"the surfaces of {n} blocks cross themselves: the convex parts of '{assembly.names[worst]}' hold "
+        f"the {crossing}: the convex parts of '{assembly.names[worst]}' hold "
         f"{100.0 * excess[worst]:+.2g} % of its volume more; redraw them"
     )
 

@@ -227,8 +227,9 @@ def _mortar_rows(proposal: Proposal, rounding: float, shares: tuple[float, float
     if not len(joints):
         return (("mortar joints", "none: no gaps between facing edges"),)
     if proposal.thickness < rounding:
-        gaps = joints.gaps.max(axis=1) <= 1.0001 * proposal.thickness
-        said = f"none: {int(gaps.sum())} gaps of up to {proposal.thickness:.1g} m are the rounding of coordinates"
+        n = int((joints.gaps.max(axis=1) <= 1.0001 * proposal.thickness).sum())
+        gaps = f"{counted(n, 'gap')} of up to {proposal.thickness:.1g} m {'is' if n == 1 else 'are'}"
+        said = f"none: {gaps} the rounding of coordinates"
         rows = [("mortar joints", f'{said}; joint_thickness = "auto" closes them')]
         return (*rows, ("", proposal.note)) if proposal.note else tuple(rows)
     widest = joints.gaps.max(axis=1) * 1e3
@@ -239,12 +240,13 @@ def _mortar_rows(proposal: Proposal, rounding: float, shares: tuple[float, float
     rows = [
         (
             "mortar joints",
-            f"{len(widest)} stretches, {joints.lengths.sum():.4g} m, gaps of {widest.min():.3g} to "
-            f"{widest.max():.3g} mm, median {np.median(widest):.3g} mm",
+            f"{counted(len(widest), 'stretch', 'stretches')}, {joints.lengths.sum():.4g} m, gaps of "
+            f"{widest.min():.3g} to {widest.max():.3g} mm, median {np.median(widest):.3g} mm",
         )
     ]
     for k in np.flatnonzero(counts):
-        rows.append(("", f"{edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {counts[k]:6d} stretches  {metres[k]:9.3f} m"))
+        stretches = f"{counts[k]:6d} {'stretch  ' if counts[k] == 1 else 'stretches'}"
+        rows.append(("", f"{edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {stretches}  {metres[k]:9.3f} m"))
     if max(shares) < MORTAR_SHARE:
         said = f"nothing: gaps are {100.0 * shares[0]:.2g} % of the length of joints"
         said += ", most on one side of blocks only, as cracks and openings are"

@@ -86,7 +86,10 @@ class Layout:
             if kind != "names" and not getattr(self, kind):
                 object.__setattr__(self, kind, ("",) * self.n_blocks)
             if len(getattr(self, kind)) != self.n_blocks:
-                raise ValueError(f"{self.n_blocks} blocks but {len(getattr(self, kind))} {kind}; give one per block")
+                raise ValueError(
+                    f"{mechanics.counted(self.n_blocks, 'block')} but {len(getattr(self, kind))} {kind}; "
+                    "give one per block"
+                )
         if not self.looks:
             object.__setattr__(self, "looks", ((),) * self.n_blocks)
         if not self.laid:

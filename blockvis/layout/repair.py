@@ -186,12 +186,13 @@ def _notes(
     notes = []
     still = {pair[:2] for pair in left}
     gone = [pair for pair in found if pair[:2] not in still]
-    for pairs, what in ((gone, "were cut away"), (left, "could not be cut away")):
+    for pairs, what in ((gone, ("was cut away", "were cut away")), (left, ("could not be cut away",) * 2)):
         if pairs:
             i, j, depth = max(pairs, key=lambda pair: pair[2])
             notes.append(
-                f"{len(pairs)} overlaps of up to {depth:.3g} m {what}, the deepest between '{assembly.names[i]}' "
-                f"and '{assembly.names[j]}'; redraw them, or lower overlap_tolerance to have them refused"
+                f"{counted(len(pairs), 'overlap')} of up to {depth:.3g} m {what[len(pairs) > 1]}, the deepest between "
+                f"'{assembly.names[i]}' and '{assembly.names[j]}'; redraw them, or lower "
+                "overlap_tolerance to have them refused"
             )
     if thickness and closing.method == "voronoi":
         notes.append(
@@ -201,7 +202,8 @@ def _notes(
         )
     elif thickness:
         notes.append(
-            f"{closing.n_joints} stretches of joints of up to {max(closing.largest_gap, 0.0):.3g} m were closed to "
-            f"their midline, {closing.n_cut} of them by cutting one side along the other"
+            f"{counted(closing.n_joints, 'stretch', 'stretches')} of joints of up to "
+            f"{max(closing.largest_gap, 0.0):.3g} m closed to the midline, {closing.n_cut} of them by cutting one side "
+            "along the other"
         )
     return notes

@@ -71,7 +71,8 @@ def twins_note(layout: Layout, twins: Sequence[tuple[int, int]], dropped: set[in
     pairs = [(copy, first) if copy in dropped else (first, copy) for first, copy in twins]
     listed = ", ".join(f"'{layout.names[gone]}' = '{layout.names[kept]}'" for gone, kept in pairs[:20])
     more = f" and {len(twins) - 20} more" if len(twins) > 20 else ""
-    return f"{len(twins)} of {layout.n_blocks} blocks are drawn twice and were dropped: {listed}{more}"
+    said = "is drawn twice and was dropped" if len(twins) == 1 else "are drawn twice and were dropped"
+    return f"{len(twins)} of {layout.n_blocks} blocks {said}: {listed}{more}"
 
 
 def _unmatched(key: str, layout: Layout) -> str:

@@ -61,14 +61,14 @@ def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[n
         kept |= bad
         found = _shortened(chains, kept, points, tolerance)
     after = sum(map(len, found))
-    spoilt = counted(len(kept), "block")
+    spoilt, of = counted(len(kept), "block"), counted(len(outlines), "block")
     if after >= before:
-        fine = f"outlines are finer than needed, {before} corners of {len(outlines)} blocks, and stay so: simplified "
+        fine = f"outlines are finer than needed, {before} corners of {of}, and stay so: simplified "
         said = f"{fine}within {tolerance:.2g} m (outline_tolerance) {spoilt} would fold or overlap others"
         return list(outlines), said if kept and before > FINE * len(outlines) else ""
     rest = f"; {spoilt} that would fold or overlap others kept all of them" if kept else ""
     return found, (
-        f"outlines were finer than needed: {before} corners of {len(outlines)} blocks were simplified to {after} "
+        f"outlines were finer than needed: {before} corners of {of} were simplified to {after} "
         f"within {tolerance:.2g} m (outline_tolerance; 0 keeps every corner){rest}"
     )
 

@@ -28,6 +28,7 @@ from blockvis.results.cracks import Crack, cracks_of, narrower_text
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text, width_text
+from solver.mechanics import counted
 
 from .page import certificate_rows, headline_of, range_rows, summary_rows, tie_rows
 
@@ -243,5 +244,6 @@ class _Paper(FPDF):
         lines = text.splitlines()
         self.set_font("code", "", 7.5)
         self.set_text_color(*palette.INK)
-        shown = lines[:MOST_LINES] + ([f"... {len(lines) - MOST_LINES} more lines"] if len(lines) > MOST_LINES else [])
+        more = len(lines) - MOST_LINES
+        shown = lines[:MOST_LINES] + ([f"... {counted(more, 'more line')}"] if more > 0 else [])
         self.multi_cell(WIDTH, 3.6, "\n".join(shown), align="L", new_x="LMARGIN", new_y="NEXT")

@@ -213,7 +213,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     handles = [_mark(CLASSES[k], MARKS[k], label) for k, label in enumerate(labels)]
     rest = sum(classes.values()) - sum(classes[one] for one in shown)
     if rest:
-        handles.append(_mark("#b5b5b5", "o", f"{len(classes) - len(shown)} other mechanisms ({rest})"))
+        handles.append(_mark("#b5b5b5", "o", f"{counted(len(classes) - len(shown), 'other mechanism')} ({rest})"))
     if stood.any():
         handles.append(_mark("#333333", "^", f"stood as far as it was followed ({int(stood.sum())})", hollow=True))
     figure.legend(handles=handles, loc="outside lower left", frameon=False, fontsize=0.82 * TEXT)

@@ -21,6 +21,7 @@ from blockvis.cases.toml_table import Table, shortened
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kinds import KINDS
+from solver.mechanics import counted
 
 from . import study_keys as keys
 from .sampling import Design, designed
@@ -372,7 +373,9 @@ def _parameter(path: str, table: Table) -> Parameter:
     values = given["values"]
     weights = np.ones(len(values)) if given["weights"] is None else np.array(given["weights"])
     if len(weights) != len(values):
-        raise table.error("weights", f"has {len(weights)} numbers; give one for each of the {len(values)} values")
+        raise table.error(
+            "weights", f"has {counted(len(weights), 'number')}; give one for each of {counted(len(values), 'value')}"
+        )
     return Parameter(path, name, given["also"], None, values, weights / weights.sum(), 0)
 
 

@@ -19,6 +19,7 @@ import solver
 from blockvis.results.folder import locked
 from blockvis.results.npz import compressed
 from blockvis.system.atomic_files import atomic_file, flush, make_folder, write_atomic
+from solver.mechanics import counted
 
 from .run_one import FAILED
 from .study_file import RESERVED, Study
@@ -82,9 +83,9 @@ class StudyFolder:
             changed = [k for k, v in definition.items() if stored.get("definition", {}).get(k) != v]
             if changed and not force:
                 raise StudyExists(
-                    f"'{self.folder}' holds {len(self._stored())} finished runs of another study: {', '.join(changed)} "
-                    f"{'has' if len(changed) == 1 else 'have'} changed; choose another folder with -o, or throw these "
-                    "runs away with --force"
+                    f"'{self.folder}' holds {counted(len(self._stored()), 'finished run')} of another study: "
+                    f"{', '.join(changed)} {'has' if len(changed) == 1 else 'have'} changed; choose another folder "
+                    "with -o, or throw these runs away with --force"
                 )
         elif self.folder.is_dir() and any(self.folder.iterdir()):
             raise StudyExists(f"'{self.folder}' holds something that is no study; choose another folder with -o")

@@ -13,6 +13,7 @@ import numpy as np
 import solver
 from blockvis.results.about import LOCAL
 from blockvis.text import rounded_text
+from solver.mechanics import counted
 
 from .fragility import fragility_of
 from .sensitivity import first_order, swings
@@ -179,7 +180,7 @@ def _mechanism_lines(classes: dict[str, int]) -> list[str]:
         for number, (name, count) in enumerate(list(classes.items())[:MOST_MECHANISMS], 1)
     ]
     more = len(classes) - MOST_MECHANISMS
-    return [*lines, f"and {more} more mechanisms"] if more > 0 else lines
+    return [*lines, f"and {counted(more, 'more mechanism')}"] if more > 0 else lines
 
 
 def _value(value: float | str) -> str:

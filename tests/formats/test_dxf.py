@@ -339,7 +339,7 @@ def test_faults_of_a_file_are_noted_and_not_printed(tmp_path, capfd):
 
     layout = read_layout(saved(tmp_path, draw))
     assert layout.n_blocks == 1
-    assert any("faults of the file were repaired or passed over" in note for note in layout.notes)
+    assert any("repaired or passed over: 1 fault of the file" in note for note in layout.notes)
     assert capfd.readouterr() == ("", "")
 
 
@@ -413,7 +413,7 @@ def test_convert_writes_what_is_drawn_twice_once(tmp_path, capsys):
     assert main(["convert", str(path), str(tmp_path / "b.json")]) == 0
     out, err = capsys.readouterr()
     assert out.startswith("2 blocks written to")
-    assert "note: 1 of 3 blocks are drawn twice and were dropped: 'block " in err
+    assert "note: 1 of 3 blocks is drawn twice and was dropped: 'block " in err
     assert read_layout(tmp_path / "b.json").n_blocks == 2
     assert main(["convert", str(path), str(tmp_path / "c.json"), "--ignore", "0"]) == 2
 

@@ -135,7 +135,7 @@ def test_antialiased_and_lossy_labels_are_those_of_the_exact_image(tmp_path, los
     assert f"outlines        {n}\n" in out
     total = float(out.split("sum ")[1].split()[0])
     assert total == pytest.approx(area, rel=0.02)
-    assert "have no label's value, as at antialiased or lossy borders" in out
+    assert "without a label's value, as at antialiased or lossy borders, went to" in out
 
 
 @pytest.mark.parametrize(("stone", "joint"), [(255, 0), (0, 255), ("#a03020", "#f0e0d0")])
@@ -479,7 +479,7 @@ def test_packed_runs_and_several_pieces_of_coco_are_read(tmp_path):
     (tmp_path / "w.json").write_text(json.dumps(pieces), encoding="utf-8")
     layout = read_layout(tmp_path / "w.json", pixel=1.0)
     assert layout.names == ("stone 1-1", "stone 1-2")
-    assert "1 annotations are in several pieces" in layout.notes[1]
+    assert "1 annotation is in several pieces" in layout.notes[1]
 
 
 def test_annotations_that_cannot_be_read_say_why(tmp_path, capsys):

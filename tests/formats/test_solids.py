@@ -208,7 +208,7 @@ def test_groups_name_the_stones_of_an_obj_file_without_objects(tmp_path):
     wavefront(path, ("g stone", 3), per_face=[f"g face {k}" for k in range(len(BOX))])
     found = read_layout(path, dimension=3)
     assert found.names == ("a.obj",)
-    assert any("not read: the names of 6 groups, which are not closed by themselves" in note for note in found.notes)
+    assert any("not read: 6 names of groups, not closed by themselves" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(

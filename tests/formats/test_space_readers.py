@@ -262,7 +262,7 @@ def test_of_two_copies_that_with_a_role_stays(tmp_path):
     low, high = trimesh.creation.box((1.0, 1.0, 1.0)), trimesh.creation.box((1.0, 1.0, 1.0))
     high.apply_translation((0.0, 0.0, 1.0))
     trimesh.Scene({"copy": low, "base": low.copy(), "stone": high}).export(tmp_path / "tower.obj")
-    with pytest.warns(UserWarning, match="1 of 3 blocks are drawn twice and were dropped: 'copy' = 'base'"):
+    with pytest.warns(UserWarning, match="1 of 3 blocks is drawn twice and was dropped: 'copy' = 'base'"):
         found = read(tmp_path / "tower.obj", roles={"base": "fixed"}, dimension=3)
     assert sorted(found.names) == ["base", "stone"]
     with pytest.warns(UserWarning, match="'base' = 'copy'|'copy' = 'base'"):

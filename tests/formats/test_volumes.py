@@ -84,7 +84,7 @@ def test_pieces_of_one_volume_are_bodies_of_their_own(tmp_path):
     layout = read_layout(tmp_path / "a.msh")
     # Bricks half a brick higher than their neighbours share no face with them.
     assert layout.n_blocks == 6
-    assert any("6 bodies, the pieces of 1 meshed volumes" in note for note in layout.notes)
+    assert any("6 bodies, the pieces of 1 meshed volume" in note for note in layout.notes)
 
 
 def test_a_volume_in_two_groups_is_refused(tmp_path):

@@ -66,7 +66,7 @@ def test_duplicates_are_dropped_with_one_warning_that_names_them(tmp_path):
     bricks = [UNIT + np.array([k, 0]) for k in range(3)]
     names = ["brick 1", "brick 2", "brick 3", "again"]
     twice = drawn(tmp_path / "a.json", [*bricks, bricks[1][[2, 1, 0, 3]]], names)
-    with pytest.warns(UserWarning, match="1 of 4 blocks are drawn twice and were dropped: 'again' = 'brick 2'") as seen:
+    with pytest.warns(UserWarning, match="1 of 4 blocks is drawn twice and was dropped: 'again' = 'brick 2'") as seen:
         assembly = read(twice)
     assert len(seen) == 1
     assert assembly.n_blocks == 3

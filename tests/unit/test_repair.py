@@ -26,7 +26,7 @@ def test_of_many_copies_one_is_left(tmp_path):
 def test_a_block_drawn_again_in_rounded_coordinates_is_drawn_twice(tmp_path):
     """A hatch over its outline has other digits; two stones do not share all of their corners."""
     ring = np.array([[1 / 3, 1 / 7], [4 / 3, 1 / 7], [4 / 3, 5 / 7], [1 / 3, 5 / 7]])
-    with pytest.warns(UserWarning, match="1 of 2 blocks are drawn twice"):
+    with pytest.warns(UserWarning, match="1 of 2 blocks is drawn twice"):
         assert read(drawn(tmp_path / "a.json", [ring, np.round(ring, 4)])).n_blocks == 1
     with pytest.raises(ValueError, match=r"overlaps block 1 .* by 0.01"):
         read(drawn(tmp_path / "b.json", [ring, np.add(ring, [0.99, 0.0])]), overlap_tolerance=1e-3)
@@ -68,7 +68,7 @@ def test_overlaps_that_stay_are_not_said_to_be_cut(tmp_path, monkeypatch):
     monkeypatch.setattr(
         "blockvis.layout.repair.close_joints", lambda outlines, *_, **__: SimpleNamespace(outlines=outlines)
     )
-    with pytest.warns(UserWarning, match=r"1 overlaps of up to 0\.01 m could not be cut away"):
+    with pytest.warns(UserWarning, match=r"1 overlap of up to 0\.01 m could not be cut away"):
         read(drawn(tmp_path / "a.json", [SQUARE, SQUARE + np.array([0.99, 0.0])]))
 
 

@@ -84,7 +84,7 @@ def test_what_is_no_path(path):
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        ("supports[1].name", "supports has 1 entries"),
+        ("supports[1].name", "supports has 1 entry"),
         ("supports.name", r"supports is a list of 1; say which entry, for instance supports\[0\].name"),
         ("support[0].name", "no list 'support' (did you mean 'supports'?)"),
         ("unit.length", "unit is 'm', no table"),
@@ -201,7 +201,7 @@ BAD = [
     ("material.friction_coefficient", "material.friction_coeficient", ("did you mean 'friction_coefficient'",)),
     ("material.friction_coefficient", "materiel.friction", ("materiel", "did you mean 'material'")),
     ("material.friction_coefficient", "geometry.parameters.voussoir", ("voussoir", "did you mean 'voussoirs'")),
-    ("material.friction_coefficient", "settlement[1].limit", ("settlement has 1 entries",)),
+    ("material.friction_coefficient", "settlement[1].limit", ("settlement has 1 entry",)),
     ("material.friction_coefficient", "material friction", ("is not a path",)),
     ("lower = 0.4", "lower = 0.9", ("lower is 0.9 and upper is 0.8",)),
     ('"uniform"', '"unifrom"', ("did you mean 'uniform'",)),
