@@ -218,5 +218,18 @@ def standing(layout: Layout, thickness: float) -> Layout:
             extruded(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)
         ),
         thickness=None,
-        notes=(*layout.notes, Note(CHANGED, "the drawing in the plane was extruded along y by its thickness")),
+        notes=(
+            *layout.notes,
+            Note(CHANGED, f"the drawing in the plane was extruded along y by {_depths(layout, thickness)}"),
+        ),
     )
+
+
+def _depths(layout: Layout, thickness: float) -> str:
+    """Say which thickness [m] blocks of the plane have in space: their own, or else this one."""
+    own = np.zeros(0) if layout.thickness is None else layout.thickness[np.isfinite(layout.thickness)]
+    if not len(own):
+        return f"{thickness:g} m"
+    low, high = f"{own.min():g}", f"{own.max():g}"
+    said = f"the thickness that {len(own)} of {mechanics.counted(layout.n_blocks, 'block')} have of their own, "
+    return said + (low if low == high else f"{low} to {high}") + f" m; {thickness:g} m is that of blocks without"

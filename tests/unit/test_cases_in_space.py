@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from structures import assembly_of, box, case_from, drawn, layout_of, run_command
+from structures import assembly_of, box, case_from, drawn, layout_of, rectangle, run_command
 
 import blockvis
 import solver
@@ -40,6 +40,23 @@ def test_the_density_of_the_case_replaces_that_of_a_layout(tmp_path):
 def test_a_layout_of_the_plane_in_space(tmp_path):
     deep = assembly_of(case(ARCH.replace("\n", "\ndimension = 3\nthickness = 0.4\n", 1) + DOWN, tmp_path))
     assert deep.shapes.volumes == pytest.approx(0.4 * generators.arch(voussoirs=5).areas)
+
+
+@pytest.mark.parametrize(
+    ("own", "says"),
+    [
+        ({}, "0.5 m"),
+        ({"thickness": [0.3, 0.3]}, "2 of 2 blocks have of their own, 0.3 m; 0.5 m is that of blocks without"),
+        ({"thickness": [0.3, None]}, "1 of 2 blocks have of their own, 0.3 m; 0.5 m is that of blocks without"),
+    ],
+)
+def test_a_drawing_of_the_plane_in_space_says_which_thickness_it_has(own, says, tmp_path):
+    blocks = [rectangle(0, y, 1, y + 0.5) for y in (0.0, 0.5)]
+    drawn(tmp_path / "wall.json", blocks, role=["moving", "free"], **own)
+    settles = "[settlement]\ndirection = [0, 0, -1]\nincrement = 0.001\nlimit = 0.001\n"
+    given = case(f'[geometry]\nfile = "wall.json"\ndimension = 3\nthickness = 0.5\n{settles}', tmp_path)
+    with pytest.warns(UserWarning, match=f"was extruded along y by .*{says}$"):
+        assembly_of(given)
 
 
 def test_rotations_and_loads_have_three_numbers(tmp_path):
