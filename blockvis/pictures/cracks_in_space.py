@@ -117,7 +117,9 @@ class CracksInSpace:
         return scenes
 
     def image(self, cracks: Sequence[Crack], numbers: Sequence[int]) -> Image.Image:
-        """Draw the views, with number and largest width of cracks where they are seen, in the view that has most of it.
+        """Draw the views, with number and largest width of each crack in the view that shows its widest place.
+
+        Of a crack whose widest place is hidden that is the widest one that some view shows.
 
         Parameters
         ----------
