@@ -10,7 +10,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -47,12 +47,20 @@ _COMMENT = re.compile(r"/\*.*?\*/|<!--|-->", re.DOTALL)
 _AT_RULE = re.compile(r"@[^@{};]*(?:;|\{(?:[^{}]|\{[^{}]*\})*\})")
 _SELECTOR = re.compile(r"(\*|[a-zA-Z][\w-]*)?((?:[.#][\w-]+)*)")
 #: Properties by which shapes are read, chosen or left out.
-_READ = re.compile(r"(?:^|[;{])\s*(?:display|visibility|opacity|fill|stroke|transform)\s*:", re.IGNORECASE)
+_READ = re.compile(
+    r"(?:^|[;{])\s*(?:display|visibility|(?:fill-|stroke-)?opacity|fill|stroke|transform)\s*:", re.IGNORECASE
+)
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 
-#: What paints nothing, and opacities of what nobody sees.
+#: Properties by which shapes are painted, where nothing is said.
+_PAINTING = {
+    "fill": "black", "stroke": "none", "visibility": "visible", "fill-opacity": "1", "stroke-opacity": "1",
+    "stroke-width": "1",
+}  # fmt: skip
+
+#: What paints nothing, and opacities and widths of what nobody sees.
 _NO_PAINT = ("none", "transparent")
-_CLEAR = re.compile(r"0*\.?0+%?")
+_CLEAR = re.compile(r"0*\.?0+\s*(?:%|[a-z]*)")
 
 #: Layer on which blocks are written that have no group, role as a support or material.
 _LAYER = "blocks"
@@ -95,7 +103,10 @@ class _Outlines:
 
 @dataclass(frozen=True)
 class _Context:
-    """Context of an element: transform of its parents, layers, and largest distance of chords from a curve."""
+    """Context of an element: transform of its parents, layers, largest distance of chords from a curve, and painting.
+
+    The last are values of the properties by which shapes are painted, which elements have from those around them.
+    """
 
     matrix: np.ndarray
     layers: tuple[str, ...]
@@ -103,9 +114,18 @@ class _Context:
     path: Path
     depth: int = 0
     label: str = ""
-    fill: str = "black"
-    stroke: str = "none"
-    visibility: str = "visible"
+    painting: Mapping[str, str] = field(default_factory=_PAINTING.copy)
+
+    @property
+    def fills(self) -> bool:
+        """Whether shapes are filled."""
+        return self.painting["fill"] not in _NO_PAINT and not _CLEAR.fullmatch(self.painting["fill-opacity"])
+
+    @property
+    def strokes(self) -> bool:
+        """Whether shapes have a line around them."""
+        clear = any(_CLEAR.fullmatch(self.painting[key]) for key in ("stroke-opacity", "stroke-width"))
+        return self.painting["stroke"] not in _NO_PAINT and not clear
 
     @property
     def layer(self) -> str:
@@ -342,17 +362,16 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> No
         except ValueError as error:
             found.notes.append(Note(LEFT_OUT, f"an inner {_called(element)} was skipped: it {error}"))
             return
-    where = replace(where, matrix=matrix, depth=where.depth + 1)
-    fill, stroke = _style(element, "fill") or where.fill, _style(element, "stroke") or where.stroke
-    where = replace(where, fill=fill, stroke=stroke, visibility=_style(element, "visibility") or where.visibility)
+    painting = {key: _style(element, key) or value for key, value in where.painting.items()}
+    where = replace(where, matrix=matrix, depth=where.depth + 1, painting=painting)
     if tag == "g":
         named = element.get(f"{_INKSCAPE}label", "")
         label = named or element.get("id") or ""
         where = replace(where, layers=(*where.layers, label) if label else where.layers, label=named or where.label)
     shape = _SHAPES.get(tag)
     found.clipped.update(f"<{tag}> with a {key}" for key in ("clip-path", "mask") if "url(" in _style(element, key))
-    unpainted = where.fill in _NO_PAINT and where.stroke in _NO_PAINT and not found.sheets_missed
-    if shape is not None and (where.visibility != "visible" or unpainted):
+    unpainted = not (where.fills or where.strokes or found.sheets_missed)
+    if shape is not None and (painting["visibility"] != "visible" or unpainted):
         found.skipped[f"hidden <{tag}>"] += 1
     elif shape is not None:
         try:
@@ -450,7 +469,7 @@ def _colour(where: _Context) -> tuple[str, ...]:
     """Give the colour of a shape as #rrggbb, that of its fill or else of its stroke; none where it has none."""
     from PIL import ImageColor
 
-    word = where.stroke if where.fill in _NO_PAINT else where.fill
+    word = where.painting["fill" if where.fills else "stroke"]
     try:
         return ("#{:02x}{:02x}{:02x}".format(*ImageColor.getrgb(word)[:3]),)
     except ValueError:

@@ -119,6 +119,16 @@ def test_what_nobody_sees_is_no_block(tmp_path):
     layout = read_layout(saved(tmp_path, body, 'viewBox="0 0 200 100"'))
     assert [ring[:, 1].max() for ring in layout.outlines] == [-10, -30, -60]
     assert "skipped: 3 hidden <rect>, 1 hidden <g>, 1 hidden <path>" in layout.notes
+    clear = """<g fill-opacity="0"><rect y="10" width="9" height="9"/><path d="M0 20H9V29H0Z" stroke="red"/></g>
+        <rect y="30" width="9" height="9" style="fill:none;stroke:#000;stroke-width:0px"/>
+        <g stroke-width="0.0"><rect y="40" width="9" height="9" style="fill:#00f;fill-opacity:0.0;stroke:black"/></g>
+        <rect y="50" width="9" height="9" fill="none" stroke="black" stroke-opacity="0%"/>
+        <rect y="60" width="9" height="9" fill="none" stroke="black" stroke-width="0.1"/>
+        <rect y="70" width="9" height="9" fill="red" stroke="black" stroke-width="0"/>"""
+    layout = read_layout(saved(tmp_path, clear, 'viewBox="0 0 200 100"'))
+    assert sorted(ring[:, 1].max() for ring in layout.outlines) == pytest.approx([-70.0, -60.0, -20.0])
+    assert layout.looks == (("path", "#ff0000"), ("rect", "#000000"), ("rect", "#ff0000"))
+    assert "skipped: 4 hidden <rect>" in layout.notes
     with pytest.raises(ValueError, match="no closed shape: skipped: 1 hidden <rect>; draw each block"):
         read_layout(saved(tmp_path, '<rect width="9" height="9" opacity="0%"/>'))
 
