@@ -14,7 +14,7 @@ from .joints.close import Closing, FoldedOutline, close_joints, proposed
 from .joints.trimming import overlapping
 from .left_out import LeftOut
 
-#: Two outlines closer than this fraction of the size of a block, corner by corner, are one block drawn twice.
+#: Outlines closer than this fraction of the narrowest extent of a block, corner by corner, are one drawn twice.
 SAME = 1e-3
 
 #: Deepest overlap that is resolved unless the caller says otherwise, as a fraction of the width of a typical block.
@@ -48,7 +48,7 @@ def duplicates(blocks: Sequence[np.ndarray]) -> list[tuple[int, int]]:
             if i in found:
                 continue
             earlier = places.setdefault(tuple(place), [])
-            twin = next((k for k in earlier if _same(blocks[k], blocks[i], SAME * sizes[i])), None)
+            twin = next((k for k in earlier if _same(blocks[k], blocks[i])), None)
             if twin is None:
                 earlier.append(i)
             else:
@@ -56,9 +56,12 @@ def duplicates(blocks: Sequence[np.ndarray]) -> list[tuple[int, int]]:
     return sorted((first, later) for later, first in found.items())
 
 
-def _same(one: np.ndarray, other: np.ndarray, tolerance: float) -> bool:
+def _same(one: np.ndarray, other: np.ndarray) -> bool:
     if len(one) != len(other):
         return False
+    about = one - one.mean(axis=0)
+    _, _, axes = np.linalg.svd(about, full_matrices=False)
+    tolerance = SAME * float(np.ptp(about @ axes.T, axis=0).min())
     distance = np.abs(one[:, None, :] - other[None, :, :]).max(axis=2)
     return bool((distance.min(axis=0) <= tolerance).all() and (distance.min(axis=1) <= tolerance).all())
 
