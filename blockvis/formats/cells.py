@@ -301,6 +301,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
         names=joined("names"),
         unit=named[0].unit,
         unit_by=named[0].unit_by,
+        thickness_unit=named[0].thickness_unit,
         notes=_joined_notes(named),
         left_out=joined("left_out"),
         looks=joined("looks"),

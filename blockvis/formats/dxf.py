@@ -206,7 +206,7 @@ def _layout(found: _Outlines, faces: Faces, stated: str) -> Layout:
         for layer, name, row in zip(found.layers, found.names, own, strict=True)
     ]
     notes = moved_notes([pair for pair, was in zip(zip(found.rows, rows, strict=True), moved, strict=True) if was])
-    return with_rows(replace(layout, notes=(*layout.notes, *notes)), rows)
+    return with_rows(replace(layout, notes=(*layout.notes, *notes)), rows, own=True)
 
 
 def _chosen_meshes(found: _Outlines, reading: Reading) -> list[DrawnMesh]:

@@ -452,7 +452,7 @@ def _with_table(layout: Layout, table: dict[str, dict[str, object]], tags: np.nd
     rows = [table.get(str(tag)) for tag in tags]
     if not all(isinstance(row, dict) for row in rows):
         return layout
-    return with_rows(layout, rows)
+    return with_rows(layout, rows, own=True)
 
 
 def write(layout: Layout, path: Path) -> None:

@@ -17,6 +17,7 @@ from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of, standing
+from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import without_collinear
 from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.remedies import deep_overlaps, proposed_ignore
@@ -38,6 +39,9 @@ from .reading import Reading
 
 #: Largest coordinate [m], larger than the Earth; double precision resolves 1e-8 m there.
 LARGEST_COORDINATE = 1e8
+
+#: Spacing of coordinates in single precision, as a fraction of a block, that is said.
+COARSE = 1e-3
 
 #: Modules whose files may be images, or annotations of one.
 HOLD_IMAGES = ("images", "layout_json")
@@ -222,16 +226,17 @@ def _in_metres(layout: Layout, unit: str | None) -> Layout:
     stated = unit or layout.unit or "m"
     by = "user" if unit else layout.unit_by
     chosen, note = chosen_unit(stated if by else None, layout.unit, layout.sizes) if layout.n_blocks else (stated, "")
-    factor = metres_per(chosen)
+    factor, rounded = metres_per(chosen), _rounded_note(layout)
     layout = replace(
         layout,
         blocks=tuple((points * factor, faces) for points, faces in layout.solids)
         if layout.dimension == 3
         else tuple(without_collinear(ring * factor) for ring in layout.outlines),
-        thickness=None if layout.thickness is None else layout.thickness * factor,
+        thickness=None if layout.thickness is None else layout.thickness * metres_per(layout.thickness_unit or chosen),
+        thickness_unit="m",
         unit=chosen,
         unit_by=by,
-        notes=layout.notes + ((note,) if note else ()),
+        notes=layout.notes + tuple(text for text in (note, rounded) if text),
         left_out=tuple(item.mapped(factor) for item in layout.left_out),
     )
     largest = float(np.abs(layout.points).max(initial=0.0))
@@ -241,6 +246,22 @@ def _in_metres(layout: Layout, unit: str | None) -> Layout:
             f"{LARGEST_COORDINATE:.0e} m of the origin: check the unit or repair the file"
         )
     return layout
+
+
+def _rounded_note(layout: Layout) -> str:
+    """Say that coordinates far from the origin are as coarse as single precision is there, if they look like it."""
+    points = layout.points
+    if layout.n_blocks == 0 or not (points == points.astype(np.float32)).all():
+        return ""
+    largest = float(np.abs(points).max())
+    coarse = float(np.spacing(np.float32(largest)))
+    if coarse <= COARSE * float(np.median(layout.sizes)):
+        return ""
+    return Note(
+        CHANGED,
+        f"all coordinates are numbers of single precision, {coarse:.3g} units apart at {largest:.4g}: stones may have "
+        "lost their shape; export nearer to the origin, or in double precision",
+    )
 
 
 def write_layout(layout: Layout, path: str | Path) -> None:

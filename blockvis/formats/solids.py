@@ -249,9 +249,10 @@ def _standing(bodies: Sequence[Body], axis: int, size: float) -> int:
 def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:
     """Meshes of a scene with its transforms applied, and their names.
 
-    In a .glb file the node has the name of the stone: several nodes may place one mesh, and have one name.
+    In a .glb file the node has the name of the stone: several nodes may place one mesh, and have one name, and a mesh
+    has a primitive for each of its materials.
     """
-    from trimesh.util import unique_name
+    from trimesh.util import concatenate, unique_name
 
     description = _description(path) if path.suffix.lower() == ".glb" else {}
     nodes, meshes = description.get("nodes", []), description.get("meshes", [])
@@ -263,14 +264,17 @@ def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:
             raise ValueError(f"node {node.get('name', k)} has mesh {node['mesh']} of {len(meshes)}")
     order = {name: k for k, name in enumerate(scene.geometry)}
     placed = [(*scene.graph[node], str(node)) for node in scene.graph.nodes_geometry]
-    found = []
+    found: dict[str, tuple[str, list[Any]]] = {}
     for transform, name, node in sorted(placed, key=lambda item: (order[item[1]], number.get(item[2], -1), item[2])):
         mesh = scene.geometry[name]
         if hasattr(mesh, "faces"):
+            # Each primitive of several lies below the node that places their mesh.
+            part = mesh.metadata.get("from_gltf_primitive")
+            node = str(scene.graph.transforms.parents[node]) if part else node
             drawn = nodes[number[node]] if node in number else {"name": str(name)}
             own = drawn.get("name") or meshes[drawn["mesh"]].get("name") or path.name
-            found.append((str(own), mesh.copy().apply_transform(transform)))
-    return found
+            found.setdefault(node, (str(own), []))[1].append(mesh.copy().apply_transform(transform))
+    return [(name, parts[0] if len(parts) == 1 else concatenate(parts)) for name, parts in found.values()]
 
 
 def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any, rows: list[dict[str, Any]]) -> dae.Drawn:
@@ -304,7 +308,7 @@ def _flat(
     layouts = [layout_of_cells(points, list(faces), {}, path, view) for _, points, faces in parts]
     layout = merged(layouts, [name for name, _, _ in parts], path)
     assert isinstance(layout, Layout)
-    return with_rows(layout, rows) if len(rows) == layout.n_blocks else layout
+    return with_rows(layout, rows, own=True) if len(rows) == layout.n_blocks else layout
 
 
 def _own_rows(path: Path) -> list[dict[str, Any]]:
@@ -342,13 +346,18 @@ def write(layout: Layout, path: Path) -> None:
 
 
 def _glb(solids: list[Solid], rows: list[dict[str, Any]]) -> bytes:
-    """Write a node for each block, in single precision; its row stands in the extras."""
+    """Write a node for each block, in single precision about the middle of all; its row stands in the extras."""
     import trimesh
 
-    scene = trimesh.Scene()
+    scene, every = trimesh.Scene(), np.concatenate([points for points, _ in solids])
+    # Whole metres: corners that are numbers of single precision stay what they are.
+    origin = np.round((every.min(axis=0) + every.max(axis=0)) / 2.0)
     for (points, faces), row, name in zip(solids, rows, _distinct(rows), strict=True):
-        mesh = trimesh.Trimesh(points, triangles_of(points, faces), process=False, metadata={"blockvis": row})
+        about = points - origin
+        mesh = trimesh.Trimesh(about, triangles_of(points, faces), process=False, metadata={"blockvis": row})
         scene.add_geometry(mesh, node_name=name, geom_name=name)
+    if origin.any():
+        scene.apply_translation(origin)
 
     def signed(tree: dict[str, Any]) -> None:
         tree["asset"]["generator"] = "blockvis"

@@ -168,7 +168,7 @@ def read(path: Path, reading: Reading) -> Layout:
     notes = tuple(dict.fromkeys([*found.notes, *moved_notes(found.moved)]))
     looks = tuple(found.looks)
     layout = Layout(blocks=turned, names=names, unit=stated, notes=notes, left_out=left_out, looks=looks)
-    return with_rows(replace(layout, unit_by="layout" if own else ""), found.rows)
+    return with_rows(replace(layout, unit_by="layout" if own else ""), found.rows, own=True)
 
 
 def _root(path: Path) -> ElementTree.Element:

@@ -37,8 +37,16 @@ def rows_of(layout: Layout) -> list[dict[str, Any]]:
     return rows
 
 
-def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
+def with_rows(layout: Layout, rows: Sequence[Any], *, own: bool = False) -> Layout:
     """Put the values of a block table, one row per block, into a layout.
+
+    Parameters
+    ----------
+    layout : Layout
+    rows : sequence of mappings
+    own : bool
+        Whether our own writer put them beside the geometry, with thicknesses in metres: these stay when somebody scales
+        the drawing, or says another unit.
 
     Raises
     ------
@@ -62,6 +70,7 @@ def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
     return replace(
         layout,
         thickness=numbers("thickness") if layout.dimension == 2 else None,
+        thickness_unit="m" if own else layout.thickness_unit,
         names=names,
         groups=words("group", [""] * layout.n_blocks),
         roles=roles,

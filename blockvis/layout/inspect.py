@@ -117,6 +117,7 @@ class Inspection:
                 f"{self.sizes.min():.4g} to {self.sizes.max():.4g} {unit}, median {np.median(self.sizes):.4g}, sum "
                 f"{self.sizes.sum():.6g} {unit}",
             ),
+            *self._number_rows(),
             *self.rows,
             *((what, self._counted(of)) for what, of in (("groups", layout.groups), ("materials", layout.materials))),
             *self._look_rows(),
@@ -137,6 +138,17 @@ class Inspection:
         counted = Counter(words[i] for i in self.kept)
         listed = [f"'{word}' {n}" if word else f"none {n}" for word, n in counted.most_common(12)]
         return ", ".join(listed) + (f", {len(counted) - 12} more" if len(counted) > 12 else "")
+
+    def _number_rows(self) -> list[Row]:
+        """Thickness and density of the blocks, where the file says them."""
+        said = (("thickness", self.layout.thickness, "m"), ("density", self.layout.density, "kg/m³"))
+        own = [(title, values[self.kept], unit) for title, values, unit in said if values is not None]
+        ends = [
+            (title, f"{np.nanmin(values):.4g}", f"{np.nanmax(values):.4g}", unit)
+            for title, values, unit in own
+            if np.isfinite(values).any()
+        ]
+        return [(title, f"{low}{f' to {high}' * (high != low)} {unit}") for title, low, high, unit in ends]
 
     def _look_rows(self) -> list[Row]:
         """Kinds and colours of the outlines of a drawing that has several, by which some can be left out."""

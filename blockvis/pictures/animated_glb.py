@@ -82,9 +82,16 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     channels: list[dict[str, Any]] = []
     sizes = np.repeat(stands[:, :, None].astype(float), 3, axis=2)
     rods = _rods(response, ties, poses, tied)
+    # Numbers in single precision are those about the first place of the first block.
+    origin, scene = places[0, 0].copy(), tree["scenes"][tree["scene"]]
+    tree["nodes"].append({"children": scene["nodes"], "translation": origin.tolist()})
+    scene["nodes"] = [len(tree["nodes"]) - 1]
     names = [*response.assembly.names, *map(_rod_name, ties)]
     for what, of_blocks, of_rods in zip(
-        ("translation", "rotation", "scale"), (places, turns, sizes), rods, strict=True
+        ("translation", "rotation", "scale"),
+        (places - origin, turns, sizes),
+        (rods[0] - origin, *rods[1:]),
+        strict=True,
     ):
         for name, values in zip(names, np.moveaxis(np.concatenate([of_blocks, of_rods], axis=1), 1, 0), strict=True):
             tree["nodes"][numbers[name]][what] = values[0].tolist()

@@ -241,13 +241,13 @@ def _shape(
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
-        vertices=vertices.astype(np.float32),
-        at_rest=at_rest.astype(np.float32),
+        vertices=vertices,
+        at_rest=at_rest,
         offsets=offsets.astype(np.int32),
         parts=mechanism.parts[block].astype(np.int16),
         free=assembly.free[block],
-        arrows=np.stack([places, directions], axis=1).astype(np.float32),
-        ties=tied.astype(np.float32),
+        arrows=np.stack([places, directions], axis=1),
+        ties=tied,
         tie_states=falling.ties.states.astype(np.int8),
     )
     return buffer.getvalue()

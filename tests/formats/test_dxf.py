@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import shapely
 
-from blockvis import read, read_layout
+from blockvis import inspect, read, read_layout, write_layout
 from blockvis.cli import main
+from blockvis.layout.layout import Layout
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
@@ -330,6 +331,23 @@ def test_an_upright_drawing_keeps_its_lengths_at_any_angle_and_with_relief(tmp_p
     assert "its relief of 0.0" in " ".join(read_layout(saved(tmp_path, traced)).notes)
     layout = read_layout(saved(tmp_path, slanting), view="xz")
     assert any("elevations were ignored: the drawing was read as seen along y" in note for note in layout.notes)
+
+
+@pytest.mark.parametrize("suffix", [".dxf", ".svg"])
+def test_a_thickness_that_we_wrote_stays_when_the_drawing_is_scaled(tmp_path, suffix):
+    """It is in metres beside the geometry, whatever unit somebody gives the drawing."""
+    layout = Layout((np.array(SQUARE, dtype=float),), ("a",), thickness=np.array([0.5]))
+    path = tmp_path / f"a{suffix}"
+    write_layout(layout, path)
+    if suffix == ".dxf":
+        document = ezdxf.readfile(path)
+        for entity in document.modelspace():
+            entity.scale_uniform(1000.0)
+        document.header["$INSUNITS"] = 4
+        document.saveas(path)
+    again = read_layout(path, unit="mm")
+    assert (again.unit, again.thickness.tolist()) == ("mm", [0.5])
+    assert "thickness       0.5 m" in str(inspect(path, unit="mm"))
 
 
 def test_faults_of_a_file_are_noted_and_not_printed(tmp_path, capfd):

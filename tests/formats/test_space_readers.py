@@ -43,6 +43,26 @@ def test_a_glb_file_of_trimesh_has_z_up(dome, tmp_path):
     assert same(read(tmp_path / "dome.glb", roles={"springer *": "fixed"}), dome)
 
 
+def test_a_stone_of_several_materials_in_a_glb_file_is_one_body(tmp_path):
+    """Its mesh has a primitive for each: here the front, then the rest."""
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.Scene()
+    for k, name in enumerate(("fixed base", "stone")):
+        scene.add_geometry(trimesh.creation.box(bounds=[[0, 0, k], [1, 1, k + 1]]), node_name=name, geom_name=name)
+
+    def split(tree):
+        (whole,), accessors = tree["meshes"][1]["primitives"], tree["accessors"]
+        faces = accessors[whole["indices"]]
+        assert (faces["componentType"], faces["count"]) == (5125, 36)
+        accessors += [{**faces, "count": 12}, {**faces, "count": 24, "byteOffset": faces.get("byteOffset", 0) + 12 * 4}]
+        tree["meshes"][1]["primitives"] = [{**whole, "indices": len(accessors) - k} for k in (2, 1)]
+
+    (tmp_path / "a.glb").write_bytes(scene.export(file_type="glb", tree_postprocessor=split))
+    assembly = read(tmp_path / "a.glb", dimension=3)
+    assert (assembly.names, assembly.roles.tolist()) == (("fixed base", "stone"), ["fixed", "free"])
+    np.testing.assert_allclose(assembly.shapes.volumes, 1.0)
+
+
 def test_y_is_up_in_a_glb_file_of_other_programs(dome, tmp_path):
     data = (
         scene_of(dome)

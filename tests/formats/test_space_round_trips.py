@@ -171,3 +171,18 @@ def test_glb_comes_back_in_single_precision_with_y_up(vault, tmp_path):
     again = read(tmp_path / "arch.glb")
     assert again.dimension == 2
     np.testing.assert_allclose(again.centroids, flat.centroids, atol=1e-6)
+
+
+def test_coordinates_of_the_world_survive_single_precision_or_are_noted(tmp_path):
+    """A .glb is written about the middle of the blocks; what others rounded to 0.25 m is said."""
+    import trimesh
+
+    flat = generators.arch()
+    rings = [np.add(flat.outline(i), [2600000.0, 1200000.0]) for i in range(flat.n_blocks)]
+    far = solver.Assembly.from_outlines(rings, names=flat.names, roles=flat.roles)
+    save_layout(far, tmp_path / "far.glb")
+    np.testing.assert_allclose(read(tmp_path / "far.glb").areas, flat.areas, rtol=1e-6)
+    assert "single precision" not in " ".join(read_layout(tmp_path / "far.glb").notes)
+    solids = [trimesh.creation.box(bounds=[[2600000 + k, 0, 0], [2600001 + k, 0.5, 1]]) for k in range(2)]
+    (tmp_path / "a.stl").write_bytes(trimesh.util.concatenate(solids).export(file_type="stl"))
+    assert "numbers of single precision, 0.25 units apart at 2.6e+06" in " ".join(read_layout(tmp_path / "a.stl").notes)
