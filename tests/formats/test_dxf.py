@@ -7,10 +7,10 @@ import ezdxf
 import numpy as np
 import pytest
 import shapely
+from structures import drawn
 
 from blockvis import inspect, read, read_layout, write_layout
 from blockvis.cli import main
-from blockvis.layout.layout import Layout
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
@@ -336,9 +336,8 @@ def test_an_upright_drawing_keeps_its_lengths_at_any_angle_and_with_relief(tmp_p
 @pytest.mark.parametrize("suffix", [".dxf", ".svg"])
 def test_a_thickness_that_we_wrote_stays_when_the_drawing_is_scaled(tmp_path, suffix):
     """It is in metres beside the geometry, whatever unit somebody gives the drawing."""
-    layout = Layout((np.array(SQUARE, dtype=float),), ("a",), thickness=np.array([0.5]))
     path = tmp_path / f"a{suffix}"
-    write_layout(layout, path)
+    write_layout(read_layout(drawn(tmp_path / "a.json", [np.array(SQUARE)], thickness=[0.5])), path)
     if suffix == ".dxf":
         document = ezdxf.readfile(path)
         for entity in document.modelspace():
