@@ -85,6 +85,17 @@ class Members:
         forces = (give - contacts.gaps / self.model.length) / self.compliance[number]
         return np.clip(forces, 0.0, self.strength[number])
 
+    def across(
+        self, contacts: Contacts, lengths: np.ndarray, forces: np.ndarray, bound: np.ndarray, compliance: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds and compliances with those across members under tension: their forces turn with them, by F / l."""
+        bound, compliance = bound.copy(), compliance.copy()
+        pulls = np.flatnonzero(is_member(contacts) & (contacts.features[:, 2] == 0) & (forces[:, 0] > 0.0))
+        length = (lengths[contacts.features[pulls, 1], 1] - contacts.gaps[pulls]) / self.model.length
+        bound[pulls] = forces[pulls, 0]
+        compliance[pulls, 1:] = (length / forces[pulls, 0])[:, None]
+        return bound, compliance
+
     def after(self, contacts: Contacts, forces: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """(n_ties, 2) array: lengths after a step to contact points with these forces: what yields gives for good."""
         full = self._at_strength(contacts, forces)

@@ -384,18 +384,21 @@ class Stepper:
         pose = put_together(free, moved(place.pose, self._of_blocks(motion_so_far)), supports)
         contacts = self.measured(start, pose, place.tie_lengths)
         load, (live, live_size) = self._load(pose, loads), model.scaled_live(pose)
-        multiplier, number = place.multiplier * live_size, 0
+        multiplier, number, members = place.multiplier * live_size, 0, is_member(start)
         while True:
             rows = ContactRows(wrench_matrix(contacts, pose, model.length), free, model.assembly.centroids)
             control = driver.control(pose) if model.live is not None else None
+            bound, compliance = self.members.across(
+                contacts, place.tie_lengths, forces, points.bound, points.compliance
+            )
             problem = ContactProblem(
                 rows=rows,
                 gap=joints.beyond_give(contacts.gaps) / model.length,
                 slip=(contacts.slip - start.slip) / model.length,
                 # Gaps are absolute, so that the give across a joint is taken back; slip counts from the step's start.
                 forces=before_step + points.pulled,
-                bound=points.bound,
-                compliance=points.compliance,
+                bound=bound,
+                compliance=compliance,
                 most=self.members.largest_forces(start),
                 load=load + resisting * before - rows.resultant(points.pulled),
                 viscosity=resisting,
@@ -409,6 +412,8 @@ class Stepper:
             solution = minimise(problem, guess, multiplier)
             forces, multiplier = solution.forces - points.pulled, solution.multiplier
             guess = trial = solution.trial
+            # Where they have turned to, members have forces along them only.
+            forces[members, 1:] = trial[members, 1:] = 0.0
             # A linearised rotation makes blocks grow: the first linearisation's forces are not kept.
             if number:
                 before_step[:, 0] = points.kept * forces[:, 0]

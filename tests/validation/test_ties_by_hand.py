@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from structures import upright
 
 import solver
 from solver import Tie, mechanics
@@ -36,6 +37,27 @@ def test_a_rope_takes_what_its_elongation_says_until_the_block_hangs():
     np.testing.assert_allclose(force, [0.0, 500.0, 1000.0, 1000.0, 1000.0], atol=1.0)
     np.testing.assert_allclose(response.reaction + force, 1000.0, rtol=1e-5)
     assert response.increments[-1].ties.elongations[0] == pytest.approx(0.001, rel=1e-4)
+
+
+@pytest.mark.parametrize("space", [False, True])
+@pytest.mark.parametrize("direction", [(0.0, -1.0), (0.3, -1.0)])
+def test_what_its_support_has_left_hangs_on_its_ties(space, direction):
+    """A lintel of 1000 N whose ropes are 0.7 and 0.5 m from its middle; they turn with it, as pendulums do."""
+    ends = [((x, 0.5), (x, 1.5)) for x in (0.3, 1.5)]
+    outlines, roles = [_box(0, 0, 2, 0.5), _box(0, -0.2, 2, 0)], ["free", "moving"]
+    if space:
+        direction = (direction[0], 0.0, direction[1])
+        ends = [tuple((x, 0.2, z) for x, z in both) for both in ends]
+        solids = [upright(outline, 0.0, 0.4) for outline in outlines]
+        assembly = solver.Assembly.from_solids(solids, roles=roles, density=2500.0 / solver.GRAVITY)
+    else:
+        assembly = solver.Assembly.from_outlines(outlines, roles=roles, density=1000.0 / solver.GRAVITY)
+    ropes = [Tie(f"rope {k}", (0, None), both, 1e6) for k, both in enumerate(ends)]
+    structure = solver.Structure(assembly, friction_coefficient=0.6, ties=ropes)
+    response = structure.settle(solver.Settlement(direction, increment=0.001, limit=0.004))
+    assert response.stop == solver.Status.LIMIT_REACHED
+    np.testing.assert_allclose(response.increments[-1].ties.forces, [1000 * 0.5 / 1.2, 1000 * 0.7 / 1.2], rtol=2e-3)
+    assert response.reaction[-1] == pytest.approx(0.0, abs=1e-3)
 
 
 def test_a_rope_that_yields_leaves_the_rest_to_the_support_and_one_that_breaks_all_of_it():
