@@ -16,7 +16,7 @@ from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import FLAT, spread_of
-from blockvis.layout.solids import Solid, area_vectors, fans, prism, triangles_of
+from blockvis.layout.solids import BASE_FRAME, Solid, area_vectors, fans, prism, triangles_of
 from blockvis.system.extras import MissingExtra
 from solver.mechanics import counted
 
@@ -252,28 +252,34 @@ def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:
     In a .glb file the node has the name of the stone: several nodes may place one mesh, and have one name, and a mesh
     has a primitive for each of its materials.
     """
+    from trimesh import Trimesh
     from trimesh.util import concatenate, unique_name
 
     description = _description(path) if path.suffix.lower() == ".glb" else {}
     nodes, meshes = description.get("nodes", []), description.get("meshes", [])
-    # trimesh numbers nodes of the same name.
+    # trimesh numbers nodes of the same name, and one that is called as its frame of all.
     number, counts = dict[str, int](), dict[str | None, int]()
     for k, node in enumerate(nodes):
         number[unique_name(node.get("name", str(k)), number, counts=counts)] = k
         if "mesh" in node and not 0 <= node["mesh"] < len(meshes):
             raise ValueError(f"node {node.get('name', k)} has mesh {node['mesh']} of {len(meshes)}")
-    order = {name: k for k, name in enumerate(scene.geometry)}
-    placed = [(*scene.graph[node], str(node)) for node in scene.graph.nodes_geometry]
+    if scene.graph.base_frame in number:
+        number[unique_name(scene.graph.base_frame, set(number))] = number[scene.graph.base_frame]
+    order, parents = {name: k for k, name in enumerate(scene.geometry)}, scene.graph.transforms.parents
+    placed = []
+    for below in scene.graph.nodes_geometry:
+        transform, name = scene.graph[below]
+        # Each primitive of several lies, under a name by chance, below the node that places their mesh.
+        node = parents[below] if below not in number and parents.get(below) in number else below
+        placed.append((order[name], number.get(node, -1), str(node), scene.geometry[name], transform))
     found: dict[str, tuple[str, list[Any]]] = {}
-    for transform, name, node in sorted(placed, key=lambda item: (order[item[1]], number.get(item[2], -1), item[2])):
-        mesh = scene.geometry[name]
+    for k, n, node, mesh, transform in sorted(placed, key=lambda item: item[:3]):
         if hasattr(mesh, "faces"):
-            # Each primitive of several lies below the node that places their mesh.
-            part = mesh.metadata.get("from_gltf_primitive")
-            node = str(scene.graph.transforms.parents[node]) if part else node
-            drawn = nodes[number[node]] if node in number else {"name": str(name)}
+            drawn = nodes[n] if n >= 0 else {"name": str([*order][k])}
             own = drawn.get("name") or meshes[drawn["mesh"]].get("name") or path.name
-            found.setdefault(node, (str(own), []))[1].append(mesh.copy().apply_transform(transform))
+            # Without its textures, which would be joined to one.
+            shape = Trimesh(mesh.vertices, mesh.faces, process=False, metadata=mesh.metadata)
+            found.setdefault(node, (str(own), []))[1].append(shape.apply_transform(transform))
     return [(name, parts[0] if len(parts) == 1 else concatenate(parts)) for name, parts in found.values()]
 
 
@@ -349,7 +355,7 @@ def _glb(solids: list[Solid], rows: list[dict[str, Any]]) -> bytes:
     """Write a node for each block, in single precision about the middle of all; its row stands in the extras."""
     import trimesh
 
-    scene, every = trimesh.Scene(), np.concatenate([points for points, _ in solids])
+    scene, every = trimesh.Scene(base_frame=BASE_FRAME), np.concatenate([points for points, _ in solids])
     # Whole metres: corners that are numbers of single precision stay what they are.
     origin = np.round((every.min(axis=0) + every.max(axis=0)) / 2.0)
     for (points, faces), row, name in zip(solids, rows, _distinct(rows), strict=True):

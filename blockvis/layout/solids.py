@@ -12,6 +12,9 @@ from .triangulation import triangles_of_ring
 #: A block in space: (n, 3) corners, and the corners around each face, counter-clockwise seen from outside.
 Solid = tuple[np.ndarray, list[list[int]]]
 
+#: Name of the frame of trimesh in which all nodes of a .glb lie: one that no block has, which would hold the others.
+BASE_FRAME = "\0world"
+
 
 def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """(n, 3) array: cross products, several times as fast as ``np.cross`` for the few faces of a block."""

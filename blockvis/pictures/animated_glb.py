@@ -15,7 +15,7 @@ import solver
 from blockvis.dynamics.fall import Fall
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import layout_of
-from blockvis.layout.solids import prism, triangles_of
+from blockvis.layout.solids import BASE_FRAME, prism, triangles_of
 from blockvis.results.ties import known_ties
 from blockvis.system.atomic_files import write_atomic
 from solver import mechanics
@@ -34,9 +34,6 @@ TIE_RADIUS = 0.03
 
 #: Rotation that turns z upwards into y upwards, as glTF has it.
 UPRIGHT = Rotation.from_euler("x", -90, degrees=True)
-
-#: Name of the frame of trimesh in which all nodes lie: one that no block can have, which would hold the others.
-BASE = "\0world"
 
 #: Component type of single precision in glTF, and the tags of its two chunks.
 FLOAT, JSON, BIN = 5126, 0x4E4F534A, 0x004E4942
@@ -198,7 +195,7 @@ def _still(assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> bytes:
         depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
         solids = [prism(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)]
     colours = palette.block_colours(assembly.materials, assembly.free)
-    scene = trimesh.Scene(base_frame=BASE)
+    scene = trimesh.Scene(base_frame=BASE_FRAME)
     rows = zip(assembly.names, solids, rows_of(layout), colours, strict=True)
     for number, (name, (points, faces), row, colour) in enumerate(rows):
         about = points.copy()

@@ -56,11 +56,29 @@ def test_a_stone_of_several_materials_in_a_glb_file_is_one_body(tmp_path):
         assert (faces["componentType"], faces["count"]) == (5125, 36)
         accessors += [{**faces, "count": 12}, {**faces, "count": 24, "byteOffset": faces.get("byteOffset", 0) + 12 * 4}]
         tree["meshes"][1]["primitives"] = [{**whole, "indices": len(accessors) - k} for k in (2, 1)]
+        # Its edges as a loop, which trimesh does not read, make one primitive of two.
+        tree["meshes"][0]["primitives"].append({**tree["meshes"][0]["primitives"][0], "mode": 2})
+        tree["nodes"] += [{"name": f"stone {k}", "mesh": 1, "translation": [0, 0, k]} for k in range(1, 8)]
+        tree["nodes"].append({"name": "support", "mesh": 0, "translation": [0, 0, 9]})
+        tree["scenes"][0]["nodes"] += range(2, len(tree["nodes"]))
 
     (tmp_path / "a.glb").write_bytes(scene.export(file_type="glb", tree_postprocessor=split))
-    assembly = read(tmp_path / "a.glb", dimension=3)
-    assert (assembly.names, assembly.roles.tolist()) == (("fixed base", "stone"), ["fixed", "free"])
+    assembly = read(tmp_path / "a.glb", dimension=3, view="xz")
+    assert assembly.names == ("fixed base", "support", "stone", *(f"stone {k}" for k in range(1, 8)))
+    np.testing.assert_allclose(assembly.centroids[:, 2], [0.5, 9.5, *np.arange(1.5, 9.0)])
+    assert assembly.roles.tolist() == ["fixed"] * 2 + ["free"] * 8
     np.testing.assert_allclose(assembly.shapes.volumes, 1.0)
+
+
+def test_a_node_of_a_glb_file_that_is_called_as_the_frame_of_trimesh_keeps_its_name(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.Scene(trimesh.creation.box((1, 1, 1)))
+
+    def renamed(tree):
+        tree["nodes"][0]["name"] = "world"
+
+    (tmp_path / "a.glb").write_bytes(scene.export(file_type="glb", tree_postprocessor=renamed))
+    assert read(tmp_path / "a.glb", dimension=3).names == ("world",)
 
 
 def test_y_is_up_in_a_glb_file_of_other_programs(dome, tmp_path):

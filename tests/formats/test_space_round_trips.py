@@ -88,6 +88,16 @@ def test_names_that_repeat_or_are_empty_lose_nothing(suffix, tmp_path):
         np.testing.assert_allclose(points.mean(axis=0), drawn.mean(axis=0), atol=1e-6)
 
 
+@pytest.mark.parametrize("far", [0.0, 2600000.0])
+def test_a_block_called_as_the_frame_of_trimesh_stays_where_it_is(far, tmp_path):
+    stones = [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 1], [1, 2], [0, 2]]]
+    drawn = solver.Assembly.from_outlines(np.add(stones, [far, 1200.0]), names=["ground", "world"])
+    save_layout(drawn, tmp_path / "a.glb")
+    again = read(tmp_path / "a.glb")
+    assert again.names == drawn.names
+    np.testing.assert_allclose(again.centroids, drawn.centroids, rtol=0.0, atol=1e-6)
+
+
 @pytest.mark.parametrize("suffix", [".stl", ".compas.json"])
 def test_the_same_joints_are_found(vault, suffix, tmp_path):
     path = tmp_path / f"vault{suffix}"
