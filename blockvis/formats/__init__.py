@@ -22,6 +22,8 @@ class Format:
         In this room.
     writes, writes_space : bool
         Whether it writes them, also blocks in space.
+    shapes_only : bool
+        Whether it holds no more of a block than its shape and name.
     alone : bool
         Whether a file holds all blocks: in a folder of one file per stone it is something else, such as a picture.
     """
@@ -29,6 +31,7 @@ class Format:
     module: str
     writes: bool = False
     writes_space: bool = False
+    shapes_only: bool = False
     alone: bool = False
 
 
@@ -45,7 +48,8 @@ FORMATS = {
     ".txt": Format("threedec", alone=True),
     **dict.fromkeys((".vtm", ".vtmb", ".pvd"), Format("pyvista_files")),
     **dict.fromkeys((".gpkg", ".shp"), Format("geodata")),
-    **dict.fromkeys((".stl", ".obj", ".ply", ".glb"), Format("solids", writes=True, writes_space=True)),
+    ".stl": Format("solids", writes=True, writes_space=True, shapes_only=True),
+    **dict.fromkeys((".obj", ".ply", ".glb"), Format("solids", writes=True, writes_space=True)),
     **dict.fromkeys((".off", ".dae"), Format("solids")),
     **dict.fromkeys((".3ddat", ".3dec", ".dat"), Format("threedec")),
     **dict.fromkeys((".geo", ".geo_unrolled", ".step", ".stp", ".brep"), Format("gmsh_cad")),

@@ -15,6 +15,7 @@ import numpy as np
 import solver
 from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
+from blockvis.layout.block_table import rows_of
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of, standing
 from blockvis.layout.notes import CHANGED, Note
@@ -28,8 +29,9 @@ from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
 from blockvis.layout.window import checked_window, within_window
 from blockvis.system.atomic_files import atomic_file, write_atomic
+from solver import mechanics
 
-from .bodies import Bodies, as_drawn, in_dimension
+from .bodies import Bodies, as_drawn, in_dimension, with_role
 from .cells import of_files
 from .elsewhere import cannot_read
 from .files import MissingFile as MissingFile
@@ -265,10 +267,30 @@ def _rounded_note(layout: Layout) -> str:
 
 
 def write_layout(layout: Layout, path: str | Path) -> None:
-    """Write a layout to a file; the suffix chooses the format, lengths in m."""
+    """Write a layout to a file; the suffix chooses the format, lengths in m.
+
+    What the layout says of its blocks and the format cannot hold is a ``UserWarning``.
+    """
     if layout.n_blocks == 0:
         raise ValueError(f"there is no block to write to '{path}'")
     _write_by_suffix(layout, Path(path))
+    suffix = Path(path).suffix.lower()
+    lost = _beside_shapes(layout) if FORMATS[suffix].shapes_only else ""
+    if lost:
+        warnings.warn(
+            f"'{path}': {suffix} holds shapes and names alone, not the {lost}; write .obj or .json to keep them",
+            stacklevel=2,
+        )
+
+
+def _beside_shapes(layout: Layout) -> str:
+    """Count what a layout says of its blocks beside their shapes and names; a role that the name says is not lost."""
+    rows = [row for row in rows_of(layout) if row.get("role", mechanics.FREE) != mechanics.FREE]
+    roles = sum(with_role({"name": row["name"]}).get("role") != row["role"] for row in rows)
+    density = 0 if layout.density is None else int(np.isfinite(layout.density).sum())
+    found = [("role", roles), ("density", density)]
+    found += [("group", sum(map(bool, layout.groups))), ("material", sum(map(bool, layout.materials)))]
+    return ", ".join(f"{what} of {mechanics.counted(n, 'block')}" for what, n in found if n)
 
 
 def read(

@@ -63,6 +63,24 @@ def test_everything_comes_back(layout, suffix, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", WRITTEN)
+def test_what_a_format_cannot_hold_is_said(layout, suffix, tmp_path, recwarn):
+    """All of the layout in .stl: roles that no name says, materials and densities."""
+    save_layout(layout, tmp_path / f"a{suffix}")
+    said = [str(warning.message) for warning in recwarn]
+    assert said == [
+        f"'{tmp_path}/a.stl': .stl holds shapes and names alone, not the role of 2 blocks, density of 4 blocks, "
+        "material of 3 blocks; write .obj or .json to keep them"
+    ] * (suffix == ".stl")
+
+
+def test_a_role_that_the_name_says_is_not_lost_in_an_stl_file(tmp_path, recwarn):
+    base = solver.Assembly.from_outlines([[[0, 0], [1, 0], [0, 1]]], names=["fixed base"], roles=["fixed"])
+    save_layout(base, tmp_path / "a.stl")
+    assert "names alone, not the density of 1 block; write" in str(recwarn.pop().message)
+    assert read_layout(tmp_path / "a.stl").roles == ("fixed",)
+
+
+@pytest.mark.parametrize("suffix", WRITTEN)
 def test_the_reader_says_what_it_assumed_of_the_unit(layout, suffix, tmp_path):
     path = tmp_path / f"layout{suffix}"
     save_layout(layout, path)
