@@ -122,6 +122,8 @@ class Worker:
             self._process.wait()
         with unread():
             self._process.stdin.close()
+        if self._errors is not None:
+            self._errors.close()
         return at_work
 
     def _listen(self) -> None:

@@ -1,7 +1,9 @@
 """Geometry through gmsh: scripts and STEP, surfaces and volumes."""
 
+import gc
 import math
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -104,6 +106,16 @@ def test_the_unit_of_a_step_file_and_the_one_asked_for(tmp_path, stated, asked, 
     assert read(path, unit=asked, view="xy").areas == pytest.approx([0.3 * (size * metres) ** 2] * 3)
     assert read_layout(path, unit=asked, view="xy").thickness == pytest.approx([0.25 * size * metres] * 3)
     assert read_layout(path, unit=asked).names == ("volume 1", "volume 2", "volume 3")
+
+
+def test_no_file_stays_open(tmp_path):
+    path = step(tmp_path)
+    gc.collect()
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", ResourceWarning)
+        read_layout(path)
+        gc.collect()
+    assert [str(one.message) for one in told if one.category is ResourceWarning] == []
 
 
 def test_what_is_left_out_of_a_step_file_is_in_its_unit(tmp_path):
