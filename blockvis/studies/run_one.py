@@ -217,7 +217,7 @@ def _shape(
     settlement: solver.Settlement,
     ties: Sequence[solver.Tie],
 ) -> bytes:
-    """Pack the blocks as the mechanism displaces them, in single precision, for a small picture.
+    """Pack the blocks as the mechanism displaces them, for a small picture.
 
     Of blocks in space these are the faces that are seen, as they are seen. The arrows are where supports settle, and
     which way.
