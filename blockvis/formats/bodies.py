@@ -104,8 +104,8 @@ class Bodies:
     unit : str
         Unit of length that the file states, "" for none.
     notes : tuple of str
-    up : {"z", "y"}
-        The coordinate that points up.
+    up : {"z", "y", ""}
+        The coordinate that points up; "" where it differs between files.
     up_says : str
         Why, for a note.
     """
@@ -228,8 +228,14 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
     Raises
     ------
     ValueError
-        For bodies without a volume, or with more faces than a block may have.
+        For bodies without a volume, or with more faces than a block may have, and for files of which some have y up and
+        others z.
     """
+    if not found.up and reading.view is None:
+        raise ValueError(
+            f"'{path}': y is up in some of its files and z in others; export them alike, or give view = \"xy\" if y is "
+            'up in all of them, "xz" if z is'
+        )
     asked, view = _selected(found, path, reading), reading.view
     lying = found.up == "y" if view is None else view == "xy"
     solids, warped, changed, bent = [], [], [], []

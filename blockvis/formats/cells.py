@@ -271,7 +271,9 @@ def _merged_bodies(parts: Sequence[tuple[Bodies, str]]) -> Bodies:
         bodies += [replace(body, name=name) for body, name in zip(part.bodies, names, strict=True)]
         group = {"group": label} if label else {}
         rows += [{**group, **row, "name": name} for row, name in zip(part.rows, names, strict=True)]
-    return Bodies(tuple(bodies), tuple(rows), parts[0][0].unit, _joined_notes([part for part, _ in parts]))
+    first, ups = parts[0][0], {part.up for part, _ in parts}
+    notes = _joined_notes([part for part, _ in parts])
+    return replace(first, bodies=tuple(bodies), rows=tuple(rows), notes=notes, up=first.up if len(ups) == 1 else "")
 
 
 def _joined_notes(parts: Sequence[Layout | Bodies]) -> tuple[str, ...]:
