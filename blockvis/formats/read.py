@@ -192,7 +192,7 @@ def _outlines(path: Path, reading: Reading) -> Layout:
     content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
     with carrying(lambda: as_drawn(content)):
         layout = _in_dimension(content, path, reading)
-    layout = replace(layout, source=str(path))
+    layout = replace(layout, source=str(path), notes=layout.notes + _rounded_note(content, layout))
     if layout.dimension == 3:
         return _in_metres(layout, unit)
     if layout.n_blocks == 0 and not layout.left_out:
@@ -228,7 +228,7 @@ def _in_metres(layout: Layout, unit: str | None) -> Layout:
     stated = unit or layout.unit or "m"
     by = "user" if unit else layout.unit_by
     chosen, note = chosen_unit(stated if by else None, layout.unit, layout.sizes) if layout.n_blocks else (stated, "")
-    factor, rounded = metres_per(chosen), _rounded_note(layout)
+    factor = metres_per(chosen)
     layout = replace(
         layout,
         blocks=tuple((points * factor, faces) for points, faces in layout.solids)
@@ -238,7 +238,7 @@ def _in_metres(layout: Layout, unit: str | None) -> Layout:
         thickness_unit="m",
         unit=chosen,
         unit_by=by,
-        notes=layout.notes + tuple(text for text in (note, rounded) if text),
+        notes=layout.notes + ((note,) if note else ()),
         left_out=tuple(item.mapped(factor) for item in layout.left_out),
     )
     largest = float(np.abs(layout.points).max(initial=0.0))
@@ -250,19 +250,25 @@ def _in_metres(layout: Layout, unit: str | None) -> Layout:
     return layout
 
 
-def _rounded_note(layout: Layout) -> str:
-    """Say that coordinates far from the origin are as coarse as single precision is there, if they look like it."""
-    points = layout.points
-    if layout.n_blocks == 0 or not (points == points.astype(np.float32)).all():
-        return ""
-    largest = float(np.abs(points).max())
+def _rounded_note(content: Layout | Bodies, layout: Layout) -> tuple[str, ...]:
+    """Say that coordinates far from the origin are as coarse as single precision is there, if they look like it.
+
+    Planes that were fitted to faces, and what else makes a layout of bodies, hide it.
+    """
+    corners = content.every_corner if isinstance(content, Layout) else [body.points for body in content.bodies]
+    with np.errstate(over="ignore", invalid="ignore"):
+        if not layout.n_blocks or not all((points == points.astype(np.float32)).all() for points in corners):
+            return ()
+    largest = max(float(np.abs(points).max(initial=0.0)) for points in corners)
     coarse = float(np.spacing(np.float32(largest)))
     if coarse <= COARSE * float(np.median(layout.sizes)):
-        return ""
-    return Note(
-        CHANGED,
-        f"all coordinates are numbers of single precision, {coarse:.3g} units apart at {largest:.4g}: stones may have "
-        "lost their shape; export nearer to the origin, or in double precision",
+        return ()
+    return (
+        Note(
+            CHANGED,
+            f"all coordinates are numbers of single precision, {coarse:.3g} units apart at {largest:.4g}: stones may "
+            "have lost their shape; export nearer to the origin, or in double precision",
+        ),
     )
 
 

@@ -211,3 +211,13 @@ def test_coordinates_of_the_world_survive_single_precision_or_are_noted(tmp_path
     solids = [trimesh.creation.box(bounds=[[2600000 + k, 0, 0], [2600001 + k, 0.5, 1]]) for k in range(2)]
     (tmp_path / "a.stl").write_bytes(trimesh.util.concatenate(solids).export(file_type="stl"))
     assert "numbers of single precision, 0.25 units apart at 2.6e+06" in " ".join(read_layout(tmp_path / "a.stl").notes)
+
+
+def test_coordinates_of_single_precision_are_noted_though_planes_are_fitted_to_faces(tmp_path):
+    """The corners of these have all digits again."""
+    dome = layout_of(generators.dome(lunes=8, courses=4))
+    far = tuple((np.float32(points + 45000.0).astype(float), faces) for points, faces in dome.solids)
+    write_layout(replace(dome, blocks=far), tmp_path / "a.obj")
+    notes = " ".join(read_layout(tmp_path / "a.obj").notes)
+    assert "planes were fitted to warped faces" in notes
+    assert "numbers of single precision, 0.00391 units apart at 4.5e+04" in notes
