@@ -68,7 +68,8 @@ def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
         stated.append(program)
         raise StopIteration
 
-    friction, limits = np.full(len(contacts), FRICTION), ForceLimits.dry(len(contacts))
+    friction, none = np.full(len(contacts), FRICTION), np.zeros(len(contacts))
+    limits = ForceLimits(least=none, most=none + np.inf, cohesion=none)
     closed = contacts.gaps <= COMPUTED_GAP * length
     with patch.object(solve, "run_clarabel", kept), suppress(StopIteration):
         StaticProgram(model, Pose.initial(assembly), contacts, friction, sinks, closed, limits).bounds()

@@ -43,8 +43,8 @@ class EquilibriumChecks:
         """Whether the forces of a place are within friction and cohesion, as they are where blocks only turn."""
         contacts, normal = place.contacts, place.forces[:, 0]
         assert contacts is not None
-        limits = self.stepper.joint_limits(place, contacts)[1]
-        allowed = self.stepper.friction(contacts) * (normal - limits.least) + limits.cohesion
+        _, least, cohesion = self.stepper.joint_limits(place, contacts)
+        allowed = self.stepper.friction(contacts) * (normal - least) + cohesion
         return bool((np.linalg.norm(place.forces[:, 1:], axis=1) < allowed + CARRIES).all())
 
     def nearest(self, place: Place, gap: float, reaction: float | None = None, at_rest: bool = False) -> np.ndarray:

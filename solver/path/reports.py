@@ -42,12 +42,12 @@ class Reports:
         balance = (resultant + model.scaled_load_at(place.pose) + multiplier * live)[model.assembly.free]
         support_forces = on_supports(model, contacts, place.pose, check.forces)
         state = self._state(place, contacts, check.forces, check.friction, velocity, support_forces)
-        gaps, limits = self.stepper.joint_limits(place, contacts, check.forces)
+        gaps, least, cohesion = self.stepper.joint_limits(place, contacts, check.forces)
         between, beyond = ~is_member(contacts), check.forces.copy()
-        beyond[:, 0] -= limits.least
+        beyond[:, 0] -= least
         # Give of elastic joints is neither a gap nor a penetration.
         in_place = replace(state.contacts, gaps=gaps[between])
-        excess = friction_excess(beyond[between], state.friction, limits.cohesion[between])
+        excess = friction_excess(beyond[between], state.friction, cohesion[between])
         certificate = Certificate(
             equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
             friction_excess=excess / model.total_load,

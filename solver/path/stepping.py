@@ -228,25 +228,21 @@ class Stepper:
 
         Those between blocks do up to a gap, in block sizes, beyond the give of their joints.
         """
-        gaps, limits = self.joint_limits(place, contacts)
+        gaps, least, cohesion = self.joint_limits(place, contacts)
         members, is_open = is_member(contacts), gaps > gap * self.model.length
         # An open joint with a rest of its strength holds, and does not push.
-        least, most = limits.least.copy(), np.where((limits.least < 0.0) & is_open, 0.0, np.inf)
+        most = np.where((least < 0.0) & is_open, 0.0, np.inf)
         least[members], most[members] = self.members.force_range(contacts[members], gap)
         carries = ~is_open | (least != 0.0) | np.isfinite(most)
-        return carries, replace(limits, least=least, most=most)
+        return carries, ForceLimits(least, most, cohesion)
 
     def joint_limits(
         self, place: Place, contacts: Contacts, forces: np.ndarray | None = None
-    ) -> tuple[np.ndarray, ForceLimits]:
-        """Gaps [m] beyond the give of joints under forces, or without, and the limits of the forces between blocks."""
-        limits = ForceLimits.dry(len(contacts))
-        if not self.mortar.present:
-            return contacts.gaps, limits
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Gaps [m] beyond the give of joints under forces, or without; least normal force and cohesion between blocks."""
         joints, friction = self.mortar.points(place, contacts), self.friction(contacts)
         gaps = joints.beyond_give(contacts.gaps, 0.0 if forces is None else forces[:, 0])
-        cohesion = np.maximum(joints.cohesion - friction * joints.tension, 0.0)
-        return gaps, replace(limits, least=-joints.tension, cohesion=cohesion)
+        return gaps, -joints.tension, np.maximum(joints.cohesion - friction * joints.tension, 0.0)
 
     @staticmethod
     def joint_compliance(contacts: Contacts, factor: float = 1.0) -> np.ndarray:

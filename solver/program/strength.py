@@ -57,11 +57,6 @@ class ForceLimits:
     most: np.ndarray
     cohesion: np.ndarray
 
-    @classmethod
-    def dry(cls, n: int) -> ForceLimits:
-        """Make the limits of contact points that push only."""
-        return cls(np.zeros(n), np.full(n, np.inf), np.zeros(n))
-
 
 @dataclass(frozen=True)
 class Admissible:
