@@ -47,8 +47,6 @@ class Members:
 
     def installed(self, place: Place, phase: int, told: TieForces | None = None) -> Place:
         """Install the members of a phase, from 0, at the geometry of a place, or all as an increment tells of them."""
-        if not self.ties:
-            return place
         if told is not None:
             before = np.where(told.states == ABSENT, np.nan, tie_lengths(told.ends) - told.elongations)
             return replace(place, tie_lengths=np.stack([before, told.rest], axis=1))
@@ -99,8 +97,6 @@ class Members:
     def after(self, contacts: Contacts, forces: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """(n_ties, 2) array: lengths after a step to contact points with these forces: what yields gives for good."""
         full = self._at_strength(contacts, forces)
-        if not len(full):
-            return lengths
         number, sense = contacts.features[full, 1], np.where(contacts.features[full, 2] == 1, -1.0, 1.0)
         give = -contacts.gaps[full] - self.strength[number] * self.compliance[number] * self.model.length
         lengths = lengths.copy()

@@ -90,8 +90,6 @@ class Mortar:
 
     def at_rest(self, place: Place, contacts: Contacts, forces: np.ndarray) -> Place:
         """The place with elastic joints compressed by forces in units of the program, as they are drawn."""
-        if not self.present:
-            return place
         number, same = matched_contacts(contacts, place.bonds)
         rest, give = place.bonds.rest.copy(), self.points(place, contacts).give[:, 0]
         rest[number[same]] += (give * forces[:, 0])[same] * self.model.length
@@ -175,8 +173,6 @@ class Mortar:
 
     def bonds(self, place: Place, contacts: Contacts, left: np.ndarray) -> Bonds:
         """The bonds of a place of whose strength contact points have this part left, (n,) array."""
-        if not self.present:
-            return place.bonds
         number, bonded = matched_contacts(contacts, place.bonds)
         of_bonds = place.bonds.left.copy()
         of_bonds[number[bonded]] = left[bonded]
