@@ -69,7 +69,6 @@ class _Iterate:
         length = np.sqrt((shear**2).sum(axis=0))
         shear = np.concatenate([bound[None], shear * np.minimum(1.0, 0.9 * bound / np.maximum(length, 1e-300))])
         slide = np.concatenate([(np.sqrt((slip**2).sum(axis=0)) + 2.0 * mean / bound)[None], slip])
-        self.factorisations = 0
         self.count = len(problem.gap) + len(self.limited) + 2 * len(self.rough)
         self.take(_Point(np.zeros_like(problem.load), multiplier, normal, opening, yielding, shear, slide))
 
@@ -108,7 +107,6 @@ class _Iterate:
     def factorise(self) -> None:
         """Factorise Newton's equations at this iterate."""
         p, d = self.problem, len(self.at.shear)
-        self.factorisations += 1
         self.scaling = Scaling(self.at.shear, self.at.slide)
         yielding = np.zeros_like(self.at.normal)
         yielding[self.limited] = self.at.yielding / self.reserve(self.at)
@@ -155,13 +153,10 @@ class _Iterate:
 
     def longest(self, change: _Point) -> float:
         """Largest part of a change, at most 1, that keeps everything inside."""
-        steepest = max(
-            1.0, float((-change.normal / self.at.normal).max()), float((-change.opening / self.at.opening).max())
-        )
-        if len(self.limited):
-            steepest = max(steepest, float((change.normal[self.limited] / self.reserve(self.at)).max()))
-            steepest = max(steepest, float((-change.yielding / self.at.yielding).max()))
-        return min(1.0 / steepest, longest_step(self.at.shear, change.shear), longest_step(self.at.slide, change.slide))
+        at, to_limit = self.at, change.normal[self.limited] / self.reserve(self.at)
+        to_zero = -change.normal / at.normal, -change.opening / at.opening, -change.yielding / at.yielding
+        steepest = max(float(rates.max(initial=1.0)) for rates in (*to_zero, to_limit))
+        return min(1.0 / steepest, longest_step(at.shear, change.shear), longest_step(at.slide, change.slide))
 
 
 @np.errstate(all="ignore")  # A step that overflows is seen by its result.
@@ -194,9 +189,6 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
             break
         point.take(point.at.moved(change, part))
     if point.mean > ACCEPTED * size or point.imbalance > ACCEPTED or point.residual > ACCEPTED * size:
-        raise NotSolved(
-            f"mean product {point.mean / size:.1e} of the movement, {point.imbalance:.1e} out of balance after "
-            f"{point.factorisations} iterations"
-        )
+        raise NotSolved(f"mean product {point.mean / size:.1e} of the movement, {point.imbalance:.1e} out of balance")
     forces = point.forces(point.at.normal, point.at.shear)
     return StepSolution(point.at.motion, forces, problem.trial(point.at.motion), point.at.multiplier)
