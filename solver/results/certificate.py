@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.geometry.contacts import Contacts
 from solver.tolerances import CARRYING_FRACTION
-
-if TYPE_CHECKING:
-    from solver.geometry.contacts import Contacts
 
 
 @dataclass(frozen=True)

@@ -205,6 +205,13 @@ class HasState:
         """(n_contacts,) array: friction coefficients."""
         return self.state.friction
 
+    @property
+    def fallen(self) -> np.ndarray:
+        """(n_blocks,) bool array: blocks that have fallen or were taken away, and are out of the structure."""
+        # Read once: the arrays may be in a file.
+        state = self.state
+        return ~np.isnan(state.fell_at) if len(state.fell_at) else np.zeros(len(state.pose.positions), dtype=bool)
+
 
 @dataclass(frozen=True)
 class Increment(HasState):
@@ -293,13 +300,6 @@ class Increment(HasState):
     def support_forces(self) -> np.ndarray:
         """(n_blocks, n_dof) array [N, N·m]: resultant of the structure on each support; see :class:`State`."""
         return self.state.support_forces
-
-    @property
-    def fallen(self) -> np.ndarray:
-        """(n_blocks,) bool array: blocks that have fallen or were taken away, and are out of the structure."""
-        # Read once: the arrays may be in a file.
-        state = self.state
-        return ~np.isnan(state.fell_at) if len(state.fell_at) else np.zeros(len(state.pose.positions), dtype=bool)
 
     @property
     def removed(self) -> np.ndarray:

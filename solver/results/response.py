@@ -409,8 +409,6 @@ class LimitLoad(HasState, Shown):
     @property
     def increment(self) -> Increment:
         """The state at the limit as an increment, for pictures and tables; its velocity is the mechanism."""
-        if self.held is None:
-            raise ValueError("this limit load has only its numbers; its arrays are with the increment that reports it")
         return Increment(
             parameter=0.0,
             measured=self.multiplier,
@@ -422,7 +420,7 @@ class LimitLoad(HasState, Shown):
             status=Status.FALLING if self.status is LimitStatus.NO_EQUILIBRIUM else Status.EQUILIBRIUM,
             programs=self.programs,
             seconds=0.0,
-            held=self.held,
+            held=self.state,
         )
 
     @property
@@ -462,9 +460,8 @@ class LimitLoad(HasState, Shown):
                 falling += f" ({assembly.listed(moving, 4)})"
                 tolerance = DRAWN_GAP * float(assembly.widths.min())
                 i, j, depths = assembly.shapes.overlaps(moved_vertices(assembly, pose), tolerance)
-                there = np.isnan(self.state.fell_at) if len(self.state.fell_at) else np.ones(len(pose.positions), bool)
-                free = assembly.free[i] | assembly.free[j]
-                depth = depths[free & there[i] & there[j]].max(initial=0.0)
+                free, gone = assembly.free, self.fallen
+                depth = depths[(free[i] | free[j]) & ~gone[i] & ~gone[j]].max(initial=0.0)
                 inside = f"; blocks overlap by up to {depth:.3g} m at this pose" if depth > 0.0 else ""
             return f"no equilibrium under the dead load: {falling}{inside}; {REMEDY}"
         if self.status is LimitStatus.UNBOUNDED:
