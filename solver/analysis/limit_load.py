@@ -224,14 +224,14 @@ class _Problem:
         self.length, free, d = assembly.block_size, assembly.free, assembly.dimension
         reach = max(closed_gap, REACH * self.length) if displacement > 0.0 else closed_gap
         vertices = moved_vertices(assembly, pose)
-        contacts = self._found(vertices, reach)
         dry = interfaces.dry and bonds is None
-        around = contacts if dry else self._found(vertices, max(reach, REACH * self.length))
-        bonded = None if bonds is None else bonds.of(around)
-        contacts, areas = (contacts, None) if bonded is None else (around, bonded.areas * bonded.left)
-        cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, around, areas)
+        # Open points, too, measure the faces of joints with strength.
+        contacts = self._found(vertices, reach if dry else max(reach, REACH * self.length))
         gaps, is_open = contacts.gaps, contacts.gaps > closed_gap
-        if bonded is not None:
+        drawn = Bonds(contacts.features[:, :3], contacts.areas, (~is_open).astype(float), np.zeros(len(contacts)))
+        bonded = drawn if bonds is None else bonds.of(contacts)
+        cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, bonded.areas * bonded.left)
+        if not dry:
             gaps = _beyond_give(assembly, interfaces, contacts, gaps - bonded.rest, tension, bonded.areas)
             number, is_open = _carrying_points(gaps, tension, closed_gap, reach)
             contacts, gaps, cohesion, tension = contacts[number], gaps[number], cohesion[number], tension[number]

@@ -9,32 +9,21 @@ import scipy.sparse as sp
 
 from solver.assembly import Assembly
 from solver.equilibrium import friction_rays
-from solver.geometry.contacts import Contacts, matched_contacts
+from solver.geometry.contacts import Contacts
 from solver.interfaces import Interfaces
 
 
 def point_strength(
-    assembly: Assembly,
-    interfaces: Interfaces,
-    contacts: Contacts,
-    around: Contacts,
-    bonded: np.ndarray | None = None,
+    assembly: Assembly, interfaces: Interfaces, contacts: Contacts, bonded: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(n_contacts,) arrays [N]: cohesive shear force, largest normal force and largest tension of each contact point.
 
-    Those around are at the same geometry, with the open ones, which measure the faces; of these the parts that are
-    bonded [m²], by default all, have cohesion and tension.
+    The parts of their areas that are ``bonded``, (n_contacts,) array [m²], have cohesion and tension.
     """
-    n = len(contacts)
-    if interfaces.dry:
-        return np.zeros(n), np.full(n, np.inf), np.zeros(n)
-    place, same = matched_contacts(contacts, around)
-    area = np.where(same, around.areas[place], contacts.areas)
     names = ("cohesion", "compressive_strength", "tensile_strength")
     cohesion, strength, tension = interfaces.values(assembly, contacts.block_a, contacts.block_b, *names)
-    crushing = np.multiply(strength, area, out=np.full(n, np.inf), where=np.isfinite(strength))
+    crushing = np.multiply(strength, contacts.areas, out=np.full(len(contacts), np.inf), where=np.isfinite(strength))
     friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-    bonded = area if bonded is None else bonded
     return cohesion * bonded, crushing, largest_tension(tension, cohesion, friction) * bonded
 
 
