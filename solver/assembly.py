@@ -317,20 +317,10 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
 
 
 def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Contacts:
-    """Find the contact points of the blocks, closed or with a gap up to a reach.
+    """Find the contact points of the blocks, closed or with a gap up to a reach [m].
 
-    Parameters
-    ----------
-    assembly : Assembly
-    vertices : (n_vertices, d) array [m]
-        Current corners of all blocks.
-    reach : float [m]
-        Largest gap of a contact point that is kept.
-
-    Returns
-    -------
-    Contacts
-        Pairs of supports have none; sorted, so that the same geometry gives the same order.
+    Of the current corners of all blocks, (n_vertices, d) [m]. Pairs of supports have none; sorted, so that the same
+    geometry gives the same order.
     """
     return assembly.shapes.find(vertices, reach, assembly.free)
 

@@ -63,18 +63,8 @@ def friction_rays(friction: np.ndarray) -> sp.csc_array:
 
 
 def block_forces(contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
-    """Resultant of the contact forces on every block, moments about its centroid.
+    """(n_blocks, n_dof) array [N, N·m]: resultant of the contact forces on every block, moments about its centroid.
 
-    Parameters
-    ----------
-    contacts : Contacts
-    pose : Pose
-    forces : (n_contacts, d) array [N]
-        Normal (compression positive) and shear forces at each contact point, on ``block_a``.
-
-    Returns
-    -------
-    (n_blocks, n_dof) array
-        Forces [N] and moments [N·m].
+    Of normal forces, compression positive, and shear forces on ``block_a``, (n_contacts, d) [N].
     """
     return (wrench_matrix(contacts, pose) @ forces.ravel()).reshape(len(pose.positions), -1)

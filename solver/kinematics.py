@@ -86,11 +86,7 @@ def cross_rows(arms: np.ndarray) -> np.ndarray:
 def turned_moments(arms: np.ndarray, pose: Pose) -> np.ndarray:
     """(n, n_dof) array [N·m]: change of the moments of forces whose points have turned with their blocks.
 
-    Parameters
-    ----------
-    arms : (n, d, d) array [N·m]
-        Sums of arm ⊗ force over the forces on each block as drawn.
-    pose : Pose
+    From the sums of arm ⊗ force over the forces on each block as drawn, (n, d, d) [N·m].
     """
     d = arms.shape[1]
     change = (rotation_matrices(pose.rotations) - np.eye(d)) @ arms
@@ -139,14 +135,7 @@ def _quaternions(rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def moved(pose: Pose, q: np.ndarray) -> Pose:
-    """Move each block by q: translation of the centroid, exact rotation about it.
-
-    Parameters
-    ----------
-    pose : Pose
-    q : (n_blocks, n_dof) array
-        Translations [m] and rotation [rad] of each block.
-    """
+    """Move each block by q, (n_blocks, n_dof): translation of the centroid [m], exact rotation about it [rad]."""
     d = pose.positions.shape[1]
     return Pose(pose.positions + q[:, :d], composed_rotations(pose.rotations, q[:, d:]))
 
@@ -174,16 +163,7 @@ def turned(vectors: np.ndarray, rotations: np.ndarray) -> np.ndarray:
 
 
 def carried(points: np.ndarray, blocks: np.ndarray, before: Pose, after: Pose) -> np.ndarray:
-    """(n, d) array [m]: points that move with blocks, at another pose.
-
-    Parameters
-    ----------
-    points : (n, d) array [m]
-        At the pose ``before``.
-    blocks : (n,) int array
-        The block of each.
-    before, after : Pose
-    """
+    """(n, d) array [m]: points of the pose ``before`` that move with blocks, (n,) int, at the pose ``after``."""
     turn = composed_rotations(-before.rotations[blocks], after.rotations[blocks])
     return after.positions[blocks] + turned(points - before.positions[blocks], turn)
 
@@ -191,15 +171,7 @@ def carried(points: np.ndarray, blocks: np.ndarray, before: Pose, after: Pose) -
 def carried_between(
     points: np.ndarray, block_a: np.ndarray, block_b: np.ndarray, before: Pose, after: Pose
 ) -> np.ndarray:
-    """(n, d) array [m]: contact points at another pose, half-way between those that move with either block.
-
-    Parameters
-    ----------
-    points : (n, d) array [m]
-        At the pose ``before``.
-    block_a, block_b : (n,) int arrays
-    before, after : Pose
-    """
+    """(n, d) array [m]: contact points at another pose, half-way between those that move with either block."""
     return (carried(points, block_a, before, after) + carried(points, block_b, before, after)) / 2.0
 
 
@@ -230,19 +202,9 @@ def swung(pose: Pose, motion: np.ndarray) -> Pose:
 
 
 def point_velocities(points: np.ndarray, block: np.ndarray, pose: Pose, velocity: np.ndarray) -> np.ndarray:
-    """Velocity of points that move with blocks: that of the centroid, and spin × arm.
+    """(n, d) array: velocity of points [m] that move with blocks, (n,) int: that of the centroid, and spin × arm.
 
-    Parameters
-    ----------
-    points : (n, d) array [m]
-    block : (n,) int array
-    pose : Pose
-    velocity : (n_blocks, n_dof) array
-        Of the centroids, and angular.
-
-    Returns
-    -------
-    (n, d) array
+    From the velocities of the centroids, and angular ones, (n_blocks, n_dof).
     """
     d = points.shape[1]
     rows = cross_rows(points - pose.positions[block])
@@ -258,14 +220,9 @@ def relative_velocities(contacts: Contacts, pose: Pose, velocity: np.ndarray) ->
 
 
 def motion_size(motion: np.ndarray, length: float) -> np.ndarray:
-    """(n,) array [m]: largest component of each block's movement, rotations times a length.
+    """(n,) array [m]: largest component of each block's movement, or of its rate, rotations times a length.
 
-    Parameters
-    ----------
-    motion : (n, n_dof) array
-        Translations [m] and rotations [rad], or their rates.
-    length : float [m]
-        Usually the block size.
+    Of translations [m] and rotations [rad], (n, n_dof); the length [m] is usually the block size.
     """
     return np.abs(motion * unit_lengths(motion.shape[1], length)).max(axis=1, initial=0.0)
 

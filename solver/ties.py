@@ -179,13 +179,7 @@ def present_members(ties: Sequence[Tie], rest: np.ndarray) -> np.ndarray:
     """(n, 4) int array: features of the contact points of the members that are there.
 
     A contact point pushes only: one that pulls the ends together for tension, one that pushes them apart for
-    compression, a bar has both.
-
-    Parameters
-    ----------
-    ties : sequence of Tie
-    rest : (n_ties,) array [m]
-        Lengths without force; nan where a member is absent or broken.
+    compression, a bar has both. Of lengths without force, (n_ties,) [m], nan where a member is absent or broken.
     """
     senses = {TIE: (0,), PROP: (1,), BAR: (0, 1)}
     rows = [(MEMBER, i, k, -1) for i in np.flatnonzero(~np.isnan(rest)).tolist() for k in senses[ties[i].kind]]
@@ -197,14 +191,7 @@ def member_contacts(
 ) -> Contacts:
     """Return the contact points of members; their gap is how far they are from carrying, negative where they carry.
 
-    Parameters
-    ----------
-    ties : sequence of Tie
-    assembly : Assembly
-    pose : Pose
-    rest : (n_ties,) array [m]
-    features : (n, 4) int array
-        Of :func:`present_members`.
+    Of lengths without force, (n_ties,) [m], and the features of :func:`present_members`, (n, 4) int.
     """
     number, sense = features[:, 1], np.where(features[:, 2] == 1, -1.0, 1.0)
     ends, blocks = tie_ends(ties, assembly, pose)[number], _blocks(ties)[number]

@@ -62,15 +62,7 @@ class Contacts:
         return Contacts(**{field.name: getattr(self, field.name)[chosen] for field in fields(self)})
 
     def joints(self) -> tuple[np.ndarray, np.ndarray]:
-        """Gather the contact points of each pair of blocks.
-
-        Returns
-        -------
-        pairs : (n_joints, 2) int array
-            The blocks, lower number first, in ascending order.
-        joint : (n,) int array
-            The pair of each contact point.
-        """
+        """Pairs of blocks, (n_joints, 2) int, ascending and the lower first, and that of each contact point, (n,)."""
         keys, joint = np.unique(self.pair_keys(), return_inverse=True)
         return np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1), joint.ravel()
 

@@ -156,23 +156,11 @@ def _side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
 def overlap_depths(
     vertices: np.ndarray, offsets: np.ndarray, tolerance: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs of polygons that overlap by more than a tolerance, and by how much.
+    """Pairs of polygons that overlap by more than a tolerance [m], (n_pairs,) int, and their depths, (n_pairs,) [m].
 
-    Parameters
-    ----------
-    vertices : (n_vertices, 2) array [m]
-        Counter-clockwise in each polygon.
-    offsets : (n + 1,) int array
-    tolerance : float [m]
+    Their vertices, (n_vertices, 2) [m], run counter-clockwise. A depth is a lower bound of the distance one has to be
+    moved out of the other.
 
-    Returns
-    -------
-    i, j : (n_pairs,) int arrays
-    depth : (n_pairs,) array [m]
-        A lower bound of the distance one has to be moved out of the other.
-
-    Notes
-    -----
     A pair overlaps where a corner, the middle of an edge or an interior point of one lies inside the other
     (depth: its distance to the outline), or where two edges cross (depth: the shortest of the four distances
     of their ends from the other edge).

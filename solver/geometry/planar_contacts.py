@@ -29,14 +29,8 @@ ON_EDGE, ON_CORNER = 0, 1
 def features_of(vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
     """(n, 4) int array: the features of contact points in the plane.
 
-    Parameters
-    ----------
-    vertex : (n,) int array
-        The corner, of ``block_a``.
-    edge : (n,) int array
-        The edge it faces, of ``block_b``, named by the vertex it starts at.
-    corner : (n,) int array
-        Where a corner stands on a corner: the vertex of ``block_b``; -1 elsewhere.
+    A vertex of ``block_a``, the edge that it faces, of ``block_b``, named by the vertex it starts at, and where it
+    stands on a corner the vertex of ``block_b`` there, else -1; (n,) int arrays.
     """
     on_corner = corner >= 0
     kind = np.where(on_corner, ON_CORNER, ON_EDGE)
