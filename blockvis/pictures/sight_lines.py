@@ -32,7 +32,8 @@ class SightLines:
         triangles, _ = triangles_of(shapes)
         corners = mechanics.moved_vertices(assembly, pose)
         self._triangles = corners[triangles]
-        self._faces, self._areas, self._owner = shapes.faces(corners), shapes.face_areas, shapes.block_of_face
+        self._faces, self._areas = shapes.faces(corners), shapes.faces(shapes.vertices).areas
+        self._owner = shapes.block_of_face
         self._near = NEARER * assembly.block_size
         most = max(20, MOST_PAIRS // max(len(triangles), 1))
         per_face = weights[self._owner] * self._areas

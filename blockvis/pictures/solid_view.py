@@ -102,8 +102,8 @@ def views_of(
 def has_intrados(assembly: solver.Assembly, joints: InitialJoints) -> bool:
     """Whether free blocks hang over air as vaults do: faces that look down and rest on nothing cover their plan."""
     shapes, free = assembly.polyhedra, assembly.free
-    heights = shapes.face_areas * shapes.faces(shapes.vertices).normals[:, 2]
-    heights = heights[free[shapes.block_of_face]]
+    faces = shapes.faces(shapes.vertices)
+    heights = (faces.areas * faces.normals[:, 2])[free[shapes.block_of_face]]
     down, up = -float(heights[heights < 0.0].sum()), float(heights[heights > 0.0].sum())
     # The normal of a joint points into block a: where it points up, b has a face that looks up, and a one down.
     plan = joints.sizes * joints.normals[:, 2]
@@ -220,7 +220,7 @@ def showing_faces(shapes: mechanics.Polyhedra, eye: np.ndarray) -> tuple[np.ndar
         Its area as seen.
     """
     faces = shapes.faces(shapes.vertices)
-    showing = shapes.face_areas * (faces.normals @ eye)
+    showing = faces.areas * (faces.normals @ eye)
     order = np.lexsort((-showing, shapes.block_of_face))
     best = order[np.searchsorted(shapes.block_of_face[order], np.arange(len(shapes)))]
     return faces.middles[best], best, showing[best]

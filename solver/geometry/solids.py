@@ -49,11 +49,13 @@ class Faces:
         Unit vectors along the longest edge of each face.
     middles : (n_faces, 3) array [m]
         Means of the corners.
+    areas : (n_faces,) array [m²]
     """
 
     normals: np.ndarray
     tangents: np.ndarray
     middles: np.ndarray
+    areas: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -147,35 +149,27 @@ class Solids(Bodies):
         starts, counts = self.face_offsets[:-1], np.diff(self.face_offsets)
         points = vertices[self.corners]
         arms = points - np.repeat(points[starts], counts, axis=0)
-        areas = np.add.reduceat(cross(arms, arms[self.next_corner]), starts)
+        areas = np.add.reduceat(cross(arms, arms[self.next_corner]), starts) / 2.0
         order = np.lexsort((-np.arange(len(self.corners)), self.edge_lengths, self.face_of_corner))
         longest = order[self.face_offsets[1:] - 1]
         normals = unit(areas)
         along = points[self.next_corner[longest]] - points[longest]
         along = along - dot(along, normals)[:, None] * normals
-        return Faces(normals, unit(along), points[starts] + np.add.reduceat(arms, starts) / counts[:, None])
-
-    @cached_property
-    def face_areas(self) -> np.ndarray:
-        """(n_faces,) array [m²]."""
-        starts, counts = self.face_offsets[:-1], np.diff(self.face_offsets)
-        points = self.vertices[self.corners]
-        arms = points - np.repeat(points[starts], counts, axis=0)
-        area = np.add.reduceat(cross(arms, arms[self.next_corner]), starts) / 2.0
-        return np.sqrt(dot(area, area))
+        middles = points[starts] + np.add.reduceat(arms, starts) / counts[:, None]
+        return Faces(normals, unit(along), middles, np.sqrt(dot(areas, areas)))
 
     @cached_property
     def face_widths(self) -> np.ndarray:
         """(n_faces,) array [m]: area over longest extent of each face, near b for a long a × b."""
-        middles = self.faces(self.vertices).middles
-        arms = self.vertices[self.corners] - middles[self.face_of_corner]
+        faces = self.faces(self.vertices)
+        arms = self.vertices[self.corners] - faces.middles[self.face_of_corner]
         far = np.maximum.reduceat(np.sqrt(dot(arms, arms)), self.face_offsets[:-1])
-        return self.face_areas / (2.0 * far)
+        return faces.areas / (2.0 * far)
 
     @cached_property
     def surfaces(self) -> np.ndarray:
         """(n,) array [m²]: area of all faces of each solid."""
-        return np.add.reduceat(self.face_areas, self.faces_of_block[:-1])
+        return np.add.reduceat(self.faces(self.vertices).areas, self.faces_of_block[:-1])
 
     @cached_property
     def _integrals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

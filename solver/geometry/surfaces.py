@@ -174,6 +174,5 @@ def _coplanar_faces(solids: Solids, flatness: np.ndarray) -> np.ndarray:
     same = (out <= flatness[solids.block_of_face[face]]) & (
         dot(faces.normals[face], faces.normals[face[solids.twins]]) > ONE_WAY
     )
-    areas = solids.face_areas
-    largest = np.maximum.reduceat(areas, solids.faces_of_block[:-1])
-    return np.unique(np.append(face[same], np.flatnonzero(areas <= SLIVER * largest[solids.block_of_face])))
+    largest = np.maximum.reduceat(faces.areas, solids.faces_of_block[:-1])
+    return np.unique(np.append(face[same], np.flatnonzero(faces.areas <= SLIVER * largest[solids.block_of_face])))
