@@ -286,12 +286,8 @@ class Assembly(Shown):
 
     def with_roles(self, roles: Sequence[str] | np.ndarray) -> Assembly:
         """Give the blocks other roles, (n_blocks,) of "free", "fixed" and "moving"."""
-        unknown = set(map(str, roles)) - set(ROLES)
-        if unknown or len(roles) != self.n_blocks:
-            raise ValueError(
-                f"give {self.n_blocks} roles out of {', '.join(ROLES)}; found {len(roles)}, {unknown or ''}"
-            )
-        return replace(self, roles=np.array(list(map(str, roles)), dtype="<U6"))
+        _, others, _ = _labels(self.n_blocks, "blocks", self.names, list(roles), self.materials)
+        return replace(self, roles=others)
 
 
 def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> None:

@@ -67,9 +67,9 @@ def test_roles():
     fixed = assembly.with_roles(["fixed", "free"])
     assert fixed.free.tolist() == [False, True]
     assert assembly.moving.tolist() == [False, True]
-    with pytest.raises(ValueError, match="roles"):
+    with pytest.raises(ValueError, match="block 'block 1' has role 'hanging'; roles are free, fixed, moving"):
         assembly.with_roles(["fixed", "hanging"])
-    with pytest.raises(ValueError, match="2 roles"):
+    with pytest.raises(ValueError, match="2 blocks but 1 roles; give one per block"):
         assembly.with_roles(["fixed"])
 
 
