@@ -126,6 +126,14 @@ class PlacedParts:
         """(..., 3) array [m]: from the starts of edges to their ends."""
         return self.starts(self.solids.next_corner[edges]) - self.starts(edges)
 
+    def before_faces(self, face: np.ndarray, corner: np.ndarray) -> np.ndarray:
+        """(n, n_faces) array [m]: how far corners, (n, n_corners) int, are at least before faces, (n, n_faces) int."""
+        # From a corner near by, for the digits of coordinates far from the origin.
+        origin = self.vertices[self.solids.offsets[self.solids.block_of_face[face[:, :1]]]]
+        normals, corners = self.faces.normals[face], self.vertices[corner] - origin
+        heights = dot(normals[:, :, None], corners[:, None]).min(axis=2)
+        return heights - dot(normals, self.faces.middles[face] - origin)
+
     def outward(self, edges: np.ndarray) -> np.ndarray:
         """(..., 3) array: sum of the outward normals of the two faces at each edge."""
         face = self.solids.face_of_corner
@@ -169,13 +177,12 @@ def convex_parts(solids: Solids) -> ConvexParts:
             surfaces.append((corners, around))
             block_of_part.append(block)
             far = ON_CORNER * float(np.linalg.norm(np.ptp(own, axis=0)))
+            made_corners.append(np.abs(corners[:, None] - own).max(axis=2).min(axis=1) > far)
             if is_bent[block]:
-                made_corners.append(np.abs(corners[:, None] - own).max(axis=2).min(axis=1) > far)
                 arms = np.linalg.solve((own[frame[1:]] - own[frame[0]]).T, (corners - own[frame[0]]).T).T
                 sources.append(np.tile(start + frame, (len(corners), 1)))
                 weights.append(np.column_stack([1.0 - arms.sum(axis=1), arms]))
             else:
-                made_corners.append(np.zeros(len(corners), dtype=bool))
                 number = start + np.arange(len(corners))
                 sources.append(np.tile(number[:, None], (1, 4)))
                 weights.append(np.tile([1.0, 0.0, 0.0, 0.0], (len(corners), 1)))

@@ -122,14 +122,7 @@ def _of_faces(movement: Movement, i: np.ndarray, j: np.ndarray) -> _Axes:
     before, after, apart = np.empty((3, len(i)))
     first = np.empty(len(i), dtype=np.int64)
     for k, face, corner in alike((solids.faces_of_block, i), (solids.offsets, j)):
-        gaps = []
-        for placed in movement:
-            normals = placed.faces.normals[face]
-            # From a corner near by, for the digits of coordinates far from the origin.
-            origin = placed.vertices[corner[:, :1]]
-            level = (normals * (placed.faces.middles[face] - origin)).sum(axis=2)
-            heights = normals @ (placed.vertices[corner] - origin).transpose(0, 2, 1)
-            gaps.append(heights.min(axis=2) - level)
+        gaps = [placed.before_faces(face, corner) for placed in movement]
         best, row = _score(*gaps).argmax(axis=1), np.arange(len(k))
         first[k], before[k], after[k] = face[row, best], gaps[0][row, best], gaps[1][row, best]
         apart[k] = gaps[1].max(axis=1)

@@ -23,15 +23,11 @@ def face_separations(
     int; and how far it is in front of one inside the block, by ``inner``, (n_faces,) bool: minus infinity where there
     is none.
     """
-    solids, vertices, faces = placed.solids, placed.vertices, placed.faces
+    solids = placed.solids
     apart, leading, behind = np.empty(len(i)), np.empty(len(i), dtype=np.int64), np.full(len(i), -np.inf)
     cut = inner.any()
     for k, face, vertex in alike((solids.faces_of_block, i), (solids.offsets, j)):
-        # From a corner near by, for the digits of coordinates far from the origin.
-        origin = vertices[solids.offsets[i[k]]][:, None]
-        normal, corner = faces.normals[face], vertices[vertex] - origin
-        level = dot(normal, faces.middles[face] - origin)
-        distance = dot(normal[:, :, None], corner[:, None]).min(axis=2) - level
+        distance = placed.before_faces(face, vertex)
         if cut:
             behind[k] = np.where(inner[face], distance, -np.inf).max(axis=1)
             distance = np.where(inner[face], -np.inf, distance)
