@@ -121,10 +121,6 @@ def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray, widths: 
     i, j, apart_i, lead_i, behind_i, width = (value[near] for value in (i, j, apart_i, lead_i, behind_i, width))
     apart_j, lead_j, behind_j = face_separations(placed, j, i, inner)
     inside = np.maximum(behind_i, behind_j) > np.maximum(apart_i, apart_j) + SAME_SEPARATION * width
-    near = np.flatnonzero((apart_j <= reach) & ~inside)
-    i, j, apart_i, lead_i, apart_j, lead_j, width = (
-        value[near] for value in (i, j, apart_i, lead_i, apart_j, lead_j, width)
-    )
     opposed_j = _opposed_faces(placed, lead_i, j)
     opposed_i = _opposed_faces(placed, lead_j, i)
     normals = placed.faces.normals
@@ -142,4 +138,4 @@ def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray, widths: 
         face_j=np.where(i_leads, opposed_j, lead_j),
         width=width,
         cosine=np.where(i_leads, cosine_i, cosine_j),
-    )
+    )[(apart_j <= reach) & ~inside]
