@@ -273,8 +273,6 @@ class Interfaces:
             raise ValueError(f"{what} knows dry joints only; leave cohesion, tensile_strength and stiffness out")
 
     def _by_material(self, name: str, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
-        if not self.pairs:
-            return np.full(len(block_a), getattr(self.default, name))
         kinds = sorted({*assembly.materials, *(m for pair in self.pairs for m in pair)})
         number = {kind: k for k, kind in enumerate(kinds)}
         table = np.full((len(kinds), len(kinds)), getattr(self.default, name))
