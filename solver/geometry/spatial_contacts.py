@@ -169,10 +169,7 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
         contacts = contacts[label[kept, 2] > 0]
     contacts = contacts[np.lexsort(contacts.features.T[[2, 1, 0]])]
     # Parts of one block may have a point in common, and tips and edges across each other a corner of a polygon.
-    in_parts = np.bincount(block_of_part, minlength=len(widths)) > 1
-    in_parts[single.block_a] = True
-    duplicates = in_parts[contacts.block_a] | in_parts[contacts.block_b]
-    return _without_duplicates(contacts, duplicates, at_one_place)
+    return _without_duplicates(contacts, at_one_place)
 
 
 def _slivers(
@@ -190,12 +187,11 @@ def _slivers(
     return small[corners.owner] & (corners.widths < narrow[corners.owner])
 
 
-def _without_duplicates(contacts: Contacts, duplicates: np.ndarray, near: float) -> Contacts:
-    """Keep one of several points of two blocks at one place with one normal, among those chosen, (n,) bool."""
+def _without_duplicates(contacts: Contacts, near: float) -> Contacts:
+    """Keep one of several points of two blocks at one place with one normal."""
     from scipy.spatial import cKDTree
 
-    chosen = np.flatnonzero(duplicates)
-    first, second = chosen[cKDTree(contacts.points[chosen]).query_pairs(near, output_type="ndarray")].T
+    first, second = cKDTree(contacts.points).query_pairs(near, output_type="ndarray").T
     pairs = contacts.pair_keys()
     sense = np.where(contacts.block_a[first] == contacts.block_a[second], 1.0, -1.0)
     same = pairs[first] == pairs[second]
