@@ -85,15 +85,7 @@ class Named(Protocol):
 
 
 def matched_contacts(contacts: Named, before: Named) -> tuple[np.ndarray, np.ndarray]:
-    """Find each contact point among those before.
-
-    Returns
-    -------
-    place : (n,) int array
-        Its number before; any number where it was not there.
-    same : (n,) bool array
-        Whether it was there.
-    """
+    """Find contact points among those before: numbers, (n,) int, and whether they were there, (n,) bool; else any."""
     if not len(before.features):
         return np.zeros(len(contacts.features), dtype=np.int64), np.zeros(len(contacts.features), dtype=bool)
     features, old = contacts.features[:, :3].astype(np.int64), before.features[:, :3].astype(np.int64)

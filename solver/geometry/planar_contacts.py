@@ -59,10 +59,9 @@ def measured_points(
     v = vertices[vertex]
     tangent = _unit(vertices[following[edge]] - vertices[edge])
     on_corner = corner >= 0
-    if on_corner.any():
-        facing = _facing_edge(shapes, vertex[on_corner], edge[on_corner], corner[on_corner])
-        other = _unit(vertices[following[facing]] - vertices[facing])
-        tangent[on_corner] = _unit(tangent[on_corner] - other)
+    facing = _facing_edge(shapes, vertex[on_corner], edge[on_corner], corner[on_corner])
+    other = _unit(vertices[following[facing]] - vertices[facing])
+    tangent[on_corner] = _unit(tangent[on_corner] - other)
     base = vertices[np.where(on_corner, corner, edge)]
     # The edge runs counter-clockwise around block b: its outward normal is a quarter turn clockwise, and
     # the tangent a quarter turn counter-clockwise from that normal is the edge's own direction.
@@ -102,7 +101,7 @@ def _areas(shapes: Outlines, contacts: Contacts) -> np.ndarray:
     order = np.lexsort((along, face))
     step = np.where(np.diff(face[order]) == 0, np.diff(along[order]), 0.0)
     length = np.zeros(len(point))
-    length[order] = (np.append(step, 0.0) + np.append(0.0, step)) / 2.0 if len(contacts) else 0.0
+    length[order] = (np.append(step, 0.0) + np.append(0.0, step)) / 2.0
     # A corner at a bend of the side that it stands on has two points there; a corner on a corner has one.
     standing = np.where(on_corner, len(side) + np.arange(len(contacts)), vertex)[point]
     _, corner_of = np.unique(face * (len(side) + len(contacts)) + standing, return_inverse=True)

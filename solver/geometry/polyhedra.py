@@ -48,10 +48,6 @@ class Polyhedra(Solids):
     def entered(
         self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
     ) -> Contacts:
-        """Contact points beside those given that would have kept apart what a movement has put into each other.
-
-        Measured before it, of corners (n_vertices, d) [m] before and after, of overlaps of more than ``tolerance`` [m]
-        with useful blocks.
-        """
+        """Contact points that would have kept apart what a movement put into each other; see :func:`entered_points`."""
         movement = Movement(self.parts.placed(before), self.parts.placed(after))
         return entered_points(movement, self.widths, useful, tolerance, contacts)
