@@ -24,13 +24,11 @@ def face_separations(
     is none.
     """
     solids = placed.solids
-    apart, leading, behind = np.empty(len(i)), np.empty(len(i), dtype=np.int64), np.full(len(i), -np.inf)
-    cut = inner.any()
+    apart, behind, leading = np.empty(len(i)), np.empty(len(i)), np.empty(len(i), dtype=np.int64)
     for k, face, vertex in alike((solids.faces_of_block, i), (solids.offsets, j)):
         distance = placed.before_faces(face, vertex)
-        if cut:
-            behind[k] = np.where(inner[face], distance, -np.inf).max(axis=1)
-            distance = np.where(inner[face], -np.inf, distance)
+        behind[k] = np.where(inner[face], distance, -np.inf).max(axis=1)
+        distance = np.where(inner[face], -np.inf, distance)
         farthest = distance.argmax(axis=1)
         row = np.arange(len(k))
         apart[k], leading[k] = distance[row, farthest], face[row, farthest]
