@@ -19,11 +19,20 @@ from blockvis.pictures.marks import (
     sliding_lines,
 )
 from blockvis.results.joint_faces import InitialJoints
-from blockvis.results.joints import carried_faces
+from blockvis.results.joints import carried_faces, joint_states
 from blockvis.text import force_text, rounded_length
 from solver import mechanics
 
-from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, rounded
+from .packing import (
+    FINENESS,
+    FORCE_FINENESS,
+    TOLD_FINENESS,
+    TOLD_FROM,
+    TURN_UNIT,
+    counted_steps,
+    deflated,
+    rounded,
+)
 
 #: How far down blocks go that are taken away, in extents of the structure.
 AWAY = 4.0
@@ -103,6 +112,7 @@ def model_of_frames(
         "fill": None,
         "force_unit": FORCE_FINENESS * largest,
         "force_length": length_per_force(sizes, largest, 1.5 * assembly.block_size, extent),
+        "told_forces": [TOLD_FROM * largest, TOLD_FINENESS],
         "force_scale": [shown_force, force_text(shown_force)],
         "packed": {
             "vertices": deflated(rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
@@ -141,11 +151,12 @@ def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list
 
 
 class FrameTables:
-    """What changes from frame to frame, as integers: motion, resultants of the joints, and marks.
+    """What changes from frame to frame, as integers: motion, forces of the joints, resultants of blocks, and marks.
 
     Marks are hinges (1), sliding joints (2) and points that crush (3). A hinge has the ends of its line, in the plane
-    its place twice, as what crushes has; a sliding joint has its ends in the plane, and in
-    space its number. Each resultant names its two blocks.
+    its place twice, as what crushes has; a sliding joint has its ends in the plane, and in space its number. Each
+    resultant names its two blocks, for which it is drawn; what is told is the normal and the shear force of each joint,
+    of which two blocks may have several.
 
     Parameters
     ----------
@@ -172,7 +183,7 @@ class FrameTables:
         coarse = round(FORCE_FINENESS / FINENESS / 4.0)
         d = assembly.dimension
         self._n, self._in_space = len(shown), d == 3
-        self._travel, self._turn = [], []
+        self._travel, self._turn, self._told = [], [], []
         self._places, self._vectors, self._pairs = (_nothing(n) for n in (d, d, 2))
         self.sizes = [np.zeros(0)]
         self._mark_places, self._marks = _nothing(2 * d), _nothing(2)
@@ -187,6 +198,9 @@ class FrameTables:
             moved[increment.removed, d - 1] -= AWAY * unit / FINENESS
             self._travel.append(rounded(moved[:, :d], unit))
             self._turn.append(rounded(moved[:, d:], TURN_UNIT))
+            states, told = joint_states(assembly, joints, increment), slice(len(joints))
+            carried = np.stack([states.normal_force[told], states.shear_force[told]], axis=1)
+            self._told.append(counted_steps(carried, TOLD_FROM * largest))
             points, forces, pairs = resultants(increment)
             size = np.linalg.norm(forces, axis=1) * (not falling)
             kept = size > SMALLEST_RESULTANT * largest
@@ -205,6 +219,7 @@ class FrameTables:
         return {
             "travel": deflated(np.stack(self._travel), self._n),
             "turn": deflated(np.stack(self._turn), self._n),
+            "joint_forces": deflated(np.stack(self._told), self._n),
             "force_first": deflated(forces, len(forces)),
             "force_place": deflated(np.concatenate(self._places), forces[-1]),
             "force_vector": deflated(np.concatenate(self._vectors), forces[-1]),

@@ -13,8 +13,12 @@ from blockvis.pictures import palette
 #: Lengths are stored in this fraction of the extent of the structure, rotations in this many radians.
 FINENESS, TURN_UNIT = 1e-6, 1e-6
 
-#: Forces are stored in this fraction of the largest.
+#: Forces that are drawn are stored in this fraction of the largest.
 FORCE_FINENESS = 1e-3
+
+#: Forces that are told are stored to this fraction of themselves, below this one of the largest as 0: equilibria are
+#: that exact.
+TOLD_FINENESS, TOLD_FROM = 2e-4, 1e-6
 
 
 def deflated(values: np.ndarray, rows: int) -> dict[str, Any]:
@@ -29,6 +33,12 @@ def deflated(values: np.ndarray, rows: int) -> dict[str, Any]:
 def rounded(values: np.ndarray, unit: float) -> np.ndarray:
     """Count the units in values, as 32-bit integers."""
     return np.rint(np.asarray(values, dtype=float) / unit).astype(np.int64).astype(np.int32)
+
+
+def counted_steps(values: np.ndarray, smallest: float) -> np.ndarray:
+    """Count, from ``smallest``, the steps by TOLD_FINENESS of itself up to each value, with its sign; 0 below that."""
+    sizes = np.maximum(np.abs(values) / smallest, 1.0)
+    return (np.sign(values) * rounded(np.log(sizes), TOLD_FINENESS)).astype(np.int32)
 
 
 def hexadecimals(colours: np.ndarray) -> list[str]:

@@ -48,17 +48,6 @@
     return { a, b, a0, a1, b0, b1, length, nx, ny, opening, slip, apart, bent: Math.abs(at[3 * a + 2] - at[3 * b + 2]) };
   }
 
-  // Resultant of a joint on its block a: normal force, compression positive, and shear force; null where there is none.
-  function forceOf(k, face) {
-    if (model.frames[k].falling) return null;
-    const low = Math.min(face.a, face.b), high = Math.max(face.a, face.b);
-    for (let i = forces.first[k]; i < forces.first[k + 1]; i++) {
-      if (forces.blocks[2 * i] !== low || forces.blocks[2 * i + 1] !== high) continue;
-      const sign = face.a === low ? 1 : -1, fx = sign * forces.vector[2 * i], fy = sign * forces.vector[2 * i + 1];
-      return [fx * face.nx + fy * face.ny, -fx * face.ny + fy * face.nx];
-    }
-    return [0, 0];
-  }
   function fitted(w, h) {
     const [x0, y0, x1, y1] = model.bounds, scale = Math.min(w / (x1 - x0), (h - MARGIN) / (y1 - y0));
     return { scale, x: w / 2 - scale * (x0 + x1) / 2, y: (h - MARGIN) / 2 + scale * (y0 + y1) / 2 };
@@ -281,7 +270,7 @@
   }
   function jointText(j, b) {
     const f = faces(pose, j), other = f.a === b ? f.b : f.a;
-    const force = forceOf(Math.min(Math.round(state.frame), nFrames - 1), f);
+    const force = forceOf(Math.min(Math.round(state.frame), nFrames - 1), j);
     const carries = force === null ? "no equilibrium" : `N ${newtons(force[0])}, T ${newtons(force[1])}`;
     return `joint with ${model.names[other]}: opening ${millimetres(Math.max(0, f.opening))} mm, slip ${millimetres(Math.abs(f.slip))} mm, ${carries}`;
   }

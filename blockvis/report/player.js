@@ -1,7 +1,7 @@
 "use strict";
 // Plays a response: shapes and poses come packed in the page, nothing is fetched. What draws the blocks, in the plane or
-// in space, stands where SCENE is; it has poseAt, paint, fit, blockAt, jointAt, blockText, placeOf, dragged, nudged, faces and
-// forceOf, and fills corners.
+// in space, stands where SCENE is; it has poseAt, paint, fit, blockAt, jointAt, blockText, placeOf, dragged, nudged and faces,
+// and fills corners.
 (async () => {
   const $ = (id) => document.getElementById(id);
   const fail = (text) => { $("failure").textContent = text; };
@@ -46,6 +46,14 @@
   // Blocks that have fallen or were taken away by each frame: their joints are no more, and they take the fill over them along.
   const gone = model.frames.map((frame) => new Set(frame.gone));
   const joined = (a, b) => { const now = gone[Math.min(Math.round(state.frame), nFrames - 1)]; return !now.has(a) && !now.has(b); };
+
+  // Normal force, compression positive, and shear force of a joint on its block a; null where there is no equilibrium.
+  // Stored are the steps from the smallest that is told, each by the same part of itself.
+  function forceOf(k, j) {
+    if (model.frames[k].falling) return null;
+    const at = 2 * (k * joints.n + j), [smallest, step] = model.told_forces;
+    return [raw.joint_forces[at], raw.joint_forces[at + 1]].map((v) => Math.sign(v) * smallest * Math.exp(step * Math.abs(v)));
+  }
 
   // SCENE
 
@@ -538,7 +546,7 @@
     poseAt(k);
     const rows = [["joint", "opening [mm]", "slip [mm]", "N [N]", "T [N]"]];
     for (let j = 0; j < joints.n; j++) {
-      const f = faces(pose, j), force = forceOf(k, f) || ["", ""];
+      const f = faces(pose, j), force = forceOf(k, j) || ["", ""];
       rows.push([`${model.names[f.a]} | ${model.names[f.b]}`, (1000 * f.opening).toFixed(4), (1000 * f.slip).toFixed(4), ...force.map((v) => (v === "" ? "" : v.toPrecision(4)))]);
     }
     draw();

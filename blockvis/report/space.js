@@ -67,18 +67,6 @@
     return { a, b, onA, onB, gaps, normal, opening, nearest: Math.min(...gaps), slip, bent };
   }
 
-  // Resultant of a joint on its block a: normal force, compression positive, and shear force; null where there is none.
-  function forceOf(k, face) {
-    if (model.frames[k].falling) return null;
-    const low = Math.min(face.a, face.b), high = Math.max(face.a, face.b);
-    for (let i = forces.first[k]; i < forces.first[k + 1]; i++) {
-      if (forces.blocks[2 * i] !== low || forces.blocks[2 * i + 1] !== high) continue;
-      const sign = face.a === low ? 1 : -1, force = [0, 1, 2].map((c) => sign * forces.vector[3 * i + c]), normal = dot(force, face.normal);
-      return [normal, Math.sqrt(Math.max(0, dot(force, force) - normal ** 2))];
-    }
-    return [0, 0];
-  }
-
   // The view: where the eye is, in radians, and where the picture lies on the canvas.
   const eye = { around: model.view[0], above: model.view[1] };
   function axes() {
@@ -378,7 +366,7 @@
   }
 
   function jointText(j, b) {
-    const f = faces(pose, j), force = forceOf(Math.min(Math.round(state.frame), nFrames - 1), f);
+    const f = faces(pose, j), force = forceOf(Math.min(Math.round(state.frame), nFrames - 1), j);
     const carries = force === null ? "no equilibrium" : `N ${newtons(force[0])}, T ${newtons(force[1])}`;
     return `joint with ${model.names[f.a === b ? f.b : f.a]}: opening ${millimetres(Math.max(0, f.opening))} mm, slip ${millimetres(f.slip)} mm, ${carries}`;
   }

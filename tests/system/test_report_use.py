@@ -13,7 +13,7 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, parted, pixels, report_of, wall
+from structures import arch_response, parted, pixels, rectangle, report_of, wall
 from test_report import browser, visit, visited
 
 import blockvis
@@ -281,6 +281,26 @@ def test_what_is_seen_can_be_saved(tmp_path):
     assert widest[0] in ("voussoir 6 | voussoir 7", "voussoir 7 | voussoir 6")
     assert found["png"][0] == "image/png"
     assert found["png"][1] > 5_000
+
+
+@browser
+def test_every_face_of_two_blocks_is_told_its_own_forces_however_small(tmp_path):
+    corner = np.array([[0, 0], [2, 0], [2, 0.5], [0.5, 0.5], [0.5, 2], [0, 2]])
+    shapes = [rectangle(-1, -0.5, 3, 0), corner, rectangle(0.5, 0.5, 1.5, 1.5), rectangle(0.6, 1.5, 0.62, 1.52)]
+    assembly = solver.Assembly.from_outlines(shapes, roles=["moving", "free", "free", "free"])
+    response = solver.settle(assembly, solver.Settlement((0, -1), increment=1e-3, limit=1e-3))
+    script = """let saved; URL.createObjectURL = (blob) => { saved = blob; return "#"; };
+      HTMLAnchorElement.prototype.click = () => {}; press("joints"); out.text = await saved.text();
+      key("n"); out.tip = $("tip").textContent;"""
+    found = told(write_report(response, tmp_path / "report.html"), tmp_path, script)
+    joints = initial_joints(assembly)
+    states = joint_states(assembly, joints, response.path[-1])
+    written = np.array([row.split(",")[3:] for row in found["text"].splitlines()[1:]], dtype=float)
+    exact = np.stack([states.normal_force, states.shear_force], axis=1)[: len(joints)]
+    assert written == pytest.approx(exact, rel=2e-4, abs=1e-6 * exact.max())
+    pebble = 9.81 * assembly.masses[3]
+    assert written[states.block_b[: len(joints)] == 3, 0] == pytest.approx([pebble], rel=2e-3)
+    assert all("N 0 N" not in line for line in found["tip"].splitlines())
 
 
 @browser
