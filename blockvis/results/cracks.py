@@ -77,7 +77,7 @@ class Crack:
     at : (d,) array [m]
         Middle of that joint in the layout.
     ends : (2, d) array [m]
-        The two ends that are farthest apart in the layout, the lower first.
+        Where it begins and ends in the layout, the lower first; in space its two corners that are farthest apart.
     size : float
         Length [m] of all its joints together, in space their area [m²].
     mean_width : float [m]
@@ -292,11 +292,13 @@ def _crack(
     chosen: np.ndarray,
     places: Places | None = None,
 ) -> Crack:
+    rings = joints.rings
+    # A course in the plane is in order; a joint beside its way, where three meet, is not where it ends.
+    outer = chosen[[0, -1]] if assembly.dimension == 2 else chosen
+    ends = _farthest(rings.points[np.isin(rings.ring, outer)])
     chosen = chosen[np.argsort(-moved[chosen, 0], kind="stable")]
     widest = chosen[0]
-    rings = joints.rings
     a, b = (assembly.names[int(of[widest])] for of in (joints.block_a, joints.block_b))
-    ends = _farthest(rings.points[np.isin(rings.ring, chosen)])
     sizes = joints.sizes[chosen]
     return Crack(
         joints=chosen,

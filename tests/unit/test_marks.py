@@ -589,6 +589,16 @@ def test_diagonals_through_a_bond_are_one_crack_each(side, apart):
     assert np.tan(np.radians(flat.inclination)) == pytest.approx(side * 0.1 / 0.125, rel=0.15)
 
 
+def test_a_crack_ends_where_its_joints_do_not_at_one_beside_their_way():
+    """The upper left corner of a bond goes, and most of what is on its right lifts from the course below."""
+    bricks = [(0, 0, 1), (1, 0, 3), (3, 0, 5), (0, 1, 2), (2, 1, 5), (0, 2, 1), (1, 2, 3), (3, 2, 5)]
+    wall = solver.Assembly.from_outlines([rectangle(left, y, right, y + 1) for left, y, right in bricks])
+    right = {f"block_{k}": (0.0, 0.05, 0.0) for k in (2, 4, 6, 7)}
+    widest = cracks_of(wall, moved(wall, block_3=(-0.03, 0.03, 0.0), block_5=(-0.07, 0.03, 0.0), **right))[0]
+    assert "the top" in widest.places
+    assert widest.ends.tolist() == pytest.approx(np.array([[0.0, 1.0], [1.0, 3.0]]))
+
+
 def test_places_are_told_by_openings():
     """A ring of squares around a window whose right column goes."""
     wall = squares(*((x, y) for y in range(3) for x in range(3) if (x, y) != (1, 1)))
