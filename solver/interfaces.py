@@ -12,8 +12,9 @@ import numpy as np
 from .assembly import Assembly
 from .words import checked, make_plain, plain
 
-#: Friction coefficient above which it is probably an angle.
-STEEPEST = 3.0
+#: Friction coefficient above which it is probably an angle, and the largest: nothing slides by that, while larger ones
+#: beside 1 cost the programs their digits.
+STEEPEST, LARGEST = 3.0, 1e4
 
 
 def steep_note(friction: float) -> str:
@@ -40,7 +41,7 @@ class InterfaceLaw:
     Attributes
     ----------
     friction_coefficient : float
-        Ratio of shear to normal force at sliding, from 0 to anything finite.
+        Ratio of shear to normal force at sliding, from 0 to 1e4, by which nothing slides.
     cohesion : float [Pa]
         Shear strength without compression; none by default.
     compressive_strength : float [Pa]
@@ -70,6 +71,8 @@ class InterfaceLaw:
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise ValueError(f"{name} is {getattr(self, name):g}{unit}; it must be a finite number of at least 0")
         mu, tension = self.friction_coefficient, self.tensile_strength
+        if mu > LARGEST:
+            raise ValueError(f"friction_coefficient is {mu:g}; nothing slides by {LARGEST:g}, give at most that")
         if not self.compressive_strength > 0.0:
             raise ValueError(f"compressive_strength is {self.compressive_strength:g} Pa; it must be positive")
         if mu * tension > self.cohesion * (1.0 + 1e-9):
@@ -78,8 +81,7 @@ class InterfaceLaw:
                 "where the joint slides; give at most that, or more cohesion"
             )
         for name in ("normal_stiffness", "shear_stiffness"):
-            value = getattr(self, name)
-            if not value >= 0.0:
+            if not (value := getattr(self, name)) >= 0.0:
                 raise ValueError(f"{name} is {value:g} Pa/m; it must be positive, or left out for a rigid joint")
         for name in ("fracture_opening", "fracture_slip"):
             value = getattr(self, name)
@@ -195,9 +197,7 @@ class Interfaces:
                 )
         for name, stiffness in self.ground.items():
             if not 0.0 < plain(stiffness, "float", f"the stiffness of the ground under '{name}'") < np.inf:
-                raise ValueError(
-                    f"the ground under '{name}' has a stiffness of {stiffness:g} Pa/m; it must be positive"
-                )
+                raise ValueError(f"the ground under '{name}' has {stiffness:g} Pa/m; it must be positive")
 
     def check(self, assembly: Assembly) -> None:
         """Raise ``ValueError`` for laws of a material that no block has, and ground under what is no support."""
