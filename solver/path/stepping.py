@@ -239,7 +239,7 @@ class Stepper:
     def joint_limits(
         self, place: Place, contacts: Contacts, forces: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Gaps [m] beyond the give of joints under forces, or without, and least normal forces and cohesion of these."""
+        """Gaps [m] beyond the give of joints under forces, or without, and least normal forces and their cohesion."""
         joints, friction = self.mortar.points(place, contacts), self.friction(contacts)
         gaps = joints.beyond_give(contacts.gaps, 0.0 if forces is None else forces[:, 0])
         return gaps, -joints.tension, np.maximum(joints.cohesion - friction * joints.tension, 0.0)
