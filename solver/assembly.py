@@ -286,8 +286,8 @@ class Assembly(Shown):
 
     def with_roles(self, roles: Sequence[str] | np.ndarray) -> Assembly:
         """Give the blocks other roles, (n_blocks,) of "free", "fixed" and "moving"."""
-        _, others, _ = _labels(self.n_blocks, "blocks", self.names, list(roles), self.materials)
-        return replace(self, roles=others)
+        labels = _labels(self.n_blocks, "blocks", self.names, list(roles), self.materials)
+        return replace(self, roles=labels["roles"])
 
 
 def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> None:
