@@ -159,8 +159,9 @@ class Settlement:
     radial_from : (2,) sequence [m], optional
         In space, instead of a direction: x and y of a vertical axis from which each support moves away, level.
     profile : mapping of str to (n_dof,) sequence, optional [m and rad]
-        Instead of one motion for all: how each support, by its name, moves and turns about its own centroid. Only the
-        proportions count: s is the largest displacement of a centroid, or the largest angle where none moves.
+        Instead of one motion for all: how each support, by its name, moves and turns about its own centroid, or
+        where its arm ends. Only the proportions count: s is the largest displacement of such a point, or the largest
+        angle where none moves.
     profile_arms : mapping of str to (d,) sequence, optional [m]
         From the centroid of a support, as drawn, to the point that moves by the profile, and about which it turns.
 

@@ -413,7 +413,7 @@ SETTLEMENT = Section(
             default=_CONTROLS.local_loss, elsewhere=True),
         Key("profile", PROFILES, "In the plane, how far each support goes, in proportion: a Gaussian trough or heave "
             "along x, points of a table, or one vector and rotation per support; s is the largest displacement of a "
-            "support's centroid",
+            "support where it turns: in the middle of its bearing face, else at its centroid",
             {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),
         Key("blocks", TEXTS, "Names of the moving supports that take part; the others stand still. A name is "
             "of all supports that are drawn with it",
