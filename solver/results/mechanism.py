@@ -72,6 +72,8 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     contacts, n = increment.contacts, assembly.n_blocks
     d = contacts.points.shape[1]
     fastest = float(np.abs(increment.velocity[:, :d]).max(initial=0.0))
+    if fastest == 0.0:
+        return np.full(n, -1)
     spins = increment.velocity[:, d:] * assembly.block_size
     part = moving_together(n, contacts, np.abs(increment.displacements).max(axis=1), spins, TOGETHER * fastest)
     # Corners, not centroids: a block may turn about its own centroid.
