@@ -92,7 +92,7 @@ class InterfaceLaw:
 
     def with_friction(self, factor: float) -> InterfaceLaw:
         """Return the law with friction times a factor, and no tension where its shear strength then ends."""
-        mu = factor * self.friction_coefficient
+        mu = min(factor * self.friction_coefficient, LARGEST)
         tension = min(self.tensile_strength, self.cohesion / mu) if mu > 0.0 else self.tensile_strength
         return replace(self, friction_coefficient=mu, tensile_strength=tension)
 

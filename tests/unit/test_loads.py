@@ -175,10 +175,7 @@ def test_friction_given_in_degrees_warns():
         (lambda: solver.Settlement((1, 0), rotation=None), "rotation is None; give a number"),
         (lambda: solver.InterfaceLaw(None), "friction_coefficient is None; give a number"),
         (lambda: solver.InterfaceLaw([0.5]), r"friction_coefficient is \[0\.5\]; give a number"),
-        (
-            lambda: solver.InterfaceLaw(1e8),
-            r"friction_coefficient is 1e\+08; nothing slides by 10000, give at most that",
-        ),
+        (lambda: solver.InterfaceLaw(1e8), r"friction_coefficient is 1e\+08; nothing slides by 10000, give"),
         (lambda: solver.settle(ASSEMBLY, (1, 0), friction_coefficient=None), "friction_coefficient is None"),
         (lambda: solver.Settlement((1, 0), blocks="pier"), "blocks is the text 'pier'; give a sequence of names"),
         (lambda: solver.Structure(ASSEMBLY, 0.5), r"interfaces are 0\.5; .* or friction_coefficient by its name"),
