@@ -51,6 +51,9 @@ EXIT_CODES = f"""exit codes:
 #: How long a run waits for the path in shorter steps: so many times what it took itself, and at least so many seconds.
 PATIENCE, LEAST_PATIENCE = 3.0, 60.0
 
+#: Seconds that each run of a range takes beside its solver time, to start a process above all.
+PROCESS_SECONDS = 2.0
+
 #: Pixels below which a picture has no room for its words.
 SMALLEST_PICTURE = 160
 
@@ -826,7 +829,7 @@ def _say_range(options: argparse.Namespace, run: Run) -> None:
     seconds = sum(increment.seconds for increment in run.response.increments)
 
     def waiting(runs: int, at_once: int) -> None:
-        about = math.ceil(runs / at_once) * seconds
+        about = math.ceil(runs / at_once) * (seconds + PROCESS_SECONDS)
         print(
             f"blockvis: range: {runs} more runs, {at_once} at a time, about {about:.0f} s; Ctrl-C leaves them, "
             f"{resume_command(run.folder)} --range makes them later",
@@ -836,8 +839,7 @@ def _say_range(options: argparse.Namespace, run: Run) -> None:
     try:
         print(find_range(run.folder, waiting))
     except KeyboardInterrupt:
-        print("blockvis: range not known: interrupted; everything else is written", file=sys.stderr)
-        return
+        raise KeyboardInterrupt("range not known: interrupted; everything else is written") from None
     draw_curves(run.response, run.folder, [n for n in ("curve.png", "curve.svg") if (run.folder / n).is_file()])
     if (run.folder / "report.html").is_file():
         write_report_of(run.response, run.folder, known_fall(run.response))

@@ -58,6 +58,10 @@ class Traced:
     stop: str
     collapse_phase: int = 0
 
+    def without_rounding(self, least: np.ndarray) -> Traced:
+        """Return it with 0 for what is measured of at most so much, by phases (n,)."""
+        return replace(self, measured=np.where(np.abs(self.measured) > least[self.phases], self.measured, 0.0))
+
     def same_places(self, other: Traced) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the increments of this path and of another that are at the same parameter."""
         near = SAME * float(np.abs(self.parameters).max(initial=0.0))

@@ -12,6 +12,7 @@ import numpy as np
 
 import solver
 from blockvis.cases.contents import Case
+from blockvis.results.about import NOTHING, reaction_size
 from blockvis.results.folder import RANGE, add_to_summary
 from blockvis.results.reaction_range import COMPLIANCE, FRICTION, WORDS, ReactionRange
 from blockvis.system.atomic_files import write_atomic
@@ -123,9 +124,10 @@ class PathRange:
             last = self.reaction()
             phase = int(last.phases[-1])
             moment = self.units[phase] == "rad"
-            forces = " to ".join(force_text(float(value), moment) for value in (last.low[-1], last.high[-1]))
+            # Ends that are the same in all digits that are told are one.
+            ends = dict.fromkeys(force_text(float(value), moment) for value in (last.low[-1], last.high[-1]))
             where = self._place(phase, float(last.settlements[-1]))
-            said = f"range of reaction {forces} at {where}, no collapse in {counted(len(followed), 'run')}"
+            said = f"range of reaction {' to '.join(ends)} at {where}, no collapse in {counted(len(followed), 'run')}"
         elif standing:
             without = f"{standing} of {len(followed)} runs without a collapse"
             said = f"range of collapse from {self._place(*falls[0])} on, {without}"
@@ -177,7 +179,9 @@ def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda 
     at_once = min(cores(), len(VARIATIONS))
     waiting(len(VARIATIONS), at_once)
     others = _all_followed([variation.of(case) for variation in VARIATIONS], folder, at_once)
-    runs = list(zip((Variation(), *VARIATIONS), (traced(response), *others), strict=True))
+    sizes = [reaction_size(response, settlement.unit == "rad") for settlement in response.settlements]
+    told = [run and run.without_rounding(NOTHING * np.array(sizes)) for run in (traced(response), *others)]
+    runs = list(zip((Variation(), *VARIATIONS), told, strict=True))
     found = PathRange(runs, [settlement.unit for settlement in response.settlements])
     write_atomic(folder / RANGE, found.reaction().table())
     add_to_summary(folder, range=found.numbers())

@@ -99,6 +99,14 @@ def test_the_range_says_how_many_collapse():
     assert str(none).startswith("range of reaction 10.5 N to 11.55 N at 0.5 m, no collapse in 2 runs (friction")
     assert str(none).endswith("× 2; 1 run came to nothing)")
     assert none.numbers()["collapse"] is None
+    alike = PathRange([(Variation(), path(0.5)), (other, path(0.5, factor=1.000001))], ["m"])
+    assert str(alike).startswith("range of reaction 10.5 N at 0.5 m, no collapse in 2 runs")
+
+
+def test_the_range_of_no_reaction_is_nothing():
+    rounding = replace(path(0.2), measured=np.array([1e-5, -1e-5, 1e-5]), phases=np.array([0, 0, 1]))
+    found = PathRange([(Variation(), rounding.without_rounding(np.array([1e-4, 1e-6])))], ["m", "m"])
+    assert found.reaction().high.tolist() == [0.0, 0.0, 1e-5]
 
 
 def test_a_run_that_does_not_stand_collapses_at_nothing_and_one_that_fails_says_nothing():
@@ -154,7 +162,7 @@ def test_the_band_of_a_later_phase_lies_behind_those_before():
     assert '"band":[]' in report_of(response)
 
 
-def test_ctrl_c_leaves_the_range(tmp_path, monkeypatch, capsys):
+def test_ctrl_c_leaves_the_range_and_a_run_of_which_it_is_missing_is_interrupted(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
@@ -163,8 +171,8 @@ def test_ctrl_c_leaves_the_range(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("blockvis.runs.step_check.stored_case", lambda _: SimpleNamespace(settings=True))
     response = SimpleNamespace(stop=solver.Status.COLLAPSED, increments=(), path=(None,))
     run = SimpleNamespace(response=response, folder=tmp_path / "out", had_finished=False)
-    _say_range(Namespace(range=False), run)
-    assert capsys.readouterr().err == "blockvis: range not known: interrupted; everything else is written\n"
+    with pytest.raises(KeyboardInterrupt, match="range not known: interrupted; everything else is written"):
+        _say_range(Namespace(range=False), run)
 
 
 def test_a_range_that_is_asked_for_later_is_drawn_in_every_curve_that_is_there(tmp_path, monkeypatch):
