@@ -263,14 +263,14 @@ def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> li
         return _Frame(swing.increment if increment is governing else increment, place.get(id(increment), len(path)))
 
     if fall is None or not path:
-        return [framed_at(increment) for increment in _thinned(shown_increments(response), most)]
+        return [framed_at(increment) for increment in _thinned(shown_increments(response), most, governing)]
     n = min(len(fall) - 1, most // 2)
     chosen = np.linspace(len(fall) - 1, 1, n).round().astype(int)[::-1]
     falling = [
         _Frame(falling_increment(response, fall, float(fall.times[k])), len(path), float(fall.times[k]))
         for k in chosen.tolist()
     ]
-    return [*map(framed_at, _thinned(path, most - n)), *falling]
+    return [*map(framed_at, _thinned(path, most - n, governing)), *falling]
 
 
 def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | None) -> dict[str, Any]:
@@ -310,6 +310,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
             )
         },
         "frames": _frames(response, frames),
+        "opens": next((k for k, frame in enumerate(frames) if frame.increment is swing.increment), 0),
         "ties": _drawn_ties(response, shown),
         "times": _times(frames),
         # In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.
@@ -378,12 +379,14 @@ def _tints_text(response: solver.Response, swing: Swing) -> str:
     return f"mechanism{whose}, darker where faster"
 
 
-def _thinned(increments: tuple[solver.Increment, ...], most: int) -> list[solver.Increment]:
-    """All increments, or an even choice of at most so many, with the last equilibrium kept."""
+def _thinned(
+    increments: tuple[solver.Increment, ...], most: int, governing: solver.Increment | None
+) -> list[solver.Increment]:
+    """All increments, or an even choice of at most so many, with the one that governs kept."""
     if len(increments) <= most:
         return list(increments)
-    last = max((k for k, i in enumerate(increments) if i.status == solver.Status.EQUILIBRIUM), default=0)
-    chosen = np.unique([*np.linspace(0, len(increments) - 1, most - 1).round().astype(int), last])
+    kept = next((k for k, increment in enumerate(increments) if increment is governing), 0)
+    chosen = np.unique([*np.linspace(0, len(increments) - 1, most - 1).round().astype(int), kept])
     return [increments[k] for k in chosen]
 
 

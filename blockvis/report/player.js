@@ -211,7 +211,7 @@
     if (model.fill && model.fill.words && marked && layers.forces && !falling) add("line", model.fill.words, model.fill.colours[2]);
     if (marked && model.live_words) add("line", model.live_words, model.colours.live);
     if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.moving]);
-    if (state.colours === "displacement") add("ramp", `displacement, 0 to ${+(1000 * model.largest_displacement).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.ramp.join(",")})`);
+    if (state.colours === "displacement") add("ramp", `displacement, 0 to ${+(1000 * model.largest_displacement).toPrecision(3)} mm${falling ? " or more" : ""}`, `linear-gradient(90deg, ${model.ramp.join(",")})`);
     const many = [["hinges", 1], ["sliding", 2]].filter(([name, kind]) => model.many && countOf(k, kind) && !layers[name]);
     if (many.length) add("", `${many.map(([name]) => (name === "hinges" ? "hinges" : "sliding joints")).join(" and ")} are off: they would hide the cracks of so many blocks`, "");
     if (!marked) add("", "hinges, sliding joints and forces are shown at true scale only", "");
@@ -349,7 +349,7 @@
     return `${+(value / factor).toPrecision(3)} ${unit}`;
   }
 
-  const millimetres = (v) => (1000 * v).toFixed(2);
+  const millimetres = (v) => (1000 * v).toFixed(2).replace(/^-(?=0\.00$)/, "");
   function tell(x, y) {
     const tip = $("tip"), b = state.hover;
     tip.textContent = blockText(b);
@@ -576,8 +576,8 @@
   const c = model.curve, known = c.reaction.filter((v) => v !== null);
   if (known.length) $("curve").setAttribute("aria-label", `Curve: ${c.y_label} against ${c.x_label || "the mechanism"}, from ${known[0]} to ${known[known.length - 1]}, at most ${Math.max(...known)}`);
   $("blocks").setAttribute("aria-label", `The blocks: ${nBlocks}, of which ${model.roles.filter((r) => !r).length} are free`);
-  // The page opens on the last equilibrium, and plays from the beginning.
-  state.frame = Math.max(0, model.frames.findLastIndex((f) => !f.falling));
+  // The page opens on the state that governs, of a path the last equilibrium, and plays from the beginning.
+  state.frame = model.opens;
   wanted();
   document.body.dataset.ready = "1";
 })();

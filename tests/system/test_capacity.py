@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import case_from, pixels, run_command
+from structures import case_from, pixels, report_of, run_command
 
 import blockvis
 import solver
@@ -157,6 +157,8 @@ def test_envelope_of_a_load_that_moves_over_an_arch(tmp_path, capsys):
     curve = blockvis.draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
     assert "load position x [m]" in curve
     assert "load multiplier α" in curve
+    # The page opens on the state that its title tells.
+    assert f'"opens":{int(np.argmin(multipliers))},' in report_of(response)
 
 
 #: An arch over piers that a settlement has opened: its tie is slack but at the last place of the load.

@@ -156,7 +156,8 @@ def test_toggles_change_the_picture_and_the_legend_follows(tmp_path):
       out.changed = {}; out.legends = {};
       for (const name of ["cracks", "hinges", "forces", "thrust", "start", "displacement", "mechanism"]) {
         const was = shown(); press(name); out.changed[name] = shown() !== was;
-        out.legends[name] = legend().join(" | "); }"""
+        out.legends[name] = legend().join(" | "); }
+      press("displacement"); key("End"); out.falling = legend();"""
     found = told(page, tmp_path, script, anchor=f"#frame={len(response.path) - 1}")
     assert all(found["changed"].values()), found["changed"]
     hinges = len(mechanics.mechanism_of(response.assembly, swing_of(response).increment).hinges)
@@ -169,6 +170,8 @@ def test_toggles_change_the_picture_and_the_legend_follows(tmp_path):
     assert "thrust line" in found["legends"]["thrust"]
     assert "settlement" not in found["legends"]["start"]
     assert "displacement, 0 to " in found["legends"]["displacement"]
+    assert " mm or more" not in found["legends"]["displacement"]
+    assert any(re.fullmatch("displacement, 0 to .* mm or more", entry) for entry in found["falling"])
     assert "parts of the mechanism" in found["legends"]["mechanism"]
 
 
