@@ -87,7 +87,8 @@ def put(values: dict[str, Any], path: Sequence[str | int], value: Any) -> None:
                     "nowhere"
                 )
         elif isinstance(here, list):
-            raise ValueError(f"{trail} is a list of {len(here)}; say which entry, for instance {trail}[0].{step}")
+            entry = f"{trail}[{step}]" if step.isdecimal() else f"{trail}[0].{step}"
+            raise ValueError(f"{trail} is a list of {len(here)}; say which entry, for instance {entry}")
         elif not isinstance(here, dict):
             raise ValueError(f"{trail} is {here!r}, no table, so that it has no '{step}'")
         if last:

@@ -86,6 +86,7 @@ def test_what_is_no_path(path):
     [
         ("supports[1].name", "supports has 1 entry"),
         ("supports.name", r"supports is a list of 1; say which entry, for instance supports\[0\].name"),
+        ("supports.0.name", r"say which entry, for instance supports\[0\]$"),
         ("support[0].name", "no list 'support' (did you mean 'supports'?)"),
         ("unit.length", "unit is 'm', no table"),
     ],
