@@ -142,6 +142,8 @@ def entry() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
     if isinstance(sys.__stderr__, io.TextIOWrapper):
         sys.stderr = _Told(sys.__stderr__.buffer, sys.__stderr__.encoding, "backslashreplace", line_buffering=True)
+    # Queues and shutdowns ask so to end: what is found is written, as after Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code = main()
         sys.stdout.flush()

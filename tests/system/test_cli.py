@@ -347,6 +347,16 @@ def test_a_second_ctrl_c_does_not_break_off_the_ending():
     assert (done.returncode, done.stderr) == (cli.INTERRUPTED, "")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="a process that is ended there hears nothing")
+def test_a_queue_that_ends_a_run_is_heard_as_ctrl_c_is():
+    stopped = (
+        "import os, signal\nfrom blockvis import cli\n"
+        "cli._options = lambda _: os.kill(os.getpid(), signal.SIGTERM)\ncli.entry()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", stopped], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (cli.INTERRUPTED, "blockvis: interrupted\n")
+
+
 @pytest.mark.parametrize("package", ["numpy", "scipy", "solver.mechanics"])
 def test_ctrl_c_while_packages_are_loaded_ends_without_a_traceback(package, tmp_path):
     """Also where a package executes a text just then, after which Python alone would end by the signal."""
