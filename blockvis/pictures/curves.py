@@ -283,10 +283,11 @@ def _draw_band(
     """Draw the range of the reaction; returns the range of the axis, in the unit ``factor``, in which it is whole."""
     per_length, _ = parameter_unit(response)
     total, least, most = band.along(response)
+    blue = palette.hexadecimal(palette.FORCE)
+    # Where it has no height its edge is seen.
     axes.fill_between(
-        total * per_length, least / factor, most / factor, color=palette.hexadecimal(palette.FORCE), alpha=0.18,
-        linewidth=0,
-    )  # fmt: skip
+        total * per_length, least / factor, most / factor, facecolor=(blue, 0.18), edgecolor=(blue, 0.5), linewidth=0.8
+    )
     low, high = shown
     return min(low, float(least.min(initial=0.0)) / factor), max(high, float(most.max(initial=0.0)) / factor)
 
@@ -424,14 +425,16 @@ def _mark_collapse(
         beside = reactions[(total >= middle - WORDS * (total[-1] - total[0])) & np.isfinite(reactions)]
         foot, head = axes.get_ylim()
         above = len(beside) > 0 and head - beside.max() > beside.min() - foot
+        # Other runs may go on for long.
+        left = middle >= sum(axes.get_xlim()) / 2.0
         axes.annotate(
             f"{what} at {collapse.displacement:.5g} {collapse.unit}{in_phase(response, phase)}\n"
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}",
             (middle, 0.96 if above else 0.04),
             xycoords=("data", "axes fraction"),
-            xytext=(-6, 0),
+            xytext=(-6 if left else 6, 0),
             textcoords="offset points",
-            ha="right",
+            ha="right" if left else "left",
             va="top" if above else "bottom",
             fontsize=0.9 * text,
             color=red,

@@ -284,7 +284,7 @@
       pen.save(); pen.globalAlpha = 0.2; pen.fillStyle = pen.strokeStyle;
       c.band.forEach(([s, low], i) => i ? pen.lineTo(X(s), Y(low)) : pen.moveTo(X(s), Y(low)));
       c.band.slice().reverse().forEach(([s, , high]) => pen.lineTo(X(s), Y(high)));
-      pen.fill(); pen.restore(); pen.beginPath();
+      pen.closePath(); pen.fill(); pen.globalAlpha = 0.5; pen.lineWidth = 1; pen.stroke(); pen.restore(); pen.beginPath();
     }
     if (c.single && c.reaction[0] !== null) { pen.moveTo(X(0), Y(0)); pen.lineTo(X(0), Y(c.reaction[0])); pen.lineTo(X(1), Y(c.reaction[0])); }
     // An unbounded multiplier is null: the line stops before it and starts again after it, as where another motion begins.

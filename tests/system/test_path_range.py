@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from structures import case_from, report_of, run_command
+from structures import arch_response, case_from, report_of, run_command
 from test_step_check import CASE, LIMIT_LOAD, SHORT, run_here
 
 import blockvis
@@ -160,6 +160,19 @@ def test_the_band_of_a_later_phase_lies_behind_those_before():
     assert '"band":[[0.0,' in report_of(response, band=band)
     assert f"<td>1 run: {ALL[1:-1]}</td>" in report_of(response, band=band)
     assert '"band":[]' in report_of(response)
+
+
+def test_words_of_a_collapse_lie_where_other_runs_leave_room():
+    """Their band has no height, and goes on to three times the settlement of the collapse."""
+    reaction = np.full(2, 2000.0)
+    band = ReactionRange(np.zeros(2, dtype=int), np.array([0.0, 0.45]), reaction, reaction, np.array([9, 2]))
+    figure = Figure()
+    axes = figure.add_subplot()
+    _draw(axes, arch_response(), events=True, band=band)
+    figure.draw_without_rendering()
+    (words,) = [text for text in axes.texts if "collapse" in text.get_text()]
+    assert words.get_window_extent().x0 > axes.bbox.x0
+    assert axes.collections[0].get_linewidth()[0] > 0.0
 
 
 def test_ctrl_c_leaves_the_range_and_a_run_of_which_it_is_missing_is_interrupted(tmp_path, monkeypatch):
