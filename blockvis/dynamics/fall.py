@@ -211,6 +211,9 @@ def _followed(
 def engine_of(response: solver.Response, push: float) -> tuple[Engine, float]:
     """Put the last equilibrium of a response above a ground, and give the height of that [m].
 
+    The supports are where no equilibrium is any more: at the last one a push would leave blocks on the last of their
+    bearing.
+
     Parameters
     ----------
     response : solver.Response
@@ -221,7 +224,12 @@ def engine_of(response: solver.Response, push: float) -> tuple[Engine, float]:
     last, end = response.path[-1].pose, response.increments[-1]
     assembly = response.assembly.with_roles(np.where(end.removed, mechanics.FIXED, response.assembly.roles))
     ground = ground_below(assembly, last)
-    whole, pose = on_ground(assembly, last, ground)
+    beyond = response.increments[min(len(response.path), len(response.increments) - 1)].pose
+    places, turns = (
+        np.where(response.assembly.free[:, None], here, there)
+        for here, there in ((last.positions, beyond.positions), (last.rotations, beyond.rotations))
+    )
+    whole, pose = on_ground(assembly, solver.Pose(places, turns), ground)
     still = np.zeros((1, response.loads.dead.shape[1]))
     loads = np.append(response.dead_at(end, last), still, axis=0)
     velocity = np.append(push * response.collapse.mechanism, still, axis=0)
