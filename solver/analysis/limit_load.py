@@ -364,7 +364,9 @@ class _Problem:
             settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
             if nearest is balanced or settled or error < least:
                 nearest, least, used, best_at = state, error, normal, programs
-            if settled or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
+            # Beside forces that grow without end the dead load is lost in their error.
+            endless = locks and largest * most_excess > 1.0
+            if settled or endless or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
                 break
             if before is not balanced and state.multiplier > before.multiplier:
                 added = state.forces - before.forces

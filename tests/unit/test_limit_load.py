@@ -272,3 +272,19 @@ def test_of_equal_positions_the_first_governs():
     x = np.array([-0.4, 0.4, -0.4])
     for places in (x, x[::-1], x[1:], x[1::-1]):
         assert structure.envelope(places, lambda at: solver.force_on_top(arch, at, (0.0, -1000.0))).worst == 0
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("shift", [0.0, 1234.5])
+def test_what_locks_by_friction_is_unbounded_however_it_is_described(mirrored, shift):
+    """Forces on two stones of a column lie within the friction cone of all joints below."""
+    drawn = generators.portal()
+    outlines = [drawn.outline(i) * [-1 if mirrored else 1, 1] + [shift, 0.0] for i in range(drawn.n_blocks)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=list(drawn.roles))
+    live = np.zeros((drawn.n_blocks, 3))
+    share = np.array([[0.31132182489449, -1.7939726613146754], [0.30339219459932365, -1.5667741211586759]])
+    live[2:4, :2] = assembly.masses[2:4, None] * solver.GRAVITY * share * [-1 if mirrored else 1, 1]
+    found = solver.limit_load(
+        assembly, loads=pushed(assembly, live), friction_coefficient=0.37225340327463124, flow="non-associative"
+    )
+    assert found.status is solver.LimitStatus.UNBOUNDED
