@@ -187,14 +187,17 @@ def _of_graph(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
     default = data.get("default_node_attributes") or data.get("dna") or data.get("node_attributes") or {}
     for key, node in data["node"].items():
         attributes = {**default, **node}
-        part = _unwrapped(attributes.get("part"))[0]
         # A part of COMPAS has its geometry in place; its frame is a mark on it.
-        block = attributes.get("block") or ((part or {}).get("attributes") or {}).get("geometry")
+        part = _unwrapped(attributes.get("part"))[0]
+        of_part = (part.get("attributes") if isinstance(part, dict) else None) or {}
+        block = attributes.get("block") or of_part.get("geometry")
         if block is None:
             context.passed["nodes without a block"] += 1
             continue
-        support = context.support or bool(attributes.get("is_support"))
-        yield from _meshes(block, replace(context, name=str(key), support=support))
+        support = context.support or bool(attributes.get("is_support") or of_part.get("is_support"))
+        for mesh in _meshes(block, replace(context, name=str(key), support=support)):
+            own = of_part.get("name")
+            yield replace(mesh, row={**mesh.row, "name": str(own)}) if own else mesh
 
 
 def _of_old_assembly(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:

@@ -238,7 +238,7 @@ def _turned(found: _Outlines, view: str | None, path: Path) -> list[str]:
     every = [*found.rings, *(line.points for line in found.loose)]
     if not every or not all(np.isfinite(points).all() for points in every):
         return []
-    turn, notes = drawing_plane(np.concatenate(every), f"'{path}'", view)
+    turn, notes = drawing_plane(every, f"'{path}'", view)
     still = np.zeros(3)
     found.rings = [ring @ turn.T for ring in found.rings]
     found.arcs = [tuple(arc.mapped(turn, still) for arc in arcs) for arcs in found.arcs]

@@ -76,10 +76,9 @@ class _Found:
     skipped: Counter[str] = field(default_factory=Counter)
 
     @property
-    def points(self) -> np.ndarray:
-        """(n, 3) array: all points of outlines and lines."""
-        every = [*self.rings, *(points for points, _ in self.lines), *(rings[0] for rings, _ in self.holed)]
-        return np.concatenate(every) if every else np.zeros((0, 3))
+    def every(self) -> list[np.ndarray]:
+        """(n, 3) arrays: the points of each outline and line."""
+        return [*self.rings, *(points for points, _ in self.lines), *(rings[0] for rings, _ in self.holed)]
 
 
 def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
@@ -298,8 +297,8 @@ def layout_of_features(
     found = _Found(skipped=Counter(skipped or {}))
     for k, feature in enumerate(features):
         _add(feature.geometry, k, found)
-    every, skips = found.points, passed_over(found.skipped, "found")
-    if not len(every):
+    every, skips = found.every, passed_over(found.skipped, "found")
+    if not every:
         seen = skips[0] if skips else "found: nothing"
         raise ValueError(f"'{path}' has no polygon ({seen}); draw each block as one polygon")
     turn, notes = drawing_plane(every, f"'{path}'", reading.view)
@@ -323,7 +322,7 @@ def layout_of_features(
     if not rings and all(item.kind == "open" for item in left_out):
         raise ValueError(f"'{path}' has no polygon: {nothing_closed(faces)}; draw each block as one polygon")
     notes += [faces_note(faces, wanted)] if faces.rings else []
-    notes += faces.notes + joined_note(found.misses, float(np.ptp(every, axis=0).max()))
+    notes += faces.notes + joined_note(found.misses, float(np.ptp(np.concatenate(every), axis=0).max()))
     layout = Layout(
         blocks=tuple(rings),
         names=tuple(row["name"] for row in kinds),

@@ -261,7 +261,9 @@ def _rounded_note(content: Layout | Bodies, layout: Layout) -> tuple[str, ...]:
             return ()
     largest = max(float(np.abs(points).max(initial=0.0)) for points in corners)
     coarse = float(np.spacing(np.float32(largest)))
-    if coarse <= COARSE * float(np.median(layout.sizes)):
+    # Whole numbers are exact: what was rounded uses the last digit that there is.
+    rounded = any((points / coarse % 2.0 == 1.0).any() for points in corners)
+    if not rounded or coarse <= COARSE * float(np.median(layout.sizes)):
         return ()
     return (
         Note(

@@ -18,6 +18,7 @@ from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import FLAT, spread_of
 from blockvis.layout.solids import BASE_FRAME, Solid, area_vectors, fans, prism, triangles_of
 from blockvis.system.extras import MissingExtra
+from solver import mechanics
 from solver.mechanics import counted
 
 from . import dae
@@ -373,8 +374,10 @@ def _glb(solids: list[Solid], rows: list[dict[str, Any]]) -> bytes:
 
 def _stl_lines(solids: list[Solid], rows: list[dict[str, Any]], _: str) -> list[str]:
     lines = []
-    for (points, faces), row in zip(solids, rows, strict=True):
-        lines.append(f"solid {row['name']}")
+    # A name is all that is kept of a block: readers number those that repeat, each in its own way.
+    names = mechanics.unique_names([str(row["name"]) for row in rows])
+    for (points, faces), name in zip(solids, names, strict=True):
+        lines.append(f"solid {name}")
         for a, b, c in points[triangles_of(points, faces)]:
             normal = np.cross(b - a, c - a)
             normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
@@ -382,7 +385,7 @@ def _stl_lines(solids: list[Solid], rows: list[dict[str, Any]], _: str) -> list[
             lines.append(" outer loop")
             lines += ["  vertex " + " ".join(repr(float(x)) for x in p) for p in (a, b, c)]
             lines += [" endloop", "endfacet"]
-        lines.append(f"endsolid {row['name']}")
+        lines.append(f"endsolid {name}")
     return lines
 
 

@@ -55,10 +55,9 @@ _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 #: Properties by which shapes are painted, where nothing is said.
 _PAINTING = {
     "fill": "black", "stroke": "none", "visibility": "visible", "fill-opacity": "1", "stroke-opacity": "1",
-    "stroke-width": "1",
 }  # fmt: skip
 
-#: What paints nothing, and opacities and widths of what nobody sees.
+#: What paints nothing, and opacities of what nobody sees.
 _NO_PAINT = ("none", "transparent")
 _CLEAR = re.compile(r"0*\.?0+\s*(?:%|[a-z]*)")
 
@@ -124,8 +123,8 @@ class _Context:
     @property
     def strokes(self) -> bool:
         """Whether shapes have a line around them."""
-        clear = any(_CLEAR.fullmatch(self.painting[key]) for key in ("stroke-opacity", "stroke-width"))
-        return self.painting["stroke"] not in _NO_PAINT and not clear
+        # A width of 0 is the thinnest line to many who draw.
+        return self.painting["stroke"] not in _NO_PAINT and not _CLEAR.fullmatch(self.painting["stroke-opacity"])
 
     @property
     def layer(self) -> str:

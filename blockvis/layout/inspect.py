@@ -32,8 +32,9 @@ CLASSES = 8
 SMALLEST_JOINT, WIDEST_JOINT = 1e-3, 0.2
 
 #: Gaps are mortar where this share of the length of all joints is open, or where this share of the open length has
-#: as much on the other side of its block; else they are openings, cracks or wedges, and stay as drawn.
-MORTAR_SHARE = 0.5
+#: as much on the other side of its block, more than beside a single row of stones; else they are openings, cracks or
+#: wedges, and stay as drawn.
+MORTAR_SHARE, OPPOSITE_SHARE = 0.15, 0.6
 
 #: Density of blocks for which the layout has none [kg/m³], as of a run.
 DENSITY = 2000.0
@@ -217,20 +218,19 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
     proposal = proposed(outlines, laid=np.array(layout.laid))
     smallest = SMALLEST_JOINT * width
     shares = open_shares(outlines, proposal.stretches, smallest)
+    is_mortar = shares[0] >= MORTAR_SHARE or shares[1] >= OPPOSITE_SHARE
     return {
         "sizes": assembly.areas,
         "overlapping": overlaps(assembly, ROUNDING * width),
         "overlap_tolerance": DEFAULT_OVERLAP * width,
-        "joint_thickness": proposal.thickness
-        if proposal.thickness >= smallest and max(shares) >= MORTAR_SHARE
-        else 0.0,
+        "joint_thickness": proposal.thickness if proposal.thickness >= smallest and is_mortar else 0.0,
         "joints": proposal.stretches,
         "rows": (("corners", f"{sum(map(len, layout.outlines))}" + (f"; in a run {finer}" if finer else "")),),
-        "joint_rows": _mortar_rows(proposal, smallest, shares),
+        "joint_rows": _mortar_rows(proposal, smallest, shares[0], is_mortar),
     }
 
 
-def _mortar_rows(proposal: Proposal, rounding: float, shares: tuple[float, float]) -> tuple[Row, ...]:
+def _mortar_rows(proposal: Proposal, rounding: float, share: float, is_mortar: bool) -> tuple[Row, ...]:
     """Report mortar joints by their thickness, and how they can be closed; thinner ones than rounding [m] are none.
 
     Where gaps are a small share of the length of joints, and on one side of blocks, nothing is proposed.
@@ -259,8 +259,8 @@ def _mortar_rows(proposal: Proposal, rounding: float, shares: tuple[float, float
     for k in np.flatnonzero(counts):
         stretches = f"{counts[k]:6d} {'stretch  ' if counts[k] == 1 else 'stretches'}"
         rows.append(("", f"{edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {stretches}  {metres[k]:9.3f} m"))
-    if max(shares) < MORTAR_SHARE:
-        said = f"nothing: gaps are {100.0 * shares[0]:.2g} % of the length of joints"
+    if not is_mortar:
+        said = f"nothing: gaps are {100.0 * share:.2g} % of the length of joints"
         said += ", most on one side of blocks only, as cracks and openings are"
         return (*rows, ("proposed", f"{said}; joint_thickness = {proposal.thickness:g} closes them"))
     rows.append(("proposed", f'joint_thickness = {proposal.thickness:g}   (m, or "auto")'))

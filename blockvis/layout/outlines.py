@@ -96,12 +96,13 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
     return points[:, VIEWS[chosen]], note
 
 
-def drawing_plane(points: np.ndarray, where: str, view: str | None = None) -> tuple[np.ndarray, list[str]]:
+def drawing_plane(lines: Sequence[np.ndarray], where: str, view: str | None = None) -> tuple[np.ndarray, list[str]]:
     """Find the plane of a drawing of lines, which may have a relief: walls are traced on scans, at any angle.
 
     Parameters
     ----------
-    points : (n, 3) array
+    lines : sequence of (n, 3) arrays
+        Outlines and lines: where each is level, they lie in x and y, one above the other.
     where : str
         The file, for messages.
     view : {"xy", "xz", "yz"}, optional
@@ -119,6 +120,7 @@ def drawing_plane(points: np.ndarray, where: str, view: str | None = None) -> tu
     ValueError
         For coordinates that are not finite, and for a drawing without area in the view.
     """
+    points = np.concatenate(lines)
     spread = spread_of(points, where)
     flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
     if view is not None and flat and view not in flat:
@@ -127,7 +129,8 @@ def drawing_plane(points: np.ndarray, where: str, view: str | None = None) -> tu
     turn, notes = np.eye(3)[[*VIEWS[chosen], axis_across(chosen)]], [] if chosen == "xy" else [upright_note(chosen)]
     if flat:
         return turn, list(notes)
-    upright = None if view == "xy" else _upright(points)
+    level = max(float(np.ptp(line[:, 2])) for line in lines) <= FLAT * spread.max()
+    upright = None if level or view == "xy" else _upright(points)
     if upright is None:
         seen = "from above" if chosen == "xy" else f"along {'xyz'[axis_across(chosen)]}"
         return turn, [*notes, Note(CHANGED, f"elevations were ignored: the drawing was read as seen {seen}")]

@@ -83,9 +83,9 @@ def assembly_of_parts():
     """An assembly of COMPAS itself: its nodes hold parts, and these the meshes, in place."""
     node = {}
     for k, part in enumerate(parts()):
-        part["attributes"]["is_support"] = k < 2
         geometry = {"dtype": "compas.datastructures/Mesh", "data": part, "name": part["attributes"]["name"]}
-        data = {"attributes": {"name": f"part {k}", "geometry": geometry}, "key": k, "features": []}
+        attributes = {"name": part["attributes"]["name"], "is_support": k < 2, "geometry": geometry}
+        data = {"attributes": attributes, "key": k, "features": []}
         node[str(k)] = {"part": {"dtype": "compas.datastructures/Part", "data": data}}
     graph = {"default_node_attributes": {"x": 0.0, "y": 0.0, "z": 0.0}, "node": node, "edge": {}}
     return {"dtype": "compas.datastructures/Assembly", "data": {"graph": graph, "attributes": {"name": "Assembly"}}}

@@ -349,6 +349,19 @@ def test_a_thickness_that_we_wrote_stays_when_the_drawing_is_scaled(tmp_path, su
     assert "thickness       0.5 m" in str(inspect(path, unit="mm"))
 
 
+def test_level_outlines_are_a_plan_or_drawing_in_xy_wherever_one_of_them_lies(tmp_path):
+    """A long course with a stray elevation is no upright drawing."""
+
+    def draw(document, space):
+        for k in range(20):
+            corners = [(0.5 * k, 0), (0.5 * k + 0.5, 0), (0.5 * k + 0.5, 0.3), (0.5 * k, 0.3)]
+            space.add_polyline3d([(x, y, 10.0 * (k == 3)) for x, y in corners], close=True)
+
+    layout = read_layout(saved(tmp_path, draw))
+    assert np.ptp(layout.points, axis=0) == pytest.approx([10.0, 0.3])
+    assert any("elevations were ignored" in note for note in layout.notes)
+
+
 def test_faults_of_a_file_are_noted_and_not_printed(tmp_path, capfd):
     def draw(document, space):
         space.add_lwpolyline(SQUARE, close=True)

@@ -208,7 +208,7 @@ def test_coordinates_of_the_world_survive_single_precision_or_are_noted(tmp_path
     save_layout(far, tmp_path / "far.glb")
     np.testing.assert_allclose(read(tmp_path / "far.glb").areas, flat.areas, rtol=1e-6)
     assert "single precision" not in " ".join(read_layout(tmp_path / "far.glb").notes)
-    solids = [trimesh.creation.box(bounds=[[2600000 + k, 0, 0], [2600001 + k, 0.5, 1]]) for k in range(2)]
+    solids = [trimesh.creation.box(bounds=[[2600000.2 + k, 0, 0], [2600001.2 + k, 0.5, 1]]) for k in range(2)]
     (tmp_path / "a.stl").write_bytes(trimesh.util.concatenate(solids).export(file_type="stl"))
     assert "numbers of single precision, 0.25 units apart at 2.6e+06" in " ".join(read_layout(tmp_path / "a.stl").notes)
 
