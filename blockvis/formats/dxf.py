@@ -159,7 +159,7 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     meshes = _chosen_meshes(found, reading)
     if meshes:
         return layout_of_meshes(meshes, path, reading, stated, _faults(audit) + _skipped(found))
-    found.notes += _turned(found, reading.view, path)
+    found.notes += _turned(found, reading, path)
     faces = _with_loose(found, reading, tolerance)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
         seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
@@ -233,12 +233,17 @@ def _faults(audit: Any) -> list[str]:
     return [Note(CHANGED, f"repaired or passed over: {counted(faults, 'fault')} of the file")] if faults else []
 
 
-def _turned(found: _Outlines, view: str | None, path: Path) -> list[str]:
-    """Turn a drawing that stands upright into the plane of x and y, and say what that changes."""
+def _turned(found: _Outlines, reading: Reading, path: Path) -> list[str]:
+    """Turn a drawing, of which what is wanted stands upright, into the plane of x and y; say what that changes."""
     every = [*found.rings, *(line.points for line in found.loose)]
     if not every or not all(np.isfinite(points).all() for points in every):
         return []
-    turn, notes = drawing_plane(every, f"'{path}'", view)
+    unwanted, asked = _choices(found, reading)
+    labels = zip(_labels(found), found.looks, strict=True)
+    wanted = [not unwanted.takes(*own) and (not reading.only or asked.takes(*own)) for own in labels]
+    wanted += _wanted_lines(found, unwanted, asked)
+    chosen = [points for points, is_wanted in zip(every, wanted, strict=True) if is_wanted]
+    turn, notes = drawing_plane(chosen or every, f"'{path}'", reading.view)
     still = np.zeros(3)
     found.rings = [ring @ turn.T for ring in found.rings]
     found.arcs = [tuple(arc.mapped(turn, still) for arc in arcs) for arcs in found.arcs]
@@ -683,22 +688,39 @@ def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> 
 
 def _chosen_lines(found: _Outlines, reading: Reading) -> tuple[Choice, list[Line]]:
     """Leave out loose lines that are not wanted; give what is unwanted, and the others."""
+    unwanted, asked = _choices(found, reading)
     wanted = []
-    layers = {*found.layers, *(line.layer for line in found.loose)}
-    names = {*layers, *found.names, *(f"line {line.handle}" for line in found.loose)}
-    names |= {str(row.get(key, "")) for row in found.rows for key in ("name", "group", "material")}
-    unwanted, asked = Choice(reading.ignore, names), Choice(reading.only, names)
-    looks = {look for own in (*found.looks, *(line.looks for line in found.loose)) for look in own}
-    chosen = any(asked.takes([layer]) for layer in layers) or asked.takes((), looks)
-    for line in found.loose:
-        own = [line.layer], line.looks
-        if unwanted.takes(*own) or (chosen and not asked.takes(*own)):
+    for line, is_wanted in zip(found.loose, _wanted_lines(found, unwanted, asked), strict=True):
+        if is_wanted:
+            wanted.append(line)
+        else:
             name = f"line {line.handle}"
             left = LeftOut("asked line", line.points[:, :2], "", line.layer, name, closed=False, looks=line.looks)
             found.left_out.append(left)
-        else:
-            wanted.append(line)
     return unwanted, wanted
+
+
+def _choices(found: _Outlines, reading: Reading) -> tuple[Choice, Choice]:
+    """What is unwanted, and what is asked for."""
+    lines = {name for line in found.loose for name in (line.layer, f"line {line.handle}")}
+    names = lines.union(*_labels(found))
+    return Choice(reading.ignore, names), Choice(reading.only, names)
+
+
+def _labels(found: _Outlines) -> list[tuple[str, ...]]:
+    """Layer and names of each outline, by which it can be asked for."""
+    rows = [[str(row.get(key, "")) for key in ("name", "group", "material")] for row in found.rows]
+    return [tuple(filter(None, own)) for own in zip(found.layers, found.names, *zip(*rows, strict=True), strict=True)]
+
+
+def _wanted_lines(found: _Outlines, unwanted: Choice, asked: Choice) -> list[bool]:
+    """Which loose lines are wanted: all, unless layers or looks are asked for."""
+    layers = {*found.layers, *(line.layer for line in found.loose)}
+    looks = {look for own in (*found.looks, *(line.looks for line in found.loose)) for look in own}
+    chosen = any(asked.takes([layer]) for layer in layers) or asked.takes((), looks)
+    every = [([line.layer], line.looks) for line in found.loose]
+    return [not unwanted.takes(*own) and (not chosen or asked.takes(*own)) for own in every]
+
 
 
 def _size(found: _Outlines) -> float:

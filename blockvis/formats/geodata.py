@@ -80,6 +80,11 @@ class _Found:
         """(n, 3) arrays: the points of each outline and line."""
         return [*self.rings, *(points for points, _ in self.lines), *(rings[0] for rings, _ in self.holed)]
 
+    @property
+    def of_every(self) -> list[int]:
+        """Number of the feature of each."""
+        return [*self.of, *(k for _, k in self.lines), *(k for _, k in self.holed)]
+
 
 def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     """Read parsed GeoJSON, which states no unit; None if it is another kind of JSON."""
@@ -301,9 +306,11 @@ def layout_of_features(
     if not every:
         seen = skips[0] if skips else "found: nothing"
         raise ValueError(f"'{path}' has no polygon ({seen}); draw each block as one polygon")
-    turn, notes = drawing_plane(every, f"'{path}'", reading.view)
-    turn = turn[:2]
     rows = _rows(features)
+    labels = [[row.get(key, "") for key in ("group", "material", "name")] for row in rows]
+    wanted = [points for points, k in zip(every, found.of_every, strict=True) if reading.wants(labels[k])]
+    turn, notes = drawing_plane(wanted or every, f"'{path}'", reading.view)
+    turn = turn[:2]
     strange = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)
     if strange:
         listed_roles = ", ".join(f"'{role}'" for role in strange)
@@ -314,14 +321,14 @@ def layout_of_features(
     _check_degrees(outlines, path, reading, degrees, notes, far=far)
     notes += passed_over(found.skipped)
     kinds = _parts(rows, found.of)
-    wanted, unwanted = _lines(found, rows, turn, reading)
-    faces = faces_of_lines(wanted, rings, [0.0] * len(rings), only=reading.only)
+    lines, unwanted = _lines(found, rows, turn, reading)
+    faces = faces_of_lines(lines, rings, [0.0] * len(rings), only=reading.only)
     _replace_cut(rings, kinds, faces)
     holes = [_hole(*(ring @ turn.T for ring in holed), row=rows[k]) for holed, k in found.holed]
     left_out = [*holes, *unwanted, *faces.left_out]
     if not rings and all(item.kind == "open" for item in left_out):
         raise ValueError(f"'{path}' has no polygon: {nothing_closed(faces)}; draw each block as one polygon")
-    notes += [faces_note(faces, wanted)] if faces.rings else []
+    notes += [faces_note(faces, lines)] if faces.rings else []
     notes += faces.notes + joined_note(found.misses, float(np.ptp(np.concatenate(every), axis=0).max()))
     layout = Layout(
         blocks=tuple(rings),

@@ -24,8 +24,8 @@ class Reading:
         Coordinates that become x and y; None for those that fit the drawing.
     ignore, only : tuple of str
         Layers, groups, materials and names, or patterns of them, that are left out, and beside which all others are.
-        Readers of drawings ask :meth:`wants` for loose lines, which later are no lines any more; of outlines it is
-        asked when all are read.
+        Readers of drawings ask :meth:`wants` for loose lines, which later are no lines any more, and for the plane of
+        a drawing; outlines are left out when all are read.
     dimension : {2, 3} or None
         Whether bodies are read in the plane or in space; None for space where they are not prisms side by side.
     image : mapping

@@ -362,6 +362,27 @@ def test_level_outlines_are_a_plan_or_drawing_in_xy_wherever_one_of_them_lies(tm
     assert any("elevations were ignored" in note for note in layout.notes)
 
 
+@pytest.mark.parametrize("chosen", [{"only": "facade"}, {"ignore": "PLAN"}, {"ignore": ["PLAN", "#ff0000"]}])
+def test_what_is_not_wanted_does_not_decide_how_a_drawing_lies(tmp_path, chosen):
+    """A façade at 60° to x beside the plan of its house, an outline and a line: 1 m wide, and not half of it."""
+
+    def draw(document, space):
+        for low in (0.0, 0.5):
+            corners = [(0, low), (1, low), (1, low + 0.5), (0, low + 0.5)]
+            points = [(0.5 * u, 0.75**0.5 * u, z) for u, z in corners]
+            space.add_polyline3d(points, close=True, dxfattribs={"layer": "facade"})
+        plan = [(5 * x, 4 * y, 0) for x, y in SQUARE]
+        space.add_polyline3d(plan, close=True, dxfattribs={"layer": "PLAN"})
+        space.add_line((0, 2), (5, 2), dxfattribs={"layer": "PLAN"})
+        space.add_line((0, 3), (5, 3), dxfattribs={"layer": "PLAN", "color": 1})
+
+    layout = read_layout(saved(tmp_path, draw), **chosen)
+    assert np.ptp(np.concatenate(layout.outlines), axis=0) == pytest.approx([1.0, 1.0])
+    notes = " ".join(layout.notes)
+    assert "stands upright at 60° to x" in notes
+    assert "elevations" not in notes
+
+
 def test_faults_of_a_file_are_noted_and_not_printed(tmp_path, capfd):
     def draw(document, space):
         space.add_lwpolyline(SQUARE, close=True)

@@ -141,6 +141,12 @@ def test_a_facade_that_stands_upright_is_turned(tmp_path):
     seen = blockvis.read_layout(geojson(tmp_path / "facade.geojson", [polygon(ring) for ring in slanting]), view="xz")
     assert np.ptp(seen.points, axis=0) == pytest.approx([0.8, 0.4])
     assert any("stands upright at 36.9° to x" in note for note in seen.notes)
+    # Nor does a plan that is not wanted decide it.
+    stones = [polygon(ring, group="facade") for ring in slanting]
+    both = geojson(tmp_path / "both.geojson", [*stones, polygon([[0, 0], [9, 0], [9, 9], [0, 0]], group="plan")])
+    for chosen in ({"only": "facade"}, {"ignore": "plan"}):
+        again = blockvis.read_layout(both, **chosen)
+        assert np.ptp(np.concatenate(again.outlines), axis=0) == pytest.approx([0.8, 0.4])
 
 
 def test_degrees_are_refused_with_the_command_that_makes_them_metres(tmp_path):
