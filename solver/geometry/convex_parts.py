@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from solver.tolerances import DRAWN_GAP
 
@@ -68,7 +71,7 @@ class ConvexParts:
     inner : (n_faces,) bool array
         Faces of the parts inside their block, where it was cut.
     plane : (n_faces,) int array
-        The plane of each face of a block: the same for faces into which one face was cut.
+        The same for faces into which one face of a block was cut.
     made : (n_corners,) bool array
         Corners that the cuts have made: none of the block.
     """
@@ -159,21 +162,20 @@ def convex_parts(solids: Solids) -> ConvexParts:
         n_faces, n_corners = len(solids.block_of_face), len(solids.vertices)
         inner, made = np.zeros(n_faces, dtype=bool), np.zeros(n_corners, dtype=bool)
         return ConvexParts(solids, np.arange(len(solids)), none.astype(np.int64), none, inner, np.arange(n_faces), made)
-    surfaces, sources, weights, block_of_part, inner_faces, made_corners = [], [], [], [], [], []
-    is_bent = np.zeros(len(solids), dtype=bool)
-    is_bent[bent] = True
+    surfaces, sources, weights, block_of_part, drawn_faces, made_corners = [], [], [], [], [], []
+    is_bent = np.isin(np.arange(len(solids)), bent)
     for block in range(len(solids)):
         own, loops = solids.surface(block)
         start = int(solids.offsets[block])
-        parts = [(own, loops, [False] * len(loops))]
+        parts = [(own, loops, list(range(len(loops))))]
         if is_bent[block]:
             frame = _spread_corners(own)
             try:
                 parts = _parts_of(own.tobytes(), tuple(map(tuple, loops)))
             except ValueError as error:
                 raise NoParts(block, str(error)) from None
-        for corners, around, inside in parts:
-            inner_faces += inside
+        for corners, around, drawn in parts:
+            drawn_faces += [(block, number) for number in drawn]
             surfaces.append((corners, around))
             block_of_part.append(block)
             far = ON_CORNER * float(np.linalg.norm(np.ptp(own, axis=0)))
@@ -186,29 +188,16 @@ def convex_parts(solids: Solids) -> ConvexParts:
                 number = start + np.arange(len(corners))
                 sources.append(np.tile(number[:, None], (1, 4)))
                 weights.append(np.tile([1.0, 0.0, 0.0, 0.0], (len(corners), 1)))
-    cut = Solids.of_surfaces(surfaces)
+    drawn_face = np.array(drawn_faces)
     return ConvexParts(
-        cut,
+        Solids.of_surfaces(surfaces),
         np.array(block_of_part),
         np.concatenate(sources),
         np.concatenate(weights),
-        np.array(inner_faces),
-        _planes(cut, np.array(block_of_part), is_bent, solids.widths),
+        drawn_face[:, 1] < 0,
+        np.unique(drawn_face, axis=0, return_inverse=True)[1].ravel(),
         np.concatenate(made_corners),
     )
-
-
-def _planes(parts: Solids, block_of_part: np.ndarray, is_bent: np.ndarray, widths: np.ndarray) -> np.ndarray:
-    """(n_faces,) int array: the first face of the same block in the plane of each."""
-    faces = parts.faces(parts.vertices)
-    block = block_of_part[parts.block_of_face]
-    plane = np.arange(len(block))
-    for k in np.split(plane, np.flatnonzero(np.diff(block)) + 1):
-        if is_bent[block[k[0]]]:
-            same = faces.normals[k] @ faces.normals[k].T > ONE_WAY
-            off = np.einsum("fi,gfi->gf", faces.normals[k], faces.middles[k][:, None] - faces.middles[k])
-            plane[k] = k[(same & (np.abs(off) <= 2.0 * DRAWN_GAP * widths[block[k[0]]])).argmax(axis=1)]
-    return plane
 
 
 def _out_of_faces(solids: Solids) -> np.ndarray:
@@ -304,16 +293,17 @@ def _body(points: np.ndarray, triangles: np.ndarray) -> Manifold:
 
 
 @lru_cache(maxsize=MOST_KEPT)
-def _parts_of(
-    points: bytes, faces: tuple[tuple[int, ...], ...]
-) -> list[tuple[np.ndarray, list[list[int]], list[bool]]]:
-    """Corners and faces of each part of a block, and which faces are inside the block; kept of the last blocks."""
+def _parts_of(points: bytes, faces: tuple[tuple[int, ...], ...]) -> list[tuple[np.ndarray, list[list[int]], list[int]]]:
+    """Corners and faces of each part of a block, kept of the last blocks.
+
+    And the number of the face of the block in which each face lies, below 0 and its own inside the block.
+    """
     vertices, loops = np.frombuffer(points).reshape(-1, 3), [list(face) for face in faces]
     origin, size = vertices[0], float(np.linalg.norm(np.ptp(vertices, axis=0)))
     drawn = Solids.of_surfaces([((vertices - origin) / size, loops)])
     planes, flatness = drawn.faces(drawn.vertices), DRAWN_GAP * float(drawn.widths[0])
     whole = _whole(drawn.vertices, loops, planes.normals)
-    queue, parts, total = [whole], [], 0.0
+    queue, parts, total, number, inside = [whole], [], 0.0, _flat_faces(whole), count(1)
     while queue:
         piece = queue.pop()
         cut = _best_cut(piece, planes, flatness)
@@ -322,8 +312,8 @@ def _parts_of(
         else:
             corners, rings, volume = _hull(_drawn_corners(piece.corners, drawn.vertices), flatness)
             total += volume
-            inner = [_is_inner(corners[ring], whole, flatness) for ring in rings]
-            parts.append((corners * size + origin, rings, inner))
+            faces_of = [_drawn_face(corners[ring], whole, number, flatness) for ring in rings]
+            parts.append((corners * size + origin, rings, [k if k >= 0 else -next(inside) for k in faces_of]))
         if len(queue) + len(parts) > MOST_PARTS:
             raise ValueError(f"has more than {MOST_PARTS} convex parts; simplify its surface")
     if abs(total - whole.volume) > VOLUME_LEFT * whole.volume:
@@ -380,19 +370,29 @@ def _crossing(piece: _Piece) -> np.ndarray | None:
     return None
 
 
-def _is_inner(face: np.ndarray, whole: _Piece, flatness: float) -> bool:
-    """Whether nothing of the surface of the block lies in a face of a part."""
+def _flat_faces(whole: _Piece) -> np.ndarray:
+    """(m,) int array: one number for triangles of a block that are joined and in a plane, as halves around a hole."""
+    n, beyond = len(whole.triangles), whole.twins // 3
+    own = np.repeat(np.arange(n), 3)
+    flat = dot(whole.normals[own], whole.normals[beyond]) >= 1.0 - REENTRANT**2 / 2.0
+    k = np.flatnonzero(flat | (whole.face[own] == whole.face[beyond]))
+    return np.asarray(connected_components(coo_array((np.ones(len(k)), (own[k], beyond[k])), shape=(n, n)))[1])
+
+
+def _drawn_face(face: np.ndarray, whole: _Piece, number: np.ndarray, flatness: float) -> int:
+    """Find the number, of those of all triangles of a block, of what lies in a face of a part; -1 inside the block."""
     arms = face - face[0]
     normal = unit(cross(arms[1:-1], arms[2:]).sum(axis=0))
-    own = whole.points[whole.triangles[whole.normals @ normal > ONE_WAY]]
-    own = own[(np.abs((own - face.mean(axis=0)) @ normal) <= 2.0 * flatness).all(axis=1)]
+    same = (np.abs((whole.points[whole.triangles] - face.mean(axis=0)) @ normal) <= 2.0 * flatness).all(axis=1)
+    same &= whole.normals @ normal > ONE_WAY
+    own = whole.points[whole.triangles[same]]
     # They lie apart where an edge of one of them has the other on its outer side.
     apart = np.zeros(len(own), dtype=bool)
     for ring, other in ((np.broadcast_to(face, (len(own), *face.shape)), own), (own, face[None])):
         outward = unit(cross(np.roll(ring, -1, axis=1) - ring, normal))
         inside = dot(ring[:, :, None] - other[:, None], outward[:, :, None]).max(axis=2)
         apart |= (inside <= ON_PLANE).any(axis=1)
-    return bool(apart.all())
+    return int(number[same][~apart][0]) if not apart.all() else -1
 
 
 def _hull(points: np.ndarray, flatness: float) -> tuple[np.ndarray, list[list[int]], float]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from structures import prism, turn_by
+from structures import prism, turn_by, upright
 
 import solver
 from solver import mechanics
@@ -99,6 +99,49 @@ def test_only_whole_stones_touch_each_other():
     np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-12)
     assert contacts.areas.sum() == pytest.approx(3.0)
     assert counts.tolist() == [4, 4, 4]
+
+
+#: Outlines that are their own mirror images, and the corners that lie between others.
+SYMMETRIC = {
+    "quoin": ([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], [3]),
+    "thin quoin": ([(0, 0), (2, 0), (2, 0.3), (0.3, 0.3), (0.3, 2), (0, 2)], [3]),
+    "cross": (
+        [(3, -1), (3, 1), (1, 1), (1, 3), (-1, 3), (-1, 1), (-3, 1), (-3, -1), (-1, -1), (-1, -3), (1, -3), (1, -1)],
+        [2, 5, 8, 11],
+    ),
+}
+
+
+@pytest.mark.parametrize("first", [0, 1, 3])
+@pytest.mark.parametrize("name", SYMMETRIC)
+def test_a_face_shares_its_area_among_its_corners_however_it_was_cut(name, first):
+    """Two cuts are as good: which of them is taken follows from the order of corners, which is that of the drawing."""
+    outline, between = SYMMETRIC[name]
+    solid, slab = prism(outline[first:] + outline[:first]), prism([(-5, -5), (5, -5), (5, 5), (-5, 5)], -1.0, 0.0)
+    solids = [(np.asarray(corners) @ TURN.T, faces) for corners, faces in (solid, slab)]
+    assembly = solver.Assembly.from_solids(solids, roles=["free", "fixed"])
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 0.05)
+    apart = np.abs((contacts.points @ TURN)[:, None, :2] - np.array(outline)).max(axis=2)
+    assert (apart.min(axis=1) < 1e-6).all()
+    areas = np.zeros(len(outline))
+    areas[apart.argmin(axis=1)] = contacts.areas
+    assert areas.sum() == pytest.approx(assembly.shapes.volumes[0])
+    # A cross turned by a quarter is itself, an L is its mirror image.
+    image = np.roll(areas, 3) if name == "cross" else np.roll(areas[::-1], 1)
+    np.testing.assert_allclose(areas, image, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(areas[between], 0.0, atol=1e-12)
+    assert (np.delete(areas, between) > 0.0).all()
+
+
+def test_each_foot_of_a_stone_has_its_own_area():
+    """On one slab and in one plane, they are two faces, of 0.2 m² and of 1 m²."""
+    outline = [(0, 0), (0.2, 0), (0.2, 0.5), (2, 0.5), (2, 0), (3, 0), (3, 1), (0, 1)]
+    stone, slab = upright(outline, 0.0, 1.0), prism([(-1, -1), (4, -1), (4, 2), (-1, 2)], -1.0, 0.0)
+    assembly = solver.Assembly.from_solids([stone, slab], roles=["free", "fixed"])
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 0.05)
+    small = contacts.points[:, 0] < 1.0
+    assert contacts.areas[small] == pytest.approx(0.05)
+    assert contacts.areas[~small] == pytest.approx(0.25)
 
 
 def groin_stone(low, high, end=2.6):
