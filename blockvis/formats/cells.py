@@ -14,6 +14,7 @@ import numpy as np
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
+from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, UPRIGHT, Note, kind_of
 from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 from solver import mechanics
@@ -62,7 +63,7 @@ def layout_of_cells(
         Points around each cell.
     data : mapping of str to (n_cells, ...) array
         Cell arrays. ``block_id`` says which cells form one block; without it every cell is a block if one has more
-        than three corners, and triangles that share points form one. ``name``, ``role``, ``material``, ``group``,
+        than three corners, and triangles that share sides form one. ``name``, ``role``, ``material``, ``group``,
         ``thickness`` and ``density`` are optional.
     path : Path or str
         Named in messages.
@@ -95,7 +96,7 @@ def layout_of_cells(
         names = [f"block {k}" for k in owner]
         how = f"{counted(len(rings), 'block')}, one per cell: no cell array 'block_id' says which cells are one block"
     else:
-        owner = components(rings, len(points))
+        owner = _pieces(rings, np.zeros(len(rings), dtype=np.int64))
         names = [f"block {k}" for k in range(int(owner.max()) + 1)]
         how = f"{counted(len(names), 'block')}, one per connected piece: no cell array 'block_id' says which are one"
     unusable: dict[int, LeftOut] = {}
@@ -106,12 +107,28 @@ def layout_of_cells(
     return layout.leaving_out(unusable)
 
 
+def _pieces(rings: Sequence[np.ndarray], owner: np.ndarray) -> np.ndarray:
+    """(n_cells,) int array: the connected piece of each cell, by its sides; a common corner connects none.
+
+    Two corners do: cells with more sides may lie between them, which is no drawing of several blocks.
+    """
+    from scipy.sparse import coo_array
+
+    cell, start = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings]), np.concatenate(list(rings))
+    sides = np.sort(np.column_stack([start, np.concatenate([np.roll(ring, -1) for ring in rings])]), axis=1)
+    _, side = np.unique(np.column_stack([owner[cell], sides]), axis=0, return_inverse=True)
+    _, corner = np.unique(np.column_stack([owner[cell], start]), axis=0, return_inverse=True)
+    n = len(rings)
+    piece = linked(cell, n + side.ravel(), n + int(side.max()) + 1)[:n]
+    at = np.unique(np.column_stack([piece[cell], corner.ravel()]), axis=0).T
+    shared = coo_array((np.ones(at.shape[1]), at)).tocsr()
+    one, other = (shared @ shared.T > 1.0).nonzero()
+    return linked(one, other, int(piece.max()) + 1)[piece]
+
+
 def _in_pieces(rings: Sequence[np.ndarray], names: Sequence[str], owner: np.ndarray) -> tuple[list[str], np.ndarray]:
     """Names of the connected pieces of parts, numbered where a part has several, and that of each cell."""
-    corners = np.column_stack([np.repeat(owner, [len(ring) for ring in rings]), np.concatenate(list(rings))])
-    own = np.unique(corners, axis=0, return_inverse=True)[1].ravel()
-    ends = np.cumsum([len(ring) for ring in rings])
-    pairs = np.column_stack([owner, components(np.split(own, ends[:-1]), int(own.max()) + 1)])
+    pairs = np.column_stack([owner, _pieces(rings, owner)])
     pieces, piece = np.unique(pairs, axis=0, return_inverse=True)
     parts, several = pieces[:, 0], np.bincount(pieces[:, 0]) > 1
     numbers = np.arange(len(parts)) - np.searchsorted(parts, parts) + 1

@@ -701,7 +701,7 @@ def _chosen_lines(found: _Outlines, reading: Reading) -> tuple[Choice, list[Line
 
 
 def _choices(found: _Outlines, reading: Reading) -> tuple[Choice, Choice]:
-    """What is unwanted, and what is asked for."""
+    """Tell apart what is unwanted and what is asked for."""
     lines = {name for line in found.loose for name in (line.layer, f"line {line.handle}")}
     names = lines.union(*_labels(found))
     return Choice(reading.ignore, names), Choice(reading.only, names)
@@ -720,7 +720,6 @@ def _wanted_lines(found: _Outlines, unwanted: Choice, asked: Choice) -> list[boo
     chosen = any(asked.takes([layer]) for layer in layers) or asked.takes((), looks)
     every = [([line.layer], line.looks) for line in found.loose]
     return [not unwanted.takes(*own) and (not chosen or asked.takes(*own)) for own in every]
-
 
 
 def _size(found: _Outlines) -> float:

@@ -59,6 +59,31 @@ def test_stones_of_one_set_that_touch_are_blocks_whichever_corner_comes_first(tm
     assert read_layout(tmp_path / "b.vtu").names == ("block 1", "block 5 1", "block 5 2")
 
 
+def test_stones_of_one_set_that_touch_at_a_corner_only_are_blocks(tmp_path):
+    """A stack bond of two materials, like a chess board; of cells with a node between others no stone is cut in two."""
+    grid = np.arange(20).reshape(4, 5)
+    points = [(x, 0.5 * y, 0.0) for y in range(4) for x in range(5)]
+    quads = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    materials = (np.indices((3, 4)).sum(axis=0) % 2 + 1).ravel()
+    triangles = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    for kind, cells in (("quad", quads), ("triangle", triangles)):
+        values = np.repeat(materials, len(cells) // len(quads))
+        meshio.write(tmp_path / "a.vtu", meshio.Mesh(points, [(kind, cells)], cell_data={"medit:ref": [values]}))
+        layout = read_layout(tmp_path / "a.vtu")
+        assert layout.n_blocks == 12
+        assert (layout.sizes**2).tolist() == pytest.approx([0.5] * 12)
+        assert layout.names[:3] == ("block 1 1", "block 1 2", "block 1 3")
+    white = triangles.reshape(-1, 2, 3)[materials == 1].reshape(-1, 3)
+    meshio.write(tmp_path / "b.vtu", meshio.Mesh(points, [("triangle", white)]))
+    assert read_layout(tmp_path / "b.vtu").n_blocks == 6
+    hanging = [(0, 0), (2, 0), (2, 1), (1, 1), (0, 1), (2, 2), (1, 2), (0, 2), (4, 0), (4, 1)]
+    cells = [("quad", np.array([[0, 1, 2, 4], [4, 3, 6, 7], [3, 2, 5, 6], [1, 8, 9, 2]]))]
+    points = [(x, y, 0.0) for x, y in hanging]
+    meshio.write(tmp_path / "c.vtu", meshio.Mesh(points, cells, cell_data={"medit:ref": [np.array([1, 1, 1, 2])]}))
+    with pytest.raises(ValueError, match="'block 1' meets itself"):
+        read_layout(tmp_path / "c.vtu")
+
+
 QUADS = np.array([[0, 1, 2, 3], [1, 4, 5, 2], [4, 6, 7, 5]])
 CORNERS = np.array([[x, y, 0.0] for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (2, 1), (4, 0), (4, 1))])
 
