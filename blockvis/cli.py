@@ -254,7 +254,12 @@ def _parser() -> argparse.ArgumentParser:
     convert.add_argument(
         "source", metavar="IN", help="or a folder or a pattern of files, one per stone; or a results folder"
     )
-    convert.add_argument("target", metavar="OUT")
+    convert.add_argument(
+        "target",
+        metavar="OUT",
+        help="of the format that its suffix says, as .json, .dxf or .obj (a wrong one lists all); of results .vtkhdf "
+        "for the path in time, .glb for an animation, else the blocks at the end",
+    )
     convert.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
     _add_view(convert)
     _add_choice(convert)

@@ -183,7 +183,7 @@ def suffixes_known(use, *first) -> list[str]:
         try:
             use(*first, path)
         except ValueError as error:
-            return re.findall(r"\.\w+", str(error).rpartition("use one of ")[2])
+            return re.findall(r"\.\w+", str(error).rpartition("use one of ")[2].partition(";")[0])
     raise AssertionError("a file of no known suffix was taken")
 
 

@@ -38,6 +38,7 @@ ELSEWHERE = {
     **dict.fromkeys((".kml", ".kmz", ".gml", ".tab", ".mif", ".qgz", ".qgs"), _MAP),
     **dict.fromkeys((".las", ".laz", ".e57", ".pts", ".ptx", ".rcp"), _CLOUD),
     **dict.fromkeys((".csv", ".xlsx", ".xls", ".ods"), _TABLE),
+    ".vtkhdf": "it holds a path in time; give the results folder, or of an increment increments/blocks_*.vtu in it",
 }
 
 #: What is read, in a line.

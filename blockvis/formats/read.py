@@ -492,5 +492,7 @@ def _format(path: Path, verb: str) -> Format:
         if verb == "read":
             raise ValueError(f"'{path}': {cannot_read(suffix)}")
         able = " ".join(sorted(key for key, value in FORMATS.items() if value.writes))
-        raise ValueError(f"'{path}': cannot write '{suffix or 'a file without suffix'}'; use one of {able}")
+        raise ValueError(
+            f"'{path}': cannot write '{suffix or 'a file without suffix'}'; use one of {able}; .vtkhdf is for results"
+        )
     return known

@@ -54,6 +54,18 @@ def test_a_series_shows_each_increment_at_its_settlement(folder, tmp_path):
     shows_each_increment(arch_response(), converted(folder, tmp_path / "arch.vtkhdf"))
 
 
+def test_a_series_is_named_where_no_other_file_is_written_or_read(folder, tmp_path, capsys):
+    assert main(["convert", str(folder), str(tmp_path / "a.nothing")]) == 2
+    assert main(["convert", str(converted(folder, tmp_path / "a.vtkhdf")), str(tmp_path / "a.dxf")]) == 2
+    with pytest.raises(SystemExit):
+        main(["convert", "--help"])
+    said, written = capsys.readouterr()[::-1]
+    assert "'.nothing'; use one of .dxf" in said
+    assert "; .vtkhdf is for results" in said
+    assert "'.vtkhdf' is not read: it holds a path in time; give the results folder" in said
+    assert "of results .vtkhdf for" in " ".join(written.split())
+
+
 @pytest.mark.slow
 def test_a_series_shows_each_increment_in_space(tmp_path):
     folder = blockvis.write(vault_response(), tmp_path / "out")
