@@ -329,8 +329,8 @@ def uncut_names(assembly: solver.Assembly) -> list[str]:
     """Name each block as it was called before :func:`cut_ground` cut it."""
     parts = [name.rpartition(" ") for name in assembly.names]
     return [
-        first if number.isdigit() and first not in assembly.names else name
-        for name, (first, _, number) in zip(assembly.names, parts, strict=True)
+        first if number.isdigit() and name != drawn else name
+        for name, drawn, (first, _, number) in zip(assembly.names, assembly.drawn_names, parts, strict=True)
     ]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 import solver
 from blockvis.cases.explain_settings import DIRECTIONS, ExplainSettings
-from blockvis.cases.profiles import Profile, bearing_points, cut_ground
+from blockvis.cases.profiles import Profile, bearing_points, cut_ground, uncut_names
 from blockvis.text import nearest
 from solver import mechanics
 
@@ -155,7 +155,8 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         cut = cut_ground(fixed, (), chosen=supports)
-    pieces = {name: _pieces(name, cut, assembly) for name in whole}
+    called = list(zip(cut.names, uncut_names(cut), strict=True))
+    pieces = {name: tuple(one for one, uncut in called if uncut == name) for name in whole}
     feet = sum(len(_bearing(cut, names)) for names in pieces.values())
     if feet < FEWEST_FEET and settings.trough is None:
         return Ground(fixed, whole, troughs=False)
@@ -164,12 +165,6 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
             f"{source}: [explain] trough: the structure stands on one place, which cannot bend; leave it out"
         )
     return Ground(cut, pieces, troughs=True, notes=tuple(str(warning.message) for warning in caught))
-
-
-def _pieces(name: str, cut: solver.Assembly, drawn: solver.Assembly) -> tuple[str, ...]:
-    """Name the pieces of a support, or itself where it was not cut."""
-    new = tuple(one for one in cut.names if one not in drawn.names and one.rpartition(" ")[0] == name)
-    return new or (name,)
 
 
 def _touching(assembly: solver.Assembly) -> mechanics.Contacts:

@@ -452,8 +452,7 @@ def _blocks(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> li
             key, f"'{name}' is the name of {len(meant)} blocks; leave it out and give the place, x and y, in space z"
         )
     names = pieces_named((name,), assembly)
-    # Pieces are of the ground: "stone" is not all of "stone 1", "stone 2" ...
-    if not set(names) <= set(assembly.names) or any(assembly.free[assembly.index(one)] for one in names[1:]):
+    if not set(names) <= set(assembly.names):
         problem = f"'{name}' is no block{nearest(name, assembly.names)}" if name else "names no block"
         raise cells.error(key, f"{problem}; blockvis info lists the names")
     return [assembly.index(one) for one in names]

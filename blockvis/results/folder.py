@@ -393,8 +393,7 @@ def stored_assembly(folder: Path) -> solver.Assembly:
     try:
         stored = checked_arrays(folder / "assembly.npz")
         names, roles, materials = (list(map(str, stored[key])) for key in ("names", "roles", "materials"))
-        # Folders of before have none.
-        drawn = tuple(map(str, stored.get("drawn_names", names)))
+        drawn = tuple(map(str, stored["drawn_names"]))
         if len(drawn) != len(names):
             raise ValueError(f"{len(names)} names but {len(drawn)} drawn_names")
         # Checked like a layout: the file may come from anywhere.

@@ -1,5 +1,7 @@
 """Tables of cracks and displaced points, and drawings of the damaged state, as observations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from structures import drawn
@@ -90,6 +92,7 @@ def test_a_support_that_is_cut_is_named_by_its_name_or_its_pieces():
     wall = solver.Assembly.from_outlines(
         outlines, names=["ground 1", "ground 2", "one", "two"], roles=["fixed", "fixed", "free", "free"]
     )
+    wall = replace(wall, drawn_names=("ground", "ground", "one", "two"))
     rows = [{"joint": f"two | {name}", "width": 0.001} for name in ("ground 2", "ground")]
     found = read_observations([*rows, {"block": "ground", "dx": 0.001, "dy": 0.0}], wall)
     np.testing.assert_allclose(found.places, [[1.5, 0.0], [1.5, 0.0]])
