@@ -32,6 +32,9 @@ SLIVER_WIDTH = 2e-3
 #: ... and longer than this many times its own width: a chip is none.
 SLIVER_SHAPE = 20.0
 
+#: Blocks thinner or thicker than these times the root of their area were drawn in another unit than they are thick.
+THINNEST, THICKEST = 0.02, 1000.0
+
 #: A frame or background holds at least this share of all other outlines.
 BACKGROUND = 0.5
 
@@ -101,10 +104,22 @@ def sorted_out(
 
 
 def noted(layout: Layout) -> Layout:
-    """Note what is left out, and the doubt that the sizes of the blocks cast on the unit."""
-    notes = [*layout.notes, *unfilled(layout), *in_words(layout.left_out)]
-    doubted = "" if layout.unit_by == "user" else doubt(layout.unit, float(np.median(layout.sizes)))
-    return replace(layout, notes=(*notes, Note(UNIT, doubted)) if doubted else tuple(notes))
+    """Note what is left out, and the doubts that the sizes of the blocks cast on the unit and on their thickness."""
+    size = float(np.median(layout.sizes))
+    doubted = "" if layout.unit_by == "user" else doubt(layout.unit, size)
+    found = [Note(UNIT, words) for words in (doubted, _thickness_doubt(layout, size)) if words]
+    return replace(layout, notes=(*layout.notes, *unfilled(layout), *in_words(layout.left_out), *found))
+
+
+def _thickness_doubt(layout: Layout, size: float) -> str:
+    """Doubt a thickness that the file says in another unit than its outlines; "" of one that may be."""
+    said = np.zeros(0) if layout.thickness is None else layout.thickness[np.isfinite(layout.thickness)]
+    if not len(said) or THINNEST * size <= (thickness := float(np.median(said))) <= THICKEST * size:
+        return ""
+    return (
+        f"thickness in doubt: {thickness:.3g} m of blocks {size:.3g} m across; beside outlines a file has it in the "
+        "unit of the drawing, .dxf, .svg and .msh in m: correct it there"
+    )
 
 
 def without_ignored(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:

@@ -149,6 +149,16 @@ def test_a_facade_that_stands_upright_is_turned(tmp_path):
         assert np.ptp(np.concatenate(again.outlines), axis=0) == pytest.approx([0.8, 0.4])
 
 
+def test_a_thickness_in_another_unit_than_its_drawing_is_doubted(tmp_path):
+    """It is in the unit of the drawing: of stones in mm, 500, and 0.5 is half a millimetre."""
+    rings = (np.array(SQUARES) * 1000.0).tolist()
+    for said, metres, doubted in ((500, 0.5, False), (0.5, 0.0005, True)):
+        path = geojson(tmp_path / "mm.geojson", [polygon(ring, thickness=said) for ring in rings])
+        layout = blockvis.read_layout(path, unit="mm")
+        assert layout.thickness.tolist() == pytest.approx([metres] * 4)
+        assert ("thickness in doubt: 0.0005 m of blocks 0.283 m across" in " ".join(layout.notes)) is doubted
+
+
 def test_degrees_are_refused_with_the_command_that_makes_them_metres(tmp_path):
     rings = [(np.array(ring) * 1e-5 + [12.49, 41.89]).tolist() for ring in SQUARES]
     path = geojson(tmp_path / "rome.geojson", [polygon(ring) for ring in rings])
