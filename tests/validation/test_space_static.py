@@ -301,6 +301,25 @@ def test_how_many_corners_a_support_has_changes_nothing_at_rest(corners):
     np.testing.assert_allclose(carried, 1.0 / 3.0, rtol=1e-3)
 
 
+def test_a_drum_carries_a_quarter_on_each_of_four_pads_wherever_outlines_begin():
+    """An octagon, of whose middle course the stones lie around its corners and are not convex."""
+    angles, reach = np.arange(16) * np.pi / 8, np.tile([1.0, np.cos(np.pi / 8)], 8)
+    inner, outer = (r * np.column_stack([reach * np.cos(angles), reach * np.sin(angles)]) for r in (1.2, 1.5))
+
+    def course(level, first, through):
+        around = [(2 * k + first + np.array(through)) % 16 for k in range(8)]
+        rings = [np.concatenate([inner[k[::-1]], outer[k]]) for k in around]
+        return [prism(np.roll(ring, 4 * (k > 4), axis=0), level, level + 0.4) for k, ring in enumerate(rings)]
+
+    pads = [box((x, y, -0.5), (x + 2, y + 2, 0.0)) for x in (-2, 0) for y in (-2, 0)]
+    solids = [*course(0.0, 0, (0, 2)), *course(0.4, 1, (0, 1, 2)), *course(0.8, 0, (0, 2)), *pads]
+    assembly = solver.Assembly.from_solids(solids, roles=[*["free"] * 24, "moving", *["fixed"] * 3])
+    assert len(assembly.shapes.parts.block_of_part) == 36
+    sinks = solver.Settlement(direction=(0.0, 0.0, -1.0), increment=1e-6, limit=1e-6)
+    first = solver.Structure(assembly, friction_coefficient=0.6).settle(sinks).increments[0]
+    np.testing.assert_allclose(-first.support_forces[-4:, 2] / mechanics.total_weight(assembly), 0.25, rtol=EXACT)
+
+
 def test_torsion_of_faces_is_for_blocks_in_space():
     assembly = on_ground([box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))])
     loads = solver.Loads(solver.self_weight(assembly).dead, push(assembly, 0.0))
