@@ -17,23 +17,12 @@ from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_o
 
 
 class ClippedCorners(NamedTuple):
-    """Corners of the polygons in which faces cover each other.
+    """Corners of the polygons in which faces cover each other."""
 
-    Attributes
-    ----------
-    owner : (n,) int array
-        The pair of faces.
-    features : (n, 4) int array
-    areas : (n,) array [m²]
-        Tributary area of each corner in its polygon.
-    widths : (n,) array [m]
-        Width of the polygon; infinite at a corner in a re-entrant corner.
-    """
-
-    owner: np.ndarray
-    features: np.ndarray
-    areas: np.ndarray
-    widths: np.ndarray
+    owner: np.ndarray  #: (n,) int: the pair of faces
+    features: np.ndarray  #: (n, 4) int
+    areas: np.ndarray  #: (n,) [m²]: tributary area of each corner in its polygon
+    widths: np.ndarray  #: (n,) [m], of the polygon; infinite at a corner in a re-entrant corner
 
 
 def clipped_faces(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> ClippedCorners:

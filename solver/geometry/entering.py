@@ -32,23 +32,13 @@ class Movement(NamedTuple):
 
 
 class _Axes(NamedTuple):
-    """The best axis of one kind for each pair of parts.
-
-    Attributes
-    ----------
-    first, second : (n,) int arrays
-        The face, or the two edges.
-    before, after : (n,) array [m]
-        Separation along it; after the movement by its plane, which rides on one of the parts.
-    apart : (n,) array [m]
-        Largest separation after the movement along any axis of this kind.
-    """
+    """The best axis of one kind for each of n pairs of parts: a face, or two edges."""
 
     first: np.ndarray
     second: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    apart: np.ndarray
+    before: np.ndarray  #: [m], separation along it
+    after: np.ndarray  #: [m], after the movement by its plane, which rides on one of the parts
+    apart: np.ndarray  #: [m], largest separation after the movement along any axis of this kind
 
 
 def entered(

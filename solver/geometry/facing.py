@@ -19,34 +19,20 @@ SAME_SEPARATION = 1e-6
 
 @dataclass(frozen=True)
 class FacingParts:
-    """Pairs of near parts, with the faces that face each other.
-
-    Attributes
-    ----------
-    i, j : (n,) int arrays
-        The parts.
-    lead_i, lead_j : (n,) int arrays
-        The face of each from which the other part is farthest.
-    apart_i, apart_j : (n,) array [m]
-        How far; negative where the parts overlap.
-    face_i, face_j : (n,) int arrays
-        The leading one, which separates the parts farther, and the face that opposes it best.
-    width : (n,) array [m]
-        Of the thinner of their blocks.
-    cosine : (n,) array
-        Between the two faces; -1 where they oppose each other.
-    """
+    """Pairs of near parts i and j, (n,) int arrays, with the faces that face each other."""
 
     i: np.ndarray
     j: np.ndarray
+    #: The face of each from which the other part is farthest, and how far [m]; negative where the parts overlap.
     lead_i: np.ndarray
     lead_j: np.ndarray
     apart_i: np.ndarray
     apart_j: np.ndarray
+    #: The leading one, which separates the parts farther, and the face that opposes it best.
     face_i: np.ndarray
     face_j: np.ndarray
-    width: np.ndarray
-    cosine: np.ndarray
+    width: np.ndarray  #: [m], of the thinner of their blocks
+    cosine: np.ndarray  #: between the two faces; -1 where they oppose each other
 
     def __getitem__(self, chosen: np.ndarray) -> FacingParts:
         """Choose some of the pairs, by a mask or their numbers."""

@@ -21,18 +21,10 @@ def next_vertices(offsets: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Polygons or solids by their corners.
+    """Polygons or solids by their corners, one after another."""
 
-    Attributes
-    ----------
-    vertices : (n_vertices, d) array [m]
-        Corners of all bodies, one after another.
-    offsets : (n + 1,) int array
-        Body ``i`` owns ``vertices[offsets[i]:offsets[i + 1]]``.
-    """
-
-    vertices: np.ndarray
-    offsets: np.ndarray
+    vertices: np.ndarray  #: (n_vertices, d) [m]
+    offsets: np.ndarray  #: (n + 1,) int: body ``i`` owns ``vertices[offsets[i]:offsets[i + 1]]``
 
     def __len__(self) -> int:
         """Count the bodies."""
@@ -50,15 +42,9 @@ class Bodies:
 
 @dataclass(frozen=True)
 class Outlines(Bodies):
-    """Polygons with a thickness as flat arrays, and what follows from their drawing; their corners counter-clockwise.
+    """Polygons with a thickness as flat arrays, and what follows from their drawing; corners run counter-clockwise."""
 
-    Attributes
-    ----------
-    thickness : (n,) array [m]
-        Out of plane.
-    """
-
-    thickness: np.ndarray
+    thickness: np.ndarray  #: (n,) [m], out of plane
 
     @cached_property
     def _integrals(self) -> tuple[np.ndarray, np.ndarray]:

@@ -39,43 +39,25 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Faces:
-    """Planes of faces, with a direction along each.
+    """Planes of faces, with a direction along each."""
 
-    Attributes
-    ----------
-    normals : (n_faces, 3) array
-        Unit vectors that point out of the solid.
-    tangents : (n_faces, 3) array
-        Unit vectors along the longest edge of each face.
-    middles : (n_faces, 3) array [m]
-        Means of the corners.
-    areas : (n_faces,) array [m²]
-    """
-
-    normals: np.ndarray
-    tangents: np.ndarray
-    middles: np.ndarray
-    areas: np.ndarray
+    normals: np.ndarray  #: (n_faces, 3): unit vectors that point out of the solid
+    tangents: np.ndarray  #: (n_faces, 3): unit vectors along the longest edge of each face
+    middles: np.ndarray  #: (n_faces, 3) [m]: means of the corners
+    areas: np.ndarray  #: (n_faces,) [m²]
 
 
 @dataclass(frozen=True)
 class Solids(Bodies):
     """Closed surfaces of plane faces as flat arrays, and what follows from their drawing.
 
-    Attributes
-    ----------
-    corners : (n_corners,) int array
-        Vertices around all faces, face after face, counter-clockwise seen from outside. A corner also names the edge
-        that starts there.
-    face_offsets : (n_faces + 1,) int array
-        Face ``k`` owns ``corners[face_offsets[k]:face_offsets[k + 1]]``.
-    block_of_face : (n_faces,) int array
-        The solid each face belongs to, ascending.
+    Corners are the vertices around all faces, face after face, counter-clockwise seen from outside: those of a face run
+    from its offset to the next. A corner also names the edge that starts there.
     """
 
-    corners: np.ndarray
-    face_offsets: np.ndarray
-    block_of_face: np.ndarray
+    corners: np.ndarray  #: (n_corners,) int
+    face_offsets: np.ndarray  #: (n_faces + 1,) int
+    block_of_face: np.ndarray  #: (n_faces,) int, ascending: the solid each face belongs to
 
     @classmethod
     def of_surfaces(cls, surfaces: Sequence[tuple[np.ndarray, list[list[int]]]]) -> Self:

@@ -20,30 +20,14 @@ BRITTLE = 1e-6
 
 @dataclass(frozen=True)
 class JointPoints:
-    """What the joints add to each of n contact points, in units of the program.
+    """What the joints add to each of n contact points, in units of the program."""
 
-    Attributes
-    ----------
-    strength : (n, 2) array
-        Largest tension and cohesive shear force of a point that has lost nothing.
-    left : (n,) array
-        Part of them that is left.
-    fracture : (n, 2) array
-        Opening and slip, in block sizes, over which they fall to nothing.
-    give : (n, d) array
-        Elastic compliance, which stays.
-    rest : (n,) array [m]
-        Gap without force.
-    length : float [m]
-        Unit of the program.
-    """
-
-    strength: np.ndarray
-    left: np.ndarray
-    fracture: np.ndarray
-    give: np.ndarray
-    rest: np.ndarray
-    length: float
+    strength: np.ndarray  #: (n, 2): largest tension and cohesive shear force of a point that has lost nothing
+    left: np.ndarray  #: (n,): part of them that is left
+    fracture: np.ndarray  #: (n, 2): opening and slip, in block sizes, over which they fall to nothing
+    give: np.ndarray  #: (n, d): elastic compliance, which stays
+    rest: np.ndarray  #: (n,) [m]: gap without force
+    length: float  #: [m], unit of the program
 
     @property
     def tension(self) -> np.ndarray:

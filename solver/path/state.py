@@ -14,45 +14,21 @@ from solver.results.increment import Bonds
 
 @dataclass(frozen=True)
 class Place:
-    """A place of a path: everything that the next step needs of the ones before.
+    """A place of a path: everything that the next step needs of the ones before, in units of the program."""
 
-    Attributes
-    ----------
-    s : float [m or rad]
-        Parameter of the driver.
-    pose : Pose
-    contacts : Contacts, optional
-        Those of the forces; None where there are none.
-    forces : (n_contacts, d) array
-        Their normal and shear forces, in units of the program.
-    trial : (n_contacts, d) array
-        Trial forces, from which the next program starts.
-    followed : (n_contacts,) array
-        Normal forces of the friction bounds: B = μ times these.
-    multiplier : float
-        Of the live load.
-    velocity : (n_blocks, n_dof) array, optional
-        Per unit of the parameter, or of time where blocks fall; None at rest.
-    works : tuple of float
-        Of dead and live loads, on supports, and of friction and ties since the start of the phase, in units of the
-        program.
-    tie_lengths : (n_ties, 2) array [m]
-        Of each tie when it was installed, nan where it is absent; and without force, nan where it is broken, too.
-    bonds : Bonds
-        Of the contact points ``contacts``, with those that are lost.
-    """
-
-    s: float
+    s: float  #: [m or rad], parameter of the driver
     pose: Pose
-    contacts: Contacts | None
-    forces: np.ndarray
-    trial: np.ndarray
-    followed: np.ndarray
+    contacts: Contacts | None  #: of the forces; None where there are none
+    forces: np.ndarray  #: (n_contacts, d)
+    trial: np.ndarray  #: (n_contacts, d): trial forces, from which the next program starts
+    followed: np.ndarray  #: (n_contacts,): normal forces of the friction bounds, B = μ times these
     multiplier: float = 0.0
-    velocity: np.ndarray | None = None
+    velocity: np.ndarray | None = None  #: (n_blocks, n_dof) [m, rad] per parameter, or time in a fall; None at rest
+    #: Of dead and live loads, on supports, and of friction and ties since the start of the phase.
     works: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    #: (n_ties, 2) [m]: when they were installed, nan where absent; and without force, nan where broken, too.
     tie_lengths: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
-    bonds: Bonds = field(default_factory=Bonds)
+    bonds: Bonds = field(default_factory=Bonds)  #: of the contact points, with those that are lost
 
     @classmethod
     def unloaded(cls, pose: Pose, s: float = 0.0) -> Place:
@@ -63,44 +39,19 @@ class Place:
 
 @dataclass(frozen=True)
 class PathState:
-    """The state of a path between two steps: a path that is resumed from it goes on bit for bit.
+    """The state of a path between two steps: a path that is resumed from it goes on bit for bit."""
 
-    Attributes
-    ----------
-    phase : int
-        Number of the settlement, from 0.
-    start : Pose
-        Where the phase began.
-    place : Place
-    step : float [m or rad]
-        Length of the next step.
-    upper_bound : float [m or rad]
-        Smallest parameter known to have no equilibrium, while a collapse is enclosed; infinite otherwise.
-    refined : bool
-        Whether the upper bound was found with reduced viscosity.
-    refine_until : float [m or rad]
-        Parameter up to which the viscosity stays reduced.
-    history : tuple of Place
-        Places before, oldest first, to go back to from one without equilibrium.
-    ended : bool
-        Whether the phase has reached its limit.
-    peak : float
-        Largest multiplier that was reported.
-    fell_at : (n_blocks,) array
-        As in :class:`solver.results.increment.State`.
-    """
-
-    phase: int
-    start: Pose
+    phase: int  #: number of the settlement, from 0
+    start: Pose  #: where the phase began
     place: Place
-    step: float
-    upper_bound: float = np.inf
-    refined: bool = False
-    refine_until: float = -np.inf
-    history: tuple[Place, ...] = ()
-    ended: bool = False
-    peak: float = 0.0
-    fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    step: float  #: [m or rad], length of the next step
+    upper_bound: float = np.inf  #: [m or rad]: without equilibrium, while a collapse is enclosed; infinite otherwise
+    refined: bool = False  #: whether the upper bound was found with reduced viscosity
+    refine_until: float = -np.inf  #: [m or rad]: up to here the viscosity stays reduced
+    history: tuple[Place, ...] = ()  #: places before, oldest first, to go back to from one without equilibrium
+    ended: bool = False  #: whether the phase has reached its limit
+    peak: float = 0.0  #: largest multiplier that was reported
+    fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))  #: (n_blocks,), as in :class:`State`
 
 
 @dataclass(frozen=True)

@@ -22,28 +22,19 @@ from .strength import Admissible, ForceLimits
 class EquilibriumBounds:
     """Bounds over all forces in equilibrium within friction at a pose.
 
-    Attributes
-    ----------
-    unbalanced : float
-        Least sum of unbalanced forces over the total load: zero where an equilibrium exists.
-    low, high : float
-        Of the reaction [N or N·m], or of the live loads' multiplier; infinite where friction bounds neither; one
-        whose program was not solved is not a number. Without an equilibrium both are the value of ``forces``.
-    gap : float
-        Largest relative difference of the two objectives of the programs.
-    forces : (n_contacts, d) array
-        Normal and shear forces of the least reaction or largest multiplier, in units of the program; of another
-        equilibrium where that has no bound or was not found; nearest to one where none exists.
-    other_forces : (n_contacts, d) array, optional
-        Those of the other bound, where there is one.
+    Of the reaction [N or N·m], or of the live loads' multiplier; infinite where friction bounds neither; one whose
+    program was not solved is not a number. Without an equilibrium both are the value of the forces.
+
+    Forces (n_contacts, d), in units of the program, are those of the least reaction or largest multiplier; of another
+    equilibrium where that has no bound or was not found; nearest to one where none exists.
     """
 
-    unbalanced: float
+    unbalanced: float  #: least sum of unbalanced forces over the total load: zero where an equilibrium exists
     low: float
     high: float
-    gap: float
+    gap: float  #: largest relative difference of the two objectives of the programs
     forces: np.ndarray
-    other_forces: np.ndarray | None = None
+    other_forces: np.ndarray | None = None  #: of the other bound, where there is one
 
     @property
     def in_equilibrium(self) -> bool:
@@ -52,19 +43,10 @@ class EquilibriumBounds:
 
 
 class StaticProgram:
-    """The program over all contact forces at a pose; what solves it raises ``SolveError``.
+    """The program over the forces of closed contact points, (n_contacts,) bool array, at a pose.
 
-    Parameters
-    ----------
-    model : Model
-        Where it has a live load, its multiplier is bounded.
-    contacts : Contacts
-        At the pose.
-    friction : (n_contacts,) array
-    rate : (n_blocks, n_dof) array, optional
-        Movement of the supports along which the reaction is bounded.
-    closed : (n_contacts,) bool array
-        Which carry force.
+    It bounds the multiplier of a live load, or the reaction along a rate of the supports, (n_blocks, n_dof) array. What
+    solves it raises ``SolveError``.
     """
 
     def __init__(

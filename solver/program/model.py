@@ -17,34 +17,20 @@ from solver.ties import Tie
 class Model:
     """Blocks, joints and loads, which are the same in all increments.
 
-    Attributes
-    ----------
-    load : (n_blocks, n_dof) array [N, N·m]
-        Forces and moments with the blocks as drawn, n_dof = 3 in the plane and 6 in space.
-    length : float [m]
-    force : float [N]
-        Block size and mean load of a free block: the program is written in these units.
-    live : (n_blocks, n_dof) array [N, N·m], optional
-        Loads whose multiplier is an unknown of every program.
-    fallen : (n_blocks,) bool array, optional
-        Blocks that have left the structure, without loads and contact points.
-    fills : tuple of Backfill
-        Fill whose load as drawn is a part of ``load`` and follows the blocks.
-    arms, live_arms : (n_blocks, d, d) array, optional [N·m]
-        As in :class:`solver.loads.Loads`.
-    compliance, imperfection : float
-        Times those of :mod:`solver.tolerances`.
+    Programs are written in units of the block size and the mean load of a free block. Loads are (n_blocks, n_dof) [N,
+    N·m], arms (n_blocks, d, d) [N·m] as in :class:`solver.loads.Loads`; compliance and imperfection are times those of
+    :mod:`solver.tolerances`.
     """
 
     assembly: Assembly
     interfaces: Interfaces
-    load: np.ndarray
-    length: float
-    force: float
-    live: np.ndarray | None = None
-    fallen: np.ndarray | None = None
+    load: np.ndarray  #: with the blocks as drawn
+    length: float  #: [m]
+    force: float  #: [N]
+    live: np.ndarray | None = None  #: whose multiplier is an unknown of every program
+    fallen: np.ndarray | None = None  #: (n_blocks,) bool: blocks that have left, without loads and contact points
     ties: tuple[Tie, ...] = ()
-    fills: tuple[Backfill, ...] = ()
+    fills: tuple[Backfill, ...] = ()  #: whose load as drawn is a part of ``load`` and follows the blocks
     arms: np.ndarray | None = None
     live_arms: np.ndarray | None = None
     compliance: float = 1.0

@@ -34,13 +34,7 @@ def largest_tension(tension: np.ndarray, cohesion: np.ndarray, friction: np.ndar
 
 @dataclass(frozen=True)
 class ForceLimits:
-    """Limits of contact forces, beside friction: least ≤ N ≤ most, |T| ≤ μ (N - least) + cohesion.
-
-    Attributes
-    ----------
-    least, most, cohesion : (n,) arrays
-        In units of the program.
-    """
+    """Limits, (n,) in units of the program, of contact forces: least ≤ N ≤ most, |T| ≤ μ (N - least) + cohesion."""
 
     least: np.ndarray
     most: np.ndarray
@@ -49,23 +43,16 @@ class ForceLimits:
 
 @dataclass(frozen=True)
 class Admissible:
-    """The forces that contact points can carry: a combination of columns with coefficients of at least 0, and limits.
+    """The forces that n contact points can carry: columns with coefficients of at least 0, and limits on these.
 
-    Attributes
-    ----------
-    columns : (size n, m) sparse array
-        Normal and shear forces of all contact points from the coefficients.
-    limits : (k, m) sparse array
-    most : (k,) array
-        The limits on the coefficients: 0 ≤ limits · coefficients ≤ most.
-    friction : (j,) array
-        Slopes of the round cones, of as many numbers as a force, that the first coefficients are in; none in the plane.
+    The limits are 0 ≤ limits · coefficients ≤ most. Friction has the slopes of the round cones, of as many numbers as a
+    force, that the first coefficients are in; none in the plane.
     """
 
-    columns: sp.csc_array
-    limits: sp.csc_array
-    most: np.ndarray
-    friction: np.ndarray
+    columns: sp.csc_array  #: (size n, m)
+    limits: sp.csc_array  #: (k, m)
+    most: np.ndarray  #: (k,)
+    friction: np.ndarray  #: (j,)
 
     @classmethod
     def of(cls, friction: np.ndarray, cohesion: np.ndarray, crushing: np.ndarray, size: int = 2) -> Admissible:

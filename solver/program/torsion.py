@@ -26,24 +26,16 @@ NOT_CONVEX = 0.01
 
 @dataclass(frozen=True)
 class Faces:
-    """The faces of contact points in space.
+    """The faces of contact points in space, by the polygons that their points span.
 
-    Attributes
-    ----------
-    face : (n_contacts,) int array
-    centres : (n_faces, 3) array [m]
-        Centroids of the polygons that their points span.
-    radii : (n_faces,) array [m]
-        Mean distance of a polygon's points from its centroid: torsional strength over friction and normal force; of
-        two points a quarter of their distance, of one zero.
-    areas : (n_faces,) array [m²]
-        Of the polygons.
+    A radius is the mean distance of a polygon's points from its centroid: torsional strength over friction and normal
+    force; of two points a quarter of their distance, of one zero.
     """
 
-    face: np.ndarray
-    centres: np.ndarray
-    radii: np.ndarray
-    areas: np.ndarray
+    face: np.ndarray  #: (n_contacts,) int
+    centres: np.ndarray  #: (n_faces, 3) [m]
+    radii: np.ndarray  #: (n_faces,) [m]
+    areas: np.ndarray  #: (n_faces,) [m²]
 
     @property
     def first(self) -> np.ndarray:

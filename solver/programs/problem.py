@@ -30,23 +30,13 @@ class Unbounded(Exception):
 
 @dataclass(frozen=True)
 class LinearProgram:
-    """Minimise cost · x subject to lower ≤ A x ≤ upper and x ≥ 0.
-
-    Attributes
-    ----------
-    cost : (n,) array
-    matrix : (m, n) sparse array, by columns
-    lower, upper : (m,) arrays
-        Finite; equations where they are equal.
-    places : (m, dim) array, optional
-        Where the row's block is.
-    """
+    """Minimise cost · x, (n,), subject to lower ≤ A x ≤ upper, (m,), and x ≥ 0; limits finite, equal of equations."""
 
     cost: np.ndarray
     matrix: sp.csc_array
     lower: np.ndarray
     upper: np.ndarray
-    places: np.ndarray | None = None
+    places: np.ndarray | None = None  #: (m, dim): where the row's block is
 
     def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
         """Measure a solution x with multipliers y of the rows by the program alone; violations are absolute."""
@@ -70,27 +60,18 @@ class LinearProgram:
 
 @dataclass(frozen=True)
 class ConicProgram:
-    """Minimise cost · x subject to A x = right, the first columns in round friction cones and x ≥ 0 in the others.
+    """Minimise cost · x, (n,), subject to A x = right, (m,), with x ≥ 0 but for the first columns, in friction cones.
 
-    Attributes
-    ----------
-    cost : (n,) array
-    matrix : (m, n) sparse array, by columns
-    right : (m,) array
-    friction : (k,) array
-        Of each cone: its first number times this is at least the length of its others, |T| ≤ μ N.
-    size : int
-        Numbers in a cone: cone i has the columns ``i * size`` to ``(i + 1) * size - 1``.
+    Cone i has the columns ``i * size`` to ``(i + 1) * size - 1``: the first number times its friction is at least the
+    length of the others, |T| ≤ μ N.
 
-    Notes
-    -----
     Its dual: maximise right · y with c - Aᵀ y in the dual cones, N ≥ μ |T|, and at least 0 in the other columns.
     """
 
     cost: np.ndarray
     matrix: sp.csc_array
     right: np.ndarray
-    friction: np.ndarray
+    friction: np.ndarray  #: (k,), of each cone
     size: int = 3
 
     @property
@@ -154,27 +135,14 @@ class ConicProgram:
 
 @dataclass(frozen=True)
 class Solution:
-    """A solution of a program with the measures of its error.
-
-    Attributes
-    ----------
-    x : (n,) array
-    row_dual : (m,) array
-        Multipliers of the rows.
-    primal_violation : float
-        Largest violation of a row, of a cone or of x ≥ 0.
-    dual_violation : float
-        How far the reduced costs leave the dual cones or go below 0 at most.
-    route : str
-        How it was found.
-    """
+    """A solution of a program with the measures of its error."""
 
     x: np.ndarray
-    row_dual: np.ndarray
+    row_dual: np.ndarray  #: (m,): multipliers of the rows
     objective: float
     dual_objective: float
-    primal_violation: float
-    dual_violation: float
+    primal_violation: float  #: largest of a row, of a cone or of x ≥ 0
+    dual_violation: float  #: how far the reduced costs leave the dual cones or go below 0 at most
     route: str
     iterations: int
 
