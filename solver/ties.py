@@ -100,26 +100,15 @@ class Tie:
 
 @dataclass(frozen=True, eq=False)
 class TieForces:
-    """What the members do at an increment.
+    """What the members do at an increment."""
 
-    Attributes
-    ----------
-    forces : (n_ties,) array [N]
-        Tension positive.
-    elongations : (n_ties,) array [m]
-        Change of length since they were installed.
-    rest : (n_ties,) array [m]
-        Lengths without force; nan where a member is absent or broken.
-    states : (n_ties,) int array
-        From ``ABSENT`` to ``BROKEN``.
-    ends : (n_ties, 2, d) array [m]
-    """
-
-    forces: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    elongations: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    forces: np.ndarray = field(default_factory=lambda: np.zeros(0))  #: (n_ties,) [N]: tension positive
+    elongations: np.ndarray = field(default_factory=lambda: np.zeros(0))  #: (n_ties,) [m], since they were installed
+    #: (n_ties,) [m]: lengths without force; nan where a member is absent or broken.
     rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    #: (n_ties,) int, from ``ABSENT`` to ``BROKEN``.
     states: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))  #: (n_ties, 2, d) [m]
 
 
 def held_ties(ties: Sequence[Tie], gone: np.ndarray) -> np.ndarray:

@@ -14,13 +14,7 @@ def _views() -> Any:
 
 
 def views() -> Any:
-    """Find the views of the package that draws.
-
-    Raises
-    ------
-    ImportError
-        Where none is installed.
-    """
+    """Find the views of the package that draws; raises ``ImportError`` where none is installed."""
     found = _views()
     if found is None:
         raise ImportError("solver draws nothing; pictures and datasets are made by blockvis: pip install blockvis")

@@ -15,12 +15,7 @@ from solver.results.increment import Increment
 class Increments(Iterator[Increment]):
     """The increments of an analysis, found one by one with the seconds that each took, and then how it ended.
 
-    Parameters
-    ----------
-    steps : generator
-        Yields each :class:`Increment`, returns the :class:`Ending`.
-    changed : callable, optional
-        From an increment as it is found to the one that is given.
+    Steps yield each and return the ending; ``changed`` makes of an increment as it is found the one that is given.
     """
 
     def __init__(
@@ -53,13 +48,7 @@ class Increments(Iterator[Increment]):
 
     @property
     def ending(self) -> Ending:
-        """How it ended.
-
-        Raises
-        ------
-        RuntimeError
-            Before the last increment has been asked for.
-        """
+        """How it ended; raises ``RuntimeError`` before the last increment has been asked for."""
         if self._ending is None:
             raise RuntimeError("the analysis has not ended; ask for all of its increments first")
         return self._ending
@@ -74,13 +63,7 @@ class Increments(Iterator[Increment]):
         self._steps.close()
 
     def all(self, on_increment: Callable[[Increment], None] | None = None) -> tuple[Increment, ...]:
-        """Find all increments, without the states that a path goes on from.
-
-        Parameters
-        ----------
-        on_increment : callable, optional
-            Called with each as it is found.
-        """
+        """Find all increments, without the states that a path goes on from; calls ``on_increment`` with each."""
         increments = []
         for found in self:
             increments.append(replace(found, checkpoint=None))

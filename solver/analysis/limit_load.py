@@ -223,10 +223,11 @@ class _Problem:
         self.assembly, self.pose, self.ties, self.ties_at, self.gone = assembly, pose, ties, ties_at, gone
         self.length, free, d = assembly.block_size, assembly.free, assembly.dimension
         reach = max(closed_gap, REACH * self.length) if displacement > 0.0 else closed_gap
-        vertices = moved_vertices(assembly, pose)
         dry = interfaces.dry and bonds is None
         # Open points, too, measure the faces of joints with strength.
-        contacts = self._found(vertices, reach if dry else max(reach, REACH * self.length))
+        measured = reach if dry else max(reach, REACH * self.length)
+        contacts = find_contacts(assembly, moved_vertices(assembly, pose), measured)
+        contacts = contacts[~(gone[contacts.block_a] | gone[contacts.block_b])]
         gaps, is_open = contacts.gaps, contacts.gaps > closed_gap
         drawn = Bonds(contacts.features[:, :3], contacts.areas, (~is_open).astype(float), np.zeros(len(contacts)))
         bonded = drawn if bonds is None else bonds.of(contacts)
@@ -271,11 +272,6 @@ class _Problem:
         if displacement > 0.0:
             total = float(np.linalg.norm(live[:, :d], axis=1).sum() + np.linalg.norm(live[:, d:], axis=1).sum())
             self.price = np.where(is_open, gaps, 0.0) / displacement * (size / total)
-
-    def _found(self, vertices: np.ndarray, reach: float) -> Contacts:
-        """Contact points of the blocks that are there, with gaps up to a reach [m]."""
-        found = find_contacts(self.assembly, vertices, reach)
-        return found[~(self.gone[found.block_a] | self.gone[found.block_b])]
 
     @property
     def size(self) -> int:

@@ -43,14 +43,7 @@ def pushover_increments(
 ) -> Increments:
     """The increments of :meth:`solver.Structure.pushover`, one by one as they are asked for, and then its ending.
 
-    Parameters
-    ----------
-    resume : PathState, optional
-        Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
-        for bit as if the loop had not been interrupted. ``pose`` is not looked at then.
-    on_step : callable, optional
-        Called with the :class:`PathState` after every step within an increment, and with the last one again at every
-        step in time in which blocks come to rest or fall.
+    ``resume`` and ``on_step`` are those of :func:`settlement_increments`; resumed, ``pose`` is not looked at.
     """
     controls = checked(Controls() if controls is None else controls, Controls, "controls")
     if controls.increments == LINEAR_PROGRAM:
@@ -79,7 +72,7 @@ def pushover_increments(
     origin = at_origin(assembly)
     near, loads, ties = without_origin(origin, assembly, loads, ties)
     if origin.any() and control.point is not None:
-        control = replace(control, point=tuple((np.asarray(control.point) - origin).tolist()))
+        control = replace(control, point=(np.asarray(control.point) - origin).tolist())
     start = Pose.initial(near) if pose is None else Pose(checked(pose, Pose, "pose").positions - origin, pose.rotations)
     if resume is not None:
         start = resume.start

@@ -37,20 +37,15 @@ def without_origin(
     """The blocks, their loads and ties in coordinates that count from a local origin."""
     if not origin.any():
         return assembly, loads, tuple(ties)
-    near_ties = tuple(replace(tie, points=_shifted(tie, -origin)) for tie in ties)
+    near_ties = tuple(replace(tie, points=(np.asarray(tie.points) - origin).tolist()) for tie in ties)
     loads = replace(loads, fills=tuple(fill.shifted(-origin) for fill in loads.fills))
     return replace(assembly, shapes=assembly.shapes.shifted(-origin)), loads, near_ties
-
-
-def _shifted(tie: Tie, by: np.ndarray) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    first, second = (np.asarray(tie.points) + by).tolist()
-    return tuple(first), tuple(second)
 
 
 def nearer(phase: Settlement, origin: np.ndarray) -> Settlement:
     """The settlement with the points it is given by in coordinates that count from the origin."""
     centre, axis = (
-        None if point is None else tuple((np.asarray(point) - origin[: len(point)]).tolist())
+        None if point is None else (np.asarray(point) - origin[: len(point)]).tolist()
         for point in (phase.rotation_centre, phase.radial_from)
     )
     return replace(phase, rotation_centre=centre, radial_from=axis)

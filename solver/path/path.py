@@ -108,8 +108,6 @@ class Path:
             message = f"beyond a {self.driver.what} of {at:.6g} {self.driver.unit}: {error}"
             return Ending(Status.SOLVER_FAILED, message)
 
-    # The start ---------------------------------------------------------------------------------------------------
-
     def begin(
         self,
         start: Pose,
@@ -192,8 +190,6 @@ class Path:
         if anew:
             place = self.stepper.mortar.at_rest(place, contacts, forces)
         return replace(place, contacts=contacts, forces=forces, trial=trial, followed=forces[:, 0])
-
-    # The loop ----------------------------------------------------------------------------------------------------
 
     def follow(self, state: PathState, resumed: bool = False) -> Generator[Increment, None, Ending]:
         """Yield the increments of the phase, return how it ended, and leave the last state in ``self.state``.
@@ -332,8 +328,6 @@ class Path:
             velocity = self.driver.rate(state.place.s) if velocity is None else velocity
             yield self.reports.increment(self._check(state.place), velocity, state.place.works)
 
-    # Advancing ---------------------------------------------------------------------------------------------------
-
     def advance(self, state: PathState, target: float) -> tuple[PathState, Ending]:
         """Advance to a parameter in steps whose length follows from their error.
 
@@ -471,8 +465,6 @@ class Path:
             float((np.where(free, 0.0, resultant) * motion).sum()),
             -float((after.forces[:, 1:] * slipped).sum() + (after.forces[:, 0] * closed)[members].sum()),
         )
-
-    # Places ------------------------------------------------------------------------------------------------------
 
     def _continue_from(self, state: PathState, resting: Place) -> PathState:
         """Continue from the place where blocks came to rest."""

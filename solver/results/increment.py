@@ -64,23 +64,15 @@ def at_rest(velocity: np.ndarray, slow: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Bonds:
-    """The points of joints with mortar or stiffness that were closed at rest: a point that is not among them has none.
+    """The points of joints with mortar or stiffness that were closed at rest: a point not among them has none."""
 
-    Attributes
-    ----------
-    features : (n, 3) int array
-        That name the contact points.
-    areas : (n,) array [m²]
-        At rest.
-    left : (n,) array
-        Part of the cohesion and the tensile strength that is left.
-    rest : (n,) array [m]
-        Gap without force: as drawn where mortar fills it, and more where elastic joints are drawn compressed.
-    """
-
+    #: (n, 3) int: that name the contact points.
     features: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    #: (n,) [m²]: at rest.
     areas: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    #: (n,): part of the cohesion and the tensile strength that is left.
     left: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    #: (n,) [m]: gap without force, as drawn where mortar fills it, more where elastic joints are drawn compressed.
     rest: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __len__(self) -> int:
@@ -98,50 +90,29 @@ class Bonds:
 
 @dataclass(frozen=True)
 class State:
-    """The arrays of an increment: pose, contact points, their forces, and the motion that follows.
-
-    Attributes
-    ----------
-    pose : Pose
-    contacts : Contacts
-    forces : (n_contacts, d) array [N]
-        Normal (compression positive) and shear force on ``block_a`` at each contact point.
-    displacements : (n_contacts, d) array
-        Rates of opening and slip of each contact point in the increment that follows, per unit of the parameter: a
-        number, or m/rad; in a fall per frame [m].
-    friction : (n_contacts,) array
-        Friction coefficient of each contact point.
-    velocity : (n_blocks, n_dof) array
-        Movement of each block in the increment that follows, per unit of the parameter; in a fall, per frame.
-    support_forces : (n_blocks, n_dof) array [N, N·m]
-        Resultant of the structure on each support about its centroid; zero for free blocks.
-    fell_at : (n_blocks,) array
-        Parameter at which blocks have fallen, minus infinity for those that were taken away, nan for the others; empty
-        where none have.
-    ties : TieForces
-        Empty where there are none.
-    intact : (n_contacts,) array
-        Part of its cohesion and tensile strength that each contact point has left; empty for dry joints.
-    bonded : (n_contacts,) array [m²]
-        Part of the joint, at rest, that its mortar or its springs stand for; empty for dry rigid joints.
-    unloaded : (n_contacts,) array [m]
-        Gap at which a joint has no force, as :attr:`Bonds.rest`; empty where that is none.
-    crushing : (n_contacts,) bool array
-        Which contact points carry their compressive strength; empty where no joint has one.
-    """
+    """The arrays of an increment: pose, contact points, their forces, and the motion that follows."""
 
     pose: Pose
     contacts: Contacts
-    forces: np.ndarray
+    forces: np.ndarray  #: (n_contacts, d) [N]: normal (compression positive) and shear force on ``block_a``
+    #: (n_contacts, d): rates of opening and slip in the increment that follows, per unit of the parameter: a number, or
+    #: m/rad; in a fall per frame [m].
     displacements: np.ndarray
-    friction: np.ndarray
+    friction: np.ndarray  #: (n_contacts,): friction coefficient of each contact point
+    #: (n_blocks, n_dof): movement in the increment that follows, per unit of the parameter; in a fall, per frame.
     velocity: np.ndarray
-    support_forces: np.ndarray
+    support_forces: np.ndarray  #: (n_blocks, n_dof) [N, N·m]: on each support about its centroid; zero for free blocks
+    #: (n_blocks,): parameter at which blocks have fallen, minus infinity for those that were taken away, nan for the
+    #: others; empty where none have.
     fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
     ties: TieForces = field(default_factory=TieForces)
+    #: (n_contacts,): part of its cohesion and tensile strength that each point has left; empty for dry joints.
     intact: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    #: (n_contacts,) [m²]: part of the joint, at rest, that its mortar or springs stand for; empty for dry rigid joints.
     bonded: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    #: (n_contacts,) [m]: gap at which a joint has no force, as :attr:`Bonds.rest`; empty where that is none.
     unloaded: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    #: (n_contacts,) bool: which points carry their compressive strength; empty where no joint has one.
     crushing: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
@@ -159,13 +130,7 @@ class HasState:
 
     @property
     def state(self) -> State:
-        """The arrays, read from their file where they are stored.
-
-        Raises
-        ------
-        ValueError
-            For a limit load that was kept without them.
-        """
+        """The arrays, read from a file where they are stored; ``ValueError`` for a limit load kept without them."""
         if self.held is None:
             raise ValueError("this limit load has only its numbers; its arrays are with the increment that reports it")
         return self.held if isinstance(self.held, State) else self.held.read()
@@ -272,13 +237,7 @@ class Increment(HasState):
         )
 
     def with_arrays(self, **arrays: Any) -> Increment:
-        """Replace some of the arrays; the others are in memory then.
-
-        Parameters
-        ----------
-        **arrays
-            Fields of :class:`State`.
-        """
+        """Replace some of the arrays, fields of :class:`State`; the others are in memory then."""
         return replace(self, held=replace(self.state, **arrays))
 
     @property

@@ -21,34 +21,20 @@ NAMED = 8
 class Mechanism:
     """The mechanism in the motion that follows an increment.
 
-    Joints are pairs of blocks, not contact points, that move noticeably beside the fastest block.
-
-    Attributes
-    ----------
-    parts : (n_blocks,) int array
-        Macro-block of each block, largest first; -1 for blocks at rest.
-    motions : (n_parts, n_dof) array
-        Velocity of the centroid of each macro-block and its angular velocity, in the scale of the increment.
-    hinges, sliding, crushing : (n, 2) int arrays
-        Pairs of blocks between which macro-blocks turn about a point, slide along a joint, or come closer at their
-        compressive strength; a joint that crushes is no hinge, as it presses where it does not turn.
-    hinge_points : (n_hinges,) int array
-        The contact point about which each hinge turns; of several the one that carries most.
-    sliding_points, crushing_points : (k,) int arrays
-        The contact points that slide or crush, of all joints.
-    names : tuple of str
-        Of the blocks.
+    Joints are pairs of blocks, (n, 2) int arrays, that move noticeably beside the fastest block: between which
+    macro-blocks turn about a point, slide along a joint, or come closer at their compressive strength. A joint that
+    crushes is no hinge, as it presses where it does not turn.
     """
 
-    parts: np.ndarray
-    motions: np.ndarray
+    parts: np.ndarray  #: (n_blocks,) int: macro-block of each block, largest first; -1 for blocks at rest
+    motions: np.ndarray  #: (n_parts, n_dof): velocity of the centroid and angular one, in the scale of the increment
     hinges: np.ndarray
     sliding: np.ndarray
     crushing: np.ndarray
-    hinge_points: np.ndarray
-    sliding_points: np.ndarray
-    crushing_points: np.ndarray
-    names: tuple[str, ...]
+    hinge_points: np.ndarray  #: (n_hinges,) int: contact point about which each turns, of several what carries most
+    sliding_points: np.ndarray  #: (k,) int: contact points that slide, of all joints
+    crushing_points: np.ndarray  #: (k,) int: contact points that crush, of all joints
+    names: tuple[str, ...]  #: of the blocks
 
     def __str__(self) -> str:
         """Count the macro-blocks, and name the hinges, sliding and crushing joints."""
@@ -131,13 +117,6 @@ def _joints(contacts: Contacts, chosen: np.ndarray, normal: np.ndarray) -> tuple
 
 
 def with_motion(increment: Increment, motion: np.ndarray) -> Increment:
-    """Give an increment another motion, and so other hinges and sliding joints.
-
-    Parameters
-    ----------
-    increment : Increment
-    motion : (n_blocks, n_dof) array
-        Velocity of each centroid and angular velocity, in any scale.
-    """
+    """Give an increment another motion, (n_blocks, n_dof) in any scale, and so other hinges and sliding joints."""
     rates = relative_velocities(increment.contacts, increment.pose, motion)
     return increment.with_arrays(velocity=motion, displacements=rates)

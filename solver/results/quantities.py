@@ -7,24 +7,13 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Quantity:
-    """A parameter or a measured value of an analysis.
+    """A parameter or a measured value of an analysis."""
 
-    Attributes
-    ----------
-    name : str
-        In words, for captions and tables.
-    symbol : str
-        For formulas.
-    unit : str
-        Of its numbers; empty for a number without unit.
-    is_path : bool
-        Of a parameter: whether its increments follow one another. Otherwise they are independent, and the one with
-        the smallest measured value governs.
-    """
-
-    name: str
-    symbol: str
-    unit: str
+    name: str  #: in words, for captions and tables
+    symbol: str  #: for formulas
+    unit: str  #: of its numbers; empty for a number without unit
+    #: Of a parameter: whether its increments follow one another. Otherwise they are independent, and the one with the
+    #: smallest measured value governs.
     is_path: bool = True
 
     @property
