@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from .assembly import Assembly
 from .geometry.contacts import Contacts
@@ -178,11 +176,8 @@ def carried_between(
 def swung(pose: Pose, motion: np.ndarray) -> Pose:
     """Move each block on the arc about its own pole, so that macro-blocks stay together.
 
-    Parameters
-    ----------
-    pose : Pose
-    motion : (n_blocks, n_dof) array
-        Translation of the centroid [m] and rotation [rad], as a linear program has them; in space a screw motion.
+    By the translation of its centroid [m] and rotation [rad], (n_blocks, n_dof), as a linear program has them; in space
+    a screw motion.
 
     Notes
     -----
@@ -225,20 +220,3 @@ def motion_size(motion: np.ndarray, length: float) -> np.ndarray:
     Of translations [m] and rotations [rad], (n, n_dof); the length [m] is usually the block size.
     """
     return np.abs(motion * unit_lengths(motion.shape[1], length)).max(axis=1, initial=0.0)
-
-
-def moving_together(
-    n_blocks: int, contacts: Contacts, apart: np.ndarray, spins: np.ndarray, together: float
-) -> np.ndarray:
-    """(n_blocks,) int array: number of the group of each block.
-
-    The contact points of two blocks of one group have come apart, and their spins times a length, (n_blocks, n_rot),
-    differ, by less than ``together`` [m].
-    """
-    pairs, which = contacts.joints()
-    most = np.zeros(len(pairs))
-    np.maximum.at(most, which, apart)
-    a, b = pairs.T
-    stay = (most < together) & (np.abs(spins[a] - spins[b]).max(axis=1) < together)
-    links = sp.coo_array((np.ones(np.count_nonzero(stay)), (a[stay], b[stay])), shape=(n_blocks, n_blocks))
-    return connected_components(links, directed=False)[1]

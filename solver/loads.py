@@ -247,16 +247,9 @@ class Settlement:
     def unit(self) -> str:
         """Unit of the parameter s: "m", or "rad" for a pure rotation."""
         if self.profile is not None:
-            return "m" if any(any(motion[: self.dimension]) for motion in self.profile.values()) else "rad"
+            travels = (motion[: dimension_of(len(motion))] for motion in self.profile.values())
+            return "m" if any(map(any, travels)) else "rad"
         return "rad" if self.direction is None and self.radial_from is None else "m"
-
-    @property
-    def dimension(self) -> int:
-        """2 in the plane, 3 in space."""
-        if self.profile is not None:
-            return dimension_of(len(next(iter(self.profile.values()))))
-        given = self.direction if self.direction is not None else self.rotation_centre
-        return 3 if given is None else len(given)
 
     def taking_part(self, assembly: Assembly) -> np.ndarray:
         """(n_blocks,) bool array: the supports that this settlement moves."""

@@ -48,9 +48,7 @@ def _along(places: np.ndarray | None) -> list[np.ndarray]:
 
 def positions_in(order: np.ndarray) -> np.ndarray:
     """(m,) int array: where in an order each row comes."""
-    position = np.empty(len(order), dtype=np.int64)
-    position[order] = np.arange(len(order))
-    return position
+    return np.argsort(order)
 
 
 def dissected(joined: sp.csr_array, places: np.ndarray | None) -> list[tuple[np.ndarray, int]]:

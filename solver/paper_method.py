@@ -105,22 +105,10 @@ def solve_program(
 ) -> ProgramSolution:
     """State the program of an increment at a geometry, and solve it.
 
-    Parameters
-    ----------
-    gaps : (n_contacts, 2) array [m]
-        Gap function and drift of each point; one whose gap is infinite takes no part.
-    supports : (n_blocks, 3) array [m, m, rad]
-        Displacements of the supports, zero for free blocks; or rates.
-    trust : float [m]
-        Bound of the displacements of free blocks.
+    Of gap function and drift of each point, (n_contacts, 2) [m], one whose gap is infinite takes no part; displacements
+    of the supports, or rates, (n_blocks, 3) [m, m, rad], zero for free blocks; and a bound of those of free blocks [m].
+    Raises ``SupportsLocked`` where no displacements of the blocks are compatible with those of the supports.
 
-    Raises
-    ------
-    SupportsLocked
-        Where no displacements of the blocks are compatible with those of the supports.
-
-    Notes
-    -----
     The static form above, and with unbalanced forces r⁺, r⁻ ≥ 0 on every free block: + ρ Σ (r⁺ + r⁻) in the cost and
     A c + f + r⁺ - r⁻ = 0. They are dual to the bound ρ of all displacements and cost too much to be used wherever the
     loads can be balanced. Equilibrium holds to a tolerance, so that frictionless blocks do not move at no cost.
@@ -182,12 +170,9 @@ def solve_program(
 def joint_errors(contacts: Contacts, solution: ProgramSolution) -> tuple[float, np.ndarray]:
     """Measure gaps and drift of the joints at their contacts after the exact motion that follows a program.
 
-    Returns
-    -------
-    largest : float [m]
-        Deepest penetration, largest gap of a point that carried force, or largest drift of one that stuck, too.
-    gaps : (n_contacts, 2) array [m]
-        For the next program; where slip leaves a part q of a gap g again, the gap is g / (1 - q).
+    Gives the deepest penetration, largest gap of a point that carried force, or largest drift of one that stuck, too
+    [m]; and both, (n_contacts, 2) [m], for the next program: where slip leaves a part q of a gap g again, the gap is
+    g / (1 - q).
     """
     before, gap = solution.state, contacts.gaps
     place, same = matched_contacts(contacts, before.contacts)

@@ -186,8 +186,8 @@ def _check_options(assembly: Assembly, flow: str, torsion: str, ties: Sequence[T
 class _State:
     """Forces (n_contacts, d), multiplier and velocity of one program, in its units.
 
-    ``unbalanced`` is what the dead load alone leaves, per row; ``drag`` (n_contacts,) the friction force that slip
-    works against without being in the normal forces' power.
+    ``unbalanced`` is what rows are, or may be, left with; ``drag`` (n_contacts,) the friction force that slip works
+    against without being in the normal forces' power.
     """
 
     forces: np.ndarray
@@ -296,8 +296,7 @@ class _Problem:
         In space it balances everything: round cones have no vertices that rounding could take away.
         """
         left = balanced.unbalanced if self.size == 2 else np.zeros(len(self.dead))
-        found = self._carried(self.price, [sp.csc_array(self.live[:, None])], np.array([-1.0]), left)
-        return replace(found, unbalanced=balanced.unbalanced)
+        return self._carried(self.price, [sp.csc_array(self.live[:, None])], np.array([-1.0]), left)
 
     def _carried(self, price: np.ndarray, beside: list[sp.csc_array], cost: np.ndarray, left: np.ndarray) -> _State:
         """The associative program over forces that points can carry, at a price, and columns with a cost.

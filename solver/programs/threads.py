@@ -27,11 +27,8 @@ def one_thread() -> Iterator[None]:
     to wake them: four hundred times as long where other processes work on the same cores. And the last bits of a
     result depend on how many threads there were.
 
-    Raises
-    ------
-    NotLimited
-        If scipy or numpy use another library, or one that hides these functions. The environment variable
-        OPENBLAS_NUM_THREADS=1, set before Python starts, makes up for it.
+    Raises ``NotLimited`` if scipy or numpy use another library, or one that hides these functions. The environment
+    variable OPENBLAS_NUM_THREADS=1, set before Python starts, makes up for it.
     """
     if os.environ.get("OPENBLAS_NUM_THREADS") == "1":
         yield

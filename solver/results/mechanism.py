@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from solver.assembly import Assembly
 from solver.geometry.contacts import Contacts
-from solver.kinematics import motion_size, moving_together, relative_velocities
+from solver.kinematics import motion_size, relative_velocities
 from solver.tolerances import CLOSED, NOTICEABLE, TOGETHER
 
 from .increment import Increment, at_rest, carries, slides
@@ -53,21 +55,25 @@ class Mechanism:
 def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     """(n_blocks,) int array: the part each block moves with in the motion that follows an increment.
 
-    Part -1 is at rest. The others are numbered from 0, the largest volume first.
+    Part -1 is at rest. The others are numbered from 0, the largest volume first. The contact points of two blocks that
+    move together come apart, and their corners turn against each other, by next to nothing.
     """
     contacts, n = increment.contacts, assembly.n_blocks
     d = contacts.points.shape[1]
     fastest = float(np.abs(increment.velocity[:, :d]).max(initial=0.0))
     if fastest == 0.0:
         return np.full(n, -1)
-    spins = increment.velocity[:, d:] * assembly.block_size
-    part = moving_together(n, contacts, np.abs(increment.displacements).max(axis=1), spins, TOGETHER * fastest)
+    (pairs, joint), spins = contacts.joints(), increment.velocity[:, d:] * assembly.block_size
+    apart = np.zeros(len(pairs))
+    np.maximum.at(apart, joint, np.abs(increment.displacements).max(axis=1))
+    apart = np.maximum(apart, np.abs(spins[pairs[:, 0]] - spins[pairs[:, 1]]).max(axis=1))
+    a, b = pairs[apart < TOGETHER * fastest].T
+    part = connected_components(sp.coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[1]
     # Corners, not centroids: a block may turn about its own centroid.
     moves = motion_size(increment.velocity, assembly.block_size) > NOTICEABLE * fastest
     moves &= assembly.free
     volume = np.bincount(part, weights=assembly.shapes.volumes * moves, minlength=int(part.max()) + 1)
-    rank = np.empty(len(volume), dtype=int)
-    rank[np.argsort(-volume, kind="stable")] = np.arange(len(volume))
+    rank = np.argsort(np.argsort(-volume, kind="stable"))
     return np.where(moves, rank[part], -1)
 
 
