@@ -11,15 +11,7 @@ from numpy.typing import ArrayLike
 
 from .assembly import Assembly
 from .backfill import Backfill
-from .kinematics import (
-    Pose,
-    composed_rotations,
-    cross_rows,
-    dimension_of,
-    rotation_count,
-    turned,
-    turned_moments,
-)
+from .kinematics import Pose, composed_rotations, cross_rows, dimension_of, rotation_count, turned, turned_moments
 from .words import checked, make_plain, numbers_of, plain
 
 #: Acceleration of gravity [m/s²], as structural codes round it.

@@ -139,11 +139,9 @@ def solve_program(
     except Unbounded as ray:
         carrying = carries((rays @ ray.x[:n]).reshape(-1, 2), tolerances.CARRYING_FRACTION)
         blocks = np.unique(np.concatenate([contacts.block_a[carrying], contacts.block_b[carrying]]))
-        names = [f"'{assembly.names[i]}'" for i in blocks if free[i]]
-        shown = ", ".join(names[:6]) + (" ..." if len(names) > 6 else "")
-        raise SupportsLocked(
-            f"the supports cannot move on: {counted(len(names), 'block is', 'blocks are')} wedged ({shown})"
-        ) from None
+        blocks = blocks[free[blocks]]
+        wedged = counted(len(blocks), "block is", "blocks are")
+        raise SupportsLocked(f"the supports cannot move on: {wedged} wedged ({assembly.listed(blocks, 4)})") from None
     forces = rays @ solution.x[:n]
     resultant = (wrench @ forces).reshape(-1, 3)
     displacements = np.zeros_like(supports)

@@ -153,8 +153,7 @@ class Reports:
         """Message that names the blocks of a jump, and how far they moved."""
         assembly = self.model.assembly
         far = np.linalg.norm(moved_vertices(assembly, end) - moved_vertices(assembly, start), axis=1)
-        distance = np.zeros(assembly.n_blocks)
-        np.maximum.at(distance, assembly.block_of_vertex, np.where(assembly.free[assembly.block_of_vertex], far, 0.0))
+        distance = np.where(assembly.free, np.maximum.reduceat(far, assembly.shapes.offsets[:-1]), 0.0)
         far_blocks = np.flatnonzero(distance > 0.1 * distance.max())
         return f"{self._named(far_blocks)} moved by up to {distance.max():.2g} m at once to the next equilibrium"
 

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 
-import numpy as np
 from scipy.linalg import lapack
 
 Function = Callable[..., int]
@@ -47,8 +46,8 @@ def one_thread() -> Iterator[None]:
 @cache
 def _libraries() -> list[tuple[Function, Function]]:
     """Functions that get and set the number of threads of scipy's library and of numpy's."""
-    core = "numpy._core" if hasattr(np, "_core") else "numpy.core"
-    return [_functions(sys.modules[name].__file__) for name in (lapack._flapack.__name__, f"{core}._multiarray_umath")]
+    extensions = lapack._flapack.__name__, "numpy._core._multiarray_umath"
+    return [_functions(sys.modules[name].__file__) for name in extensions]
 
 
 def _functions(extension: str | None) -> tuple[Function, Function]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -64,10 +64,5 @@ def largest_penetration(contacts: Contacts) -> float:
 
 def worst_of(certificates: Iterable[Certificate]) -> Certificate | None:
     """Largest of each measure over some results, nan where none has it; None without a result."""
-    found = tuple(certificates)
-    if not found:
-        return None
-    measures = ((getattr(one, field.name) for one in found) for field in fields(Certificate))
-    return Certificate(
-        *(max((value for value in values if not math.isnan(value)), default=math.nan) for values in measures)
-    )
+    measures = [astuple(one) for one in certificates]
+    return Certificate(*np.fmax.reduce(measures).tolist()) if measures else None
