@@ -55,18 +55,14 @@ class Controls:
         make_plain(self)
         if self.increments not in (None, *INCREMENTS):
             raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
-        if self.falling_frames < 0:
-            raise ValueError(f"falling_frames is {self.falling_frames}; it is a number of at least 0, by default 10")
-        if not 0.0 < self.step_tolerance < 1.0:
-            raise ValueError(
-                f"step_tolerance is {self.step_tolerance:g}; it is a number between 0 and 1, by default 0.005"
-            )
-        if not 0.0 < self.compliance_factor < math.inf:
-            raise ValueError(f"compliance_factor is {self.compliance_factor:g}; it is a number above 0, by default 1")
-        if not 0.0 <= self.imperfection_factor < math.inf:
-            raise ValueError(
-                f"imperfection_factor is {self.imperfection_factor:g}; it is a number of at least 0, by default 1"
-            )
+        for name, fits, wanted in (
+            ("falling_frames", self.falling_frames >= 0, "of at least 0, by default 10"),
+            ("step_tolerance", 0.0 < self.step_tolerance < 1.0, "between 0 and 1, by default 0.005"),
+            ("compliance_factor", 0.0 < self.compliance_factor < math.inf, "above 0, by default 1"),
+            ("imperfection_factor", 0.0 <= self.imperfection_factor < math.inf, "of at least 0, by default 1"),
+        ):
+            if not fits:
+                raise ValueError(f"{name} is {getattr(self, name):g}; it is a number {wanted}")
         if not 0.0 <= self.local_loss <= 1.0:
             raise ValueError(f"local_loss is {self.local_loss:g}; give a share of the weight from 0 to 1")
 
