@@ -322,11 +322,7 @@ def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Con
 
 
 def _labels(
-    n: int,
-    what: str,
-    names: Sequence[str] | None,
-    roles: Sequence[str] | None,
-    materials: Sequence[str] | None,
+    n: int, what: str, names: Sequence[str] | None, roles: Sequence[str] | None, materials: Sequence[str] | None
 ) -> dict[str, Any]:
     """Names, roles and materials of n blocks, checked, with their defaults."""
     if n == 0:

@@ -19,9 +19,7 @@ class Increments(Iterator[Increment]):
     """
 
     def __init__(
-        self,
-        steps: Generator[Increment, None, Ending],
-        changed: Callable[[Increment], Increment] | None = None,
+        self, steps: Generator[Increment, None, Ending], changed: Callable[[Increment], Increment] | None = None
     ) -> None:
         self._steps, self._changed = steps, changed
         self._first: Increment | None = None
