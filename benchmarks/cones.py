@@ -56,9 +56,9 @@ def wall(blocks: int) -> solver.Assembly:
 
 def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
     """The program of the least reaction, and how many contact points it has."""
-    load, length = solver.self_weight(assembly).dead, assembly.block_size
-    force = float(np.abs(load[assembly.free, 2]).mean())
-    model = Model(assembly, Interfaces(InterfaceLaw(FRICTION)), load, length, force)
+    loads, length = solver.self_weight(assembly), assembly.block_size
+    force = float(np.abs(loads.dead[assembly.free, 2]).mean())
+    model = Model(assembly, Interfaces(InterfaceLaw(FRICTION)), loads, length, force)
     contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-6 * length)
     sinks = np.zeros((assembly.n_blocks, 6))
     sinks[assembly.moving, 2] = -1.0

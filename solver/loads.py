@@ -51,6 +51,12 @@ class Loads:
         """(n_blocks, n_dof) array: live load where the blocks are."""
         return self.live if self.live_arms is None else self.live + turned_moments(self.live_arms, pose)
 
+    def without(self, fallen: np.ndarray) -> Loads:
+        """Return the loads once blocks, (n_blocks,) bool array, have left with their dead load and fill."""
+        arms = None if self.dead_arms is None else np.where(fallen[:, None, None], 0.0, self.dead_arms)
+        fills = tuple(fill.without(fallen) for fill in self.fills)
+        return replace(self, dead=np.where(fallen[:, None], 0.0, self.dead), dead_arms=arms, fills=fills)
+
     def with_forces(self, assembly: Assembly, forces: PointForces, kind: str = "dead") -> Loads:
         """Add forces at points that go with their blocks to the dead or, by ``kind``, the live loads."""
         if kind not in ("dead", "live"):

@@ -139,18 +139,14 @@ def model_of(
     force = float(np.linalg.norm(drawn[assembly.free, : assembly.dimension], axis=1).mean())
     if force == 0.0:
         raise ValueError("no load acts on any free block; give them a weight")
-    length = assembly.block_size
     return Model(
         assembly,
         interfaces,
-        drawn,
-        length,
+        loads,
+        assembly.block_size,
         force,
         live=live,
         ties=ties,
-        fills=loads.fills,
-        arms=loads.dead_arms,
-        live_arms=loads.live_arms,
         compliance=controls.compliance_factor,
         imperfection=controls.imperfection_factor,
     )
