@@ -14,7 +14,7 @@ from solver.results.increment import Bonds
 
 @dataclass(frozen=True)
 class Place:
-    """A place of a path: everything that the next step needs of the ones before, in units of the program."""
+    """A place of a path: everything that the next step needs; forces and works in units of the program."""
 
     s: float  #: [m or rad], parameter of the driver
     pose: Pose
