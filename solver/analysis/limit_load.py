@@ -97,16 +97,13 @@ def find_limit_load(
     Its dual is the kinematic program: minimise - dead · q over mechanisms q with N(q) ≥ μ |T(q)| at every closed
     contact point and live · q = 1. Livesley (1978), https://doi.org/10.1002/nme.1620121207, for the static form; both
     bounds are recomputed from the forces and from the mechanism. In space the forces of a point are in its round cone
-    |T| ≤ μ N, and the program is a conic one. The multiplier is the exact limit load of the model
-    with associative flow, and an upper bound for every other flow rule with the same friction.
+    |T| ≤ μ N, and the program is a conic one.
 
     Cohesion c and compressive strength σ of the interfaces, off by default, give each contact point its part A of the
     face between two blocks (half the distance to its neighbours, times the thickness): |T| ≤ μ N + c A and
     -τ A ≤ N ≤ σ A with the tensile strength τ. A face of two corners thus carries moments up to σ A b / 2 with all of
     its force at the ends: more than the stress block of a continuous face, so that crushing at a toe is found later
     than it comes. What crushes moves by the same flow rule.
-
-    Blocks that have left the structure are out of it, with their loads, contact points and ties.
 
     At the pose of an increment its bonds say what is closed: gaps count from those at which elastic joints have no
     force, and points with tension left hold at any gap, as in the bounds of a path. The give that the forces of the

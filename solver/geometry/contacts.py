@@ -23,35 +23,21 @@ SAME_NORMAL = 1.0 - 1e-6
 
 @dataclass(frozen=True)
 class Contacts:
-    """Contact points at one geometry, in the plane or in space, contact on axis 0.
+    """Contact points at one geometry, in the plane or in space, contact on axis 0."""
 
-    Attributes
-    ----------
-    features : (n, 4) int array
-        Kind of contact, feature of ``block_a``, feature of ``block_b``, and what else the geometry needs to measure it
-        again. The first three name the contact point; their meaning is that of the geometry.
-    block_a, block_b : (n,) int arrays
-        -1 for the ground, which holds ends of ties.
-    points : (n, d) array [m]
-    frames : (n, d, d) array
-        Row 0: unit normal from ``block_b`` into ``block_a``; then the tangents, in the plane one, a quarter turn
-        counter-clockwise.
-    gaps : (n,) array [m]
-        Positive where open.
-    slip : (n, d - 1) array [m]
-        Position of the feature of ``block_a`` along the tangents, from a place that is fixed on ``block_b``.
-    areas : (n,) array [m²]
-        Tributary area of each contact point; zero for a corner alone.
-    """
-
+    #: (n, 4) int: kind of contact, feature of ``block_a``, feature of ``block_b``, and what else the geometry needs to
+    #: measure it again. The first three name the contact point; their meaning is that of the geometry.
     features: np.ndarray
-    block_a: np.ndarray
-    block_b: np.ndarray
-    points: np.ndarray
+    block_a: np.ndarray  #: (n,) int; -1 for the ground, which holds ends of ties
+    block_b: np.ndarray  #: (n,) int, likewise
+    points: np.ndarray  #: (n, d) [m]
+    #: (n, d, d), row 0: unit normal from ``block_b`` into ``block_a``; then the tangents, in the plane one, a quarter
+    #: turn counter-clockwise.
     frames: np.ndarray
-    gaps: np.ndarray
+    gaps: np.ndarray  #: (n,) [m], positive where open
+    #: (n, d - 1) [m]: position of the feature of ``block_a`` along the tangents, from a place fixed on ``block_b``.
     slip: np.ndarray
-    areas: np.ndarray
+    areas: np.ndarray  #: (n,) [m²]: tributary area of each contact point; zero for a corner alone
 
     def __len__(self) -> int:
         """Count the contact points."""
