@@ -427,10 +427,7 @@ class LimitLoad(HasState, Shown):
     def response(self) -> Response:
         """The limit load as an analysis of its own, of one increment, for pictures, tables and files.
 
-        Raises
-        ------
-        ValueError
-            Where it was read from a file and not found by :meth:`solver.Structure.limit_load`.
+        Raises ``ValueError`` where it was read from a file and not found by :meth:`solver.Structure.limit_load`.
         """
         if self.analysed is None:
             raise ValueError("this limit load does not know its structure; the response that reports it does")
