@@ -42,11 +42,11 @@ DOUBTED = (0.02, 10.0)
 #: Median size of the blocks of common masonry [m], from a split brick to an ashlar.
 COMMON = (0.04, 3.0)
 
-#: Units that templates state whose drawings are metric, and those in which these are drawn.
-IMPERIAL, METRIC = ("in", "ft", "yd"), ("mm", "cm", "m")
+#: Size of a stone between bricks and ashlars [m]: of units that make common masonry the one nearest to it is likely.
+USUAL = 0.25
 
-#: Units that are tried where another makes no masonry.
-TRIED = ("mm", "cm", "m", "dm", "in", "ft")
+#: Units that templates state whose drawings are metric, those in which these are drawn, and others that are tried last.
+IMPERIAL, METRIC, RARE = ("in", "ft", "yd"), ("mm", "cm", "m"), ("dm", "in", "ft")
 
 
 def metres_per(unit: str) -> float:
@@ -106,7 +106,7 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
     if low <= in_stated <= high:
         return stated, _doubt_of_template(stated, median)
     # Most drawings whose unit is wrong are in m; blocks of several m are rather bricks in another.
-    likely = "m" if COMMON[0] <= in_metres <= COMMON[1] else _masonry_unit(median)
+    likely = "m" if COMMON[0] <= in_metres <= COMMON[1] else next(iter(_masonry_units(median)), "")
     likely = likely or ("m" if low <= in_metres <= high else "")
     if not likely:
         return stated, ""
@@ -120,20 +120,29 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
 def _doubt_of_template(stated: str, size: float) -> str:
     """Doubt inches, feet or yards that make blocks too large for common masonry, as a metric unit would not."""
     large = size * UNITS.get(stated, 1.0)
-    metric = _masonry_unit(size, METRIC) if stated in IMPERIAL and COMMON[1] < large <= DOUBTED[1] else ""
+    metric = _masonry_units(size, ()) if stated in IMPERIAL and COMMON[1] < large <= DOUBTED[1] else []
     if not metric:
         return ""
     return Note(
         UNIT,
         f"unit {stated} in doubt, which the file states, perhaps from a template: it makes the median block "
-        f"{large:.3g} m across; {metric} would make it {size * UNITS[metric]:.3g} m: say so under [geometry] "
-        f'unit = "{metric}", or by --unit {metric}',
+        f"{large:.3g} m across; {_would_make(metric, size)}: say so under [geometry] "
+        f'unit = "{metric[0]}", or by --unit {metric[0]}',
     )
 
 
-def _masonry_unit(size: float, tried: Sequence[str] = TRIED) -> str:
-    """Find the unit in which blocks of a size, a number of the file, are masonry; "" if there is none."""
-    return next((unit for unit in tried if COMMON[0] <= size * metres_per(unit) <= COMMON[1]), "")
+def _masonry_units(size: float, rare: Sequence[str] = RARE) -> list[str]:
+    """List the units in which blocks of a size, a number of the file, are masonry, the likeliest first."""
+    made = {unit: size * UNITS[unit] for unit in (*METRIC, *rare)}
+    common = [unit for unit in made if COMMON[0] <= made[unit] <= COMMON[1]]
+    return sorted(common, key=lambda unit: (unit not in METRIC, abs(np.log(made[unit] / USUAL))))
+
+
+def _would_make(units: Sequence[str], size: float) -> str:
+    """Say how large the likeliest of some units makes blocks of a size, and other metric ones that are as possible."""
+    first, *others = units
+    said = [f"{first} would make it {size * UNITS[first]:.3g} m"]
+    return ", ".join(said + [f"{unit} {size * UNITS[unit]:.3g} m" for unit in others if unit in METRIC])
 
 
 def better_unit(unit: str, size: float) -> str:
@@ -156,9 +165,13 @@ def better_unit(unit: str, size: float) -> str:
     >>> better_unit("m", 130.0)
     'mm'
     """
-    if DOUBTED[0] <= size <= DOUBTED[1] or size <= 0.0:
-        return ""
-    return _masonry_unit(size / metres_per(unit), (*TRIED, "km"))
+    return next(iter(_units_instead(unit, size)), "")
+
+
+def _units_instead(unit: str, size: float) -> list[str]:
+    """List the units that make blocks masonry whose unit is doubted; arguments as of :func:`better_unit`."""
+    doubted = size > 0.0 and not DOUBTED[0] <= size <= DOUBTED[1]
+    return _masonry_units(size / metres_per(unit), (*RARE, "km")) if doubted else []
 
 
 def doubt(unit: str, size: float, *, remedy: str = 'say so under [geometry] unit = "{}", or by --unit {}') -> str:
@@ -176,18 +189,17 @@ def doubt(unit: str, size: float, *, remedy: str = 'say so under [geometry] unit
     Returns
     -------
     str
-        A note that names the unit that would make the blocks masonry; "" if there is nothing to doubt.
+        A note that names the units that would make the blocks masonry; "" if there is nothing to doubt.
 
     Examples
     --------
     >>> doubt("m", 130.0, remedy="unit = '{}'")
-    "unit m in doubt: it makes the median block 130 m across; mm would make it 0.13 m: unit = 'mm'"
+    "unit m in doubt: it makes the median block 130 m across; mm would make it 0.13 m, cm 1.3 m: unit = 'mm'"
     """
     if DOUBTED[0] <= size <= DOUBTED[1] or size <= 0.0:
         return ""
     doubted = f"unit {unit} in doubt: it makes the median block {size:.3g} m across"
-    other = better_unit(unit, size)
-    if not other:
+    others = _units_instead(unit, size)
+    if not others:
         return f"{doubted}; no other unit makes it masonry"
-    better = size / metres_per(unit) * metres_per(other)
-    return f"{doubted}; {other} would make it {better:.3g} m: {remedy.format(other, other)}"
+    return f"{doubted}; {_would_make(others, size / metres_per(unit))}: {remedy.format(others[0], others[0])}"

@@ -31,7 +31,17 @@ def test_metres_are_doubted_too(tmp_path, factor, unit):
 
 
 @pytest.mark.parametrize(
-    ("size", "doubt"), [(0.05, ""), (0.3, ""), (2.0, ""), (9.0, ""), (35.0, "cm would make it 0.35 m")]
+    ("size", "doubt"),
+    [
+        (0.05, ""),
+        (0.3, ""),
+        (2.0, ""),
+        (9.0, ""),
+        (35.0, "cm would make it 0.35 m"),
+        # Stones of half a metre in cm are no chips of 5 cm in mm; bricks in mm no stones of a metre in cm.
+        (49.9, 'cm would make it 0.499 m, mm 0.0499 m: say so under [geometry] unit = "cm"'),
+        (105.0, 'mm would make it 0.105 m, cm 1.05 m: say so under [geometry] unit = "mm"'),
+    ],
 )
 def test_masonry_is_not_doubted(tmp_path, size, doubt):
     square = size * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
