@@ -458,6 +458,8 @@ class Drawer:
             weight = volumes[blocks] / volumes[blocks].sum()
             tails[k] = weight @ pose.positions[blocks]
             tips[k] = mechanics.carried(tails[[k]], blocks[:1], pose, swing.displaced)[0]
+        # Arrows are as long as ever, where the blocks are drawn after a part of it.
+        tips = tails + (tips - tails) / swing.share
         into = self._into_sight(tails)
         tails, tips = tails + into, tips + into
         lengths = np.linalg.norm(self._projected(tips - tails)[:, :2], axis=1)

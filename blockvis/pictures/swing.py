@@ -17,6 +17,10 @@ from .frame import framed
 #: of :class:`Swing`.
 ENOUGH_FRAMES, SWING_FRAMES, SWING_REACH = 8, 15, 1.2
 
+#: The fastest corner of a mechanism goes so far, in sizes of the picture; in space less where points that carry would
+#: part by more than ``TEAR`` beyond what they do to first order: a hinge is closed, however far its sides turn.
+REACH, TEAR = 0.05, 0.002
+
 #: Up to this many parts of a mechanism are tinted one by one: each has a colour of its own.
 MOST_PARTS = len(palette.PARTS)
 
@@ -37,6 +41,8 @@ class Swing:
         Whether anything moves.
     motion : (n_blocks, n_dof) array
         From the increment's pose to the displaced one.
+    share : float
+        How much this is of the motion whose fastest corner goes ``REACH`` of the picture.
     """
 
     increment: solver.Increment
@@ -44,6 +50,7 @@ class Swing:
     parts: np.ndarray
     moves: bool
     motion: np.ndarray
+    share: float
 
     @property
     def n_parts(self) -> int:
@@ -69,10 +76,13 @@ def swing_of(response: solver.Response) -> Swing:
         # Without collapse a single loose brick may be the fastest: it would make the motion of the whole invisible.
         fastest = _exceeded_by(0.01, speeds, assembly.shapes.volumes) or fastest
         motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
-    reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
-    motion = motion * (reach / fastest if fastest > 0 else 0.0)
-    displaced = mechanics.swung(last.pose, motion)
-    return Swing(last, displaced, mechanics.rigid_parts(assembly, last), fastest > 0.0, motion)
+    size, share = float(framed(assembly, [last.pose]).size.max()), 1.0
+    motion = motion * (REACH * size / fastest if fastest > 0 else 0.0)
+    if assembly.dimension == 3:
+        # Blocks in space are drawn after it; those in the plane stay where their hinges are.
+        share = min(1.0, float(np.sqrt(TEAR * size / max(_torn(last, motion), 1e-300))))
+    displaced = mechanics.swung(last.pose, share * motion)
+    return Swing(last, displaced, mechanics.rigid_parts(assembly, last), fastest > 0.0, share * motion, share)
 
 
 def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:
@@ -110,6 +120,20 @@ def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing)
     travel = np.linalg.norm(swing.displaced.positions - swing.increment.pose.positions, axis=1)
     tints = palette.displacement_colours(0.75 * travel / travel[assembly.free].max())
     return np.where(assembly.free[:, None], tints, fill)
+
+
+def _torn(increment: solver.Increment, motion: np.ndarray) -> float:
+    """Find by how much [m] blocks on their arcs part at most where they carry each other, beyond first order.
+
+    It grows with the square of the motion, (n_blocks, n_dof) from the increment on.
+    """
+    before, carrying = increment.pose, increment.contacts[increment.forces[:, 0] > 0.0]
+    after, points = mechanics.swung(before, motion), carrying.points
+    of_a, of_b = (
+        mechanics.carried(points, block, before, after) - mechanics.point_velocities(points, block, before, motion)
+        for block in (carrying.block_a, carrying.block_b)
+    )
+    return float(np.linalg.norm(of_a - of_b, axis=1).max(initial=0.0))
 
 
 def _exceeded_by(share: float, speeds: np.ndarray, volumes: np.ndarray) -> float:
