@@ -12,9 +12,9 @@ from PIL import Image
 
 import solver
 from blockvis.layout.sights import Cut, Sight
-from blockvis.results.cracks import Crack, cracks_of, main_cracks
+from blockvis.results.cracks import Crack, cracks_of, main_cracks, slid_joints
 from blockvis.results.joint_faces import InitialJoints, initial_joints
-from blockvis.results.joints import end_openings
+from blockvis.results.joints import end_openings, opening_and_slip
 from blockvis.system.atomic_files import atomic_file
 from blockvis.text import width_text
 from solver import mechanics
@@ -66,37 +66,42 @@ def draw_cracks(
     increment = numbered(increments, number)
     joints = initial_joints(assembly)
     cracks = cracks_of(assembly, increment.pose, joints, increment.fallen)
-    shown = cracks
+    shown, hidden = cracks, 0
     sheet = Sheet(size)
     if assembly.dimension == 2:
         if view is not None or section is not None:
             raise ValueError("view and section are of blocks in space; these lie in the plane: leave both out")
         thickness = "lines as thick as they are open, the thickest "
         picture, keys, pixel = _drawn_in_plane(assembly, increment, joints, cracks, sheet)
+        # Stepped cracks run through joints that slide, which are drawn.
+        moved = opening_and_slip(assembly, joints, increment.pose, increment.fallen)
+        for crack in cracks:
+            moved[crack.joints, 1] = 0.0
+        slip, drawn = float(np.abs(moved[slid_joints(assembly, moved), 1]).max(initial=0.0)), ", not drawn"
     else:
         # VTK takes seconds to import, and pictures in the plane need none.
         from .cracks_in_space import CracksInSpace
 
         thickness = "the widest "
-        drawing = CracksInSpace(response, increment, joints, sheet, *seen_from(view, section))
+        drawing = CracksInSpace(response, increment, joints, sheet, cracks, *seen_from(view, section))
         shown = drawing.left_by_section(cracks)
         main = main_cracks(shown)
         picture = drawing.image(main, _numbers(main, cracks))
-        keys, pixel = drawing.keys, drawing.pixel
+        keys, pixel, slip, drawn = drawing.keys, drawing.pixel, drawing.slip, ""
+        hidden = len(drawing.hidden(shown))
     none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
     of_them = "" if len(shown) == len(cracks) else f", of which the section shows {len(shown) or 'none'}"
-    counts = [
-        mechanics.counted(len(cracks), "crack") + of_them,
-        *phase_words(response, increment),
-        *loss_words(increment),
-    ]
+    of_them += f", {'' if hidden == len(cracks) else f'{hidden} '}in no view" if hidden else ""
+    counts = [mechanics.counted(len(cracks), "crack") + of_them if cracks else none]
+    counts += [*phase_words(response, increment), *loss_words(increment)] if cracks else []
     counts += [thickness + width_text(shown[0].width)] if shown else []
-    counted = "   ·   ".join(counts)
+    counts += [f"joints slide by up to {width_text(slip)}{drawn}"] if slip else []
+    counts += ["drawn on the layout"] if cracks or slip else []
     page = sheet.composed(
         picture,
         title=f"Cracks   ·   {state_text(increment, response)}",
-        detail=f"{counted}   ·   drawn on the layout" if cracks else none,
-        keys=keys if shown else [],
+        detail="   ·   ".join(counts),
+        keys=keys,
         pixel=pixel,
     )
     with atomic_file(path) as partial:

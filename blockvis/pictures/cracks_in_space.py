@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from PIL import Image
 
 import solver
 from blockvis.layout.sights import Cut, Sight
-from blockvis.results.cracks import SMALLEST_OPENING, Crack
+from blockvis.results.cracks import SMALLEST_OPENING, Crack, main_cracks, slid_joints
 from blockvis.results.joint_faces import InitialJoints
-from blockvis.results.joints import carried_faces
+from blockvis.results.joints import carried_faces, opening_and_slip
 from blockvis.text import width_text
 
 from . import palette
 from .drawer import MARGIN, WHOLE, alike
 from .frame import Key, Sheet, framed, write_labels, write_words
 from .paired_scenes import WORDS
+from .sight_lines import SightLines
 from .solid_scene import SolidScene
-from .solid_view import hiding_supports, plane_of, views_of
+from .solid_view import AROUND, View, hiding_supports, plane_of, views_of
 from .swing import swing_of
 
 #: Widths between the classes are of these, times a power of ten [mm]; most classes; thinnest and thickest line in
@@ -41,6 +43,8 @@ class CracksInSpace:
     increment : solver.Increment
     joints : InitialJoints
     sheet : Sheet
+    cracks : sequence of Crack
+        As of :func:`blockvis.results.cracks.cracks_of`: the main ones of them are to be seen.
     sight, cut
         From where the blocks are seen and what cuts them open, as of :func:`blockvis.draw_still`.
 
@@ -50,6 +54,8 @@ class CracksInSpace:
         Size of a pixel.
     keys : list of Key
         The classes of width.
+    slip : float [m]
+        The largest of joints that have slid by far and are not open; 0 without any.
     """
 
     def __init__(
@@ -58,6 +64,7 @@ class CracksInSpace:
         increment: solver.Increment,
         joints: InitialJoints,
         sheet: Sheet,
+        cracks: Sequence[Crack],
         sight: Sight | None = None,
         cut: Cut | None = None,
     ) -> None:
@@ -66,22 +73,38 @@ class CracksInSpace:
         motion = swing.displaced.positions - swing.increment.pose.positions
         self._views = views_of(response, motion, joints, sight, cut)
         self._sheet = sheet
+        edges = _Edges.of(assembly, joints, increment)
+        opened = edges.chosen(edges.openings > SMALLEST_OPENING * assembly.block_size)
+        if cut is None and (sight is None or sight.azimuth is None):
+            self._views = _showing(assembly, self._views, opened, main_cracks(cracks), increment.fallen)
         plane = plane_of(assembly, cut, self._views[0])
-        opened = _opened(assembly, joints, increment)
-        kept = _kept(opened[0].mean(axis=1), plane)
-        self._pieces, self._openings, self._owner = (of_pieces[kept] for of_pieces in opened)
+        self._opened = opened.chosen(_kept(opened.middles, plane))
         self._joints_kept = joints.rings.ring[_kept(joints.rings.points, plane)]
-        limits = class_limits(float(self._openings.max(initial=0.0)))
+        moved = opening_and_slip(assembly, joints, increment.pose, increment.fallen)
+        slides = np.isin(edges.joints, slid_joints(assembly, moved))
+        self._slid = edges.chosen(slides & _kept(edges.middles, plane))
+        self._slips = np.abs(moved[self._slid.joints, 1])
+        self.slip = float(self._slips.max(initial=0.0))
+        self._seen_joints = np.zeros(0, dtype=int)
+        limits = class_limits(float(self._opened.openings.max(initial=0.0)))
         colours = [palette.rgb(colour) for colour in palette.crack_colours(len(limits) + 1)]
         self._scenes = self._drawn(assembly, limits, colours, plane, increment.fallen)
         self.pixel = self._scenes[0].pixel
         texts = [width_text(limit) for limit in limits]
         words = [*(f"to {text}" for text in texts), f"above {texts[-1]}" if texts else "open joint"]
         self.keys = [Key("line", text, colour) for text, colour in zip(words, colours, strict=True)]
+        if not len(self._opened.joints):
+            self.keys = []
+        if len(self._slid.joints):
+            self.keys.append(Key("line", "sliding joint", palette.SLIDING))
 
     def left_by_section(self, cracks: Sequence[Crack]) -> list[Crack]:
         """Choose the cracks of which the section leaves something."""
         return [crack for crack in cracks if np.isin(crack.joints, self._joints_kept).any()]
+
+    def hidden(self, cracks: Sequence[Crack]) -> list[Crack]:
+        """Choose the cracks of which the views of the last image show nothing."""
+        return [crack for crack in cracks if not np.isin(crack.joints, self._seen_joints).any()]
 
     def _drawn(
         self,
@@ -99,7 +122,7 @@ class CracksInSpace:
             framed(assembly, [solver.Pose.initial(assembly)], MARGIN, 0.3, view.axes[:2], WHOLE, plane)
             for view in self._views
         ]
-        which = np.searchsorted(limits, self._openings)
+        which = np.searchsorted(limits, self._opened.openings)
         scenes = []
         for view, frame in zip(self._views, alike(frames), strict=True):
             outlined = hiding_supports(assembly, view)
@@ -112,7 +135,8 @@ class CracksInSpace:
             for k, colour in enumerate(colours):
                 part = k / max(len(colours) - 1, 1)
                 thick = height * (THIN + part * (THICK - THIN))
-                scene.lines(f"crack/{k}", self._pieces[which == k], colour, thick, forward=2.0 + k)
+                scene.lines(f"crack/{k}", self._opened.ends[which == k], colour, thick, forward=2.0 + k)
+            scene.lines("sliding", self._slid.ends, palette.SLIDING, height * (THIN + THICK) / 2.0, forward=1.5)
             scenes.append(scene)
         return scenes
 
@@ -129,28 +153,129 @@ class CracksInSpace:
         """
         text = self._sheet.text
         page, left = Image.new("RGB", self._sheet.inside_size, palette.PAPER), 0
+        opened, slid = self._opened, self._slid
         found: dict[int, tuple[float, np.ndarray]] = {}
-        dots = []
+        slipped: tuple[float, np.ndarray] = 0.0, np.zeros(2)
+        dots, seen_joints = [], []
         for scene, words in zip(self._scenes, ("from above", "from below"), strict=False):
             page.paste(scene.image(), (left, 0))
             if len(self._scenes) > 1:
                 place = left + scene.size[0] / 2.0, page.height - 0.7 * text
                 write_words(page, place, words, text)
-            middles = self._pieces.mean(axis=1)
-            seen, pixels = scene.sees(middles), scene.at_pixel(middles) + np.array([left, 0])
-            dots.append(pixels[seen])
+            offset, thin = np.array([left, 0]), THIN * scene.size[1]
+            seen, pixels = ~scene.hides(opened.middles, thin), scene.at_pixel(opened.middles) + offset
             for crack, number in zip(cracks, numbers, strict=True):
-                here = seen & np.isin(self._owner, crack.joints)
-                widest = int(np.where(here, self._openings, -1.0).argmax())
-                if here.any() and (number not in found or self._openings[widest] > found[number][0]):
-                    found[number] = self._openings[widest], pixels[widest]
+                here = seen & np.isin(opened.joints, crack.joints)
+                widest = int(np.where(here, opened.openings, -1.0).argmax()) if len(here) else 0
+                if here.any() and (number not in found or opened.openings[widest] > found[number][0]):
+                    found[number] = opened.openings[widest], pixels[widest]
+            slides, along = ~scene.hides(slid.middles, thin), scene.at_pixel(slid.middles) + offset
+            slips = np.where(slides, self._slips, 0.0)
+            if slips.max(initial=0.0) > slipped[0]:
+                slipped = float(slips.max()), along[slips.argmax()]
+            dots += [pixels[seen], along[slides]]
+            seen_joints.append(opened.joints[seen])
             left += scene.size[0]
             scene.close()
-        if found:
-            labelled = [(crack, n) for crack, n in zip(cracks, numbers, strict=True) if n in found]
-            labels = [f"{n}: {width_text(crack.width)}" for crack, n in labelled]
-            write_labels(page, np.array([found[n][1] for _, n in labelled]), labels, text, np.concatenate(dots))
+        self._seen_joints = np.concatenate(seen_joints)
+        labelled = [(crack, n) for crack, n in zip(cracks, numbers, strict=True) if n in found]
+        labels = [f"{n}: {width_text(crack.width)}" for crack, n in labelled]
+        places, colours = [found[n][1] for _, n in labelled], [palette.OPEN] * len(labelled)
+        if slipped[0] > 0.0:
+            labels.append(f"slip {width_text(slipped[0])}")
+            places.append(slipped[1])
+            colours.append(palette.SLIDING)
+        if labels:
+            write_labels(page, np.array(places), labels, text, np.concatenate(dots), colours)
         return page
+
+
+@dataclass(frozen=True)
+class _Edges:
+    """Pieces of the edges of joints in the layout.
+
+    Attributes
+    ----------
+    ends : (n, 2, 3) array [m]
+    openings : (n,) array [m]
+    joints : (n,) int array
+    across : (n, 3) array
+        Unit normals of the joints.
+    """
+
+    ends: np.ndarray
+    openings: np.ndarray
+    joints: np.ndarray
+    across: np.ndarray
+
+    @property
+    def middles(self) -> np.ndarray:
+        """(n, 3) array [m]."""
+        return np.asarray(self.ends.mean(axis=1))
+
+    @classmethod
+    def of(cls, assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment) -> _Edges:
+        """Divide the edges of all joints, with their openings at an increment."""
+        rings = joints.rings
+        gaps = carried_faces(assembly, joints, increment.pose, increment.fallen).gaps
+        start, end = rings.points, rings.points[rings.following]
+        at = np.linspace(0.0, 1.0, PIECES + 1)[:, None, None]
+        points = start + at * (end - start)
+        middle = (at[:-1, :, 0] + at[1:, :, 0]) / 2.0
+        owner = np.tile(rings.ring, PIECES)
+        return cls(
+            ends=np.stack([points[:-1], points[1:]], axis=2).reshape(-1, 2, 3),
+            openings=(gaps + middle * (gaps[rings.following] - gaps)).ravel(),
+            joints=owner,
+            across=joints.normals[owner],
+        )
+
+    def chosen(self, which: np.ndarray) -> _Edges:
+        """Choose pieces by numbers, or by (n,) bool."""
+        return _Edges(self.ends[which], self.openings[which], self.joints[which], self.across[which])
+
+
+def _showing(
+    assembly: solver.Assembly,
+    views: tuple[View, ...],
+    opened: _Edges,
+    cracks: Sequence[Crack],
+    gone: np.ndarray,
+) -> tuple[View, ...]:
+    """Turn views around where they leave a crack unseen that others show: to what shows most cracks, and most of them.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    views : tuple of View
+        Those of the other pictures.
+    opened : _Edges
+    cracks : sequence of Crack
+        That are to be seen.
+    gone : (n_blocks,) bool array
+        Blocks that are not drawn.
+    """
+    lines = SightLines(assembly, solver.Pose.initial(assembly), np.ones(assembly.n_blocks))
+    order = np.argsort(-opened.openings, kind="stable")
+    most = lines.most // max(len(cracks), 1)
+    # The widest pieces of each; where there are too many the others are not looked for.
+    own = [opened.chosen(order[np.isin(opened.joints[order], crack.joints)][:most]) for crack in cracks]
+
+    def shown(tried: tuple[View, ...]) -> tuple[int, float]:
+        hide = [gone | hiding_supports(assembly, view) for view in tried]
+        parts = []
+        for one in own:
+            seen = [
+                lines.sees(one.middles, one.across, view.axes, without)
+                for view, without in zip(tried, hide, strict=True)
+            ]
+            parts.append(float(np.any(seen, axis=0).mean()))
+        return sum(part > 0.0 for part in parts), sum(parts)
+
+    if shown(views)[0] == len(own):
+        return views
+    turned = [tuple(View(around, view.above) for view in views) for around in AROUND]
+    return max([views, *turned], key=shown)
 
 
 def class_limits(widest: float) -> list[float]:
@@ -169,20 +294,3 @@ def class_limits(widest: float) -> list[float]:
 def _kept(points: np.ndarray, plane: np.ndarray | None) -> np.ndarray:
     """(n,) bool array: points, (n, 3) [m], on the side of a plane that is kept, as of :func:`plane_of`."""
     return np.ones(len(points), dtype=bool) if plane is None else (points - plane[0]) @ plane[1] >= 0.0
-
-
-def _opened(
-    assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pieces of the edges of open joints in the layout, (n, 2, 3) [m], their openings (n,) [m] and joints (n,)."""
-    rings = joints.rings
-    gaps = carried_faces(assembly, joints, increment.pose, increment.fallen).gaps
-    start, end = rings.points, rings.points[rings.following]
-    at = np.linspace(0.0, 1.0, PIECES + 1)[:, None, None]
-    points = start + at * (end - start)
-    pieces = np.stack([points[:-1], points[1:]], axis=2).reshape(-1, 2, 3)
-    middle = (at[:-1, :, 0] + at[1:, :, 0]) / 2.0
-    openings = (gaps + middle * (gaps[rings.following] - gaps)).ravel()
-    owner = np.tile(rings.ring, PIECES)
-    kept = openings > SMALLEST_OPENING * assembly.block_size
-    return pieces[kept], openings[kept], owner[kept]

@@ -29,15 +29,16 @@ class SightLines:
 
     def __init__(self, assembly: solver.Assembly, pose: solver.Pose, weights: np.ndarray) -> None:
         shapes = assembly.polyhedra
-        triangles, _ = triangles_of(shapes)
+        triangles, self._block_of_triangle = triangles_of(shapes)
         corners = mechanics.moved_vertices(assembly, pose)
         self._triangles = corners[triangles]
         self._faces, self._areas = shapes.faces(corners), shapes.faces(shapes.vertices).areas
         self._owner = shapes.block_of_face
         self._near = NEARER * assembly.block_size
-        most = max(20, MOST_PAIRS // max(len(triangles), 1))
+        #: Points that are looked for in a view, at most.
+        self.most = max(20, MOST_PAIRS // max(len(triangles), 1))
         per_face = weights[self._owner] * self._areas
-        self._chosen = np.sort(np.argsort(-per_face, kind="stable")[:most])
+        self._chosen = np.sort(np.argsort(-per_face, kind="stable")[: self.most])
 
     def seen(self, axes: np.ndarray, n_blocks: int) -> np.ndarray:
         """(n_blocks,) array: part of what of each block faces the eye that nothing hides; 1 where nobody looked.
@@ -55,6 +56,26 @@ class SightLines:
         whole = np.bincount(owner, weights=area, minlength=n_blocks)
         part = np.bincount(owner, weights=area * free, minlength=n_blocks)
         return np.where(whole > 0.0, part / np.where(whole > 0.0, whole, 1.0), 1.0)
+
+    def sees(
+        self, points: np.ndarray, across: np.ndarray, axes: np.ndarray, without: np.ndarray | None = None
+    ) -> np.ndarray:
+        """(n,) bool array: which points on edges of joints nothing hides.
+
+        Parameters
+        ----------
+        points : (n, 3) array [m]
+        across : (n, 3) array
+            Unit normals of the joints: along one the eye would look between its blocks, through both of them.
+        axes : (3, 3) array
+            As of :meth:`seen`.
+        without : (n_blocks,) bool array, optional
+            Blocks that hide nothing.
+        """
+        triangles = self._triangles if without is None else self._triangles[~without[self._block_of_triangle]]
+        beside = self._near / 2.0 * across
+        one, other = (~self._hidden(side @ axes.T, triangles @ axes.T) for side in (points - beside, points + beside))
+        return np.asarray(one | other)
 
     def _hidden(self, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         """(n,) bool array: points (n, 3) behind one of the triangles (m, 3, 3), all to the right, up and to the eye."""

@@ -410,6 +410,16 @@ class SolidScene(Scene):
         """(n,) bool array: which points (n, 3) [m] on the blocks nothing hides in the last picture."""
         return np.asarray(np.abs(self._hidden_by(points)) < SAME_DEPTH * self.frame.size.max())
 
+    def hides(self, points: np.ndarray, thick: float) -> np.ndarray:
+        """(n,) bool array: which points (n, 3) [m] of lines ``thick`` pixels wide the last picture hides altogether.
+
+        Of lines along a silhouette half is seen.
+        """
+        aside = self.pixel * max(0.5 * thick, 1.0) * self.view.axes[:2]
+        beside = np.concatenate([np.zeros((1, 3)), aside, -aside])
+        hidden = self._hidden_by((points + beside[:, None]).reshape(-1, 3)).reshape(len(beside), -1)
+        return np.asarray((hidden >= SAME_DEPTH * self.frame.size.max()).all(axis=0))
+
     def _hidden_by(self, points: np.ndarray) -> np.ndarray:
         """(n,) array [m]: how far before points (n, 3) [m] what is seen at their pixels lies; nothing lies at -inf."""
         buffer, window = vtkFloatArray(), self._plotter.render_window

@@ -35,6 +35,10 @@ DIRECTIONS, BESIDE = 36, 2
 #: joints along it do.
 SLIDING = 0.4
 
+#: Joints have slid by far where their slip is more than this part of the largest opening, and are not open where their
+#: opening is less than this part of it.
+SLID = 0.1
+
 #: A course ends where the sides part by less than this part of what they do at its widest joint.
 HAIRLINE = 0.01
 
@@ -155,6 +159,23 @@ def cracks_of(
         places = Places(assembly) if open_ones else None
         found = [_crack(assembly, joints, moved, course, places) for course in open_ones]
     return sorted((crack for crack in found if crack.width > least), key=lambda crack: -crack.width)
+
+
+def slid_joints(assembly: solver.Assembly, moved: np.ndarray) -> np.ndarray:
+    """(n,) int array: joints that have slid by far and are not open, the farthest first.
+
+    They are no cracks, and yet a step in what a survey draws.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    moved : (n_joints, 2) array [m]
+        As of :func:`opening_and_slip`.
+    """
+    opening, slip = np.maximum(moved[:, 0], 0.0), np.abs(moved[:, 1])
+    least = max(SMALLEST_OPENING * assembly.block_size, SLID * float(opening.max(initial=0.0)))
+    far = np.flatnonzero((slip > least) & (opening < SLID * slip))
+    return far[np.argsort(-slip[far], kind="stable")]
 
 
 def main_cracks(cracks: Sequence[Crack]) -> list[Crack]:

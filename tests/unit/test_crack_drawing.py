@@ -124,3 +124,60 @@ def test_labels_stand_at_the_widest_point_of_a_joint(monkeypatch):
         gap = np.linalg.norm((on_a - on_b)[crack.joints[0]], axis=1)
         widest = (on_a + on_b)[crack.joints[0], gap.argmax()] / 2.0
         np.testing.assert_allclose(place, drawer.scene.at_pixel(widest[None])[0], atol=0.01)
+
+
+def details(monkeypatch):
+    """The second lines of the drawings that are made from here on."""
+    said = []
+    sheet, composed = crack_drawing.Sheet, crack_drawing.Sheet.composed
+    monkeypatch.setattr(
+        sheet, "composed", lambda *args, **given: (said.append(given["detail"]), composed(*args, **given))[1]
+    )
+    return said
+
+
+@pytest.mark.slow
+def test_a_crack_behind_a_wall_is_looked_at_from_behind(tmp_path, monkeypatch):
+    """Two boxes that part by 20 mm behind a screen; what is asked for holds, and says that it shows none of it."""
+    boxes = [box((0, 0, 0), (1, 1, 1)), box((1, 0, 0), (2, 1, 1)), box((-4, -2, -1), (6, -1, 4))]
+    assembly = solver.Assembly.from_solids(boxes, roles=["free", "free", "fixed"])
+    pose = solver.Pose.initial(assembly)
+    pose.positions[1, 0] += 0.02
+    said = details(monkeypatch)
+    for view in (None, "above", {"azimuth": -60, "elevation": 24}, "back"):
+        picture = pixels(draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE, view=view))
+        hidden = view is not None and "azimuth" in view
+        assert bool(covered(picture, palette.crack_colours(4)[-1], 30)) is not hidden
+    assert said == [
+        *2 * ["1 crack   ·   the widest 20 mm   ·   drawn on the layout"],
+        "1 crack, in no view   ·   the widest 20 mm   ·   drawn on the layout",
+        "1 crack   ·   the widest 20 mm   ·   drawn on the layout",
+    ]
+
+
+@pytest.mark.slow
+def test_a_step_between_blocks_in_space_is_drawn_though_no_joint_is_open(tmp_path, monkeypatch):
+    assembly = solver.Assembly.from_solids([box((-1, 0, 0), (0, 1, 1)), box((0, 0, 0), (1, 1, 1))])
+    pose = solver.Pose.initial(assembly)
+    pose.positions[1, 2] -= 0.25
+    said = details(monkeypatch)
+    picture = pixels(draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE))
+    assert said == ["no joint is open   ·   joints slide by up to 250 mm   ·   drawn on the layout"]
+    assert covered(picture, palette.SLIDING, 30) > 100
+    # Beside a crack that is ten times as wide as they slide they are no step.
+    pose.positions[1] += 3.0, 0.0, 0.0
+    draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE)
+    assert said[1:] == ["1 crack   ·   the widest 3000 mm   ·   drawn on the layout"]
+
+
+def test_a_step_in_the_plane_is_said(tmp_path, monkeypatch):
+    """A joint that slides and belongs to no crack; through those that do a stepped crack runs."""
+    rings = [rectangle(x, 0.0, x + 1.0, 1.0) for x in (0.0, 1.0, 2.0)]
+    assembly = solver.Assembly.from_outlines(rings)
+    pose = solver.Pose.initial(assembly)
+    pose.positions[1:, 1] -= 0.25
+    pose.positions[2, 0] += 0.03
+    said = details(monkeypatch)
+    draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE)
+    counts = "1 crack   ·   lines as thick as they are open, the thickest 30 mm"
+    assert said == [f"{counts}   ·   joints slide by up to 250 mm, not drawn   ·   drawn on the layout"]
