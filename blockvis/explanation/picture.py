@@ -18,12 +18,15 @@ from matplotlib.text import Annotation
 from matplotlib.transforms import BboxBase
 
 import solver
+from blockvis.layout.sights import BELOW, Sight
 from blockvis.pictures import palette
 from blockvis.pictures.drawer import WHOLE, magnified
 from blockvis.pictures.figures import plain_text
 from blockvis.pictures.frame import Frame, framed
-from blockvis.pictures.solid_view import ABOVE, AROUND, View
+from blockvis.pictures.sight_lines import SightLines
+from blockvis.pictures.solid_view import ABOVE, View, hiding_supports, views_from
 from blockvis.results.cracks import SMALLEST_OPENING
+from blockvis.results.joint_faces import Rings
 from blockvis.results.joints import carried_faces
 from blockvis.system.atomic_files import atomic_file
 from blockvis.text import rounded_length
@@ -48,11 +51,18 @@ WIDE = 4.0
 #: Pixels of matplotlib per inch, and of the blocks in space.
 DPI, FINE = 130, 260
 
-#: Views in which the cracks are as near to the eye as in the best, within this part of the structure, are equal.
-ALIKE = 0.02
+#: What it is worth to have the cracks, and what has moved far, in front by the size of the structure, beside seeing all
+#: of them; what it costs to look from below; views that are as good as the best, within ``ALIKE``, are equal.
+IN_FRONT, FROM_BELOW, ALIKE = 0.35, 0.3, 0.02
+
+#: Each edge of a joint is looked for at so many places.
+PIECES = 6
 
 #: A joint has its largest width written, too, where that is so many times the one at an observed place.
 GAPES = 1.5
+
+#: Frames of widths whose joints are hidden: dashed; their labels are known by this word.
+DASHED, HIDDEN = (0, (2.0, 1.5)), "hidden"
 
 #: Most widths that are written in a panel.
 MOST_LABELS = 24
@@ -103,8 +113,9 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
         panel.set_axis_off()
     # How wide a text is in the drawing, is known when the panels have their sizes.
     figure.draw_without_rendering()
-    for own in labels:
-        _uncover(own)
+    written = [label for own in labels for label in _uncover(own)]
+    if any(label.get_gid() == HIDDEN for label in written):
+        _title(axes[0], f"{axes[0].get_title(loc='left')}, dashed: hidden")
     path = Path(path)
     with atomic_file(path) as partial:
         figure.savefig(partial, dpi=DPI, facecolor="white")
@@ -112,14 +123,46 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
 
 
 def _view_of(found: Explanation) -> View:
-    """Choose from where the wide cracks, and what has moved far, are in front."""
-    given, middle = found.observations, found.assembly.centroids.mean(axis=0)
-    places = np.concatenate([given.places, given.points]) - middle
-    sizes = np.concatenate([given.widths, np.linalg.norm(given.displacements, axis=1)])
-    size = float(np.ptp(found.assembly.vertices, axis=0).max())
-    views = [View(around, ABOVE) for around in AROUND]
-    near = [float(sizes @ view.depth(places) / (sizes.sum() * size)) for view in views]
-    return next(view for view, value in zip(views, near, strict=True) if value >= max(near) - ALIKE)
+    """Choose from where the wide cracks, and what has moved far, are seen and in front; as the case asks for."""
+    given, assembly, joints = found.observations, found.assembly, found.comparison.joints
+    sight = found.case.sight or Sight(both=True)
+    views = views_from(sight, ABOVE) + (views_from(sight, BELOW) if sight.both else [])
+    if len(views) == 1:
+        return views[0]
+    lines = SightLines(assembly, solver.Pose.initial(assembly), np.ones(assembly.n_blocks))
+    # Of many cracks the widest are looked for.
+    pieces = _pieces(joints.rings)
+    counts = PIECES * np.diff(joints.rings.offsets)
+    chosen = np.argsort(-given.widths, kind="stable")[: np.count_nonzero(given.widths)]
+    chosen = chosen[np.cumsum(counts[found.comparison.own[chosen]]) - counts.max(initial=0) < lines.most]
+    own = found.comparison.own[chosen]
+    around = [pieces[first:stop].reshape(-1, 3) for first, stop in joints.rings.offsets[own[:, None] + [0, 1]].tolist()]
+    points = np.concatenate([given.points, *around])
+    across = np.concatenate([np.zeros_like(given.points), np.repeat(joints.normals[own], counts[own], axis=0)])
+    sizes = np.concatenate([np.linalg.norm(given.displacements, axis=1), given.widths[chosen]])
+    owner = np.repeat(np.arange(len(sizes)), np.concatenate([np.ones(len(given.points), dtype=int), counts[own]]))
+    places = np.concatenate([given.points, given.places[chosen]]) - assembly.centroids.mean(axis=0)
+    size = float(np.ptp(assembly.vertices, axis=0).max())
+    if not sizes.any():
+        return views[0]
+
+    def worth(view: View) -> float:
+        seen = lines.sees(points, across, view.axes, hiding_supports(assembly, view))
+        shares = np.bincount(owner, weights=seen, minlength=len(sizes)) / np.bincount(owner, minlength=len(sizes))
+        front = IN_FRONT * view.depth(places) / size
+        # Of what stands on something half is seen from everywhere.
+        worths = np.minimum(2.0 * shares, 1.0) + front
+        return float(sizes @ worths) / float(sizes.sum()) - (FROM_BELOW if view.above < 0.0 else 0.0)
+
+    values = [worth(view) for view in views]
+    return next(view for view, value in zip(views, values, strict=True) if value >= max(values) - ALIKE)
+
+
+def _pieces(rings: Rings) -> np.ndarray:
+    """(n_points, PIECES, 3) array [m]: places along the edge that begins at each corner of polygons in space."""
+    at = (np.arange(PIECES) + 0.5)[:, None] / PIECES
+    start, end = rings.points[:, None], rings.points[rings.following][:, None]
+    return np.asarray(start + at * (end - start))
 
 
 @dataclass(frozen=True)
@@ -144,15 +187,19 @@ class _Canvas:
         """(n, 2) array [m]: where points, or arrows, (n, d) [m] are drawn."""
         return points if self.view is None else self.view.projected(points)
 
-    def blocks(self, pose: solver.Pose, lines: Sequence[np.ndarray], thick: Sequence[float], filled: Any) -> None:
-        """Draw the blocks, and open joints as lines (n, 2, d) [m] so thick [points], or as polygons (n, 4, d) [m]."""
+    def blocks(
+        self, pose: solver.Pose, lines: Sequence[np.ndarray], thick: Sequence[float], filled: Any, joints: Rings
+    ) -> _Sights:
+        """Draw the blocks, and open joints as lines (n, 2, d) [m] so thick [points], or as polygons (n, 4, d) [m].
+
+        Returns what is seen of the edges of joints.
+        """
         colour, fill = (
             palette.hexadecimal(palette.OPEN),
             palette.block_colours(self.assembly.materials, self.assembly.free),
         )
         if self.view is not None:
-            self._solid_blocks(pose, lines, thick, filled)
-            return
+            return self._solid_blocks(pose, lines, thick, filled, joints)
         corners = mechanics.moved_vertices(self.assembly, pose)
         self.panel.add_collection(
             PolyCollection(
@@ -167,6 +214,7 @@ class _Canvas:
         self.panel.add_collection(
             PolyCollection(list(filled), facecolors=[colour], edgecolors=[colour], linewidths=0.8, zorder=3)
         )
+        return _Sights(joints)
 
     def compass(self) -> None:
         """Show where the right and the back are, in a corner of the panel."""
@@ -174,8 +222,12 @@ class _Canvas:
             return
         (across, high), corner = self.frame.size, self.frame.low
         arms = 0.07 * across * self.view.projected(np.eye(3)[:2])
-        centre = corner + np.array([0.1 * across, 0.0]) + 0.05 * high
+        # From below the back is downwards.
+        centre = corner + np.array([0.1 * across, 1.35 * max(0.0, -arms[:, 1].min())]) + 0.05 * high
         for word, arm in zip(("right", "back"), arms, strict=True):
+            if np.hypot(*arm) < 0.1 * np.hypot(*arms.T).max():
+                # Straight to the eye or away from it.
+                continue
             arrow = {"arrowstyle": "-|>", "color": palette.hexadecimal(palette.FAINT)}
             self.panel.annotate("", centre + arm, xytext=centre, arrowprops=arrow)
             x, y = centre + 1.35 * arm
@@ -184,25 +236,66 @@ class _Canvas:
             )
 
     def _solid_blocks(
-        self, pose: solver.Pose, lines: Sequence[np.ndarray], thick: Sequence[float], filled: Any
-    ) -> None:
+        self, pose: solver.Pose, lines: Sequence[np.ndarray], thick: Sequence[float], filled: Any, joints: Rings
+    ) -> _Sights:
         assert self.view is not None
         # VTK takes seconds to import, and pictures in the plane need none.
         from blockvis.pictures.solid_scene import SolidScene
 
         across, high = self.frame.size
         size = (round(PANEL * FINE), round(PANEL * FINE * float(high / across)))
-        scene = SolidScene(self.assembly, self.view, self.frame, size, palette.role_colours(self.assembly))
+        outlined = hiding_supports(self.assembly, self.view)
+        colours = palette.role_colours(self.assembly)
+        scene = SolidScene(self.assembly, self.view, self.frame, size, colours, outlined=outlined)
         scene.pose(pose)
         for k, (line, points) in enumerate(zip(lines, thick, strict=True)):
             scene.lines(f"crack {k}", line[None], palette.OPEN, points * FINE / 72.0)
         scene.polygons("crack", filled, palette.OPEN)
         edges = np.asarray(filled).reshape(-1, 4, 3)
         scene.lines("crack edge", edges[:, [[0, 1], [2, 3]]].reshape(-1, 2, 3), palette.OPEN, 0.8 * FINE / 72.0)
-        picture, seen = scene.image(), scene.frame
+        picture, shown, pieces = scene.image(), scene.frame, _pieces(joints)
+        seen = ~scene.hides(pieces.reshape(-1, 3), FINE / 72.0).reshape(pieces.shape[:2])
         scene.close()
-        extent = (seen.low[0], seen.high[0], seen.low[1], seen.high[1])
+        extent = (shown.low[0], shown.high[0], shown.low[1], shown.high[1])
         self.panel.imshow(np.asarray(picture), extent=extent, zorder=2)
+        return _Sights(joints, pieces, seen)
+
+
+@dataclass(frozen=True)
+class _Sights:
+    """What a panel shows of the edges of joints: all of them in the plane.
+
+    Attributes
+    ----------
+    rings : Rings
+    pieces : (n_points, PIECES, 3) array [m], optional
+        Places along the edges, of joints in space.
+    seen : (n_points, PIECES) bool array, optional
+        Those that nothing hides.
+    """
+
+    rings: Rings
+    pieces: np.ndarray | None = None
+    seen: np.ndarray | None = None
+
+    def of(self, places: np.ndarray, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Find what is seen of joints (n,) int, nearest to places (n, d) [m] on them.
+
+        Returns
+        -------
+        places : (n, d) array [m]
+            On an edge of the joint; as given where nothing of it is seen.
+        seen : (n,) bool array
+        """
+        if self.pieces is None or self.seen is None:
+            return places, np.ones(len(places), dtype=bool)
+        places, found = np.array(places), np.zeros(len(places), dtype=bool)
+        for k, joint in enumerate(joints.tolist()):
+            here = slice(*self.rings.offsets[joint : joint + 2])
+            edges = self.pieces[here][self.seen[here]]
+            if len(edges):
+                places[k], found[k] = edges[np.linalg.norm(edges - places[k], axis=1).argmin()], True
+        return places, found
 
 
 def _observed(canvas: _Canvas, found: Explanation) -> list[Annotation]:
@@ -216,18 +309,19 @@ def _observed(canvas: _Canvas, found: Explanation) -> list[Annotation]:
         around = [corner] if len(corner) == 2 else np.stack([corner, rings.following[corner]], axis=1)
         lines += [rings.points[both] for both in around]
         thick += [1.5 + 4.0 * width / max(given.largest, 1e-300)] * len(around)
-    canvas.blocks(solver.Pose.initial(assembly), lines, thick, [])
+    sights = canvas.blocks(solver.Pose.initial(assembly), lines, thick, [], rings)
     canvas.compass()
-    places = canvas.placed(given.places)
-    panel.plot(*places[~opened].T, "o", ms=4.5, mfc="white", mec=palette.hexadecimal(palette.FAINT), zorder=4)
-    labels = _labels(panel, places, given.widths, found, sizes=given.widths)
+    at, seen = sights.of(given.places, found.comparison.own)
+    places, closed = canvas.placed(at), ~opened & seen
+    panel.plot(*places[closed].T, "o", ms=4.5, mfc="white", mec=palette.hexadecimal(palette.FAINT), zorder=4)
+    labels = _labels(panel, places, given.widths, found, seen, sizes=given.widths)
     points = canvas.placed(given.points)
     strange = np.concatenate([places[list(found.unexplained)], points[list(found.unexplained_points)]])
     panel.plot(*strange.T, "o", ms=17, mfc="none", mec=palette.hexadecimal(palette.WARNING), mew=1.6, zorder=6)
     if len(given.points):
         _arrows(panel, points, canvas.placed(given.displacements), assembly)
     what = "Observed" + (": open joints [mm], ○ closed" if len(given.widths) else ": displaced points")
-    panel.set_title(what, loc="left", fontsize=TEXT + 1, color=palette.hexadecimal(palette.INK))
+    _title(panel, what)
     if len(strange):
         panel.annotate(
             "○ unexplained",
@@ -259,23 +353,25 @@ def _computed(
         start = start[::2]
     stop = rings.following[start]
     filled = np.stack([faces.on_a[start], faces.on_a[stop], faces.on_b[stop], faces.on_b[start]], axis=1)
-    canvas.blocks(shown, [], [], filled)
     between = rings.at((faces.on_a + faces.on_b) / 2.0)
+    sights = canvas.blocks(shown, [], [], filled, between)
     labels: list[Annotation] = []
     labelled = np.zeros(len(opening))
     if len(given.widths):
         pairs = cause.best.pairs[cause.at]
         corners = between.points[compared.corners[compared.joint[pairs]]]
-        places = canvas.placed((corners * compared.weights[pairs][..., None]).sum(axis=1))
-        labels = _labels(panel, places, cause.best.widths[cause.at], found, sizes=given.widths)
+        at, seen = sights.of((corners * compared.weights[pairs][..., None]).sum(axis=1), compared.joint[pairs])
+        labels = _labels(panel, canvas.placed(at), cause.best.widths[cause.at], found, seen, sizes=given.widths)
         np.maximum.at(labelled, compared.joint[pairs], cause.best.widths[cause.at])
     # Where nothing was observed at the end that gapes, the width at the other is not that of the crack.
     wider = np.flatnonzero(opening > GAPES * labelled)
     widest = compared.corners[wider, openings[0, compared.corners[wider]].argmax(axis=1)]
-    labels += _labels(panel, canvas.placed(between.points[widest]), opening[wider], found, sizes=opening[wider])
+    at, seen = sights.of(between.points[widest], wider)
+    labels += _labels(panel, canvas.placed(at), opening[wider], found, seen, sizes=opening[wider])
     measurement = found.next_measurement
     if measurement is not None:
-        x, y = canvas.placed(between.middles()[[measurement.joint]])[0]
+        at, _ = sights.of(between.middles()[[measurement.joint]], np.array([measurement.joint]))
+        x, y = canvas.placed(at)[0]
         panel.plot(x, y, "D", ms=8, mfc="white", mec=palette.hexadecimal(palette.FORCE), mew=1.8, zorder=7)
         here = panel.annotate(
             f"measure here: {width_text(float(opening[measurement.joint]))}",
@@ -293,14 +389,16 @@ def _computed(
     if np.hypot(*moved.T).max(initial=0.0) > 0.0 and not cause.best.candidate.turns:
         _arrows(panel, canvas.placed(_tops(assembly, moving, shown)), moved, assembly, canvas.frame)
     amount = amount_text(float(cause.best.amounts[cause.at]), cause.unit)
-    panel.set_title(
+    _title(
+        panel,
         f"{number}  {cause.name}, {percent(cause.probability)}\n"
         f"best fit: {amount}; widths [mm]; displacements × {factor:g}",
-        loc="left",
-        fontsize=TEXT + 1,
-        color=palette.hexadecimal(palette.INK),
     )
     return labels
+
+
+def _title(panel: Axes, words: str) -> None:
+    panel.set_title(words, loc="left", fontsize=TEXT + 1, color=palette.hexadecimal(palette.INK))
 
 
 def _tops(assembly: solver.Assembly, blocks: Sequence[int], pose: solver.Pose) -> np.ndarray:
@@ -339,10 +437,14 @@ def _labels(
     places: np.ndarray,
     widths: np.ndarray,
     found: Explanation,
+    seen: np.ndarray,
     *,
     sizes: np.ndarray,
 ) -> list[Annotation]:
-    """Write widths in mm at places (n, 2) of open joints, the widest first, and where one opens that was closed."""
+    """Write widths in mm at places (n, 2) of open joints, the widest first, and where one opens that was closed.
+
+    The frames of those that are not seen, (n,) bool, are dashed.
+    """
     least = 0.05 * found.observations.largest
     order = np.argsort(-np.maximum(sizes, widths), kind="stable")
     return [
@@ -355,7 +457,14 @@ def _labels(
             va="center",
             fontsize=TEXT - 1,
             color=palette.hexadecimal(palette.INK),
-            bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": palette.hexadecimal(palette.OPEN), "lw": 0.7},
+            bbox={
+                "boxstyle": "round,pad=0.15",
+                "fc": "white",
+                "ec": palette.hexadecimal(palette.OPEN),
+                "lw": 0.7 if seen[k] else 1.1,
+                "ls": "-" if seen[k] else DASHED,
+            },
+            gid="" if seen[k] else HIDDEN,
             zorder=5,
         )
         # Each is laid out before those that cover others are removed.
@@ -364,9 +473,10 @@ def _labels(
     ]
 
 
-def _uncover(labels: Sequence[Annotation]) -> None:
-    """Remove each label that covers one written before it, and what is beyond the most."""
+def _uncover(labels: Sequence[Annotation]) -> list[Annotation]:
+    """Remove each label that covers one written before it, and what is beyond the most; gives those that are left."""
     written: list[BboxBase] = []
+    left = []
     for label in labels:
         patch = label.get_bbox_patch()
         assert patch is not None
@@ -375,3 +485,5 @@ def _uncover(labels: Sequence[Annotation]) -> None:
             label.remove()
         else:
             written.append(box)
+            left.append(label)
+    return left

@@ -87,16 +87,27 @@ def views_of(
     """
     sight = sight or Sight(both=cut is None and has_intrados(response.assembly, joints))
     level = cut is not None and abs(cut.normal[2]) > ACROSS
-    above = sight.elevation if sight.elevation is not None else ABOVE_CUT if level else _above(response.assembly)
-    if sight.azimuth is not None:
-        view = View(sight.azimuth, above)
-    else:
-        views = [View(around, above) for around in AROUND]
-        if cut is not None and not level:
-            facing = [abs(float(view.axes[2] @ cut.normal)) for view in views]
-            views = [view for view, cosine in zip(views, facing, strict=True) if cosine >= min(ACROSS, max(facing))]
-        view = chosen_view(response, motion, views)
+    above = ABOVE_CUT if level else _above(response.assembly)
+    views = views_from(sight, above)
+    if sight.azimuth is None and cut is not None and not level:
+        facing = [abs(float(view.axes[2] @ cut.normal)) for view in views]
+        views = [view for view, cosine in zip(views, facing, strict=True) if cosine >= min(ACROSS, max(facing))]
+    view = views[0] if len(views) == 1 else chosen_view(response, motion, views)
     return (view, View(view.around, BELOW)) if sight.both else (view,)
+
+
+def views_from(sight: Sight, above: float) -> list[View]:
+    """List the views among which one is chosen: that which is asked for, or three-quarter views.
+
+    Parameters
+    ----------
+    sight : Sight
+        As asked for.
+    above : float [degrees]
+        Above the level, where it does not say how far.
+    """
+    arounds = AROUND if sight.azimuth is None else (sight.azimuth,)
+    return [View(around, above if sight.elevation is None else sight.elevation) for around in arounds]
 
 
 def has_intrados(assembly: solver.Assembly, joints: InitialJoints) -> bool:

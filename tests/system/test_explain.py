@@ -10,7 +10,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
-from structures import posed
+from structures import box, posed
 
 import blockvis
 import solver
@@ -431,6 +431,41 @@ def test_what_is_of_the_plane_is_refused_in_space(folder, tmp_path, capsys):
     said = capsys.readouterr().err
     assert len(said.splitlines()) == 1
     assert "dome.toml: [explain] trough is of structures in the plane, this one is in space; leave it out" in said
+
+
+@pytest.mark.slow
+def test_cracks_in_space_are_looked_at_from_where_they_are_seen(tmp_path):
+    """A lintel behind a screen, with low walls far behind that draw the middle of all to the back."""
+    boxes = {
+        "left": ((0.0, 0.0, -1.0), (0.4, 0.5, 0.0)),
+        "right": ((1.6, 0.0, -1.0), (2.0, 0.5, 0.0)),
+        "lintel": ((0.0, 0.0, 0.0), (2.0, 0.5, 0.4)),
+        "screen": ((-2.0, -1.2, -1.0), (4.0, -1.0, 1.5)),
+        **{f"wall {k}": ((0.0, 4.0 + k, -1.0), (1.0, 4.5 + k, -0.9)) for k in range(4)},
+    }
+    roles = ["free" if name == "lintel" else "fixed" for name in boxes]
+    solids = [box(*corners) for corners in boxes.values()]
+    save_layout(solver.Assembly.from_solids(solids, names=list(boxes), roles=roles), tmp_path / "lintel.json")
+    case = (
+        "[geometry]\nfile = 'lintel.json'\n[material]\nfriction_coefficient = 0.6\n"
+        "[explain]\nsupports = ['right']\ndirections = ['down']\n"
+    )
+    rows = [{"joint": "lintel | left", "width [mm]": 4.0}, {"joint": "lintel | right", "width [mm]": 4.0}]
+
+    def cracks(name, view=""):
+        (tmp_path / f"{name}.toml").write_text(f"{case}[output]\n{view}\n", encoding="utf-8")
+        blockvis.explain(tmp_path / f"{name}.toml", rows, tmp_path / name)
+        with Image.open(tmp_path / name / "explain.png") as picture:
+            pixels = np.asarray(picture.convert("RGB")).astype(int)
+        return int((np.abs(pixels - [226, 78, 27]).sum(axis=2) < 60).sum())
+
+    seen, hidden, behind = (
+        cracks("seen"),
+        cracks("hidden", "view = { azimuth = -60, elevation = 24 }"),
+        cracks("behind", "view = 'back'"),
+    )
+    # Of cracks behind the screen nothing is drawn but the dashed frames of their widths.
+    assert min(seen, behind) > 2 * hidden > 0
 
 
 @pytest.mark.slow

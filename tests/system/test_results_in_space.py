@@ -25,7 +25,6 @@ from blockvis.pictures import palette
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.frame import framed
 from blockvis.pictures.marks import marks_of
-from blockvis.pictures.solid_scene import SolidScene
 from blockvis.pictures.solid_view import View, chosen_view
 from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import swing_of
@@ -523,7 +522,10 @@ def test_a_mechanism_is_drawn_with_closed_hinges(tmp_path, monkeypatch):
     assert 1e-5 * size < np.linalg.norm(a - b, axis=1).max() < 2.5e-3 * size
     assert 0.3 < swing.share < 0.8
     drawn = []
-    monkeypatch.setattr(SolidScene, "show_motion", lambda scene, swing, tails, tips: drawn.append(tips - tails))
+    monkeypatch.setattr(
+        "blockvis.pictures.solid_scene.SolidScene.show_motion",
+        lambda scene, swing, tails, tips: drawn.append(tips - tails),
+    )
     draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL)
     # The longest is that of a part, whose middle goes less far than its fastest corner.
     assert 0.02 * size < np.linalg.norm(drawn[0], axis=1).max() <= 0.05 * size
