@@ -341,7 +341,7 @@ class _Problem:
         change_cost = (CHANGE_COST * self._unlike(normal) if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
         normals: list[np.ndarray] = []
         answers: list[np.ndarray] = []
-        nearest, least, used, programs, best_at, locks = balanced, np.inf, normal, 1, 0, False
+        nearest, least, used, programs, best_at, locked = balanced, np.inf, normal, 1, 0, False
         for _ in range(PROGRAMS):
             try:
                 state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
@@ -351,30 +351,36 @@ class _Problem:
                 break
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
             excess = friction_excess(state.forces, self.friction, self.cohesion) / largest
-            change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
+            change = abs(self._gained(state, normal)) / max(abs(state.multiplier), 1e-12)
             error = np.inf if state.falls else max(excess, change)
             settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
             if nearest is balanced or settled or error < least:
                 nearest, least, used, best_at = state, error, normal, programs
-            # Beside forces that grow without end the dead load is lost in their error.
-            endless = locks and largest * most_excess > 1.0
-            if settled or endless or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
+            if settled or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
                 break
-            if before is not balanced and state.multiplier > before.multiplier:
-                added = state.forces - before.forces
-                locks |= friction_excess(added, self.friction) <= FRICTION_EXCESS * float(np.abs(added).max())
+            added = state.forces - before.forces
+            within = friction_excess(added, self.friction) <= FRICTION_EXCESS * float(np.abs(added).max())
+            locks = within and state.multiplier > before.multiplier
+            locked |= locks
+            if locks and (programs > PLAIN_PROGRAMS or largest * FRICTION_EXCESS > 1.0):
+                # What a program adds may be added without end, unless crushing ends it (raises).
+                self.associative(balanced)
             normals = [*normals[-REMEMBERED:], normal]
             answers = [*answers[-REMEMBERED:], state.forces[:, 0]]
-            normal, before = _next_normal(normals, answers, programs), state
+            normal, before = _next_normal(normals, answers, programs > PLAIN_PROGRAMS and not locks), state
         if least <= FRICTION_EXCESS:
             status = found
-        elif locks:
-            # What a program adds is within friction: it may be added without end, unless crushing ends it (raises).
+        elif locked:
             self.associative(balanced)
         if status is found and not plane:
             free = self._sliding(used, balanced.unbalanced, 0.0 * change_cost)
             nearest, programs = replace(nearest, velocity=free.velocity, gap=free.gap), programs + 1
         return self.result(nearest, status, "non-associative", programs)
+
+    def _gained(self, state: _State, normal: np.ndarray) -> float:
+        """What the multiplier gains, to first order, once friction is that of its normal forces, not of ``normal``."""
+        slip = np.linalg.norm((self.matrix.T @ state.velocity).reshape(-1, self.size)[:, 1:], axis=1)
+        return float((self.friction * (state.forces[:, 0] - normal)) @ slip)
 
     def _unlike(self, normal: np.ndarray) -> np.ndarray:
         """(n,) array: factors in which points differ whatever their order, by forces (n,) at rest and places."""
@@ -500,7 +506,7 @@ class _Problem:
         )
 
 
-def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs: int) -> np.ndarray:
+def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], extrapolated: bool) -> np.ndarray:
     """(n,) array: normal forces to try after those of the last programs and what these answered.
 
     Anderson (1965), https://doi.org/10.1145/321296.321305, once a constant relaxation has not converged, as in vaults:
@@ -509,7 +515,7 @@ def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], programs:
     errors = np.subtract(answers, normals)
     tried, answered = (float(np.abs(of[-1] - of[-2 % len(of)]).max(initial=0.0)) for of in (normals, answers))
     moved = normals[-1] + (CONFIDENT if answered < 0.2 * tried else RELAXATION) * errors[-1]
-    if programs > PLAIN_PROGRAMS:
+    if extrapolated:
         changes, of_errors = np.diff(normals, axis=0).T, np.diff(errors, axis=0).T
         moved -= (changes + RELAXATION * of_errors) @ np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
     return np.asarray(np.maximum(moved, 0.0))

@@ -3,7 +3,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from structures import prism, rectangle
+from structures import prism, rectangle, upright
 
 import solver
 from blockvis import generators
@@ -288,3 +288,43 @@ def test_what_locks_by_friction_is_unbounded_however_it_is_described(mirrored, s
         assembly, loads=pushed(assembly, live), friction_coefficient=0.37225340327463124, flow="non-associative"
     )
     assert found.status is solver.LimitStatus.UNBOUNDED
+
+
+@pytest.mark.parametrize("mirror", [1, -1])
+@pytest.mark.parametrize("in_space", [False, True])
+@pytest.mark.parametrize(
+    ("stones", "forces", "friction"),
+    [
+        ([(0, 0, 0.8, 0.2), (0, 0.2, 0.8, 0.7), (-0.1, 0.7, 0.5, 1.4)], [(-800, -5200), (0, 0), (0, 0)], 0.25),
+        ([(-0.07, 0, 0.41, 0.33), (0.09, 0.33, 0.8, 0.98)], [(1320, -4440), (-652, -1621)], 0.43),
+    ],
+)
+def test_what_locks_slowly_is_unbounded(stones, forces, friction, in_space, mirror):
+    """Resultants on every joint of a column are within its friction and its middle third; forces grow by a third."""
+    outlines = [rectangle(-1.0, -0.2, 2.0, 0.0), *(rectangle(*stone) for stone in stones)]
+    outlines = [(np.array(outline) * [mirror, 1])[::mirror] for outline in outlines]
+    roles = ["fixed"] + ["free"] * len(stones)
+    if in_space:
+        assembly = solver.Assembly.from_solids([upright(outline, 0.0, 1.0) for outline in outlines], roles=roles)
+    else:
+        assembly = solver.Assembly.from_outlines(outlines, roles=roles, thickness=1.0)
+    live = np.zeros((assembly.n_blocks, 6 if in_space else 3))
+    live[1:, [0, 2 if in_space else 1]] = np.array(forces) * [mirror, 1]
+    found = solver.limit_load(
+        assembly, loads=pushed(assembly, live), friction_coefficient=friction, flow="non-associative"
+    )
+    assert found.status is solver.LimitStatus.UNBOUNDED
+
+
+@pytest.mark.parametrize("strength", [1e8, 1e11])
+def test_what_locks_and_crushes_has_the_limit_load_of_associative_flow(strength):
+    outlines = [rectangle(-1.0, -0.2, 2.0, 0.0), rectangle(0.0, 0.0, 1.0, 0.5), rectangle(0.0, 0.5, 1.0, 1.0)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "free", "free"], density=100.0)
+    live = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [200.0, -1000.0, 0.0]])
+    law = solver.Interfaces(solver.InterfaceLaw(0.6, compressive_strength=strength))
+    one, other = (
+        solver.limit_load(assembly, loads=pushed(assembly, live), interfaces=law, flow=flow)
+        for flow in ("associative", "non-associative")
+    )
+    assert one.status is other.status is solver.LimitStatus.FOUND
+    assert other.multiplier == pytest.approx(one.multiplier, rel=1e-9)
