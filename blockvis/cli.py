@@ -46,7 +46,7 @@ EXIT_CODES = f"""exit codes:
   {SOLVER_FAILED}    the solver failed; what it had found is written
   {NO_PICTURES}    everything is written but the pictures
   {NO_EQUILIBRIUM}    no initial equilibrium: the structure does not stand as drawn
-  {INTERRUPTED}  interrupted by Ctrl-C or increment_seconds; blockvis run --resume OUT goes on"""
+  {INTERRUPTED}  interrupted by Ctrl-C, SIGTERM or increment_seconds; blockvis run --resume OUT goes on"""
 
 #: How long a run waits for the path in shorter steps: so many times what it took itself, and at least so many seconds.
 PATIENCE, LEAST_PATIENCE = 3.0, 60.0
@@ -131,6 +131,12 @@ class _Told(io.TextIOWrapper):
             super().flush()
 
 
+def _end(*_: object) -> None:
+    """End as after Ctrl-C, what is found written: so queues and shutdowns ask for it, and some ask again meanwhile."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
 def entry() -> None:
     """Console script."""
     # Streams that were closed beforehand are None.
@@ -142,8 +148,7 @@ def entry() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
     if isinstance(sys.__stderr__, io.TextIOWrapper):
         sys.stderr = _Told(sys.__stderr__.buffer, sys.__stderr__.encoding, "backslashreplace", line_buffering=True)
-    # Queues and shutdowns ask so to end: what is found is written, as after Ctrl-C.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, _end)
     try:
         code = main()
         sys.stdout.flush()

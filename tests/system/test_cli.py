@@ -349,8 +349,10 @@ def test_a_second_ctrl_c_does_not_break_off_the_ending():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process that is ended there hears nothing")
 def test_a_queue_that_ends_a_run_is_heard_as_ctrl_c_is():
+    """Once, also where it asks again while the run ends."""
     stopped = (
-        "import os, signal\nfrom blockvis import cli\n"
+        "import atexit, os, signal\nfrom blockvis import cli\n"
+        "atexit.register(os.kill, os.getpid(), signal.SIGTERM)\n"
         "cli._options = lambda _: os.kill(os.getpid(), signal.SIGTERM)\ncli.entry()\n"
     )
     done = subprocess.run([sys.executable, "-c", stopped], capture_output=True, text=True)
