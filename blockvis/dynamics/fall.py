@@ -223,7 +223,7 @@ def engine_of(response: solver.Response, push: float) -> tuple[Engine, float]:
     assert response.collapse is not None
     last, end = response.path[-1].pose, response.increments[-1]
     assembly = response.assembly.with_roles(np.where(end.removed, mechanics.FIXED, response.assembly.roles))
-    ground = ground_below(assembly, last)
+    ground = ground_below(assembly, last, end.removed)
     beyond = response.increments[min(len(response.path), len(response.increments) - 1)].pose
     places, turns = (
         np.where(response.assembly.free[:, None], here, there)

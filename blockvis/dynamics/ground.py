@@ -10,31 +10,36 @@ from solver import mechanics
 #: Name of the slab that is the ground.
 GROUND = "ground"
 
-#: Faces of supports steeper than 1 in this are walls, not places to lie on; the ground lies no deeper below the
-#: structure than this part of its height, however far supports reach down that are wider than tall.
-STEEP, DEEPEST = 0.3, 0.25
+#: Faces of supports steeper than 1 in this are walls, not places to lie on.
+STEEP = 0.3
 
 #: Clearance between the ground and the lowest corner, in block sizes: what stands on a support stands on that alone.
 CLEARANCE = 1e-3
 
 
-def ground_below(assembly: solver.Assembly, pose: solver.Pose) -> float:
-    """Height of the ground [m]: below the lowest corner, in the plane of the lowest place where something may lie.
+def ground_below(assembly: solver.Assembly, pose: solver.Pose, removed: np.ndarray) -> float:
+    """Height of the ground [m]: of the lowest place where something may lie, and below what is free.
 
-    Supports that are taller than wide are piers, and stand on the ground; others are the ground.
+    Places are upward faces of supports, and the feet of supports that are taller than wide: piers stand on the ground.
+    Blocks of ``removed``, an (n_blocks,) bool array, are not there.
     """
-    corners, free = mechanics.moved_vertices(assembly, pose), assembly.free[assembly.block_of_vertex]
-    low, high = corners[free, -1].min(), corners[free, -1].max()
-    ground = low
+    corners, drawn, offsets = mechanics.moved_vertices(assembly, pose), assembly.vertices, assembly.shapes.offsets[:-1]
+    supports, free = ~assembly.free & ~removed, assembly.free & ~removed
+    lowest = np.minimum.reduceat(drawn, offsets)
+    extents = np.maximum.reduceat(drawn, offsets) - lowest
+    piers = supports & (extents[:, :-1] < extents[:, -1:]).all(axis=1)
     if assembly.dimension == 2:
-        following = corners[assembly.next_vertex]
+        following, owner = corners[assembly.next_vertex], assembly.block_of_vertex
         # The outward normal of an edge points up where the edge runs to the left.
-        upward = ~free & (corners[:, 0] - following[:, 0] > STEEP * np.abs(following[:, 1] - corners[:, 1]))
-        faces = np.minimum(corners[upward, 1], following[upward, 1])
-        ground = min(max(faces.min(initial=low), low - DEEPEST * (high - low)), low)
-    drawn = [assembly.vertices[assembly.block_of_vertex == block] for block in np.flatnonzero(~assembly.free)]
-    feet = [corners[:, -1].min() for corners in drawn if (np.ptp(corners, axis=0)[:-1] < np.ptp(corners[:, -1])).all()]
-    return float(min([ground, *feet])) - CLEARANCE * assembly.block_size
+        normals = (following - corners)[:, ::-1] * [1.0, -1.0]
+        heights = np.minimum(corners[:, 1], following[:, 1])
+    else:
+        solids = assembly.polyhedra
+        normals, owner = solids.faces(corners).normals, solids.block_of_face
+        heights = np.minimum.reduceat(corners[solids.corners, 2], solids.face_offsets[:-1])
+    upward = supports[owner] & (normals[:, -1] > STEEP * np.linalg.norm(normals[:, :-1], axis=1))
+    places = [corners[free[assembly.block_of_vertex], -1], lowest[piers, -1], heights[upward]]
+    return float(np.concatenate(places).min()) - CLEARANCE * assembly.block_size
 
 
 def on_ground(assembly: solver.Assembly, pose: solver.Pose, ground: float) -> tuple[solver.Assembly, solver.Pose]:

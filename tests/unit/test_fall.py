@@ -74,6 +74,21 @@ def test_what_is_pulled_off_its_bearing_falls():
     assert fall.positions[-1, 0, 1] < -5.0
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("width", [2.9, 3.1])
+def test_a_lintel_falls_to_the_floor_whether_its_abutments_are_taller_or_wider(width, dimension):
+    rectangles = [(0, 0, 2, 0.4), (0.2 - width, -3, 0.2, 0), (1.8, -3, 1.8 + width, 0), (-4, -3.5, 6, -3)]
+    rectangles += [(0.9, -9, 1.1, -3.5)]
+    roles, removed = ["free", "fixed", "moving", "fixed", "fixed"], np.arange(5) == 4
+    if dimension == 2:
+        assembly = solver.Assembly.from_outlines([rectangle(*at) for at in rectangles], roles=roles)
+    else:
+        solids = [box((x0, 0.0, z0), (x1, 0.5, z1)) for x0, z0, x1, z1 in rectangles]
+        assembly = solver.Assembly.from_solids(solids, roles=roles)
+    ground = ground_below(assembly, solver.Pose.initial(assembly), removed)
+    assert ground == pytest.approx(-3.0, abs=2e-3)
+
+
 @pytest.mark.slow
 @EACH
 def test_blocks_never_overlap_by_a_hundredth(structure):
@@ -474,7 +489,8 @@ def engine_of(velocity, shift=(0.0, 0.0, 0.0)):
     pose.positions[3] += shift
     motion, loads = np.zeros((5, 6)), np.zeros((5, 6))
     motion[3], loads[:4] = velocity, response.loads.dead
-    whole, pose = on_ground(response.assembly, pose, ground_below(response.assembly, pose) - 1.0)
+    below = ground_below(response.assembly, pose, np.zeros(4, dtype=bool))
+    whole, pose = on_ground(response.assembly, pose, below - 1.0)
     return Engine(whole, loads, response.interfaces, pose, motion)
 
 
