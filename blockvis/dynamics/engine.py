@@ -43,6 +43,10 @@ FORCE = 1e-3
 #: the last one leaves blocks in each other, the step is halved.
 EXACT, LINEARISATIONS = 1e-4, 6
 
+#: Change of a normal force, as part of it and a block weight, above which a step is solved again: a program bounds
+#: friction by the normal force of the one before, and a blow lasts for one step.
+LAG = 0.25
+
 #: Change of the acceleration of a block from step to step, in its weight, up to which nothing has struck it.
 SMOOTH = 0.1
 
@@ -205,7 +209,9 @@ class Engine:
             counts = (forces[:, 0] > FORCE) | (gaps < -DEEP * self.length)
             entered = self._entered(corners, contacts)
             error = np.abs(gaps - predicted) / np.where(members, EXACT_TIES, 1.0)
-            if error[counts].max(initial=0.0) < EXACT * self.length and len(entered) == 0:
+            lag = ~members & (np.abs(forces[:, 0] - before[:, 0]) > LAG * (1.0 + before[:, 0]))
+            before[:, 0] = forces[:, 0]
+            if error[counts].max(initial=0.0) < EXACT * self.length and len(entered) == 0 and not lag.any():
                 break
             if left > 1 and len(entered):
                 contacts = mechanics.joined_contacts([contacts, entered])

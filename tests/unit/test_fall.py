@@ -161,6 +161,37 @@ def test_what_tips_turns_as_the_equation_of_motion_says():
     np.testing.assert_allclose(beyond, exact, rtol=0.05)
 
 
+@pytest.mark.parametrize("height", [0.5, 0.87, 2.3])
+def test_a_blow_takes_the_speed_along_that_friction_has_by_its_impulse(height):
+    """A stone lands with 8 m/s along: by the normal force of the step before it lost up to half as much again."""
+    outlines = [rectangle(-50.0, -1.0, 50.0, 0.0), rectangle(0.0, height, 1.0, height + 0.2)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "free"])
+    weight, law = solver.self_weight(assembly).dead, solver.Interfaces(solver.InterfaceLaw(0.6))
+    velocity = np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]])
+    engine = Engine(assembly, weight, law, solver.Pose.initial(assembly), velocity)
+    steps = int(np.ceil(np.sqrt(2.0 * height / solver.GRAVITY) / 0.04)) + 3
+    for _ in range(steps):
+        engine.advance(0.04)
+    lost = 8.0 - engine.velocity[1, 0] * engine.length / engine.unit
+    # Before and after it has landed all that weight gives to the ground is its impulse m g t.
+    assert lost == pytest.approx(0.6 * solver.GRAVITY * 0.04 * steps, rel=0.01)
+
+
+def test_what_rests_at_nine_tenths_of_its_friction_does_not_creep():
+    base, stone = rectangle(-5.0, -1.0, 5.0, 0.0), rectangle(0.0, 0.0, 1.0, 0.5)
+    turn, other = np.arctan(0.54), rectangle(20.0, 0.0, 21.0, 1.0)
+    about = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    assembly = solver.Assembly.from_outlines(
+        [np.array(base) @ about, np.array(stone) @ about, other], roles=["fixed", "free", "free"]
+    )
+    weight, law = solver.self_weight(assembly).dead, solver.Interfaces(solver.InterfaceLaw(0.6))
+    engine = Engine(assembly, weight, law, solver.Pose.initial(assembly), np.zeros((3, 3)))
+    start = engine.pose.positions[1].copy()
+    for _ in range(10):
+        engine.advance(0.04)
+    np.testing.assert_allclose(engine.pose.positions[1], start, atol=1e-4)
+
+
 @pytest.mark.parametrize("gap", [0.1, 0.23, 0.31])
 def test_a_block_that_strikes_another_goes_on_with_it_at_half_its_speed(gap):
     """On a floor without friction: no restitution, and all of the momentum."""
