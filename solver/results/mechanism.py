@@ -58,14 +58,18 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     Part -1 is at rest. The others are numbered from 0, the largest volume first. The contact points of two blocks that
     move together come apart, and their corners turn against each other, by next to nothing.
     """
-    contacts, n = increment.contacts, assembly.n_blocks
-    d = contacts.points.shape[1]
+    contacts, n, d = increment.contacts, assembly.n_blocks, assembly.dimension
     fastest = float(np.abs(increment.velocity[:, :d]).max(initial=0.0))
     if fastest == 0.0:
         return np.full(n, -1)
-    (pairs, joint), spins = contacts.joints(), increment.velocity[:, d:] * assembly.block_size
+    spins = increment.velocity[:, d:] * assembly.block_size
+    rates, gives = increment.displacements.copy(), contacts.gaps < CLOSED * assembly.block_size
+    gives[np.flatnonzero(increment.state.crushing)] = False
+    # What only comes closer at a closed joint is its give, which is no parting.
+    rates[gives, 0] = np.maximum(rates[gives, 0], 0.0)
+    pairs, joint = contacts.joints()
     apart = np.zeros(len(pairs))
-    np.maximum.at(apart, joint, np.abs(increment.displacements).max(axis=1))
+    np.maximum.at(apart, joint, np.abs(rates).max(axis=1))
     apart = np.maximum(apart, np.abs(spins[pairs[:, 0]] - spins[pairs[:, 1]]).max(axis=1))
     a, b = pairs[apart < TOGETHER * fastest].T
     part = connected_components(sp.coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[1]
@@ -87,8 +91,7 @@ def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
     point that opens: of a joint that is wide open already, only the corner it turns about is near enough to touch.
     """
     parts = rigid_parts(assembly, increment)
-    contacts, velocity = increment.contacts, increment.velocity
-    d = contacts.points.shape[1]
+    contacts, velocity, d = increment.contacts, increment.velocity, assembly.dimension
     count = int(parts.max(initial=-1)) + 1
     moves, motions = parts >= 0, np.zeros((count, velocity.shape[1]))
     np.add.at(motions, parts[moves], (assembly.masses[:, None] * velocity)[moves])
@@ -103,8 +106,7 @@ def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
     carrying = carries(increment.forces)
     at_strength = increment.state.crushing
     crushes = closed & carrying & (opening < -slow) & (at_strength if len(at_strength) else False)
-    if carrying.any():
-        slips &= carrying
+    slips &= carrying | ~carrying.any()
     of_pair = contacts.pair_keys()
     turns &= ~np.isin(of_pair, of_pair[crushes])
     slipping, crushing = np.flatnonzero(slips), np.flatnonzero(crushes)

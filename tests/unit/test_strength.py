@@ -150,6 +150,23 @@ def test_what_crushes_is_told_and_marked_where_it_presses(in_space, tmp_path):
     assert "1 moving part, 1 crushing joint" in blockvis.write_report(response, tmp_path / "r.html").read_text()
 
 
+def test_two_glued_blocks_that_tip_as_one_are_one_macro_block():
+    """The joint between them closes by what it gives, at 1e-3 of the fastest corner; it does not part them."""
+    outlines = [rectangle(0, 0, 1, 0.5), rectangle(1, 0, 1.6, 0.5), rectangle(-3, -0.5, 1, 0)]
+    names, materials = ["inner", "outer", "ledge"], ["s", "s", "rock"]
+    assembly = solver.Assembly.from_outlines(
+        outlines, roles=["free", "free", "moving"], names=names, materials=materials
+    )
+    glue = solver.InterfaceLaw(0.6, 2e6, tensile_strength=1e6)
+    interfaces = solver.Interfaces(solver.InterfaceLaw(2.0), {("s", "s"): glue})
+    tilt = solver.Settlement(rotation_centre=(1.0, 0.0), rotation=-1.0, increment=0.3, limit=1.0, tolerance=1e-3)
+    controls = solver.Controls(falling_frames=1)
+    response = solver.settle(assembly, tilt, interfaces=interfaces, controls=controls)
+    assert response.collapse.displacement == pytest.approx(np.arctan(0.2 / 0.25), rel=1e-3)
+    falling = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
+    assert str(mechanics.mechanism_of(assembly, falling)) == "1 macro-block; hinge at inner | ledge"
+
+
 def test_a_press_crushes_at_the_strength_of_the_joint():
     """A downward force, unbounded for rigid joints: W + α F = σ A."""
     assembly, interfaces, weight = block(compressive_strength=1e6)
