@@ -34,10 +34,11 @@ PUSH, DOUBLINGS = 0.05, 5
 #: Blocks rest that are slower than this, in sqrt(g × block size), for this time [s].
 STILL, RESTING = 4e-3, 0.2
 
-#: Something has fallen where a block has moved by more than this part of the block size.
+#: Blocks have fallen of which a corner has moved by more than this part of the block size; and what is said of none.
 FALLEN = 0.25
+STANDS = f"after the collapse no corner moves by more than {FALLEN:g} of a block before all rest"
 
-#: In space so much of the mass that the mechanism takes has to have fallen: by a small push a dome jams again.
+#: So much of the mass that the mechanism takes has to have fallen: by a small push a dome jams again.
 MOST = 0.5
 
 
@@ -134,11 +135,13 @@ def fall_of(
         return None
     assembly = response.assembly
     push = PUSH * np.sqrt(solver.GRAVITY * assembly.block_size)
-    enough = 0.0 if assembly.dimension == 2 else MOST * _falling_mass(response)
+    enough = MOST * _falling_mass(response)
     best, most = None, 0.0
     for _ in range(DOUBLINGS + 1):
         fall = _followed(response, push, progress, watch)
-        fallen = np.linalg.norm(fall.positions[-1] - fall.positions[0], axis=1) > FALLEN * assembly.block_size
+        start, end = (mechanics.moved_vertices(assembly, fall.pose(number)) for number in (0, -1))
+        far = np.linalg.norm(end - start, axis=1) > FALLEN * assembly.block_size
+        fallen = np.logical_or.reduceat(far, assembly.shapes.offsets[:-1])
         # What was lost before falls in any case.
         mass = float(assembly.masses[fallen & ~response.path[-1].fallen].sum())
         # No more falls by a larger push: the mechanism takes blocks with it that come to rest.

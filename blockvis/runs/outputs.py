@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import solver
 from blockvis.cases.contents import Case
-from blockvis.dynamics.fall import FALLEN, Fall, fall_of, may_fall
+from blockvis.dynamics.fall import STANDS, Fall, fall_of, may_fall
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.fall_files import stored_fall, write_fall
 from blockvis.results.folder import ResultsFolder
@@ -267,6 +267,5 @@ def _fall(response: solver.Response, film: FilmProcess | None, progress: Drawing
 def _told(response: solver.Response, fall: Fall | None) -> Fall | None:
     """Give a fall; say so where a collapse has none."""
     if fall is None and may_fall(response):
-        said = f"after the collapse no block moves by more than {FALLEN:g} of a block before all rest: no fall is shown"
-        warnings.warn(said, stacklevel=2)
+        warnings.warn(f"{STANDS}: no fall is shown", stacklevel=2)
     return fall

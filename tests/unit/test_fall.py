@@ -89,6 +89,28 @@ def test_a_lintel_falls_to_the_floor_whether_its_abutments_are_taller_or_wider(w
     assert ground == pytest.approx(-3.0, abs=2e-3)
 
 
+def pulled_apart(outlines, friction):
+    """Blocks on a fixed and a moving support, which leaves them."""
+    roles = ["free"] * (len(outlines) - 2) + ["fixed", "moving"]
+    apart = solver.Settlement((1, 0), increment=0.1, tolerance=1e-3)
+    assembly = solver.Assembly.from_outlines([rectangle(*at) for at in outlines], roles=roles)
+    return solver.settle(assembly, apart, friction_coefficient=friction, controls=solver.Controls(falling_frames=1))
+
+
+def test_a_stone_that_turns_and_wedges_in_a_gap_has_fallen():
+    """Its centroid sinks by less than a quarter of it."""
+    fall = fall_of(pulled_apart([(0, 0, 1, 1), (-1, -6, 0.3, 0), (0.7, -6, 1.4, 0)], 0.1))
+    assert np.linalg.norm(fall.positions[-1, 0] - fall.positions[0, 0]) < 0.25
+    assert abs(fall.rotations[-1, 0]) == pytest.approx(np.pi / 4.0, abs=0.05)
+
+
+def test_what_collapses_onto_the_ground_at_once_is_said_to_rest():
+    response = pulled_apart([(0, 0, 2, 0.4), (-2.9, -3, 0.2, 0), (1.8, -3, 4.9, 0)], 0.6)
+    assert response.stop is solver.Status.COLLAPSED
+    with pytest.raises(ValueError, match=r"no corner moves by more than 0\.25 of a block"):
+        response.fall(0.5)
+
+
 @pytest.mark.slow
 @EACH
 def test_blocks_never_overlap_by_a_hundredth(structure):
