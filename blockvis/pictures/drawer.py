@@ -231,7 +231,7 @@ class Drawer:
         self._arrow = (ARROW if self._flat else ARROW_IN_SPACE) * float(whole.size.max())
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
         heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
-        ends = np.concatenate([self.live.tails, heads, *self._arrow_ends(frame, extra), tied])
+        ends = np.concatenate([self.live.tails, heads, *self._arrow_ends(frame, extra), tied, self._turned_out(whole)])
         if self._plane is not None:
             ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
         frame = self._with_floor(frame.holding(self._projected(ends)))
@@ -339,6 +339,14 @@ class Drawer:
         shown = [(one, magnified(self.assembly, one.pose, self.look.magnification)) for one in (first, last)]
         for increment, pose in (*shown, *((last, pose) for pose in extra)):
             yield from self._settlement_arrows(increment, pose, frame if self._flat else None)
+
+    def _turned_out(self, frame: Frame) -> np.ndarray:
+        """(n, d) array [m]: at last, the corners of moving supports that a frame holds at first: they stay in it."""
+        poses = (magnified(self.assembly, self.increments[k].pose, self.look.magnification) for k in (0, -1))
+        first, last = (mechanics.moved_vertices(self.assembly, pose) for pose in poses)
+        places = self._projected(first)
+        held = ((frame.low < places) & (places < frame.high)).all(axis=1)
+        return last[held & self.assembly.moving[self.assembly.block_of_vertex]]
 
     def _surveyed(self) -> Iterator[solver.Pose]:
         """Yield the poses as shown, and note what must be the same in all pictures.

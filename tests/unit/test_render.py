@@ -320,6 +320,24 @@ def test_wrong_options_are_named(tmp_path):
         animate(arch_response(), tmp_path / "a.mp4", seconds=-1, size=SMALL)
 
 
+def test_a_support_that_turns_stays_in_the_frame():
+    blocks = [
+        rectangle(0, 0, 1, 0.5),
+        rectangle(1.5, -2.5, 2, -2),
+        rectangle(-3, -0.5, 1, 0),
+        rectangle(0, -3, 3, -2.5),
+    ]
+    assembly = solver.Assembly.from_outlines(blocks, roles=["free", "free", "moving", "fixed"])
+    turn = solver.Settlement(rotation_centre=(1.0, 0.0), rotation=-1.0, increment=0.25, limit=0.5)
+    response = solver.settle(assembly, turn, friction_coefficient=2.0)
+    drawer = Drawer(response, Look(forces="none"), SMALL, response.path)
+    frame = drawer.frame.fitted(*drawer.sheet.inside_size)
+    for increment in (response.path[0], response.path[-1]):
+        corners = mechanics.moved_vertices(assembly, increment.pose)[assembly.block_of_vertex == 2]
+        assert (corners > frame.low).all()
+        assert (corners < frame.high).all()
+
+
 def test_huge_supports_do_not_shrink_the_structure():
     assembly = wall(6, 5)
     wide = solver.Assembly.from_outlines(
