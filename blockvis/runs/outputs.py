@@ -265,7 +265,10 @@ def _fall(response: solver.Response, film: FilmProcess | None, progress: Drawing
 
 
 def _told(response: solver.Response, fall: Fall | None) -> Fall | None:
-    """Give a fall; say so where a collapse has none."""
+    """Give a fall; say so where a collapse has none, or where it leaves out what holds blocks together."""
     if fall is None and may_fall(response):
         warnings.warn(f"{STANDS}: no fall is shown", stacklevel=2)
+    if fall is not None and (response.path[-1].state.intact > 0.0).any():
+        said = "the fall leaves mortar out: blocks whose joints are whole at the last equilibrium come apart in it"
+        warnings.warn(said, stacklevel=2)
     return fall

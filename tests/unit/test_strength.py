@@ -344,6 +344,36 @@ animation = false
 """
 
 
+GLUED = """
+[geometry]
+file = "pair.json"
+[settlement]
+rotation_centre = [1.0, 0.0]
+rotation = -1
+increment = 0.3
+limit = 1.0
+[material]
+friction_coefficient = 2.0
+[[interfaces]]
+materials = ["s", "s"]
+friction_coefficient = 0.6
+cohesion = 2e6
+tensile_strength = 1e6
+[output]
+animation = false
+"""
+
+
+@pytest.mark.slow
+def test_a_run_says_that_its_fall_leaves_mortar_out(tmp_path, capsys):
+    shapes = [rectangle(0, 0, 1, 0.5), rectangle(1, 0, 1.6, 0.5), rectangle(-3, -0.5, 1, 0)]
+    roles, materials = ["free", "free", "moving"], ["s", "s", "rock"]
+    drawn(tmp_path / "pair.json", shapes, names=["inner", "outer", "ledge"], role=roles, material=materials)
+    (tmp_path / "case.toml").write_text(GLUED, encoding="utf-8")
+    assert run_command(tmp_path / "case.toml", "-o", tmp_path / "out", drawn=True) == 0
+    assert "note: the fall leaves mortar out" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_the_summary_tells_what_the_ground_carries(tmp_path, capsys):
     """A beam on two footings: half of its weight on each, and the tilt of their settlement."""
