@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Iterator
-from contextlib import ExitStack, suppress
 from dataclasses import replace
 
 from solver.path.controls import Ending
-from solver.programs.threads import NotLimited, one_thread
+from solver.programs.threads import one_thread
 from solver.results.increment import Increment
 
 
@@ -33,9 +32,7 @@ class Increments(Iterator[Increment]):
         started = time.perf_counter()
         try:
             # Of several threads all but one wait by counting, on a core that another process could have.
-            with ExitStack() as limits:
-                with suppress(NotLimited):
-                    limits.enter_context(one_thread())
+            with one_thread():
                 found = next(self._steps)
         except StopIteration as stop:
             # What it stops with again after its end is nothing.

@@ -13,7 +13,7 @@ from solver.ordering import narrowest, positions_in
 from solver.tolerances import ACCEPTED_ERROR, INTERIOR_TOLERANCE
 
 from .problem import LinearProgram, Solution, Unbounded
-from .threads import NotLimited, one_thread
+from .threads import one_thread
 
 #: Iterations at most: walls of 6,500 blocks take 90.
 ITERATIONS = 200
@@ -248,7 +248,7 @@ def run_band(program: LinearProgram) -> tuple[Solution | None, str]:
     try:
         with one_thread(), np.errstate(divide="raise", over="raise", invalid="raise"):
             x, y, iterations = _solved_in_pieces(program, wide) if len(wide) else _solved(program)
-    except (NoProgress, NotLimited, FloatingPointError) as reason:
+    except (NoProgress, FloatingPointError) as reason:
         return None, str(reason)
     return program.checked(x, y, "band", iterations), "solved"
 
