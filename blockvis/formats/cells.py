@@ -324,6 +324,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
         notes=_joined_notes(named),
         left_out=joined("left_out"),
         looks=joined("looks"),
+        within=joined("within"),
     )
     groups = [{"group": label} if label else {} for part, label in parts for _ in range(part.n_blocks)]
     rows = [row for part in named for row in rows_of(part)]

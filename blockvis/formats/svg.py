@@ -85,12 +85,12 @@ class _Outlines:
 
     rings: list[np.ndarray] = field(default_factory=list)
     rows: list[dict[str, Any]] = field(default_factory=list)
-    labels: list[tuple[str, ...]] = field(default_factory=list)
+    within: list[tuple[str, ...]] = field(default_factory=list)
     looks: list[tuple[str, ...]] = field(default_factory=list)
     offs: list[float] = field(default_factory=list)
     curves: list[tuple[Curve, ...]] = field(default_factory=list)
     loose: list[Line] = field(default_factory=list)
-    loose_labels: list[tuple[str, ...]] = field(default_factory=list)
+    loose_within: list[tuple[str, ...]] = field(default_factory=list)
     misses: list[float] = field(default_factory=list)
     moved: list[tuple[dict[str, Any], dict[str, Any]]] = field(default_factory=list)
     skipped: Counter[str] = field(default_factory=Counter)
@@ -99,12 +99,24 @@ class _Outlines:
     left_out: list[LeftOut] = field(default_factory=list)
     sheets_missed: bool = False
 
+    @property
+    def of_outlines(self) -> tuple[list[Any], ...]:
+        """Lists with an item for each outline."""
+        return self.rings, self.rows, self.looks, self.within
+
+    def append(self, ring: np.ndarray, row: dict[str, Any], looks: tuple[str, ...], within: tuple[str, ...]) -> None:
+        """Add an outline (n, 2)."""
+        for each, item in zip(self.of_outlines, (ring, row, looks, within), strict=True):
+            each.append(item)
+
 
 @dataclass(frozen=True)
 class _Context:
     """Context of an element: transform of its parents, layers, largest distance of chords from a curve, and painting.
 
-    The last are values of the properties by which shapes are painted, which elements have from those around them.
+    Layers are groups with a label, the innermost last; where none around has one, those with an id: programs without
+    labels write the name of a layer so, and others give every group one. ``named`` says whether one has a label.
+    Painting are values of the properties by which shapes are painted, which elements have from those around them.
     """
 
     matrix: np.ndarray
@@ -112,7 +124,7 @@ class _Context:
     tolerance: float | None
     path: Path
     depth: int = 0
-    label: str = ""
+    named: bool = False
     painting: Mapping[str, str] = field(default_factory=_PAINTING.copy)
 
     @property
@@ -165,8 +177,8 @@ def read(path: Path, reading: Reading) -> Layout:
     found.notes += passed_over(found.skipped)
     found.notes += passed_over(found.clipped, "read whole, not clipped")
     notes = tuple(dict.fromkeys([*found.notes, *moved_notes(found.moved)]))
-    looks = tuple(found.looks)
-    layout = Layout(blocks=turned, names=names, unit=stated, notes=notes, left_out=left_out, looks=looks)
+    drawn: dict[str, Any] = {"looks": tuple(found.looks), "within": tuple(found.within)}
+    layout = Layout(blocks=turned, names=names, unit=stated, notes=notes, left_out=left_out, **drawn)
     return with_rows(replace(layout, unit_by="layout" if own else ""), found.rows, own=True)
 
 
@@ -195,18 +207,13 @@ def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> 
     wanted = [replace(line, points=points) for line, points in zip(wanted, drawn[len(found.rings) :], strict=True)]
     faces = faces_of_lines(wanted, found.rings, found.offs, ignored, reading.only)
     found.left_out += faces.left_out
-    for k in sorted({*faces.pieces, *ignored}, reverse=True):
-        ring, row, looks = found.rings.pop(k), found.rows.pop(k), found.looks.pop(k)
-        if k in ignored:
-            found.left_out.append(LeftOut("asked", ring, "", row.get("group", ""), row.get("name", ""), looks=looks))
-        for number, piece in enumerate(faces.pieces.get(k, ())):
-            found.rings.append(piece)
-            found.rows.append({**row, "name": f"{row.get('name', 'block')} {number + 1}"})
-            found.looks.append(looks)
+    for k, pieces in sorted(faces.pieces.items(), reverse=True):
+        _, row, looks, within = (each.pop(k) for each in found.of_outlines)
+        for number, piece in enumerate(pieces):
+            found.append(piece, {**row, "name": f"{row.get('name', 'block')} {number + 1}"}, looks, within)
+    around = {line.layer: within for line, within in zip(found.loose, found.loose_within, strict=True)}
     for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
-        found.rings.append(ring)
-        found.rows.append(_row(layer, f"face {number}"))
-        found.looks.append(("face",))
+        found.append(ring, _row(around[layer], f"face {number}"), ("face",), around[layer])
     if faces.rings:
         faces.notes.append(faces_note(faces, wanted))
     return faces
@@ -214,10 +221,12 @@ def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> 
 
 def _wanted_lines(found: _Outlines, reading: Reading) -> tuple[list[Line], set[int]]:
     """Leave out loose lines that are not wanted; give the others, and the numbers of the outlines not wanted."""
-    every = [*zip(found.labels, found.looks, strict=True)]
-    lines = [(labels, line.looks) for line, labels in zip(found.loose, found.loose_labels, strict=True)]
-    names = {label for labels, _ in (*every, *lines) for label in labels}
-    names |= {str(row.get(key, "")) for row in found.rows for key in ("name", "group", "material")}
+    said = ([str(row.get(key, "")) for key in ("name", "group", "material")] for row in found.rows)
+    outlines = zip(said, found.within, found.looks, strict=True)
+    every = [((*own, *within), looks) for own, within, looks in outlines]
+    loose = zip(found.loose, found.loose_within, strict=True)
+    lines = [((*within, line.layer, line.handle), line.looks) for line, within in loose]
+    names = {label for labels, _ in (*every, *lines) for label in labels if label}
     unwanted, asked = Choice(reading.ignore, names), Choice(reading.only, names)
     chosen = any(asked.takes(*own) for own in (*every, *lines))
 
@@ -364,9 +373,7 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> No
     painting = {key: _style(element, key) or value for key, value in where.painting.items()}
     where = replace(where, matrix=matrix, depth=where.depth + 1, painting=painting)
     if tag == "g":
-        named = element.get(f"{_INKSCAPE}label", "")
-        label = named or element.get("id") or ""
-        where = replace(where, layers=(*where.layers, label) if label else where.layers, label=named or where.label)
+        where = _in_group(element, where)
     shape = _SHAPES.get(tag)
     found.clipped.update(f"<{tag}> with a {key}" for key in ("clip-path", "mask") if "url(" in _style(element, key))
     unpainted = not (where.fills or where.strokes or found.sheets_missed)
@@ -382,6 +389,14 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> No
         _walk(child, where, found)
 
 
+def _in_group(element: ElementTree.Element, where: _Context) -> _Context:
+    """Add a group to the layers, if it is one."""
+    label = element.get(f"{_INKSCAPE}label", "")
+    named = bool(label) or element.get(f"{_INKSCAPE}groupmode") == "layer"
+    label = label or (element.get("id", "") if named or not where.named else "")
+    return replace(where, layers=(*where.layers, label), named=named or where.named) if label else where
+
+
 def _called(element: ElementTree.Element) -> str:
     return f"<{_tag(element)}> '{element.get('id', 'without id')}'"
 
@@ -391,7 +406,6 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
     name = title.strip() or element.get(f"{_INKSCAPE}label") or element.get("id") or ""
     kept = _kept(element, title, where, found)
     looks = (_tag(element), *_colour(where))
-    labels = (*where.layers, *(x for x in (title.strip(), element.get(f"{_INKSCAPE}label"), element.get("id")) if x))
     rings, offs, every_curve = [], [], []
     for points, closed, of_part in parts:
         if len(points) < 2:
@@ -405,7 +419,7 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
         if joined is None and not (closed and len(placed) > 2):
             handle = name or f"<{_tag(element)}>"
             found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks, off, curves))
-            found.loose_labels.append(labels)
+            found.loose_within.append(where.layers)
             continue
         # A closed path may have a short last edge: it stays.
         short = joined is None or (closed and joined[1] > 1e-6 * float(np.ptp(placed, axis=0).max()))
@@ -424,12 +438,9 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
             holes = tuple(rings[j] for j in inside)
             found.left_out.append(LeftOut("hole", rings[k], message, where.layer, called, holes=holes, looks=looks))
             continue
-        found.rings.append(rings[k])
+        found.append(rings[k], kept or _row(where.layers, called), looks, where.layers)
         found.offs.append(offs[k])
         found.curves.append(every_curve[k])
-        found.rows.append(kept or _row(where.layer, called))
-        found.labels.append(labels)
-        found.looks.append(looks)
 
 
 def _kept(element: ElementTree.Element, title: str, where: _Context, found: _Outlines) -> dict[str, Any]:
@@ -442,8 +453,8 @@ def _kept(element: ElementTree.Element, title: str, where: _Context, found: _Out
         return {}
     row = kept
     # A program that drops the labels of layers leaves ids that it made up.
-    if where.label not in ("", _in_xml(layer_of(kept)[0] or _LAYER)):
-        row = {**_row(where.label, ""), **on_layer(kept, where.label)}
+    if where.named and where.layer not in ("", _in_xml(layer_of(kept)[0] or _LAYER)):
+        row = {**_row([where.layer], ""), **on_layer(kept, where.layer)}
         found.moved.append((kept, row))
     names = (element.get(f"{_INKSCAPE}label", ""), title)
     written = _in_xml(str(kept.get("name", ""))).split()
@@ -475,9 +486,12 @@ def _colour(where: _Context) -> tuple[str, ...]:
         return ()
 
 
-def _row(layer: str, name: str) -> dict[str, Any]:
-    """Write the row of the block table of an outline that has none of its own."""
-    row: dict[str, Any] = {"group": layer, "material": "" if layer.lower() in mechanics.ROLES else layer}
+def _row(layers: Sequence[str], name: str) -> dict[str, Any]:
+    """Write the row of the block table of an outline that has none of its own: a layer within fixed is fixed, too."""
+    *around, layer = layers or [""]
+    roles = [word for word in (word.strip().lower() for word in around) if word in mechanics.ROLES]
+    row = {"group": layer, "material": layer, **({"role": roles[-1]} if roles else {})}
+    row = {"group": layer} if layer.strip().lower() in mechanics.ROLES else row
     return row | ({"name": name} if name else {})
 
 

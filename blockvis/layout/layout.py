@@ -63,6 +63,8 @@ class Layout:
         What the file draws beside its blocks.
     looks : tuple of tuples of str
         Kind of entity and colour of each block in a drawing, by which it can be left out.
+    within : tuple of tuples of str
+        Layers around that of each block, by which it can be asked for, too.
     laid : tuple of bool
         Whether a bond laid the block: two of them touch or stand apart as they are, and have no mortar between them.
     """
@@ -81,6 +83,7 @@ class Layout:
     source: str = ""
     left_out: tuple[LeftOut, ...] = ()
     looks: tuple[tuple[str, ...], ...] = ()
+    within: tuple[tuple[str, ...], ...] = ()
     laid: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
@@ -93,8 +96,9 @@ class Layout:
                     f"{mechanics.counted(self.n_blocks, 'block')} but {len(getattr(self, kind))} {kind}; "
                     "give one per block"
                 )
-        if not self.looks:
-            object.__setattr__(self, "looks", ((),) * self.n_blocks)
+        for key in ("looks", "within"):
+            if not getattr(self, key):
+                object.__setattr__(self, key, ((),) * self.n_blocks)
         if not self.laid:
             object.__setattr__(self, "laid", (False,) * self.n_blocks)
         # A file in another encoding than it states leaves halves of characters, which cannot be written to a file.
@@ -157,14 +161,16 @@ class Layout:
         """Take only these blocks, in this order."""
         keep = [int(i) for i in blocks]
         taken: dict[str, Any] = {}
-        for kind in ("blocks", *_WORDS, "looks", "laid", "thickness", "density"):
+        for kind in ("blocks", *_WORDS, "looks", "within", "laid", "thickness", "density"):
             of = getattr(self, kind)
             taken[kind] = tuple(of[i] for i in keep) if isinstance(of, tuple) else of if of is None else of[keep]
         return replace(self, **taken)
 
     def with_more(self, blocks: Sequence[Outline | Solid], **of_blocks: Sequence[Any]) -> Layout:
         """Add blocks, with what is known of them: names, roles, materials, density, thickness, laid."""
-        taken: dict[str, Any] = {"blocks": self.blocks + tuple(blocks), "looks": self.looks + ((),) * len(blocks)}
+        nothing = ((),) * len(blocks)
+        taken: dict[str, Any] = {"blocks": self.blocks + tuple(blocks)}
+        taken |= {"looks": self.looks + nothing, "within": self.within + nothing}
         taken["laid"] = self.laid + tuple(of_blocks.get("laid", (False,) * len(blocks)))
         for kind in _WORDS:
             taken[kind] = getattr(self, kind) + tuple(of_blocks.get(kind, ("",) * len(blocks)))

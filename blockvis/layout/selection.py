@@ -56,8 +56,8 @@ MORTAR = re.compile(r"\b(mortar|mörtel|moertel|malta|mortier|mortero|argamassa)
 
 
 def labels_of(layout: Layout, block: int) -> tuple[str, ...]:
-    """Group, material and name of a block, by which it can be asked for."""
-    return layout.groups[block], layout.materials[block], layout.names[block]
+    """Group, material and name of a block, and layers around it, by which it can be asked for."""
+    return layout.groups[block], layout.materials[block], layout.names[block], *layout.within[block]
 
 
 def _words(layout: Layout, block: int) -> tuple[str, ...]:

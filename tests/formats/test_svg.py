@@ -336,3 +336,38 @@ def test_a_page_that_gives_no_scale_is_told_in_a_run(tmp_path):
     head = 'width="400mm" height="200mm" viewBox="0 0 4 1" preserveAspectRatio="xMidYMid slice"'
     with pytest.warns(UserWarning, match="another shape than the viewBox"):
         read(saved(tmp_path, '<rect width="1" height="1"/>', head))
+
+
+INKSCAPE = 'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" viewBox="0 0 4 4"'
+
+#: Two stones, a joint of loose lines and a support; some are grouped within their layers.
+GROUPED = """<g inkscape:groupmode="layer" id="layer1" inkscape:label="wall"><rect id="a" width="1" height="1"/>
+<g id="g5"><rect id="b" x="1" width="1" height="1"/><path id="c" d="M2 0H3V1"/><path id="d" d="M3 1H2V0"/></g></g>
+<g inkscape:groupmode="layer" id="layer2" inkscape:label="fixed"><g id="g7" {0}>
+<rect id="s" y="1" width="4" height="1"/></g></g>"""
+
+
+@pytest.mark.parametrize(("label", "groups"), [("", ("fixed",)), ('inkscape:label="pad"', ("pad",))])
+def test_groups_within_a_layer_hide_neither_it_nor_its_role(tmp_path, label, groups):
+    path = saved(tmp_path, GROUPED.format(label), INKSCAPE)
+    drawing = read_layout(path)
+    assert drawing.names == ("a", "b", "s", "face 0")
+    assert drawing.groups == ("wall", "wall", *groups, "wall")
+    assert drawing.materials[:2] == ("wall", "wall")
+    assert read(path, supports=()).roles.tolist() == ["free", "free", "fixed", "free"]
+
+
+def test_layers_around_a_layer_are_asked_for_with_it(tmp_path):
+    path = saved(tmp_path, GROUPED.format('inkscape:label="pad"'), INKSCAPE)
+    for asked in ({"only": "wall"}, {"ignore": "fixed"}):
+        drawing = read_layout(path, **asked)
+        assert drawing.names == ("a", "b", "face 0")
+        assert "matches no" not in " ".join(drawing.notes)
+        assert [(item.kind, item.layer) for item in drawing.left_out] == [("asked", "pad")]
+    assert read_layout(path, only="fixed").names == ("s",)
+
+
+def test_ids_of_groups_are_layers_where_none_around_has_a_label(tmp_path):
+    path = saved(tmp_path, '<g id="A"><g id="B"><rect width="1" height="1"/></g></g>', 'viewBox="0 0 4 4"')
+    assert read_layout(path).groups == ("B",)
+    assert read_layout(path, only="A").n_blocks == 1
