@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -390,6 +390,29 @@ def _mortar(found: Bodies, labels: Sequence[Sequence[str]], only: Sequence[str])
         if held.sum() >= 2 and not (only and matches(labels[k], only)):
             around.append(k)
     return around
+
+
+def drawn_row(name: str, around: Sequence[str] = (), materials: Iterable[str] = ()) -> dict[str, Any]:
+    """Write what a file says of a body beside its name, as its row.
+
+    Parameters
+    ----------
+    name : str
+    around : sequence of str
+        Layers, groups or nodes around it, the innermost last.
+    materials : iterable of str
+        Of its faces; a body of several has none.
+
+    Returns
+    -------
+    dict
+        ``group``, ``material`` and ``role`` where there is one; the innermost word says the role.
+    """
+    one = {*materials}
+    row = {"group": around[-1] if around else "", "material": one.pop() if len(one) == 1 else ""}
+    said = (with_role({"name": word}).get("role", "") for word in (name, *reversed(around), row["material"]))
+    row["role"] = next(filter(None, said), "")
+    return {key: word for key, word in row.items() if word}
 
 
 def with_role(row: dict[str, Any]) -> dict[str, Any]:

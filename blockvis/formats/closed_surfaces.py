@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -221,7 +222,11 @@ class Enclosed:
 
 
 def enclosed(
-    parts: Sequence[tuple[str, np.ndarray, np.ndarray]], size: float, path: Path | str, reading: Reading | None = None
+    parts: Sequence[tuple[str, np.ndarray, np.ndarray]],
+    size: float,
+    path: Path | str,
+    reading: Reading | None = None,
+    rows: Sequence[Mapping[str, Any]] = (),
 ) -> Enclosed:
     """Find the closed bodies of the parts of a file; plane ones, and open ones that nobody wants, are left out.
 
@@ -233,6 +238,8 @@ def enclosed(
     path : Path or str
         Named in messages.
     reading : Reading, optional
+    rows : sequence of mapping, optional
+        One per part, with the group and material by which it can be asked for, too.
 
     Raises
     ------
@@ -250,7 +257,9 @@ def enclosed(
             try:
                 found = closed_bodies(name, points, faces, size, path)
             except ValueError as error:
-                if reading is not None and not reading.wants([name]):
+                row = rows[number] if rows else {}
+                words = [name, str(row.get("group", "")), str(row.get("material", ""))]
+                if reading is not None and not reading.wants(words):
                     unwanted.append(name)
                 elif isinstance(error, OpenSurface) and _is_plane(points[np.unique(faces)], size):
                     plane.append(name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,8 @@ import numpy as np
 from blockvis.layout.notes import Note
 from blockvis.layout.units import UNITS
 from blockvis.system.extras import require
+
+from .bodies import drawn_row
 
 #: Nodes nested deeper than this are refused: nodes may place each other.
 DEEPEST = 100
@@ -26,7 +28,8 @@ UP = {"X_UP": ([1, 2, 0], "z"), "Y_UP": ([0, 1, 2], "y"), "Z_UP": ([0, 1, 2], "z
 class Drawn:
     """Meshes of a file: name, (n, 3) points in place and (m, 3) faces of each; unit, axis that points up, notes.
 
-    ``rows`` has one for each mesh, or is empty; ``grouped`` are meshes that may be parts of stones.
+    ``rows`` has one for each mesh, or is empty; those that we wrote have a name. ``grouped`` are meshes that may be
+    parts of stones.
     """
 
     parts: list[tuple[str, np.ndarray, np.ndarray]]
@@ -69,29 +72,45 @@ def drawn_in(path: Path) -> Drawn:
     metres = float(about.unitmeter or 1.0)
     unit = next((name for name, size in UNITS.items() if math.isclose(metres, size, rel_tol=1e-3)), "")
     factor = 1.0 if unit else metres
-    parts = []
-    for name, matrix, geometry in _placed(document.scene.nodes if document.scene else [], np.eye(4), "", 0):
+    parts, paths = [], []
+    for names, matrix, geometry in _placed(document.scene.nodes if document.scene else [], np.eye(4), (), 0):
         points, faces = _mesh(geometry)
         points = points @ matrix[:3, :3].T + matrix[:3, 3]
         if len(faces):
-            parts.append((name or str(geometry.name or geometry.id), points[:, order] * factor, faces))
-    return Drawn(parts, unit or "m", up, "y is up, as the file says" if up == "y" else "")
+            *around, name = names or [str(geometry.name or geometry.id)]
+            parts.append((name, points[:, order] * factor, faces))
+            paths.append(around)
+    rows = rows_below([name for name, _, _ in parts], paths)
+    return Drawn(parts, unit or "m", up, "y is up, as the file says" if up == "y" else "", rows)
 
 
-def _placed(nodes: Any, matrix: np.ndarray, name: str, depth: int) -> Iterator[tuple[str, np.ndarray, Any]]:
-    """Yield the geometries below nodes, with the matrices that place them."""
+def rows_below(
+    names: Sequence[str], paths: Sequence[Sequence[str]], materials: Sequence[Sequence[str]] = ()
+) -> list[dict[str, Any]]:
+    """Rows of bodies, given the names of the nodes around each, but for those around all: these are the scene."""
+    shared = min(map(len, paths), default=0)
+    common = next((k for k in range(shared) if len({path[k] for path in paths}) > 1), shared)
+    painted = materials or [[]] * len(names)
+    return [drawn_row(*of) for of in zip(names, (path[common:] for path in paths), painted, strict=True)]
+
+
+def _placed(
+    nodes: Any, matrix: np.ndarray, names: tuple[str, ...], depth: int
+) -> Iterator[tuple[tuple[str, ...], np.ndarray, Any]]:
+    """Yield the geometries below nodes, with the names of these, outside first, and the matrices that place them."""
     from collada.scene import GeometryNode, Node, NodeNode
 
     if depth > DEEPEST:
         raise ValueError(f"it nests nodes more than {DEEPEST} deep")
     for node in nodes:
         if isinstance(node, GeometryNode):
-            yield name, matrix, node.geometry
+            yield names, matrix, node.geometry
         elif isinstance(node, NodeNode):
-            yield from _placed([node.node], matrix, name, depth + 1)
+            yield from _placed([node.node], matrix, names, depth + 1)
         elif isinstance(node, Node):
-            own = node.xmlnode.get("name") or node.xmlnode.get("id") or name
-            yield from _placed(node.children, matrix @ np.asarray(node.matrix, dtype=float), own, depth + 1)
+            own = tuple(filter(None, [node.xmlnode.get("name") or node.xmlnode.get("id")]))
+            placed = matrix @ np.asarray(node.matrix, dtype=float)
+            yield from _placed(node.children, placed, (*names, *own), depth + 1)
 
 
 def _has_nan(geometry: Any) -> bool:

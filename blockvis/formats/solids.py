@@ -6,7 +6,7 @@ import json
 import logging
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from . import dae
-from .bodies import Bodies, Body
+from .bodies import Bodies, Body, drawn_row
 from .cells import layout_of_cells, merged
 from .closed_surfaces import Enclosed, OpenSurface, enclosed
 from .reading import Reading
@@ -36,6 +36,9 @@ LEVEL = 1e-3
 #: Of what is upright no more than this part of the bodies stands on the ground; of what lies on its side all may.
 STANDING = 0.5
 
+#: Words of an .obj file that name its objects, groups and materials.
+_WORDS = ("o", "g", "usemtl")
+
 #: Largest description of a .glb file that is looked into [bytes].
 LARGEST_HEADER = 64 * 2**20
 
@@ -48,19 +51,20 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     if _are_flat(drawn.parts, size):
         flat = _flat(drawn.parts, path, drawn.rows, reading.view)
         return replace(flat, unit=drawn.unit, notes=(*flat.notes, *drawn.notes))
-    closed = _enclosed(drawn, size, path, reading)
+    closed, rows = _enclosed(drawn, size, path, reading)
     bodies = closed.bodies
     known = [
-        {**(drawn.rows[k] if drawn.rows else {}), **({"name": body.name} if body.piece_of or not drawn.rows else {})}
+        {"name": body.name, **(rows[k] if rows else {}), **({"name": body.name} if body.piece_of else {})}
         for body, k in zip(bodies, closed.owners.tolist(), strict=True)
     ]
     up, up_says = _up(path, bodies, size) if suffix == ".glb" else (drawn.up, drawn.up_says)
     return Bodies(tuple(bodies), tuple(known), drawn.unit, (*closed.notes, *drawn.notes), up=up, up_says=up_says)
 
 
-def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> Enclosed:
+def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> tuple[Enclosed, Sequence[dict[str, Any]]]:
+    """Find the closed bodies of a file, and the rows of the parts of which they are."""
     try:
-        return enclosed(drawn.parts, size, path, reading)
+        return enclosed(drawn.parts, size, path, reading, drawn.rows), drawn.rows
     except OpenSurface as error:
         if not drawn.grouped:
             raise
@@ -74,11 +78,64 @@ def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> En
             raise error from None
         groups = counted(len(drawn.parts), "name of a group", "names of groups")
         said = f"{groups}, not closed by themselves; name blocks by 'o' lines"
-        return replace(found, notes=[*found.notes, Note(LEFT_OUT, f"not read: {said}")])
+        return replace(found, notes=[*found.notes, Note(LEFT_OUT, f"not read: {said}")]), ()
+
+
+@dataclass
+class _Object:
+    """Faces of an object of an .obj file, by the numbers of their points, and their groups and materials."""
+
+    faces: list[list[int]] = field(default_factory=list)
+    groups: set[str] = field(default_factory=set)
+    materials: set[str] = field(default_factory=set)
+
+    def row(self, name: str, named_by: str) -> dict[str, Any]:
+        """Say its group, which it has if all its faces are in one, and does not name it; and its material."""
+        return drawn_row(name, [*self.groups] if len(self.groups) == 1 and named_by == "o" else (), self.materials)
 
 
 def _obj(path: Path) -> dae.Drawn:
-    """Read the objects of an .obj file, or, where it has none, its groups, in the order of the file."""
+    """Read the objects of an .obj file, or, where it has none, its groups, or else its materials, in their order."""
+    text = _obj_text(path)
+    there = {*re.findall(r"^[ \t]*(o|g|usemtl)[ \t]", text, re.MULTILINE)}
+    word = next((word for word in _WORDS if word in there), "o")
+    said, points, objects = dict.fromkeys(_WORDS, ""), list[list[float]](), dict[str, _Object]()
+    for line in text.split("\n"):
+        first, *rest = line.split() or [""]
+        try:
+            if first in _WORDS:
+                # SketchUp puts a number before the names of a group and of those around it, and "Model" behind.
+                said[first] = re.sub(r"^Mesh\d+ (.+) Model$", r"\1", " ".join(rest))
+            elif first == "v":
+                x, y, z = rest[:3]
+                points.append([float(x), float(y), float(z)])
+            elif first == "f":
+                numbers = [int(corner.split("/")[0]) for corner in rest]
+                one = objects.setdefault(said[word] or path.name, _Object())
+                # Negative numbers count back from the last point before the line.
+                one.faces.append([k - 1 if k > 0 else len(points) + k for k in numbers])
+                one.groups.add(said["g"])
+                one.materials.add(said["usemtl"])
+        except ValueError:
+            raise ValueError(f"'{path}' cannot be read as .obj ('{line.strip()[:60]}'); export it again") from None
+    every, parts = np.array(points).reshape(-1, 3), []
+    for name, one in objects.items():
+        outside = next((k for face in one.faces for k in face if not 0 <= k < len(points)), None)
+        if outside is not None:
+            raise ValueError(
+                f"'{path}': a face of '{name}' uses point {outside + 1}, but there are {len(points)}; export it again"
+            )
+        own, triangles = np.unique(fans(one.faces), return_inverse=True)
+        if len(own):
+            parts.append((name, every[own], triangles.reshape(-1, 3)))
+    rows, names = _own_rows(path), [name for name, _, _ in parts]
+    if word != "o" or _distinct(rows) != names:
+        rows = [objects[name].row(name, word) for name in names]
+    return dae.Drawn(parts, "", "z", "", rows, grouped=word != "o")
+
+
+def _obj_text(path: Path) -> str:
+    """Read the lines of an .obj file, with those that are continued in one."""
     data = path.read_bytes()
     # A name may have any character.
     if b"\0" in data and not re.search(rb"^[ \t]*f[ \t]", data, re.MULTILINE):
@@ -87,37 +144,7 @@ def _obj(path: Path) -> dae.Drawn:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
-    text = re.sub(r"\\\r?\n", " ", text)
-    word = "o" if re.search(r"^[ \t]*o[ \t]", text, re.MULTILINE) else "g"
-    name, points, objects = path.name, list[list[float]](), dict[str, list[list[int]]]()
-    for line in text.split("\n"):
-        first, *rest = line.split() or [""]
-        try:
-            if first == word:
-                # SketchUp puts a number before the names of a group and of those around it, and "Model" behind.
-                name = re.sub(r"^Mesh\d+ (.+) Model$", r"\1", " ".join(rest)) or path.name
-            elif first == "v":
-                x, y, z = rest[:3]
-                points.append([float(x), float(y), float(z)])
-            elif first == "f":
-                numbers = [int(corner.split("/")[0]) for corner in rest]
-                # Negative numbers count back from the last point before the line.
-                objects.setdefault(name, []).append([k - 1 if k > 0 else len(points) + k for k in numbers])
-        except ValueError:
-            raise ValueError(f"'{path}' cannot be read as .obj ('{line.strip()[:60]}'); export it again") from None
-    every, parts = np.array(points).reshape(-1, 3), []
-    for name, faces in objects.items():
-        outside = next((k for face in faces for k in face if not 0 <= k < len(points)), None)
-        if outside is not None:
-            raise ValueError(
-                f"'{path}': a face of '{name}' uses point {outside + 1}, but there are {len(points)}; export it again"
-            )
-        own, triangles = np.unique(fans(faces), return_inverse=True)
-        if len(own):
-            parts.append((name, every[own], triangles.reshape(-1, 3)))
-    rows = _own_rows(path)
-    rows = rows if word == "o" and _distinct(rows) == [name for name, _, _ in parts] else []
-    return dae.Drawn(parts, "", "z", "", rows, grouped=word == "g")
+    return re.sub(r"\\\r?\n", " ", text)
 
 
 def _distinct(rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -145,9 +172,10 @@ def _scene(path: Path) -> dae.Drawn:
         raise ValueError(f"'{path}' breaks off: {bodies} and {ended} end (endsolid); export it again")
     try:
         scene = trimesh.load_scene(str(path), process=False)
+        placed = _placed(scene, path)
         parts = [
             (str(name), np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
-            for name, mesh in _placed(scene, path)
+            for name, mesh in placed
             if len(mesh.faces)
         ]
         if suffix == ".ply":
@@ -158,8 +186,12 @@ def _scene(path: Path) -> dae.Drawn:
         raise ValueError(f"'{path}' cannot be read as {suffix} ({reason}); export it again") from None
     if suffix != ".glb":
         return dae.Drawn(parts, "", "z", "")
-    rows = [mesh.metadata.get("blockvis") for _, mesh in _placed(scene, path) if len(mesh.faces)]
-    return dae.Drawn(parts, "m", "y", "", rows if all(isinstance(row, dict) for row in rows) else [])
+    beside = [mesh.metadata for _, mesh in placed if len(mesh.faces)]
+    rows = [one.get("blockvis") for one in beside]
+    if not all(isinstance(row, dict) for row in rows):
+        names = [name for name, _, _ in parts]
+        rows = dae.rows_below(names, [one["around"] for one in beside], [one["materials"] for one in beside])
+    return dae.Drawn(parts, "m", "y", "", rows)
 
 
 def _dae(path: Path) -> dae.Drawn:
@@ -251,13 +283,14 @@ def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:
     """Meshes of a scene with its transforms applied, and their names.
 
     In a .glb file the node has the name of the stone: several nodes may place one mesh, and have one name, and a mesh
-    has a primitive for each of its materials.
+    has a primitive for each of its materials. The names of these and of the nodes around are in its metadata.
     """
     from trimesh import Trimesh
     from trimesh.util import concatenate, unique_name
 
     description = _description(path) if path.suffix.lower() == ".glb" else {}
     nodes, meshes = description.get("nodes", []), description.get("meshes", [])
+    above = {below: k for k, node in enumerate(nodes) for below in node.get("children", [])}
     # trimesh numbers nodes of the same name, and one that is called as its frame of all.
     number, counts = dict[str, int](), dict[str | None, int]()
     for k, node in enumerate(nodes):
@@ -279,9 +312,27 @@ def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:
             drawn = nodes[n] if n >= 0 else {"name": str([*order][k])}
             own = drawn.get("name") or meshes[drawn["mesh"]].get("name") or path.name
             # Without its textures, which would be joined to one.
-            shape = Trimesh(mesh.vertices, mesh.faces, process=False, metadata=mesh.metadata)
+            beside = {"around": _around(n, nodes, above), "materials": _materials(drawn, description)}
+            shape = Trimesh(mesh.vertices, mesh.faces, process=False, metadata={**mesh.metadata, **beside})
             found.setdefault(node, (str(own), []))[1].append(shape.apply_transform(transform))
     return [(name, parts[0] if len(parts) == 1 else concatenate(parts)) for name, parts in found.values()]
+
+
+def _around(node: int, nodes: Sequence[dict[str, Any]], above: dict[int, int]) -> list[str]:
+    """Names of the nodes of a .glb file around one, the outermost first."""
+    names = list[str]()
+    while (node := above.get(node, -1)) >= 0 and len(names) < len(nodes):
+        names.insert(0, str(nodes[node].get("name", "")))
+    return names
+
+
+def _materials(node: dict[str, Any], description: dict[str, Any]) -> list[str]:
+    """Names of the materials of the mesh at a node of a .glb file."""
+    mesh, every = (
+        description.get("meshes", [])[node["mesh"]] if "mesh" in node else {},
+        description.get("materials", []),
+    )
+    return [str(every[one["material"]].get("name", "")) for one in mesh.get("primitives", []) if "material" in one]
 
 
 def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any, rows: list[dict[str, Any]]) -> dae.Drawn:
@@ -312,10 +363,16 @@ def _flat(
         # Each triangle has corners of its own there, by which it would be a piece of its own.
         same = [np.unique(points, axis=0, return_inverse=True) for _, points, _ in parts]
         parts = [(name, own, index.ravel()[faces]) for (name, _, faces), (own, index) in zip(parts, same, strict=True)]
-    layouts = [layout_of_cells(points, list(faces), {}, path, view) for _, points, faces in parts]
+    layouts = []
+    for (_, points, faces), row in zip(parts, rows or [{}] * len(parts), strict=True):
+        found = layout_of_cells(points, list(faces), {}, path, view)
+        assert isinstance(found, Layout)
+        every = [{key: word for key, word in row.items() if key != "name"}] * found.n_blocks
+        layouts.append(with_rows(found, every, own=True) if row else found)
     layout = merged(layouts, [name for name, _, _ in parts], path)
     assert isinstance(layout, Layout)
-    return with_rows(layout, rows, own=True) if len(rows) == layout.n_blocks else layout
+    named = len(rows) == layout.n_blocks and all("name" in row for row in rows)
+    return with_rows(layout, rows, own=True) if named else layout
 
 
 def _own_rows(path: Path) -> list[dict[str, Any]]:

@@ -16,7 +16,7 @@ SHEAR = np.array([[1, 0, 0.2], [0, 1, 0.1], [0, 0, 1]])
 
 
 def document(path, places, *, points=BOX, up="Z_UP", unit=0.0254, parts=1):
-    """Write one shape at several places: (name, matrix) each; its faces in one or more primitives."""
+    """Write one shape at several places: (names of nodes, outside first, matrix); its faces in several primitives."""
     found = collada.Collada()
     found.assetInfo.upaxis, found.assetInfo.unitname, found.assetInfo.unitmeter = up, "unit", unit
     corners = source.FloatSource("corners", points.ravel(), ("X", "Y", "Z"))
@@ -31,7 +31,10 @@ def document(path, places, *, points=BOX, up="Z_UP", unit=0.0254, parts=1):
     nodes = []
     for name, matrix in places:
         inner = scene.Node("", children=[scene.GeometryNode(shape)])
-        nodes.append(scene.Node(name, children=[inner], transforms=[scene.MatrixTransform(matrix.ravel())]))
+        *around, own = name.split("/")
+        nodes.append(scene.Node(own, children=[inner], transforms=[scene.MatrixTransform(matrix.ravel())]))
+        for outer in reversed(around):
+            nodes[-1] = scene.Node(outer, children=[nodes[-1]])
     found.scenes.append(scene.Scene("scene", nodes))
     found.scene = found.scenes[0]
     found.write(str(path))
@@ -53,6 +56,12 @@ def test_nodes_are_placed_and_named_in_the_unit_of_the_file(tmp_path):
     np.testing.assert_allclose(layout.sizes**2, 16 * 4 * 0.0254**2, rtol=1e-6)
     np.testing.assert_allclose(layout.thickness, 8 * 0.0254, rtol=1e-6)
     np.testing.assert_allclose(blockvis.read_layout(path, dimension=3).volumes, 512 * 0.0254**3, rtol=1e-6)
+
+
+def test_nodes_around_those_of_stones_are_groups_but_for_those_around_all(tmp_path):
+    places = [("all/fixed/A", at(0, 0, 0)), ("all/wall/B", at(16, 0, 0)), ("all/C", at(8, 0, 4))]
+    layout = blockvis.read_layout(document(tmp_path / "wall.dae", places))
+    assert (layout.names, layout.groups, layout.roles) == (("A", "B", "C"), ("fixed", "wall", ""), ("fixed", "", ""))
 
 
 @pytest.mark.parametrize(("up", "turn"), [("Z_UP", [0, 1, 2]), ("Y_UP", [0, 2, 1]), ("X_UP", [2, 0, 1])])

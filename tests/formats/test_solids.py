@@ -96,12 +96,12 @@ def test_touching_bodies_of_which_one_is_turned_inside_out_are_refused(tmp_path)
         read(tmp_path / "a.stl")
 
 
-def glb(path, nodes):
+def glb(path, nodes, roots=None):
     """Write a box and nodes that place it."""
     data = trimesh.creation.box((1, 1, 1)).export(file_type="glb")
     length = int.from_bytes(data[12:16], "little")
     tree = json.loads(data[20 : 20 + length])
-    tree |= {"nodes": nodes, "scenes": [{"nodes": list(range(len(nodes)))}], "scene": 0}
+    tree |= {"nodes": nodes, "scenes": [{"nodes": roots or list(range(len(nodes)))}], "scene": 0}
     tree["meshes"][0].pop("name", None)
     text = json.dumps(tree).encode()
     text += b" " * (-len(text) % 4)
@@ -286,3 +286,43 @@ def test_rows_of_a_ply_belong_to_the_blocks_of_their_number_or_to_none(tmp_path,
     else:
         assert not {"A", "B", "C"} & set(left)
         assert "not read: what blockvis wrote of 3 blocks: faces have no block_id any more" in layout.notes
+
+
+@pytest.mark.parametrize(
+    ("lines", "names"),
+    [
+        (("g fixed\no a", "g wall\no b"), ("a", "b")),
+        (("o a\nusemtl fixed\ng x", "o b\nusemtl brick\ng wall"), ("a", "b")),
+        (("g fixed", "g b\nusemtl brick"), ("fixed", "b")),
+        (("usemtl fixed", "usemtl brick"), ("fixed", "brick")),
+    ],
+)
+def test_groups_and_materials_of_an_obj_file_say_roles(tmp_path, lines, names):
+    found = read_layout(wavefront(tmp_path / "a.obj", (lines[0], 3), (lines[1], 2)), dimension=3)
+    assert found.names == names
+    assert found.roles == ("fixed", "")
+    assert found.materials[1] == ("brick" if "brick" in lines[1] else "")
+    assert found.groups[1] == ("wall" if "o b" in lines[1] else "")
+
+
+def test_groups_of_an_obj_file_are_asked_for_open_surfaces_too(tmp_path):
+    path = wavefront(tmp_path / "a.obj", ("o a\ng wall", 3))
+    path.write_text(path.read_text(encoding="utf-8") + "o b\ng dims\nf 1 2 4\n", encoding="utf-8")
+    opened = path.read_text(encoding="utf-8").replace("f 1 2 4", "f 1 2 4\nf 1 2 5")
+    path.write_text(opened, encoding="utf-8")
+    assert read_layout(path, ignore="dims").names == ("a",)
+
+
+def test_an_object_of_several_groups_has_none(tmp_path):
+    path = wavefront(tmp_path / "a.obj", ("o a", 3), per_face=[f"g fixed {k}" for k in range(len(BOX))])
+    assert (read_layout(path).groups, read_layout(path).roles) == (("",), ("",))
+
+
+def test_nodes_around_those_of_stones_are_groups(tmp_path):
+    names = ("world", "fixed", "wall", "deep", "a", "b")
+    children = {0: [1, 2], 1: [3], 3: [4], 2: [5]}
+    nodes = [{"name": name, **({"children": children[k]} if k in children else {})} for k, name in enumerate(names)]
+    nodes[4] |= {"mesh": 0}
+    nodes[5] |= {"mesh": 0, "translation": [2, 0, 0]}
+    layout = read_layout(glb(tmp_path / "a.glb", nodes, [0]))
+    assert (layout.names, layout.groups, layout.roles) == (("a", "b"), ("deep", "wall"), ("fixed", ""))
