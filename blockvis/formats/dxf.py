@@ -26,7 +26,7 @@ from solver.mechanics import counted
 from .arcs import Arc, with_shared_corners
 from .bodies import Bodies
 from .dxf_bodies import DrawnMesh, drawn_mesh, is_mesh, layout_of_meshes, meshes_of_faces
-from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
+from .loose_lines import Faces, Line, faces_of_lines, is_chain, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
 #: How a binary file begins.
@@ -58,6 +58,9 @@ WHOLE_TURN = 1e-9
 #: Colours of an entity that stand for that of its layer or of the inserted block, and what nobody gave a colour.
 BY_LAYER, BY_BLOCK, WHITE = 256, 0, 7
 
+#: The same of line types.
+BY_LAYER_TYPE, BY_BLOCK_TYPE = "BYLAYER", "BYBLOCK"
+
 _CURVES = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE", "ARC", "LINE", "SOLID", "TRACE", "3DFACE"}
 
 
@@ -70,6 +73,7 @@ class _Outlines:
     layers: list[str] = field(default_factory=list)
     rows: list[dict[str, Any]] = field(default_factory=list)
     looks: list[tuple[str, ...]] = field(default_factory=list)
+    within: list[tuple[str, ...]] = field(default_factory=list)
     offs: list[float] = field(default_factory=list)
     arcs: list[tuple[Arc, ...]] = field(default_factory=list)
     loose: list[Line] = field(default_factory=list)
@@ -89,15 +93,25 @@ class _Outlines:
         self.layers.append(str(entity.dxf.layer))
         self.names.append(f"block {handle}")
         self.rows.append(_own_data(entity))
+        self.within.append(())
         self.looks.append(_looks(entity))
 
     @property
     def of_outlines(self) -> tuple[list[Any], ...]:
         """Lists with an item for each outline."""
-        return self.rings, self.names, self.layers, self.rows, self.looks, self.offs, self.arcs
+        return self.rings, self.names, self.layers, self.rows, self.looks, self.offs, self.arcs, self.within
 
-    def append(self, ring: np.ndarray, level: float, layer: str, name: str, looks: tuple[str, ...]) -> None:
+    def append(
+        self,
+        ring: np.ndarray,
+        level: float,
+        layer: str,
+        name: str,
+        looks: tuple[str, ...],
+        within: tuple[str, ...] = (),
+    ) -> None:
         """Add an outline (n, 2) that lines make, at a level."""
+        self.within.append(within)
         self.rings.append(np.column_stack([ring, np.full(len(ring), level)]))
         self.offs.append(0.0)
         self.arcs.append(())
@@ -194,6 +208,7 @@ def _layout(found: _Outlines, faces: Faces, stated: str) -> Layout:
         notes=tuple(notes),
         left_out=tuple(item.turned(np.eye(item.points.shape[1])[:2]) for item in found.left_out),
         looks=tuple(found.looks),
+        within=tuple(found.within),
     )
     moved = [
         row and _layer_name(row).lower() != layer.lower() for row, layer in zip(found.rows, found.layers, strict=True)
@@ -279,6 +294,7 @@ def _flat(
     parent: str = "",
     layer: str = "0",
     colour: int = WHITE,
+    line_type: str = BY_LAYER_TYPE,
 ) -> Iterator[tuple[Any, str]]:
     """Yield all entities, inserted blocks resolved, each with a handle that names it.
 
@@ -292,6 +308,8 @@ def _flat(
             entity.dxf.layer = layer
         if parent and entity.dxf.get("color", BY_LAYER) == BY_BLOCK:
             entity.dxf.color = colour
+        if parent and str(entity.dxf.get("linetype", BY_LAYER_TYPE)).upper() == BY_BLOCK_TYPE:
+            entity.dxf.linetype = line_type
         if entity.dxftype() != "INSERT" or entity.dxf.layer in frozen or _is_closed(entity):
             yield entity, handle
             continue
@@ -299,8 +317,8 @@ def _flat(
         for k, copy in enumerate(copies):
             plain, stretch = _stretched(copy)
             number_of = f"{handle}.{k}" if entity.mcount > 1 else handle
-            own = int(entity.dxf.get("color", BY_LAYER))
-            inner = _flat(_inserted(plain, path), depth + 1, path, frozen, number_of, entity.dxf.layer, own)
+            own = entity.dxf.layer, int(entity.dxf.get("color", BY_LAYER)), _line_type(entity) or "Continuous"
+            inner = _flat(_inserted(plain, path), depth + 1, path, frozen, number_of, *own)
             yield from inner if stretch is None else _transformed(inner, stretch, frozen)
 
 
@@ -412,7 +430,10 @@ def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | No
         found.add(points, entity, handle, off, arcs)
         return
     layer, must_close = str(entity.dxf.layer), kind not in ("LINE", "ARC")
-    found.loose.append(Line(points, layer, handle, must_close, _looks(entity), off, arcs))
+    drawn = _line_type(entity)
+    found.loose.append(
+        Line(points, layer, handle, must_close, _looks(entity), off, arcs, drawn, _is_chain(entity, drawn))
+    )
 
 
 def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, Any, Any]:
@@ -537,6 +558,22 @@ def _looks(entity: Any) -> tuple[str, ...]:
         return (kind, "#{:02x}{:02x}{:02x}".format(*int2rgb(int(exact))))
     number = number if 0 < number < BY_LAYER else WHITE
     return (kind, "#{:02x}{:02x}{:02x}".format(*int2rgb(DXF_DEFAULT_COLORS[number])), str(number))
+
+
+def _line_type(entity: Any) -> str:
+    """Name of the line type of an entity, or else of its layer; "" of a whole line."""
+    name = str(entity.dxf.get("linetype", BY_LAYER_TYPE))
+    if name.upper() == BY_LAYER_TYPE and entity.doc is not None and entity.dxf.layer in entity.doc.layers:
+        name = str(entity.doc.layers.get(entity.dxf.layer).dxf.linetype)
+    return "" if name.upper() in (BY_LAYER_TYPE, BY_BLOCK_TYPE, "CONTINUOUS") else name
+
+
+def _is_chain(entity: Any, line_type: str) -> bool:
+    """Whether the pattern of a line type is of dashes and dots."""
+    if not line_type or entity.doc is None or line_type not in entity.doc.linetypes:
+        return False
+    lengths = [tag.value for tag in entity.doc.linetypes.get(line_type).pattern_tags.tags if tag.code == 49]
+    return is_chain([length for length in lengths if length >= 0.0])
 
 
 def _hatch_rings(entity: Any, tolerance: float | None) -> list[tuple[np.ndarray, float, tuple[Arc, ...]]]:
@@ -679,10 +716,8 @@ def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> 
             found.append(piece, level, found.layers[i], f"{found.names[i]}.{number}", found.looks[i])
         for values in found.of_outlines:
             del values[i]
-    for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
-        found.append(ring, 0.0, layer, f"face {number}", ("face",))
-    if faces.rings:
-        faces.notes.append(faces_note(faces, wanted))
+    for number, (ring, layer, around) in enumerate(zip(faces.rings, faces.layers, faces.around, strict=True)):
+        found.append(ring, 0.0, layer, f"face {number}", ("face",), around)
     return faces
 
 

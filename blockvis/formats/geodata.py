@@ -27,7 +27,7 @@ from blockvis.system.extras import require
 from solver import mechanics
 
 from .bodies import ROLE_WORDS
-from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
+from .loose_lines import Faces, Line, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
 #: Attributes that name a block and its group, the first that a file has; in small letters.
@@ -328,7 +328,6 @@ def layout_of_features(
     left_out = [*holes, *unwanted, *faces.left_out]
     if not rings and all(item.kind == "open" for item in left_out):
         raise ValueError(f"'{path}' has no polygon: {nothing_closed(faces)}; draw each block as one polygon")
-    notes += [faces_note(faces, lines)] if faces.rings else []
     notes += faces.notes + joined_note(found.misses, float(np.ptp(np.concatenate(every), axis=0).max()))
     layout = Layout(
         blocks=tuple(rings),
@@ -336,6 +335,7 @@ def layout_of_features(
         unit=unit,
         notes=tuple(notes),
         left_out=tuple(left_out),
+        within=(*[()] * (len(rings) - len(faces.rings)), *faces.around),
     )
     return with_rows(layout, kinds)
 

@@ -47,6 +47,10 @@ class Line:
         Whether it is a polyline, and so part of an outline; a single line may also be a dimension or an axis.
     looks : tuple of str
         Kind of entity and colour.
+    line_type : str
+        In which it is drawn, "" where nothing says so.
+    chain : bool
+        Whether that is dashes and dots, as of axes, section planes and neighbouring parts: see :func:`is_chain`.
     off : float
         Largest distance of its chords from the curve for which they stand.
     curves : tuple of Curve
@@ -60,6 +64,19 @@ class Line:
     looks: tuple[str, ...] = ()
     off: float = 0.0
     curves: tuple[Curve, ...] = ()
+    line_type: str = ""
+    chain: bool = False
+
+
+def is_chain(dashes: Sequence[float]) -> bool:
+    """Whether dashes are of several lengths, as in line types of axes, in which no joint is drawn.
+
+    Examples
+    --------
+    >>> is_chain([12.0, 0.0]), is_chain([6.0, 6.0])
+    (True, False)
+    """
+    return len({*dashes}) > 1
 
 
 @dataclass
@@ -72,6 +89,8 @@ class Faces:
         Faces between lines.
     layers : list of str
         The layer of most of the lines around each face.
+    around : list of tuples of str
+        The layers of all of them.
     pieces : {int: list of (n, 2) arrays}
         The pieces into which lines cut an outline, by its number.
     left_out : list of LeftOut
@@ -80,6 +99,7 @@ class Faces:
 
     rings: list[np.ndarray] = field(default_factory=list)
     layers: list[str] = field(default_factory=list)
+    around: list[tuple[str, ...]] = field(default_factory=list)
     pieces: dict[int, list[np.ndarray]] = field(default_factory=dict)
     left_out: list[LeftOut] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -105,10 +125,12 @@ def faces_of_lines(
         Numbers of the outlines that will be left out: lines may end on them within another, as at openings; those that
         lines cross are as if they were not there.
     only : sequence of str
-        What the caller asks for: where that is faces, strips of mortar stay.
+        What the caller asks for: where that is faces, strips of mortar stay, and chain lines of its layers are joints.
 
     Notes
     -----
+    Chain lines are no joints.
+
     Lines cut an outline if they lie within it and it has two or more pieces along its border then; a line that reaches
     beyond, as an axis or a dimension does, cuts nothing. An outline around lines that do not reach it stays whole.
     Joints may be drawn as pairs of lines: the strips between them are left out as mortar.
@@ -117,6 +139,9 @@ def faces_of_lines(
     from scipy.spatial import cKDTree
 
     found = Faces()
+    axes = [line.chain and not matches([line.layer, *line.looks], only) for line in lines]
+    found.left_out += [_axis(line) for line, is_axis in zip(lines, axes, strict=True) if is_axis]
+    lines = [line for line, is_axis in zip(lines, axes, strict=True) if not is_axis]
     flat = [line.points[:, :2] for line in lines]
     if not flat:
         return found
@@ -133,7 +158,17 @@ def faces_of_lines(
     _add_faces([lines[k] for k in rest], [segments[k] for k in rest], kept, every, size, found)
     mortar = [] if matches(["face"], only) else _without_mortar(found, 4 * GRID * size)
     found.notes += [*_cut_notes(found, len(cutting), openings), *mortar]
+    found.notes += [_faces_note(found, lines)] if found.rings else []
     return found
+
+
+def _axis(line: Line) -> LeftOut:
+    name = f"line {line.handle}"
+    message = (
+        f"{name} on layer '{line.layer}' is drawn in {line.line_type}, dashes and dots as of an axis; if it is a "
+        "joint, draw it whole or ask for its layer (only)"
+    )
+    return LeftOut("axis", line.points[:, :2], message, line.layer, name, closed=False, looks=line.looks)
 
 
 def _cut_outlines(
@@ -216,8 +251,10 @@ def _without_mortar(found: Faces, reach: float) -> list[Note]:
     for k in np.flatnonzero(strip):
         found.left_out.append(LeftOut("mortar", every[k][1], "the faces between pairs of lines are mortar"))
     kept = [one for k, one in enumerate(every) if not strip[k]]
-    layers = found.layers
-    found.layers = [layers[k] for k in range(len(found.rings)) if not strip[k]]
+    layers = [
+        one for one, is_strip in zip(zip(found.layers, found.around, strict=True), strip, strict=False) if not is_strip
+    ]
+    found.layers, found.around = [layer for layer, _ in layers], [around for _, around in layers]
     found.rings = [ring for i, ring in kept if i < 0]
     found.pieces = {i: [ring for k, ring in kept if k == i] for i in found.pieces}
     said = 'are taken for joints drawn as pairs of lines; joint_thickness = "auto" closes them, only = "*" keeps them'
@@ -248,7 +285,33 @@ def joined_note(misses: Sequence[float], size: float) -> list[str]:
     return [Note(CHANGED, words)] if far else []
 
 
-def faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
+def _crossing_notes(
+    lines: Sequence[Line], segments: list[Any], borders: Sequence[set[int]], meets: float
+) -> list[Note]:
+    """Say which layers have lines that run across those of others, as axes, ground lines and leaders, around faces."""
+    import shapely
+
+    layers = np.array([line.layer for line in lines])
+    main = Counter(layers[k] for border in borders for k in border).most_common(1)
+    i, j = shapely.STRtree(segments).query(segments, "crosses")
+    i, j = np.array([i, j])[:, (layers[i] != layers[j]) & (layers[i] != (main[0][0] if main else ""))]
+    one, other = np.array(segments, dtype=object)[i], np.array(segments, dtype=object)[j]
+    # A joint that ends at another may pass it by a little.
+    ends = np.array([shapely.get_point(line, k) for line in (one, other) for k in (0, -1)])
+    through = (shapely.distance(ends, shapely.intersection(one, other)) > meets).all(axis=0)
+    said = []
+    for layer in dict.fromkeys(layers[i[through]].tolist()):
+        across = {k for k in i[through].tolist() if layers[k] == layer}
+        types = ", ".join(dict.fromkeys(lines[k].line_type for k in sorted(across) if lines[k].line_type))
+        n = sum(not across.isdisjoint(border) for border in borders)
+        if n:
+            many = counted(len(across), "line")
+            said.append(f"{many} on layer '{layer}'{f' ({types})' if types else ''} around {counted(n, 'face')}")
+    words = f"lines run across those of other layers: {', '.join(said)}; leave them out (ignore) if they are no joints"
+    return [Note(CHANGED, words)] if said else []
+
+
+def _faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
     """Say that blocks are what loose lines enclose."""
     return Note(
         CHANGED,
@@ -429,11 +492,12 @@ def _add_faces(
             left = LeftOut("open", line.points[:, :2], said, line.layer, name, closed=False, looks=line.looks)
             found.left_out.append(left)
     tree = shapely.STRtree(segments)
-    drawn = shapely.STRtree([shapely.Polygon(ring).buffer(0) for ring in outlines])
+    drawn, borders = shapely.STRtree([shapely.Polygon(ring).buffer(0) for ring in outlines]), list[set[int]]()
     for face in faces.geoms:
         ring = np.array(shapely.orient_polygons(face).exterior.coords)[:-1]
         middles = shapely.points((ring + np.roll(ring, -1, axis=0)) / 2.0)
-        nearest = [lines[int(k)].layer for k in tree.nearest(middles)]
+        border = tree.nearest(middles).tolist()
+        nearest = [lines[k].layer for k in border]
         layer = max(sorted(set(nearest)), key=nearest.count)
         ring = _sharpened(ring, every, grid)
         if len(face.interiors):
@@ -454,6 +518,9 @@ def _add_faces(
             continue
         found.rings.append(ring)
         found.layers.append(layer)
+        found.around.append(tuple(sorted({*nearest})))
+        borders.append({*border})
+    found.notes += _crossing_notes(lines, segments, borders, MEETS * size)
 
 
 def _open_message(line: Line) -> str:

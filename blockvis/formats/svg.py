@@ -30,7 +30,7 @@ from blockvis.layout.units import UNITS, metres_per
 from solver import mechanics
 
 from .arcs import MOST_CHORDS, Arc, Bezier, Curve, bezier_chords, with_shared_corners
-from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
+from .loose_lines import Faces, Line, faces_of_lines, is_chain, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -48,13 +48,15 @@ _AT_RULE = re.compile(r"@[^@{};]*(?:;|\{(?:[^{}]|\{[^{}]*\})*\})")
 _SELECTOR = re.compile(r"(\*|[a-zA-Z][\w-]*)?((?:[.#][\w-]+)*)")
 #: Properties by which shapes are read, chosen or left out.
 _READ = re.compile(
-    r"(?:^|[;{])\s*(?:display|visibility|(?:fill-|stroke-)?opacity|fill|stroke|transform)\s*:", re.IGNORECASE
+    r"(?:^|[;{])\s*(?:display|visibility|(?:fill-|stroke-)?opacity|fill|stroke(?:-dasharray)?|transform)\s*:",
+    re.IGNORECASE,
 )
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 
 #: Properties by which shapes are painted, where nothing is said.
 _PAINTING = {
     "fill": "black", "stroke": "none", "visibility": "visible", "fill-opacity": "1", "stroke-opacity": "1",
+    "stroke-dasharray": "none",
 }  # fmt: skip
 
 #: What paints nothing, and opacities of what nobody sees.
@@ -139,6 +141,14 @@ class _Context:
         return self.painting["stroke"] not in _NO_PAINT and not _CLEAR.fullmatch(self.painting["stroke-opacity"])
 
     @property
+    def dashes(self) -> tuple[str, bool]:
+        """What lines are called by their dashes, and whether these are those of axes."""
+        numbers = re.findall(_NUMBER, self.painting["stroke-dasharray"])
+        # Of an odd number of lengths the gaps become dashes when they are repeated.
+        chain = is_chain([float(number) for number in (numbers * 2 if len(numbers) % 2 else numbers)[::2]])
+        return "dashes and dots" if chain else "dashes" if numbers else "", chain
+
+    @property
     def layer(self) -> str:
         """The innermost layer, "" for none."""
         return self.layers[-1] if self.layers else ""
@@ -211,11 +221,10 @@ def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> 
         _, row, looks, within = (each.pop(k) for each in found.of_outlines)
         for number, piece in enumerate(pieces):
             found.append(piece, {**row, "name": f"{row.get('name', 'block')} {number + 1}"}, looks, within)
-    around = {line.layer: within for line, within in zip(found.loose, found.loose_within, strict=True)}
-    for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
-        found.append(ring, _row(around[layer], f"face {number}"), ("face",), around[layer])
-    if faces.rings:
-        faces.notes.append(faces_note(faces, wanted))
+    paths = {line.layer: within for line, within in zip(found.loose, found.loose_within, strict=True)}
+    for number, (ring, layer, around) in enumerate(zip(faces.rings, faces.layers, faces.around, strict=True)):
+        within = tuple(word for one in around for word in paths[one])
+        found.append(ring, _row(paths[layer], f"face {number}"), ("face",), within)
     return faces
 
 
@@ -418,7 +427,7 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
         joined = joined_ends(placed)
         if joined is None and not (closed and len(placed) > 2):
             handle = name or f"<{_tag(element)}>"
-            found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks, off, curves))
+            found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks, off, curves, *where.dashes))
             found.loose_within.append(where.layers)
             continue
         # A closed path may have a short last edge: it stays.

@@ -13,6 +13,7 @@ from .notes import LEFT_OUT, Note
 #: Kinds of what is left out, for one and for many.
 KINDS = {
     "open": ("line that closes no outline", "lines that close no outline"),
+    "axis": ("line in the line type of an axis", "lines in line types of axes"),
     "across": ("face of loose lines across outlines", "faces of loose lines across outlines"),
     "hole": ("face with a hole", "faces with a hole"),
     "pieces": ("face in several pieces", "faces in several pieces"),

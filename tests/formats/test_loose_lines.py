@@ -330,3 +330,60 @@ def test_thousands_of_lines_close_their_cells(tmp_path):
     across = [((x, y), (x + 1, y)) for x in range(n) for y in range(n + 1)]
     lines = "".join(f"M{x} {y}L{u} {v}M{y} {x}L{v} {u}" for (x, y), (u, v) in across)
     assert read_layout(svg(tmp_path, f'<path d="{lines}"/>', f"0 0 {n} {n}")).n_blocks == n * n
+
+
+def across(space, **of_axes):
+    """Six stones in three courses, drawn by lines, and an upright axis across them on a layer of its own."""
+    document = space.doc
+    document.layers.add("axes", linetype=of_axes.pop("of_layer", "Continuous"))
+    for y in (0, 200, 400, 600):
+        space.add_line((0, y), (1000, y), {"layer": "wall"})
+    for x, low, high in ((0, 0, 600), (1000, 0, 600), (500, 0, 200), (400, 200, 400), (500, 400, 600)):
+        space.add_line((x, low), (x, high), {"layer": "wall"})
+    space.add_line((250, -100), (250, 700), {"layer": "axes", **of_axes})
+
+
+@pytest.mark.parametrize(
+    "of_axes",
+    [{"linetype": "CENTER"}, {"linetype": "DASHDOT2"}, {"of_layer": "PHANTOM"}, {"linetype": "TRATTO E PUNTO"}],
+)
+def test_lines_in_line_types_of_axes_are_no_joints(tmp_path, of_axes):
+    document = ezdxf.new("R2010", setup=True)
+    document.linetypes.add("TRATTO E PUNTO", [3.0, 2.0, -0.5, 0.0, -0.5])
+    across(document.modelspace(), **of_axes)
+    document.saveas(tmp_path / "a.dxf")
+    drawing = read_layout(tmp_path / "a.dxf")
+    assert drawing.n_blocks == 6
+    assert any(n.startswith("left out: 1 line in the line type of an axis on layer 'axes'") for n in drawing.notes)
+    # Who asks for its layer has it cut.
+    assert read_layout(tmp_path / "a.dxf", only=["wall", "axes"]).n_blocks == 9
+
+
+@pytest.mark.parametrize("linetype", ["Continuous", "DASHED"])
+def test_layers_whose_lines_run_across_those_of_others_are_told(tmp_path, linetype):
+    document = ezdxf.new("R2010", setup=True)
+    across(document.modelspace(), linetype=linetype)
+    document.saveas(tmp_path / "a.dxf")
+    drawing = read_layout(tmp_path / "a.dxf")
+    assert drawing.n_blocks == 9
+    kind = " (DASHED)" if linetype == "DASHED" else ""
+    says = (
+        f"lines run across those of other layers: 1 line on layer 'axes'{kind} around 6 faces; leave them out (ignore)"
+    )
+    assert any(note.startswith(says) for note in drawing.notes)
+    assert not any("run across" in note for note in read_layout(tmp_path / "a.dxf", ignore="axes").notes)
+
+
+def test_axes_of_inserted_blocks_are_no_joints_either(tmp_path):
+    document = ezdxf.new("R2010", setup=True)
+    across(document.blocks.new("wall"), linetype="BYBLOCK")
+    document.modelspace().add_blockref("wall", (0, 0), dxfattribs={"linetype": "CENTER"})
+    document.saveas(tmp_path / "a.dxf")
+    assert read_layout(tmp_path / "a.dxf").n_blocks == 6
+
+
+def test_strokes_of_dashes_and_dots_are_no_joints(tmp_path):
+    frame = '<path d="M0 0H1000M1000 0V600M1000 600H0M0 600V0" stroke="red"/>'
+    for dashes, n in (("8 2 0 2", 1), ("8 2", 2), ("none", 2)):
+        axis = f'<g stroke-dasharray="{dashes}" id="axes"><path d="M250 -9V700" stroke="red"/></g>'
+        assert read_layout(svg(tmp_path, frame + axis)).n_blocks == n
