@@ -57,7 +57,12 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         {"name": body.name, **(rows[k] if rows else {}), **({"name": body.name} if body.piece_of else {})}
         for body, k in zip(bodies, closed.owners.tolist(), strict=True)
     ]
-    up, up_says = _up(path, bodies, size) if suffix == ".glb" else (drawn.up, drawn.up_says)
+    if suffix == ".glb":
+        up, up_says = _up(path, bodies, size)
+    else:
+        # .dae states it, and we have z up where we write a row, with a name, for each block.
+        stated = suffix == ".dae" or (len(rows) > 0 and all("name" in row for row in rows))
+        up, up_says = drawn.up, drawn.up_says if stated else _stand_along_y(bodies, size)
     return Bodies(tuple(bodies), tuple(known), drawn.unit, (*closed.notes, *drawn.notes), up=up, up_says=up_says)
 
 
@@ -242,8 +247,7 @@ def _description(path: Path) -> dict[str, Any]:
 def _up(path: Path, bodies: Sequence[Body], size: float) -> tuple[str, str]:
     """Find the coordinate that points up in a .glb file: y, as the format has it, unless its program does not care.
 
-    Of a program that writes coordinates as they are, z, which is up in most of them; y where the bodies stand along it
-    on level faces, and fewer do than along z: what lies on its side does so with most of its bodies.
+    Of a program that writes coordinates as they are, z, which is up in most of them; y where the bodies stand along it.
     """
     try:
         generator = str(_description(path).get("asset", {}).get("generator", ""))
@@ -252,22 +256,25 @@ def _up(path: Path, bodies: Sequence[Body], size: float) -> tuple[str, str]:
     program = next((word for word in AS_THEY_ARE if word in generator.lower()), "")
     if not program:
         return "y", f"y is up in .glb files{f' ({generator})' if generator else ''}"
+    writes, stand = f"{program} writes coordinates as they are", _stand_along_y(bodies, size)
+    return ("y", f"{writes}, and {stand}") if stand else ("z", f"{writes}, z up in most files")
+
+
+def _stand_along_y(bodies: Sequence[Body], size: float) -> str:
+    """Say that bodies stand along y on level faces, fewer than along z: what lies on its side does with most; or ""."""
     along_y, along_z = (_standing(bodies, axis, size) for axis in (1, 2))
-    writes = f"{program} writes coordinates as they are"
-    if along_y and along_y <= STANDING * len(bodies) and (along_y < along_z or not along_z):
-        found = f"{along_z} would" if along_z else "none would"
-        return (
-            "y",
-            f"{writes}, and {counted(along_y, 'body stands', 'bodies stand')} on a level if y is up, {found} if z is",
-        )
-    return "z", f"{writes}, z up in most files"
+    if not along_y or along_y > STANDING * len(bodies) or 0 < along_z <= along_y:
+        return ""
+    stand = counted(along_y, "body stands", "bodies stand")
+    return f"{stand} on a level if y is up, {along_z or 'none'} would if z is"
 
 
 def _standing(bodies: Sequence[Body], axis: int, size: float) -> int:
     """Count the bodies with a face in the lowest level along an axis; 0 if the middle of all is not above them."""
     import shapely
 
-    corners = [body.points for body in bodies]
+    # The pieces of one mesh share its points.
+    corners = [body.points[np.unique(body.faces)] for body in bodies]
     lowest = min(float(points[:, axis].min()) for points in corners)
     feet = [points[points[:, axis] <= lowest + LEVEL * size] for points in corners]
     feet = [foot for foot in feet if len(foot) > 2]

@@ -70,6 +70,26 @@ def test_where_a_program_may_write_either_axis_up_it_is_the_one_on_which_the_blo
     assert any(re.search(says, note) for note in found.notes)
 
 
+@pytest.mark.parametrize("suffix", ["obj", "stl", "ply", "off"])
+@pytest.mark.parametrize("name", ["barrel vault", "dome"])
+def test_where_blocks_stand_along_y_that_is_told_of_files_that_do_not_say_what_is_up(tmp_path, name, suffix):
+    layout = layout_of(generators.build(name))
+    for up in "yz":
+        turned = [points if up == "z" else points[:, [0, 2, 1]] * [1, 1, -1] for points, _ in layout.solids]
+        meshes = [
+            trimesh.Trimesh(own, fans(of[1]), process=False) for own, of in zip(turned, layout.solids, strict=True)
+        ]
+        path = tmp_path / f"{up}.{suffix}"
+        trimesh.util.concatenate(meshes).export(path)
+        told = [note for note in read_layout(path, dimension=3).notes if 'give view = "xy" if y is up' in note]
+        assert len(told) == (up == "y")
+        assert all(re.match(r"\d bodies stand on a level if y is up, (\d+|none) would if z is: z was", n) for n in told)
+    if suffix in ("obj", "ply"):
+        # We write that z is up.
+        write_layout(replace(layout, blocks=tuple(zip(turned, (f for _, f in layout.solids), strict=True))), path)
+        assert not any("is up" in note for note in read_layout(path, dimension=3).notes)
+
+
 @pytest.mark.parametrize("suffix", ["stl", "ply"])
 @pytest.mark.parametrize(
     "name", ["T corner", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("dome", "cross vault"))]
