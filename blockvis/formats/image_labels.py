@@ -33,6 +33,12 @@ WHITE = 240
 #: Channels of grey differ by no more, of 255.
 GREY = 8
 
+#: So many pixels from another label a codec, which works on squares of 16 pixels, leaves what was one value exact ...
+CODEC = 16
+
+#: ... where this share of pixels, or more, is like those right of it and below, and less than EXACT of what varies.
+PAINTED = 0.95
+
 #: A flat place of a noisy image is so many pixels from its border.
 WIDE = 3.0
 
@@ -115,6 +121,8 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
         outer = _background_of_mask(_filled(numbers, found, 0, np.inf)[0])
     else:
         outer = _background(numbers, known, coloured=coloured or not exact)
+    if not exact and _is_painted(found, outer):
+        raise Photograph
     numbers, nearest = _filled(numbers, found, outer, np.inf if mask else BORDER)
     moved, said = int((found.numbers < 0).sum()), "" if outer is None else called[outer]
     if not exact and not mask:
@@ -238,10 +246,31 @@ def _colour(rgb: np.ndarray) -> str:
 
 def _alike(values: np.ndarray) -> float:
     """Share of the pixels that are like those right of them and below."""
-    if min(values.shape) < 2:
-        return 1.0
-    first = values[:-1, :-1]
-    return float(((first == values[1:, :-1]) & (first == values[:-1, 1:])).mean())
+    return float(_same(values[..., None]).mean()) if min(values.shape) > 1 else 1.0
+
+
+def _same(shown: np.ndarray) -> np.ndarray:
+    """(height - 1, width - 1) bool array: which pixels are like those right of them and below."""
+    first = shown[:-1, :-1]
+    same: np.ndarray = ((first == shown[1:, :-1]) & (first == shown[:-1, 1:])).all(axis=2)
+    return same
+
+
+def _is_painted(found: _Found, outer: int | None) -> bool:
+    """Whether stones are exact and something else is not, as of a photograph whose openings are painted over.
+
+    The noise of a codec, or of a scan, is everywhere.
+    """
+    from scipy import ndimage
+
+    same, shares = _same(found.shown), dict[int, float]()
+    for k in range(len(found.values)):
+        other = (found.numbers >= 0) & (found.numbers != k)
+        deep = (found.numbers == k) & (ndimage.distance_transform_edt(~other) > CODEC)
+        own = same[deep[:-1, :-1]]
+        shares |= {k: float(own.mean())} if len(own) else {}
+    stones = [share for k, share in shares.items() if k != outer]
+    return max(stones, default=0.0) >= PAINTED and min(shares.values()) < EXACT
 
 
 def _of_values(values: np.ndarray, image: Image.Image, wanted: int | None) -> _Found:

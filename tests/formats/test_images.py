@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFilter
 
 from blockvis import generators, read, read_layout, save_layout
 from blockvis.cli import main
@@ -339,6 +339,26 @@ def test_a_blob_an_empty_image_and_a_photograph_are_refused(tmp_path, capsys):
     assert "is no image that can be read" in informed(capsys, tmp_path / "wall.tif", "--width", 3)[2]
     (tmp_path / "wall.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", encoding="utf-8")
     assert "is no image: width is of images" in informed(capsys, tmp_path / "wall.obj", "--width", 3)[2]
+
+
+@pytest.mark.parametrize("ending", ["png", "jpg"])
+def test_a_photograph_with_openings_painted_over_is_no_mask_of_them(tmp_path, capsys, ending):
+    random = np.random.default_rng(3)
+    drawn, n = drawn_wall()
+    wall = np.asarray(drawn.resize((600, 320), Image.Resampling.NEAREST)).astype(float)[..., None]
+    noise = random.normal(0.0, 8.0, (320, 600, 3))
+    pixels = np.where(wall > 0.0, (150, 120, 95), (205, 200, 190)) + noise
+    image = Image.fromarray(pixels.clip(0, 255).astype(np.uint8)).filter(ImageFilter.GaussianBlur(0.7))
+    for left, low, right, high in ((100, 60, 180, 140), (400, 60, 480, 140), (250, 120, 330, 280)):
+        ImageDraw.Draw(image).rectangle((left, low, right, high), fill=(40, 30, 25))
+    image.save(tmp_path / f"a.{ending}", quality=85)
+    code, _, said = informed(capsys, tmp_path / f"a.{ending}", "--width", "3")
+    assert code != 0
+    assert "is a photograph" in said
+    # Stones cut out of a photograph, with what is around them painted over, are a mask.
+    stones = Image.fromarray(np.where(wall > 0.0, pixels, 0.0).clip(0, 255).astype(np.uint8))
+    stones.save(tmp_path / f"b.{ending}", quality=95)
+    assert read_layout(tmp_path / f"b.{ending}", width=3.0, smallest=0.05).n_blocks == n
 
 
 def test_charts_and_shaded_drawings_are_refused_unless_their_specks_are_said(tmp_path, capsys):
