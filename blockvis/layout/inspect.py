@@ -224,7 +224,7 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
         "overlapping": overlaps(assembly, ROUNDING * width),
         "overlap_tolerance": DEFAULT_OVERLAP * width,
         "joint_thickness": proposal.thickness if proposal.thickness >= smallest and is_mortar else 0.0,
-        "joints": proposal.stretches,
+        "joints": proposal.stretches.chosen(proposal.stretches.gaps.max(axis=1) >= smallest),
         "rows": (("corners", f"{sum(map(len, layout.outlines))}" + (f"; in a run {finer}" if finer else "")),),
         "joint_rows": _mortar_rows(proposal, smallest, shares[0], is_mortar),
     }

@@ -68,7 +68,13 @@ def proposed_ignore(
         covers = all(i in blocks or j in blocks for i, j in pairs)
         if covers and len(blocks) < LESS * layout.n_blocks:
             known.setdefault(patterns, blocks)
-    for patterns, blocks in sorted(known.items(), key=lambda item: len(item[1]))[:TRIES]:
+    concerned = {block for pair in pairs for block in pair}
+
+    def rank(item: tuple[tuple[str, ...], set[int]]) -> tuple[bool, int]:
+        """First what one word names, if all of it overlaps: of windows drawn as frames and panes, the layer of both."""
+        return len(item[0]) > 1 or not item[1] <= concerned, len(item[1])
+
+    for patterns, blocks in sorted(known.items(), key=rank)[:TRIES]:
         try:
             without = read_without(patterns)
             if without.n_blocks < (1.0 - LESS) * layout.n_blocks or deep_overlaps(without):

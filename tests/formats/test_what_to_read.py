@@ -3,6 +3,7 @@
 import ezdxf
 import pytest
 
+import blockvis
 from blockvis.cli import main
 
 
@@ -51,6 +52,8 @@ def test_a_background_alone_is_no_block(tmp_path, capsys):
 def test_only_gaps_that_are_joints_are_proposed_as_such(tmp_path, capsys, gap, says):
     drawn(tmp_path / "wall.dxf", *(brick(k * (1.0 + gap), 0.0) for k in range(4)))
     assert says in info(capsys, tmp_path / "wall.dxf")
+    # What is no joint has no mark and no colour bar in the picture.
+    assert len(blockvis.inspect(tmp_path / "wall.dxf").joints) == (3 if gap > 1e-3 else 0)
 
 
 def test_a_window_reads_what_lies_within_it_and_tells_what_it_cuts(tmp_path, capsys, monkeypatch):
@@ -124,6 +127,13 @@ def test_overlaps_name_the_smallest_set_to_leave_out_having_tried_it(tmp_path, c
     document.modelspace().add_circle((1.0, 0.5), 0.3)
     document.saveas("discs.dxf")
     assert '--ignore "circle" leaves out 1 of 9 blocks' in info(capsys, "discs.dxf")
+    document = drawn("windows.dxf", *bricks)
+    for x in (2.0, 4.0):
+        # A window, and what lies across it.
+        for ring in (brick(x, 2.0), brick(x - 0.1, 2.1, 1.2, 0.3)):
+            document.modelspace().add_lwpolyline(ring, close=True).dxf.layer = "windows"
+    document.saveas("windows.dxf")
+    assert '--ignore "windows" leaves out 4 of 12 blocks' in info(capsys, "windows.dxf")
     drawn("bands.dxf", *bricks, *(brick(0.1, y, 3.7, 0.2) for y in (0.1, 0.4)))
     assert '--ignore "block 37" --ignore "block 38" leaves out 2 of 10 blocks' in info(capsys, "bands.dxf")
 
