@@ -188,7 +188,8 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
         if not (part > 1e-9 and np.isfinite(change.motion).all()):
             break
         point.take(point.at.moved(change, part))
-    if point.mean > ACCEPTED * size or point.imbalance > ACCEPTED or point.residual > ACCEPTED * size:
+    # Numbers that are none are not accepted.
+    if not (point.mean <= ACCEPTED * size and point.imbalance <= ACCEPTED and point.residual <= ACCEPTED * size):
         raise NotSolved(f"mean product {point.mean / size:.1e} of the movement, {point.imbalance:.1e} out of balance")
     forces = point.forces(point.at.normal, point.at.shear)
     return StepSolution(point.at.motion, forces, problem.trial(point.at.motion), point.at.multiplier)
