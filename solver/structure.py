@@ -190,9 +190,9 @@ class Structure(Shown):
         -------
         Response
             ``settlement`` is the control displacement [m], ``load_multiplier`` is α and ``reaction`` the resultant of
-            the live loads, α times its value at 1 [N]. The first increment has the limit load of the undeformed
-            structure. The collapse is where α reaches zero, ``lost`` "capacity": beyond, the structure falls under its
-            dead load alone; or where no equilibrium follows along the control at some α, ``lost`` "equilibrium".
+            the live loads, α times its value at 1 [N]. The first increment has the non-associative limit load of the
+            undeformed structure. The collapse is where α reaches zero, ``lost`` "capacity": beyond, the structure falls
+            under its dead load alone; or where no equilibrium follows along the control, ``lost`` "equilibrium".
 
         Raises
         ------

@@ -49,6 +49,9 @@ CONTROL = Section(
     ),
 )  # fmt: skip
 
+#: Part of a multiplier by which increments of a plateau differ: programs are solved to less.
+EQUAL = 1e-6
+
 
 class PushoverKind(AnalysisKind):
     """The load multiplier over a control displacement, after settlements where there are any."""
@@ -168,7 +171,8 @@ def _largest(response: solver.Response) -> solver.Increment | None:
     """Find the told increment of the largest multiplier; where joints or ground give, the first one is not carried."""
     path = response.path[1:] if response.interfaces.elastic else response.path
     found = [increment for increment in path if math.isfinite(increment.load_multiplier)]
-    return max(found, key=lambda increment: increment.load_multiplier, default=None)
+    most = max((increment.load_multiplier for increment in found), default=0.0)
+    return next((i for i in found if i.load_multiplier >= most - EQUAL * abs(most)), None)
 
 
 def _lost(response: solver.Response) -> str:

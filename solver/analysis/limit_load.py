@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,9 +19,10 @@ from solver.interfaces import Interfaces
 from solver.kinematics import Pose, moved_vertices, relative_velocities, unit_lengths
 from solver.loads import Loads, checked_loads
 from solver.path.stepping import Stepper
+from solver.program.non_associative import NonAssociative, ProgramState
 from solver.program.strength import Admissible, point_strength
 from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces, face_wrench_matrix, point_forces
-from solver.programs.problem import SolveError, Unbounded
+from solver.programs.problem import Unbounded
 from solver.programs.solve import solve_between
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Bonds, State
@@ -39,35 +41,11 @@ from solver.ties import (
     slack,
     ties_as_drawn,
 )
-from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION, USED_UP
+from solver.tolerances import COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION, USED_UP
 from solver.words import checked, counted, plain
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25
-
-#: Non-associative flow: part of the new normal forces in the next program where they hardly depend on the last ones,
-#: and where they do, as in vaults, whose programs go in circles with more; programs at most.
-CONFIDENT, RELAXATION, PROGRAMS = 0.9, 0.5, 300
-
-#: Non-associative flow: programs after which the next one follows of so many changes.
-PLAIN_PROGRAMS, REMEMBERED = 40, 15
-
-#: Non-associative flow has converged when the multiplier changes by less than programs are solved to, and shear forces
-#: exceed friction by less than this part of the largest normal force; the second in space, where the multiplier is off
-#: by as much. There rounding may stop it short: then after so many programs that have come no nearer.
-FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE, NO_NEARER = 1e-6, 1e-8, 5
-
-#: Cost of a change of a normal force in the non-associative programs, in multipliers: it only decides between equals.
-#: The second in space, where solutions are interior ones and a smaller cost is lost in their rounding; it is seen in
-#: the motion, which a last program without it gives.
-CHANGE_COST, CHANGE_COST_IN_SPACE = 1e-8, 1e-5
-
-#: Non-associative flow in the plane: parts of that cost in which points differ, at most, by place along the resultants
-#: of the live and the dead load and by normal force at rest: between equals the order of the rows would decide.
-UNLIKE = np.array([0.1, 0.037, 0.071])
-
-#: Non-associative flow: cost of unbalanced force, in multipliers, above that of any mechanism.
-UNBALANCED_COST = 1e3
 
 
 def find_limit_load(
@@ -179,23 +157,6 @@ def _check_options(assembly: Assembly, flow: str, torsion: str, ties: Sequence[T
         raise ValueError(f"torsion = 'uniform' knows no ties ('{ties[0].name}'); take torsion = 'points'")
 
 
-@dataclass(frozen=True)
-class _State:
-    """Forces (n_contacts, d), multiplier and velocity of one program, in its units.
-
-    ``unbalanced`` is what rows are, or may be, left with; ``drag`` (n_contacts,) the friction force that slip works
-    against without being in the normal forces' power.
-    """
-
-    forces: np.ndarray
-    multiplier: float
-    velocity: np.ndarray
-    unbalanced: np.ndarray
-    gap: float
-    falls: bool = False
-    drag: np.ndarray | None = None
-
-
 class _Problem:
     """One geometry and its loads in units of block size and mean block load; rows of the free blocks.
 
@@ -275,7 +236,7 @@ class _Problem:
         """Numbers of the force of a contact point: 2 in the plane, 3 in space, 4 with the torsion of its face."""
         return self.contacts.points.shape[1] + (self.faces is not None)
 
-    def balanced(self, *, with_live: bool) -> _State:
+    def balanced(self, *, with_live: bool) -> ProgramState:
         """The least unbalanced force that the dead load leaves, and how the blocks move where it is not nothing."""
         rows = len(self.dead)
         identity = sp.identity(rows, format="csc")
@@ -287,7 +248,7 @@ class _Problem:
         falls = float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * self.total
         return replace(found, multiplier=multiplier, unbalanced=unbalanced, falls=falls)
 
-    def associative(self, balanced: _State) -> _State:
+    def associative(self, balanced: ProgramState) -> ProgramState:
         """The program of the limit load; what the dead load leaves unbalanced by rounding it may leave too.
 
         In space it balances everything: round cones have no vertices that rounding could take away.
@@ -295,7 +256,9 @@ class _Problem:
         left = balanced.unbalanced if self.size == 2 else np.zeros(len(self.dead))
         return self._carried(self.price, [sp.csc_array(self.live[:, None])], np.array([-1.0]), left)
 
-    def _carried(self, price: np.ndarray, beside: list[sp.csc_array], cost: np.ndarray, left: np.ndarray) -> _State:
+    def _carried(
+        self, price: np.ndarray, beside: list[sp.csc_array], cost: np.ndarray, left: np.ndarray
+    ) -> ProgramState:
         """The associative program over forces that points can carry, at a price, and columns with a cost.
 
         The price is that of normal forces; the first of the columns is that of the multiplier; ``left`` is what rows
@@ -314,9 +277,9 @@ class _Problem:
         )
         n = columns.shape[1]
         forces = (columns @ solution.x[:n]).reshape(-1, self.size)
-        return _State(forces, float(solution.x[n]), -solution.row_dual[:rows], left, solution.gap)
+        return ProgramState(forces, float(solution.x[n]), -solution.row_dual[:rows], left, solution.gap)
 
-    def at_rest(self, balanced: _State) -> np.ndarray:
+    def at_rest(self, balanced: ProgramState) -> np.ndarray:
         """(n,) array: normal forces of the state of least elastic energy under the dead load, where there is one."""
         free, d = self.assembly.free, self.contacts.points.shape[1]
         matrix = wrench_matrix(self.contacts, self.pose, self.length)
@@ -331,114 +294,16 @@ class _Problem:
             forces = balanced.forces
         return np.asarray(forces[:, 0])
 
-    def non_associative(self, balanced: _State, found: LimitStatus) -> LimitLoad:
+    def non_associative(self, balanced: ProgramState, found: LimitStatus) -> LimitLoad:
         """The sequence of programs in which friction is that of the normal forces carried over."""
-        normal, before, status = self.at_rest(balanced), balanced, LimitStatus.NOT_CONVERGED
-        plane = self.size == 2
-        most_excess = FRICTION_EXCESS if plane else FRICTION_EXCESS_IN_SPACE
-        # Of equal ways to carry, those that press where nothing pressed come last.
-        idle = normal <= CARRYING_FRACTION * normal.max(initial=0.0)
-        change_cost = (CHANGE_COST * self._unlike(normal) if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
-        normals: list[np.ndarray] = []
-        answers: list[np.ndarray] = []
-        nearest, least, used, programs, best_at, locked = balanced, np.inf, normal, 1, 0, False
-        for _ in range(PROGRAMS):
-            try:
-                state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
-            except SolveError:
-                if nearest is balanced:
-                    raise
-                break
-            largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
-            excess = friction_excess(state.forces, self.friction, self.cohesion) / largest
-            change = abs(self._gained(state, normal)) / max(abs(state.multiplier), 1e-12)
-            error = np.inf if state.falls else max(excess, change)
-            settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
-            if nearest is balanced or settled or error < least:
-                nearest, least, used, best_at = state, error, normal, programs
-            if settled or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
-                break
-            added = state.forces - before.forces
-            within = friction_excess(added, self.friction) <= FRICTION_EXCESS * float(np.abs(added).max())
-            locks = within and state.multiplier > before.multiplier
-            locked |= locks
-            if locks and (programs > PLAIN_PROGRAMS or largest * FRICTION_EXCESS > 1.0):
-                # What a program adds may be added without end, unless crushing ends it (raises).
-                self.associative(balanced)
-            normals = [*normals[-REMEMBERED:], normal]
-            answers = [*answers[-REMEMBERED:], state.forces[:, 0]]
-            normal, before = _next_normal(normals, answers, programs > PLAIN_PROGRAMS and not locks), state
-        if least <= FRICTION_EXCESS:
-            status = found
-        elif locked:
-            self.associative(balanced)
-        if status is found and not plane:
-            free = self._sliding(used, balanced.unbalanced, 0.0 * change_cost)
-            nearest, programs = replace(nearest, velocity=free.velocity, gap=free.gap), programs + 1
-        return self.result(nearest, status, "non-associative", programs)
+        points = self.friction, self.cohesion, self.crushing, self.tension, self.price
+        equations = self.contacts, self.pose, self.matrix, self.dead, self.live
+        flow = NonAssociative(*equations, *points, self.total, self.size)
+        at_rest, associative = (balanced.forces, balanced.multiplier), partial(self.associative, balanced)
+        state, converged, programs = flow.limit(self.at_rest(balanced), at_rest, associative)
+        return self.result(state, found if converged else LimitStatus.NOT_CONVERGED, "non-associative", programs)
 
-    def _gained(self, state: _State, normal: np.ndarray) -> float:
-        """What the multiplier gains, to first order, once friction is that of its normal forces, not of ``normal``."""
-        slip = np.linalg.norm((self.matrix.T @ state.velocity).reshape(-1, self.size)[:, 1:], axis=1)
-        return float((self.friction * (state.forces[:, 0] - normal)) @ slip)
-
-    def _unlike(self, normal: np.ndarray) -> np.ndarray:
-        """(n,) array: factors in which points differ whatever their order, by forces (n,) at rest and places."""
-        points, blocks = self.contacts.points, (self.contacts.block_a, self.contacts.block_b)
-        # Corners of two blocks on a third are at one place: what they belong to tells them apart.
-        places = points + sum(np.where(block[:, None] < 0, points, self.pose.positions[block]) for block in blocks)
-        places -= places.mean(axis=0)
-        resultants = [load.reshape(-1, 3)[:, :2].sum(axis=0) for load in (self.live, self.dead)]
-        unlike = np.column_stack([places @ np.transpose(resultants), normal])
-        return 1.0 + unlike @ (UNLIKE / np.maximum(np.abs(unlike).max(axis=0, initial=0.0), 1e-300))
-
-    def _sliding(self, normal: np.ndarray, unbalanced: np.ndarray, change_cost: np.ndarray) -> _State:
-        """One program of the sequence: maximise α with |T| ≤ B; of equal α the normal forces nearest to N⁰, ``normal``.
-
-        Columns: the shear forces, N, p, m, α and unbalanced forces, with N - N⁰ = p - m, and a row N for each point
-        that may crush. In the plane T = (u - v) / 2 of columns u + v = 2 B; in space the disc |T| ≤ B is the cone
-        |T| ≤ B s with s = 1.
-        """
-        n, rows, size, plane = len(normal), len(self.dead), self.size, self.size == 2
-        bound, brittle = self.cohesion + self.friction * normal, np.flatnonzero(np.isfinite(self.crushing))
-        identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
-        if plane:
-            half = sp.diags_array(np.full(n, 0.5))
-            shears = sp.hstack([half, -half])
-            to_shear = self.matrix[:, 1::2] @ shears
-            level, level_is, slopes, slack = sp.hstack([eye, eye]), 2.0 * bound, np.zeros(0), unbalanced
-        else:
-            disc = np.ones((n, size)) * bound[:, None]
-            disc[:, 0] = 0.0
-            shears = sp.diags_array(disc.ravel())
-            to_shear = self.matrix @ shears
-            level = sp.csr_array((np.ones(n), (np.arange(n), size * np.arange(n))), shape=(n, size * n))
-            level_is, slopes, slack = np.ones(n), np.ones(n), np.zeros(rows)
-        first = shears.shape[1]
-        blocks = [
-            [to_shear, self.matrix[:, 0::size], None, None, sp.csr_array(self.live[:, None]), identity, -identity],
-            [level, None, None, None, None, None, None],
-            [None, eye, -eye, eye, None, None, None],
-            [None, sp.csr_array(eye)[brittle], None, None, None, None, None],
-        ]
-        # Joints that may pull press sooner: pulling takes friction away, until nothing is left that could carry.
-        released = change_cost * (1.0 + (self.tension > 0.0))
-        of_forces = [np.zeros(first), self.price, change_cost, released]
-        solution = solve_between(
-            np.concatenate([*of_forces, [-1.0], np.full(2 * rows, UNBALANCED_COST)]),
-            sp.csc_array(sp.block_array(blocks, format="csc")),
-            np.concatenate([-self.dead - slack, level_is, normal, np.zeros(len(brittle))]),
-            np.concatenate([-self.dead + slack, level_is, normal, self.crushing[brittle]]),
-            slopes,
-            size,
-        )
-        shear, x = (shears @ solution.x[:first]).reshape(n, -1), solution.x[first:]
-        forces = np.column_stack([x[:n], shear[:, int(not plane) :]])
-        multiplier, left = float(x[3 * n]), x[3 * n + 1 :][: 2 * rows].max(initial=0.0)
-        falls = bool(left > FALLING_FRACTION * self.total)
-        return _State(forces, multiplier, -solution.row_dual[:rows], unbalanced, solution.gap, falls, bound)
-
-    def result(self, state: _State, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
+    def result(self, state: ProgramState, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
         """The state in metres and newtons, its bounds and its certificate recomputed from it."""
         velocity, multiplier = state.velocity, state.multiplier
         if status is LimitStatus.UNBOUNDED:
@@ -504,21 +369,6 @@ class _Problem:
             ties=plastic_forces(self.contacts, forces, self.ties, self.ties_at),
             crushing=at_strength[between] if np.isfinite(self.crushing[between]).any() else at_strength[:0],
         )
-
-
-def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], extrapolated: bool) -> np.ndarray:
-    """(n,) array: normal forces to try after those of the last programs and what these answered.
-
-    Anderson (1965), https://doi.org/10.1145/321296.321305, once a constant relaxation has not converged, as in vaults:
-    what changes of the forces did to their error says which would take it away.
-    """
-    errors = np.subtract(answers, normals)
-    tried, answered = (float(np.abs(of[-1] - of[-2 % len(of)]).max(initial=0.0)) for of in (normals, answers))
-    moved = normals[-1] + (CONFIDENT if answered < 0.2 * tried else RELAXATION) * errors[-1]
-    if extrapolated:
-        changes, of_errors = np.diff(normals, axis=0).T, np.diff(errors, axis=0).T
-        moved -= (changes + RELAXATION * of_errors) @ np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
-    return np.asarray(np.maximum(moved, 0.0))
 
 
 def _carrying_points(

@@ -14,6 +14,7 @@ from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.program.admissible import EquilibriumBounds, StaticProgram
 from solver.program.model import Model
+from solver.programs.problem import SolveError
 from solver.tolerances import COMPUTED_GAP, SMALLEST_RATE
 
 from .state import EquilibriumCheck, Place
@@ -88,9 +89,7 @@ class EquilibriumChecks:
         """Bounds at a place, and forces in equilibrium with the path's reaction [N or N·m], or its multiplier."""
         contacts, friction = self._contacts_at(place)
         bounds = self.bounds(place, gap)
-        # A pushover starts from its limit load.
-        is_limit = place.s == 0.0 and np.isfinite(bounds.high)
-        target = reaction if self.model.live is None else bounds.high if is_limit else place.multiplier
+        target = reaction if self.model.live is None else place.multiplier
         if not bounds.in_equilibrium:
             # The forces of the program that comes nearest to equilibrium.
             nearest = bounds.high if self.model.live is not None else self.reaction(place, contacts, bounds.forces)
@@ -142,6 +141,22 @@ class EquilibriumChecks:
         bounds = program.bounds()
         self.stepper.programs += program.programs
         return bounds
+
+    def limit_multiplier(self, place: Place) -> tuple[float, bool]:
+        """Multiplier of the limit load without dilatancy at a place at rest, and whether its sequence has converged.
+
+        Infinite where no program of it was solved.
+        """
+        program = self._program(place, COMPUTED_GAP)
+        flow, multiplier = program.non_associative, place.multiplier * program.live_size
+        forces = self.stepper.transferred(place, self._contacts_at(place)[0])[0][program.closed] - program.least
+        try:
+            # Where friction with dilatancy has no limit the path does not begin.
+            limit, converged, programs = flow.limit(forces[:, 0], (forces, multiplier), lambda: None)
+        except SolveError:
+            return np.inf, False
+        self.stepper.programs += programs
+        return limit.multiplier / program.live_size, converged
 
     def moves_control(self, place: Place) -> bool:
         """Whether the control displacement grows in the mechanism of the largest multiplier at a place."""

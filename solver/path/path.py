@@ -169,20 +169,21 @@ class Path:
         place = self._without_viscosity(self._at_rest(state.place, anew=False) or state.place)
         return replace(state, place=place, history=(place,))
 
-    def _at_rest(self, place: Place, anew: bool = True) -> Place | None:
+    def _at_rest(self, place: Place, anew: bool = True, multiplier: float | None = None) -> Place | None:
         """The place with forces in equilibrium, of least elastic energy or nearest to its own; None without any."""
+        # Beside the dead load with this part of the live load.
+        place = replace(place, multiplier=multiplier or 0.0)
         try:
-            forces = self.checks.nearest(replace(place, multiplier=0.0), COMPUTED_GAP, at_rest=anew)
+            forces = self.checks.nearest(place, COMPUTED_GAP, at_rest=anew)
         except NotSolved:
             bounds = self.checks.bounds(place)
             if not bounds.in_equilibrium:
                 return None
-            forces = bounds.forces if bounds.other_forces is None else 0.5 * (bounds.forces + bounds.other_forces)
-            if self.model.live is not None:
+            if self.model.live is not None and multiplier is None:
                 # A given pose may be in equilibrium with its live load only.
-                if not np.isfinite(bounds.high):
-                    return None
-                forces, place = bounds.forces, replace(place, multiplier=bounds.high)
+                middle = bounds.high if bounds.other_forces is None else 0.5 * (bounds.low + bounds.high)
+                return self._at_rest(place, anew, middle) if np.isfinite(bounds.high) else None
+            forces = bounds.forces if bounds.other_forces is None else 0.5 * (bounds.forces + bounds.other_forces)
         contacts = self.stepper.contacts_at(place)
         beyond = forces.copy()
         beyond[:, 0] += self.stepper.mortar.points(place, contacts).tension
@@ -260,9 +261,17 @@ class Path:
             # What has lost its capacity by then moves along the control all the same.
             if first_state.place.multiplier <= 0.0 and not self.checks.moves_control(place):
                 raise ValueError(self.driver.misdirected)
-        # Where joints or ground give, the first multiplier is not carried.
+            # A pushover starts from its limit load.
+            limit, converged = self.checks.limit_multiplier(place)
+            check = self._check(replace(place, multiplier=limit))
+            if not converged:
+                warning = "the limit load of friction without dilatancy has not converged: the path may carry less"
+                self.reports.notes.append((0.0, warning))
+            place = replace(place, multiplier=check.measured)
+        # What rises above the first multiplier by the joints' compliance alone is no peak; where these or ground give,
+        # it is not carried.
         peak = 0.0 if model.live is None or model.interfaces.elastic else bounds.high
-        self.state = replace(state, peak=peak)
+        self.state = replace(state, place=place, history=(place,), peak=peak)
         yield self._report(self.state, check)
         return None
 

@@ -15,6 +15,7 @@ from solver.programs.solve import CONIC_ROUTES, solve_between, solve_lp
 from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, FALLING_FRACTION
 
 from .model import Model
+from .non_associative import NonAssociative
 from .strength import Admissible, ForceLimits
 
 
@@ -76,6 +77,11 @@ class StaticProgram:
         self.load = model.scaled_load_at(pose).ravel()[free] + given[free]
         self.tolerance = BALANCE_TOLERANCE * model.total_load
         live, self.live_size = model.scaled_live(pose)
+        loads, points = (
+            (self.load, live[blocks].ravel()),
+            (friction, cohesion, most - least, -least, np.zeros(len(least))),
+        )
+        self.non_associative = NonAssociative(contacts, pose, matrix[free], *loads, *points, self.total, d)
         columns, objective = [balance], np.zeros(self.n)
         if self.live_size > 0.0:
             column = sp.csc_array(live[blocks].reshape(-1, 1))

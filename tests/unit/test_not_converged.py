@@ -27,7 +27,7 @@ weight_fraction = [1, 0]
 
 @pytest.mark.slow
 def test_the_upper_bound_is_named(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("solver.analysis.limit_load.PROGRAMS", 1)
+    monkeypatch.setattr("solver.program.non_associative.PROGRAMS", 1)
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
     assert main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out"), "--no-pictures"]) == 3
     (said,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("status"))

@@ -201,6 +201,61 @@ def test_the_peak_at_which_a_tie_or_a_joint_breaks_is_told_however_long_incremen
     assert glued.pushover(control).load_multiplier[1] == pytest.approx(glued.limit_load().multiplier, rel=0.01)
 
 
+def beside(interfaces=None, pushed_back=0.0, **structure):
+    """A wall 0.4 m wide and 2 m high that touches a block 2 m wide, pushed away from it, and its limit loads."""
+    outlines = [[[a, b], [c, b], [c, d], [a, d]] for a, b, c, d in ((0, 0, 0.4, 2), (-2, 0, 0, 2), (-5, -0.5, 5, 0))]
+    assembly = solver.Assembly.from_outlines(
+        outlines, roles=["free", "free", "fixed"], names=["wall", "rear", "ground"]
+    )
+    loads = sideways(assembly)
+    loads = replace(loads, dead=loads.dead - pushed_back * loads.live)
+    interfaces = solver.Interfaces(solver.InterfaceLaw(0.6)) if interfaces is None else interfaces
+    structure = solver.Structure(assembly, interfaces, loads, **structure)
+    limits = [structure.limit_load(flow=flow).multiplier for flow in ("non-associative", "associative")]
+    return structure, solver.ControlDisplacement("wall", (1, 0), increment=0.01, limit=0.01), limits
+
+
+@pytest.mark.parametrize("pushed_back", [0.0, 0.7])
+def test_a_pushover_begins_at_the_limit_load_of_friction_that_does_not_dilate(pushed_back):
+    """It began with the associative one, half as much again, which its path never carries; held by it alone, too."""
+    structure, control, (sliding, lifting) = beside(pushed_back=pushed_back)
+    first, *_, last = structure.pushover(control).path
+    assert first.load_multiplier == pytest.approx(sliding, abs=1e-6)
+    assert first.largest == pytest.approx(lifting, abs=1e-6)
+    assert first.load_multiplier < lifting - 0.1
+    assert first.certificate.equilibrium_residual < 1e-8
+    assert first.certificate.friction_excess < 1e-8
+    # From there on the wall tips alone: the tangent of the angle that is left, its centroid 10 mm farther.
+    assert last.load_multiplier == pytest.approx(pushed_back + np.tan(np.arcsin(0.19 / np.hypot(0.2, 1.0))), rel=2e-4)
+    again, *_ = structure.pushover(control, pose=last.pose).path
+    at_pose = structure.limit_load(flow="non-associative", pose=last.pose)
+    assert again.load_multiplier == pytest.approx(at_pose.multiplier, abs=1e-6)
+
+
+def test_the_first_multiplier_of_a_pushover_is_of_the_prestress_that_ties_are_drawn_with():
+    """Of both blocks that slide as one it is 0.6, of the wall alone, tied to the other one, less."""
+    found = []
+    for prestress in (0.0, 3000.0):
+        ends = ((0.4, 1.5), (-2.0, 1.5))
+        tie = solver.Tie("rod", (0, 1), ends, stiffness=1e7, strength=5e3, prestress=prestress)
+        structure, control, (sliding, _) = beside(ties=[tie])
+        first = structure.pushover(replace(control, limit=1e-4)).path[0]
+        assert first.ties.forces[0] == pytest.approx(prestress, abs=1.0)
+        assert first.load_multiplier < first.largest - 0.05 < sliding
+        found.append(first.load_multiplier)
+    assert found[0] == pytest.approx(beside()[2][0], abs=1e-4)
+    assert found[1] > found[0] + 0.2
+
+
+def test_a_first_multiplier_that_has_not_converged_is_noted(monkeypatch):
+    structure, control, _ = beside()
+    monkeypatch.setattr("solver.program.non_associative.PROGRAMS", 1)
+    first, second, *_ = structure.pushover(replace(control, limit=1e-4)).path
+    assert "at 0 m: the limit load of friction without dilatancy has not converged" in first.notes[0]
+    assert first.load_multiplier <= first.largest
+    assert not second.notes
+
+
 def test_far_from_the_origin_a_pushover_is_what_it_is_near():
     # Quarters of metres, which are as exact in both places.
     shift, found = np.array([524288.0, 5242880.0]), []
@@ -216,7 +271,7 @@ def test_far_from_the_origin_a_pushover_is_what_it_is_near():
         response = structure.pushover(control)
         first, last = response.path
         again = structure.pushover(control, pose=last.pose, ties_at=last.ties).path[0]
-        assert again.load_multiplier == pytest.approx(last.load_multiplier, rel=1e-9)
+        assert again.load_multiplier == pytest.approx(last.load_multiplier, rel=1e-8)
         assert last.ties.ends[0, 1] == pytest.approx(ends[1], abs=1e-9)
         found.append([*response.load_multiplier, *(last.pose.positions - first.pose.positions).ravel()])
     assert found[1] == pytest.approx(found[0], rel=1e-12, abs=2e-9)

@@ -1,0 +1,208 @@
+"""Limit loads of friction without dilatancy: a sequence of programs over the forces of contact points at a pose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from solver.geometry.contacts import Contacts
+from solver.kinematics import Pose
+from solver.programs.problem import SolveError
+from solver.programs.solve import solve_between
+from solver.results.certificate import friction_excess
+from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, FALLING_FRACTION
+
+#: Part of the new normal forces in the next program where they hardly depend on the last ones,
+#: and where they do, as in vaults, whose programs go in circles with more; programs at most.
+CONFIDENT, RELAXATION, PROGRAMS = 0.9, 0.5, 300
+
+#: Programs after which the next one follows of so many changes.
+PLAIN_PROGRAMS, REMEMBERED = 40, 15
+
+#: It has converged when the multiplier changes by less than programs are solved to, and shear forces
+#: exceed friction by less than this part of the largest normal force; the second in space, where the multiplier is off
+#: by as much. There rounding may stop it short: then after so many programs that have come no nearer.
+FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE, NO_NEARER = 1e-6, 1e-8, 5
+
+#: Cost of a change of a normal force in multipliers: it only decides between equals.
+#: The second in space, where solutions are interior ones and a smaller cost is lost in their rounding; it is seen in
+#: the motion, which a last program without it gives.
+CHANGE_COST, CHANGE_COST_IN_SPACE = 1e-8, 1e-5
+
+#: In the plane: parts of that cost in which points differ, at most, by place along the resultants
+#: of the live and the dead load and by normal force at rest: between equals the order of the rows would decide.
+UNLIKE = np.array([0.1, 0.037, 0.071])
+
+#: Cost of unbalanced force, in multipliers, above that of any mechanism.
+UNBALANCED_COST = 1e3
+
+
+@dataclass(frozen=True)
+class ProgramState:
+    """Forces (n_contacts, d), multiplier and velocity of one program, in its units.
+
+    ``unbalanced`` is what rows are, or may be, left with; ``drag`` (n_contacts,) the friction force that slip works
+    against without being in the normal forces' power.
+    """
+
+    forces: np.ndarray
+    multiplier: float
+    velocity: np.ndarray
+    unbalanced: np.ndarray
+    gap: float
+    falls: bool = False
+    drag: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class NonAssociative:
+    """Rows of free blocks, with a live load, and n contact points that have limits, in units of the program.
+
+    Forces are those beyond the largest tension, which is a load of the blocks, in ``dead``.
+    """
+
+    contacts: Contacts
+    pose: Pose
+    matrix: sp.csr_array  #: (n_rows, size n)
+    dead: np.ndarray  #: (n_rows,)
+    live: np.ndarray  #: (n_rows,)
+    friction: np.ndarray  #: (n,)
+    cohesion: np.ndarray  #: (n,)
+    crushing: np.ndarray  #: (n,): largest normal forces
+    tension: np.ndarray  #: (n,)
+    price: np.ndarray  #: (n,): of normal forces, in multipliers
+    total: float  #: sum of the loads
+    size: int  #: numbers of a force
+
+    def limit(
+        self, normal: np.ndarray, at_rest: tuple[np.ndarray, float], associative: Callable[[], object]
+    ) -> tuple[ProgramState, bool, int]:
+        """Run the sequence: its last program or the nearest one, whether it has converged, and how many were solved.
+
+        It begins with normal forces (n,), and with forces and a multiplier in equilibrium. ``associative`` raises
+        ``Unbounded`` where friction with dilatancy has no limit; raises ``SolveError`` where no program is solved.
+        """
+        (forces, multiplier), plane = at_rest, self.size == 2
+        unbalanced = np.abs(self.matrix @ forces.ravel() + self.dead + multiplier * self.live)
+        most_excess = FRICTION_EXCESS if plane else FRICTION_EXCESS_IN_SPACE
+        # Of equal ways to carry, those that press where nothing pressed come last.
+        idle = normal <= CARRYING_FRACTION * normal.max(initial=0.0)
+        change_cost = (CHANGE_COST * self._unlike(normal) if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
+        normals: list[np.ndarray] = []
+        answers: list[np.ndarray] = []
+        nearest: ProgramState | None = None
+        least, used, programs, best_at, locked = np.inf, normal, 1, 0, False
+        for _ in range(PROGRAMS):
+            try:
+                state, programs = self._sliding(normal, unbalanced, change_cost), programs + 1
+            except SolveError:
+                if nearest is None:
+                    raise
+                break
+            largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
+            excess = friction_excess(state.forces, self.friction, self.cohesion) / largest
+            change = abs(self._gained(state, normal)) / max(abs(state.multiplier), 1e-12)
+            error = np.inf if state.falls else max(excess, change)
+            settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
+            if nearest is None or settled or error < least:
+                nearest, least, used, best_at = state, error, normal, programs
+            if settled or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
+                break
+            added = state.forces - forces
+            within = friction_excess(added, self.friction) <= FRICTION_EXCESS * float(np.abs(added).max())
+            locks = within and state.multiplier > multiplier
+            locked |= locks
+            if locks and (programs > PLAIN_PROGRAMS or largest * FRICTION_EXCESS > 1.0):
+                # What a program adds may be added without end, unless crushing ends it (raises).
+                associative()
+            normals = [*normals[-REMEMBERED:], normal]
+            answers = [*answers[-REMEMBERED:], state.forces[:, 0]]
+            normal = _next_normal(normals, answers, programs > PLAIN_PROGRAMS and not locks)
+            forces, multiplier = state.forces, state.multiplier
+        converged = least <= FRICTION_EXCESS
+        if locked and not converged:
+            associative()
+        assert nearest is not None
+        if converged and not plane:
+            free = self._sliding(used, unbalanced, 0.0 * change_cost)
+            nearest, programs = replace(nearest, velocity=free.velocity, gap=free.gap), programs + 1
+        return nearest, converged, programs
+
+    def _gained(self, state: ProgramState, normal: np.ndarray) -> float:
+        """Tell what the multiplier gains, to first order, once friction follows from its forces, not ``normal``."""
+        slip = np.linalg.norm((self.matrix.T @ state.velocity).reshape(-1, self.size)[:, 1:], axis=1)
+        return float((self.friction * (state.forces[:, 0] - normal)) @ slip)
+
+    def _unlike(self, normal: np.ndarray) -> np.ndarray:
+        """(n,) array: factors in which points differ whatever their order, by forces (n,) at rest and places."""
+        points, blocks = self.contacts.points, (self.contacts.block_a, self.contacts.block_b)
+        # Corners of two blocks on a third are at one place: what they belong to tells them apart.
+        places = points + sum(np.where(block[:, None] < 0, points, self.pose.positions[block]) for block in blocks)
+        places -= places.mean(axis=0)
+        resultants = [load.reshape(-1, 3)[:, :2].sum(axis=0) for load in (self.live, self.dead)]
+        unlike = np.column_stack([places @ np.transpose(resultants), normal])
+        return 1.0 + unlike @ (UNLIKE / np.maximum(np.abs(unlike).max(axis=0, initial=0.0), 1e-300))
+
+    def _sliding(self, normal: np.ndarray, unbalanced: np.ndarray, change_cost: np.ndarray) -> ProgramState:
+        """One program of the sequence: maximise α with |T| ≤ B; of equal α the normal forces nearest to N⁰, ``normal``.
+
+        Columns: the shear forces, N, p, m, α and unbalanced forces, with N - N⁰ = p - m, and a row N for each point
+        that may crush. In the plane T = (u - v) / 2 of columns u + v = 2 B; in space the disc |T| ≤ B is the cone
+        |T| ≤ B s with s = 1.
+        """
+        n, rows, size, plane = len(normal), len(self.dead), self.size, self.size == 2
+        bound, brittle = self.cohesion + self.friction * normal, np.flatnonzero(np.isfinite(self.crushing))
+        identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
+        if plane:
+            half = sp.diags_array(np.full(n, 0.5))
+            shears = sp.hstack([half, -half])
+            to_shear = self.matrix[:, 1::2] @ shears
+            level, level_is, slopes, slack = sp.hstack([eye, eye]), 2.0 * bound, np.zeros(0), unbalanced
+        else:
+            disc = np.ones((n, size)) * bound[:, None]
+            disc[:, 0] = 0.0
+            shears = sp.diags_array(disc.ravel())
+            to_shear = self.matrix @ shears
+            level = sp.csr_array((np.ones(n), (np.arange(n), size * np.arange(n))), shape=(n, size * n))
+            level_is, slopes, slack = np.ones(n), np.ones(n), np.zeros(rows)
+        first = shears.shape[1]
+        blocks = [
+            [to_shear, self.matrix[:, 0::size], None, None, sp.csr_array(self.live[:, None]), identity, -identity],
+            [level, None, None, None, None, None, None],
+            [None, eye, -eye, eye, None, None, None],
+            [None, sp.csr_array(eye)[brittle], None, None, None, None, None],
+        ]
+        # Joints that may pull press sooner: pulling takes friction away, until nothing is left that could carry.
+        released = change_cost * (1.0 + (self.tension > 0.0))
+        of_forces = [np.zeros(first), self.price, change_cost, released]
+        solution = solve_between(
+            np.concatenate([*of_forces, [-1.0], np.full(2 * rows, UNBALANCED_COST)]),
+            sp.csc_array(sp.block_array(blocks, format="csc")),
+            np.concatenate([-self.dead - slack, level_is, normal, np.zeros(len(brittle))]),
+            np.concatenate([-self.dead + slack, level_is, normal, self.crushing[brittle]]),
+            slopes,
+            size,
+        )
+        shear, x = (shears @ solution.x[:first]).reshape(n, -1), solution.x[first:]
+        forces = np.column_stack([x[:n], shear[:, int(not plane) :]])
+        multiplier, left = float(x[3 * n]), x[3 * n + 1 :][: 2 * rows].max(initial=0.0)
+        falls = bool(left > FALLING_FRACTION * self.total)
+        return ProgramState(forces, multiplier, -solution.row_dual[:rows], unbalanced, solution.gap, falls, bound)
+
+
+def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], extrapolated: bool) -> np.ndarray:
+    """(n,) array: normal forces to try after those of the last programs and what these answered.
+
+    Anderson (1965), https://doi.org/10.1145/321296.321305, once a constant relaxation has not converged, as in vaults:
+    what changes of the forces did to their error says which would take it away.
+    """
+    errors = np.subtract(answers, normals)
+    tried, answered = (float(np.abs(of[-1] - of[-2 % len(of)]).max(initial=0.0)) for of in (normals, answers))
+    moved = normals[-1] + (CONFIDENT if answered < 0.2 * tried else RELAXATION) * errors[-1]
+    if extrapolated:
+        changes, of_errors = np.diff(normals, axis=0).T, np.diff(errors, axis=0).T
+        moved -= (changes + RELAXATION * of_errors) @ np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
+    return np.asarray(np.maximum(moved, 0.0))
