@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -98,11 +99,8 @@ class EquilibriumChecks:
         measured = float(np.clip(target, low, max(low, high)))
         if self.model.live is None and self.stepper.mortar.gives:
             # Ground that gives has forces by its pose; the reaction of the path has the viscosity in it.
-            try:
+            with suppress(NotSolved):
                 forces = self.nearest(place, gap)
-            except NotSolved:
-                pass
-            else:
                 measured = float(np.clip(self.reaction(place, contacts, forces), low, max(low, high)))
                 return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
         determined = bounds.high - bounds.low <= 1e-6 * max(abs(low), abs(high))

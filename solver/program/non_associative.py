@@ -91,8 +91,7 @@ class NonAssociative:
         # Of equal ways to carry, those that press where nothing pressed come last.
         idle = normal <= CARRYING_FRACTION * normal.max(initial=0.0)
         change_cost = (CHANGE_COST * self._unlike(normal) if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
-        normals: list[np.ndarray] = []
-        answers: list[np.ndarray] = []
+        tried: list[tuple[np.ndarray, np.ndarray]] = []
         nearest: ProgramState | None = None
         least, used, programs, best_at, locked = np.inf, normal, 1, 0, False
         for _ in range(PROGRAMS):
@@ -118,10 +117,9 @@ class NonAssociative:
             if locks and (programs > PLAIN_PROGRAMS or largest * FRICTION_EXCESS > 1.0):
                 # What a program adds may be added without end, unless crushing ends it (raises).
                 associative()
-            normals = [*normals[-REMEMBERED:], normal]
-            answers = [*answers[-REMEMBERED:], state.forces[:, 0]]
-            normal = _next_normal(normals, answers, programs > PLAIN_PROGRAMS and not locks)
             forces, multiplier = state.forces, state.multiplier
+            tried = [*tried[-REMEMBERED:], (normal, forces[:, 0])]
+            normal = _next_normal(tried, programs > PLAIN_PROGRAMS and not locks)
         converged = least <= FRICTION_EXCESS
         if locked and not converged:
             associative()
@@ -193,15 +191,16 @@ class NonAssociative:
         return ProgramState(forces, multiplier, -solution.row_dual[:rows], unbalanced, solution.gap, falls, bound)
 
 
-def _next_normal(normals: list[np.ndarray], answers: list[np.ndarray], extrapolated: bool) -> np.ndarray:
-    """(n,) array: normal forces to try after those of the last programs and what these answered.
+def _next_normal(tried: list[tuple[np.ndarray, np.ndarray]], extrapolated: bool) -> np.ndarray:
+    """(n,) array: normal forces to try after those (n,) of the last programs, each with what it answered.
 
     Anderson (1965), https://doi.org/10.1145/321296.321305, once a constant relaxation has not converged, as in vaults:
     what changes of the forces did to their error says which would take it away.
     """
-    errors = np.subtract(answers, normals)
-    tried, answered = (float(np.abs(of[-1] - of[-2 % len(of)]).max(initial=0.0)) for of in (normals, answers))
-    moved = normals[-1] + (CONFIDENT if answered < 0.2 * tried else RELAXATION) * errors[-1]
+    normals, answers = np.swapaxes(tried, 0, 1)
+    errors = answers - normals
+    asked, answered = (float(np.abs(of[-1] - of[-2 % len(of)]).max(initial=0.0)) for of in (normals, answers))
+    moved = normals[-1] + (CONFIDENT if answered < 0.2 * asked else RELAXATION) * errors[-1]
     if extrapolated:
         changes, of_errors = np.diff(normals, axis=0).T, np.diff(errors, axis=0).T
         moved -= (changes + RELAXATION * of_errors) @ np.linalg.lstsq(of_errors, errors[-1], rcond=1e-10)[0]
