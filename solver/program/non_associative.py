@@ -93,7 +93,8 @@ class NonAssociative:
         change_cost = (CHANGE_COST * self._unlike(normal) if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
         tried: list[tuple[np.ndarray, np.ndarray]] = []
         nearest: ProgramState | None = None
-        least, used, programs, best_at, locked = np.inf, normal, 1, 0, False
+        least, used, programs, best_at = np.inf, normal, 1, 0
+        locked, bounded = False, False
         for _ in range(PROGRAMS):
             try:
                 state, programs = self._sliding(normal, unbalanced, change_cost), programs + 1
@@ -103,20 +104,21 @@ class NonAssociative:
                 break
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
             excess = friction_excess(state.forces, self.friction, self.cohesion) / largest
-            change = abs(self._gained(state, normal)) / max(abs(state.multiplier), 1e-12)
+            change = abs(self._gained(state, normal))
             error = np.inf if state.falls else max(excess, change)
             settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
             if nearest is None or settled or error < least:
                 nearest, least, used, best_at = state, error, normal, programs
             if settled or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
                 break
-            added = state.forces - forces
-            within = friction_excess(added, self.friction) <= FRICTION_EXCESS * float(np.abs(added).max())
+            added, error = state.forces - forces, FRICTION_EXCESS_IN_SPACE * largest
+            within = friction_excess(added, self.friction) <= error + FRICTION_EXCESS * float(np.abs(added).max())
             locks = within and state.multiplier > multiplier
             locked |= locks
-            if locks and (programs > PLAIN_PROGRAMS or largest * FRICTION_EXCESS > 1.0):
+            if not bounded and ((locks and programs > PLAIN_PROGRAMS) or (locked and largest * FRICTION_EXCESS > 1.0)):
                 # What a program adds may be added without end, unless crushing ends it (raises).
                 associative()
+                bounded = True
             forces, multiplier = state.forces, state.multiplier
             tried = [*tried[-REMEMBERED:], (normal, forces[:, 0])]
             normal = _next_normal(tried, programs > PLAIN_PROGRAMS and not locks)
@@ -130,9 +132,14 @@ class NonAssociative:
         return nearest, converged, programs
 
     def _gained(self, state: ProgramState, normal: np.ndarray) -> float:
-        """Tell what the multiplier gains, to first order, once friction follows from its forces, not ``normal``."""
+        """Tell what the multiplier gains, to first order, once friction follows from its forces, not ``normal``.
+
+        As a part of the multiplier and of what friction takes.
+        """
         slip = np.linalg.norm((self.matrix.T @ state.velocity).reshape(-1, self.size)[:, 1:], axis=1)
-        return float((self.friction * (state.forces[:, 0] - normal)) @ slip)
+        gain = float((self.friction * (state.forces[:, 0] - normal)) @ slip)
+        taken = float((self.cohesion + self.friction * normal) @ slip)
+        return gain / max(abs(state.multiplier) + taken, 1e-300)
 
     def _unlike(self, normal: np.ndarray) -> np.ndarray:
         """(n,) array: factors in which points differ whatever their order, by forces (n,) at rest and places."""
