@@ -71,23 +71,14 @@ class Band:
 
 @dataclass(frozen=True)
 class Front:
-    """Rows that are eliminated together, and those beyond them that they act on.
-
-    Parameters
-    ----------
-    beyond : (n,) int array
-    start : int
-        Where its matrices begin among those of all fronts: (own, own), and (beyond, own) after it, by columns.
-    into : int
-        The front that gets what is left between the rows beyond, -1 for the last.
-    parts : list of (int, rows and columns, rows and columns)
-        Parts of what is left, and where they go there: in the first of its matrices, the second, or what it leaves.
-    """
+    """Rows that are eliminated together, and those beyond them that they act on."""
 
     own: slice
-    beyond: np.ndarray
+    beyond: np.ndarray  #: (n,) int
+    #: Where its matrices begin among those of all fronts: (own, own), and (beyond, own) after it, by columns.
     start: int
-    into: int
+    into: int  #: the front that gets what is left between the rows beyond, -1 for the last
+    #: Parts of what is left, and where they go there: in the first of its matrices, the second, or what it leaves.
     parts: list[tuple[int, tuple[slice, slice], tuple[slice, slice]]]
 
     def matrices(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -18,19 +18,9 @@ SEARCHES = 20
 
 
 def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplier: float = 0.0) -> StepSolution:
-    """Find the minimum of a step's program.
+    """Find the minimum of a step's program, from a multiplier of the live load; raises ``NotSolved``.
 
-    Parameters
-    ----------
-    problem : ContactProblem
-    trial : (n, d) array, optional
-        Forces of the springs to linearise at first: those of the program before. By default those at the start.
-    multiplier : float
-        Of the live load, to start from.
-
-    Raises
-    ------
-    NotSolved
+    Trial forces (n, d) are those of the springs to linearise at first, by default those at the start.
     """
     if len(problem.gap) == 0:
         motion = problem.load / problem.viscosity - problem.motion_so_far

@@ -27,50 +27,21 @@ from .stiffness import ContactRows
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """The program of a step, in its units: lengths in block sizes, forces in mean block weights.
+    """The program of a step, in its units: lengths in block sizes, forces in mean block weights."""
 
-    Attributes
-    ----------
-    rows : ContactRows
-        How forces at the contact points act on the n_dof freedoms of the free blocks.
-    gap : (n,) array
-    slip : (n, d - 1) array
-        Where the free blocks now are, with the supports at the end of the step; slip counts from the step's start.
-    forces : (n, d) array
-        N⁰ and T⁰.
-    bound : (n,) array
-        B.
-    compliance : (n, d) array
-        c_n, then c_t for each tangent.
-    most : (n,) array
-        Largest normal forces; infinite where there is no limit.
-    load : (n_dof,) array
-    viscosity : (n_dof,) array
-        Force per movement.
-    motion_so_far : (n_dof,) array
-        g.
-    size : float
-        Movement of the supports in the step.
-    live : (n_dof,) array, optional
-        Load whose multiplier is one more unknown.
-    control : (n_dof,) array, optional
-        Weights of the movements that make up the control displacement: one more equation.
-    control_target : float
-        Change of the control displacement.
-    """
-
-    rows: ContactRows
-    gap: np.ndarray
-    slip: np.ndarray
-    forces: np.ndarray
-    bound: np.ndarray
-    compliance: np.ndarray
-    most: np.ndarray
-    load: np.ndarray
-    viscosity: np.ndarray
-    motion_so_far: np.ndarray
-    size: float
-    live: np.ndarray | None = None
+    rows: ContactRows  #: how forces at the contact points act on the n_dof freedoms of the free blocks
+    gap: np.ndarray  #: (n,), where the free blocks now are, with the supports at the end of the step
+    slip: np.ndarray  #: (n, d - 1), likewise; counts from the step's start
+    forces: np.ndarray  #: (n, d): N⁰ and T⁰
+    bound: np.ndarray  #: (n,): B
+    compliance: np.ndarray  #: (n, d): c_n, then c_t for each tangent
+    most: np.ndarray  #: (n,): largest normal forces; infinite where there is no limit
+    load: np.ndarray  #: (n_dof,)
+    viscosity: np.ndarray  #: (n_dof,): force per movement
+    motion_so_far: np.ndarray  #: (n_dof,): g
+    size: float  #: movement of the supports in the step
+    live: np.ndarray | None = None  #: (n_dof,): load whose multiplier is one more unknown
+    #: (n_dof,): weights of the movements that make up the control displacement, one more equation; with its change.
     control: np.ndarray | None = None
     control_target: float = 0.0
 
@@ -111,20 +82,9 @@ class ContactProblem:
 
 @dataclass(frozen=True)
 class StepSolution:
-    """The minimum of a step's program.
+    """The minimum of a step's program."""
 
-    Attributes
-    ----------
-    motion : (n_dof,) array
-        Movement of the free blocks.
-    forces : (n, d) array
-    trial : (n, d) array
-        Trial forces, from which the next program starts.
-    multiplier : float
-        Of the live load.
-    """
-
-    motion: np.ndarray
-    forces: np.ndarray
-    trial: np.ndarray
-    multiplier: float
+    motion: np.ndarray  #: (n_dof,): movement of the free blocks
+    forces: np.ndarray  #: (n, d)
+    trial: np.ndarray  #: (n, d): trial forces, from which the next program starts
+    multiplier: float  #: of the live load

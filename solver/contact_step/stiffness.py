@@ -28,15 +28,10 @@ def _factorisation(pairs: bytes, places: bytes | None, n_blocks: int, dof: int) 
 
 
 class ContactRows:
-    """What contact points do to the free blocks, and movements of the blocks to the contact points.
+    """What contact points do to the free blocks, (n_blocks,) bool, and movements of the blocks to the contact points.
 
-    Parameters
-    ----------
-    matrix : (dof n_blocks, d n) sparse array
-        Of :func:`solver.equilibrium.wrench_matrix`.
-    free : (n_blocks,) bool array
-    places : (n_blocks, d) array, optional
-        Of the blocks as drawn, for an order in which factors take less time.
+    The matrix is that of :func:`solver.equilibrium.wrench_matrix`; places, (n_blocks, d), are those of the blocks as
+    drawn, for an order in which factors take less time.
     """
 
     def __init__(self, matrix: sp.csc_array, free: np.ndarray, places: np.ndarray | None = None) -> None:
@@ -80,9 +75,7 @@ class ContactRows:
     def factorised(self, stiffness: np.ndarray, diagonal: np.ndarray) -> Solve:
         """Factorise the stiffness (n, d, d) of the contact points and a diagonal (n_dof,); gives what solves with it.
 
-        Raises
-        ------
-        NotSolved
+        Raises ``NotSolved``.
         """
         weighted = np.matmul(stiffness, self.blocks)
         sums, pairs = _over_pairs(self.key)

@@ -56,33 +56,15 @@ MOST_PARTS = 500
 
 @dataclass(frozen=True)
 class ConvexParts:
-    """Convex parts of blocks, as drawn, and how their corners ride on those of the blocks.
+    """Convex parts of blocks, as drawn, and how their corners ride on those of the blocks."""
 
-    Attributes
-    ----------
-    solids : Solids
-        The parts.
-    block_of_part : (n_parts,) int array
-        Ascending.
-    source : (n_corners, 4) int array
-        Four corners of the block from which each corner of the parts follows.
-    weights : (n_corners, 4) array
-        With these weights.
-    inner : (n_faces,) bool array
-        Faces of the parts inside their block, where it was cut.
-    plane : (n_faces,) int array
-        The same for faces into which one face of a block was cut.
-    made : (n_corners,) bool array
-        Corners that the cuts have made: none of the block.
-    """
-
-    solids: Solids
-    block_of_part: np.ndarray
-    source: np.ndarray
-    weights: np.ndarray
-    inner: np.ndarray
-    plane: np.ndarray
-    made: np.ndarray
+    solids: Solids  #: the parts
+    block_of_part: np.ndarray  #: (n_parts,) int, ascending
+    source: np.ndarray  #: (n_corners, 4) int: four corners of the block from which each corner of the parts follows
+    weights: np.ndarray  #: (n_corners, 4): with these weights
+    inner: np.ndarray  #: (n_faces,) bool: faces of the parts inside their block, where it was cut
+    plane: np.ndarray  #: (n_faces,) int: the same for faces into which one face of a block was cut
+    made: np.ndarray  #: (n_corners,) bool: corners that the cuts have made, none of the block
 
     @cached_property
     def cut_edges(self) -> np.ndarray:
@@ -224,19 +206,11 @@ def _spread_corners(vertices: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Piece:
-    """What is left of a block on one side of the cuts so far: the triangles around it, in diagonals of the block.
+    """What is left of a block on one side of the cuts so far: the triangles around it, in diagonals of the block."""
 
-    Attributes
-    ----------
-    points : (n, 3) array
-    triangles : (m, 3) int array
-    face : (m,) int array
-        The face of the block in which each triangle lies; numbers beyond those of its faces are of cuts.
-    """
-
-    points: np.ndarray
-    triangles: np.ndarray
-    face: np.ndarray
+    points: np.ndarray  #: (n, 3)
+    triangles: np.ndarray  #: (m, 3) int
+    face: np.ndarray  #: (m,) int: the face of the block in which each lies; numbers beyond those of faces are of cuts
     volume: float
 
     @cached_property

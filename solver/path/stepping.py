@@ -64,24 +64,12 @@ DAMPING = 2.0
 
 @dataclass(frozen=True)
 class StepError:
-    """Measures of the error of a step.
+    """Measures of the error of a step: the work in units of the program, all else in block sizes."""
 
-    Attributes
-    ----------
-    work : float
-        Of friction by which bounds at the end of the step were not what was expected, in units of the program.
-    turn : float
-        Change of the movement against that of the steps before, in block sizes.
-    moved : float
-        Movement of the fastest block, in block sizes.
-    penetration : float
-        Deepest penetration at a contact point that carries, in block sizes.
-    """
-
-    work: float
-    turn: float
-    moved: float
-    penetration: float
+    work: float  #: of friction by which bounds at the end of the step were not what was expected
+    turn: float  #: change of the movement against that of the steps before
+    moved: float  #: movement of the fastest block
+    penetration: float  #: deepest at a contact point that carries
 
 
 def viscous_weights(model: Model) -> np.ndarray:
@@ -97,34 +85,18 @@ def viscous_weights(model: Model) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _StepPoints:
-    """The n contact points of a step, in units of the program.
+    """The n contact points of a step, in units of the program."""
 
-    Attributes
-    ----------
-    start : Contacts
-        At the start of the step.
-    forces, trial : (n, d) arrays
-    followed : (n,) array
-    expected : (n,) array
-        Normal forces of the friction bounds at the end of the step, were all normal forces to stay.
-    is_new : (n,) bool array
-    friction : (n,) array
-    compliance : (n, d) array
-    joints : JointPoints
-    kept : (n,) array
-        Part of the give under the normal force that the next linearisation takes back.
-    """
-
-    start: Contacts
-    forces: np.ndarray
-    trial: np.ndarray
-    followed: np.ndarray
-    expected: np.ndarray
-    is_new: np.ndarray
-    friction: np.ndarray
-    compliance: np.ndarray
+    start: Contacts  #: at the start of the step
+    forces: np.ndarray  #: (n, d)
+    trial: np.ndarray  #: (n, d)
+    followed: np.ndarray  #: (n,)
+    expected: np.ndarray  #: (n,): normal forces of the friction bounds at the end, were all normal forces to stay
+    is_new: np.ndarray  #: (n,) bool
+    friction: np.ndarray  #: (n,)
+    compliance: np.ndarray  #: (n, d)
     joints: JointPoints
-    kept: np.ndarray
+    kept: np.ndarray  #: (n,): part of the give under the normal force that the next linearisation takes back
 
     @property
     def bound(self) -> np.ndarray:
@@ -144,19 +116,7 @@ class _StepPoints:
 
 
 class Stepper:
-    """Steps from one place to another under a driver.
-
-    Parameters
-    ----------
-    model : Model
-        Units, loads, interfaces.
-    driver : Driver
-
-    Attributes
-    ----------
-    programs : int
-        Solved since the last increment.
-    """
+    """Steps from one place to another under a driver; counts the programs solved since the last increment."""
 
     def __init__(self, model: Model, driver: Driver) -> None:
         self.model, self.driver, self.members = model, driver, Members(model)
@@ -300,11 +260,12 @@ class Stepper:
         exact: bool = False,
         candidates: Contacts | None = None,
     ) -> tuple[Place, np.ndarray, StepError]:
-        """Take one step of the driver, or one in time with the supports at rest.
+        """Take one step of the driver, or one in time with the supports at rest; raises ``NotSolved``.
+
+        Gives the place, the motion, (n_blocks, n_dof) in units of the program with that of the supports, and the error.
 
         Parameters
         ----------
-        place : Place
         length : float [m or rad]
             In time in units of √(block size / g).
         in_time : bool
@@ -315,17 +276,6 @@ class Stepper:
             Where nothing slides, all that joints give is taken back in this step, and nothing of it left to the next.
         candidates : Contacts, optional
             Contact points of the step; by default those at the place.
-
-        Returns
-        -------
-        place : Place
-        motion : (n_blocks, n_dof) array
-            In units of the program; supports included.
-        error : StepError
-
-        Raises
-        ------
-        NotSolved
         """
         model, free = self.model, self.free
         # A step in time is solved to a small part of such a movement.
