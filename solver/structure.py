@@ -176,13 +176,9 @@ class Structure(Shown):
         controls : Controls, optional
         pose : Pose, optional
             Where to start, for instance after a settlement; the drawing by default. Displacements count from there.
-        ties_at : TieForces, optional
-            ``ties`` of the increment that the pose is from; by default all are new, and none may be of a later phase.
-        bonds_at : Bonds, optional
-            ``bonds`` of that increment: the strength that joints have left, and where elastic ones have no force,
-            without which a pose with cohesion or elastic joints is refused.
-        fallen : (n_blocks,) bool array, optional
-            ``fallen`` of that increment: blocks that have left the structure, which all are a part of by default.
+        ties_at, bonds_at, fallen
+            ``ties``, ``bonds`` and ``fallen`` of the increment that the pose is from, as in :meth:`limit_load`: without
+            its bonds a pose with cohesion or elastic joints is refused. By default ties are new, none of a later phase.
         on_increment : callable, optional
             Called with every :class:`Increment` as it is found.
 

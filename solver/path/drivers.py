@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -104,6 +104,8 @@ class ControlDisplacement:
     increment: float = 0.01
     limit: float = 1.0
     tolerance: float | None = None
+    #: Of the control displacement.
+    unit: ClassVar[str] = "m"
 
     def __post_init__(self) -> None:
         """Check the numbers; the direction becomes a unit vector."""
@@ -111,11 +113,6 @@ class ControlDisplacement:
         units = {"direction": "direction in which the displacement counts"}
         set_vectors(self, "control", {"direction": (2, 3), "point": (2, 3)}, units)
         check_steps(self, "control")
-
-    @property
-    def unit(self) -> str:
-        """Unit of the control displacement."""
-        return "m"
 
     def displacement(self, assembly: Assembly, pose: Pose) -> float:
         """Control displacement at a pose [m]."""

@@ -126,7 +126,7 @@ class Stepper:
         # What turns moves its corners against each other by its own width at most, however large the others are.
         assembly, d = model.assembly, model.dimension
         arms = np.linalg.norm(assembly.vertices - assembly.centroids[assembly.block_of_vertex], axis=1)
-        across = 2.0 * np.maximum.reduceat(arms, np.flatnonzero(np.diff(assembly.block_of_vertex, prepend=-1)))
+        across = 2.0 * np.maximum.reduceat(arms, assembly.shapes.offsets[:-1])
         turning = np.minimum(across[self.free] / model.length, 1.0)
         self._shares = np.column_stack([np.ones_like(turning)] * d + [turning] * (model.n_dof - d)).ravel()
         self.unit = model.length / driver.lever
