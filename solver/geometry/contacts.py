@@ -92,12 +92,13 @@ def are_known(contacts: Contacts, known: Contacts) -> np.ndarray:
 
 def successors(
     before: Contacts, vanished: np.ndarray, contacts: Contacts, size: float
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the contact points that stand where others of the same two blocks have vanished, with the nearest normals.
 
     A force that went over to another face of the two blocks would lose there what that one's friction does not hold.
-    Of the ``vanished``, (k,) int, rows (m,) are given with the successor of each, (m,) int: one that is near to several
-    is there several times. The size is that of the blocks [m].
+    Of the ``vanished``, (k,) int, those (m,) are given that have any, with the successor of each, (m,) int, and its
+    share, (m,): equally near ones share what one passes, so that their order does not matter. The size is that of the
+    blocks [m].
     """
     old, new = before.pair_keys()[vanished], contacts.pair_keys()
     order = np.argsort(new, kind="stable")
@@ -111,4 +112,5 @@ def successors(
     measure, least = apart + length * turned, np.full(len(vanished), np.inf)
     np.minimum.at(least, row[apart < length], measure[apart < length])
     chosen = (measure <= least[row] + SAME_PLACE * size) & (apart < length)
-    return row[chosen], successor[chosen]
+    row = row[chosen]
+    return vanished[row], successor[chosen], 1.0 / np.bincount(row)[row]

@@ -97,18 +97,15 @@ class EquilibriumChecks:
             return EquilibriumCheck(place, contacts, friction, bounds.forces, nearest, bounds)
         low, high = (value if np.isfinite(value) else target for value in (bounds.low, bounds.high))
         measured = float(np.clip(target, low, max(low, high)))
-        if self.model.live is None and self.stepper.mortar.gives:
+        if self.model.live is None and self.model.interfaces.ground:
             # Ground that gives has forces by its pose; the reaction of the path has the viscosity in it.
             with suppress(NotSolved):
                 forces = self.nearest(place, gap)
                 measured = float(np.clip(self.reaction(place, contacts, forces), low, max(low, high)))
                 return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
-        determined = bounds.high - bounds.low <= 1e-6 * max(abs(low), abs(high))
+        determined = self.model.live is not None or bounds.high - bounds.low <= 1e-6 * max(abs(low), abs(high))
         try:
-            if self.model.live is None and not determined:
-                forces = self.nearest(place, gap, measured)
-            else:
-                forces = self.nearest(replace(place, multiplier=measured), gap)
+            forces = self.nearest(replace(place, multiplier=measured), gap, None if determined else measured)
         except NotSolved:
             forces = self._between_bounds(contacts, place, bounds, measured)
         return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)

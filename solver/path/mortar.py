@@ -57,8 +57,7 @@ class Mortar:
     """The mortar of a model, and the elastic joints."""
 
     def __init__(self, model: Model) -> None:
-        self.model, self.present, interfaces = model, model.interfaces.mortar, model.interfaces
-        self.gives = bool(interfaces.ground)
+        self.model, self.present = model, model.interfaces.mortar
 
     def cast(self, place: Place, contacts: Contacts) -> Place:
         """The place with all of its closed joints whole."""
@@ -143,9 +142,9 @@ class Mortar:
         vanished = np.flatnonzero(same & ~kept)
         if not len(vanished):
             return place
-        row, successor = successors(before, vanished, contacts, self.model.length)
-        # Equally near ones share it, and several that pass to one add up.
-        part, old = 1.0 / np.bincount(row)[row], number[vanished[row]]
+        vanished, successor, part = successors(before, vanished, contacts, self.model.length)
+        # Several that pass to one add up.
+        old = number[vanished]
         stays = np.setdiff1d(np.arange(len(bonds)), old)
         part, old = np.concatenate([np.ones(len(stays)), part]), np.concatenate([stays, old])
         names = np.concatenate([bonds.features[stays], contacts.features[successor, :3]])

@@ -236,9 +236,7 @@ class Stepper:
         vanished = np.flatnonzero(~kept & carried)
         is_new = ~same
         if len(vanished):
-            row, successor = successors(before, vanished, contacts, self.model.length)
-            # Equally near ones share them, so that their order does not matter.
-            part, vanished = 1.0 / np.bincount(row)[row], vanished[row]
+            vanished, successor, part = successors(before, vanished, contacts, self.model.length)
             sense = np.where(before.block_a[vanished] == contacts.block_a[successor], 1.0, -1.0)
             vectors = np.einsum("nji,nj->ni", before.frames[vanished], place.forces[vanished]) * sense[:, None]
             passed = np.einsum("nij,nj->ni", contacts.frames[successor], vectors)
