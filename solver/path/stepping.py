@@ -289,8 +289,6 @@ class Stepper:
         where_sliding = np.inf if in_time or viscosity == 1.0 else EXACT
         closed = (where_sliding, EXACT if exact else np.inf)
         new, points, left, motion_so_far = self._solved(place, points, s, size, loads, resisting, before, closed)
-        if not np.isfinite(motion_so_far).all():
-            raise NotSolved("the movement is not finite")
         movement_size = self._largest(motion_so_far * self._shares)
         all_points = self._with_missed(start, place, new.pose, movement_size)
         if len(all_points) > len(start):
