@@ -84,8 +84,7 @@ class InterfaceLaw:
             if not (value := getattr(self, name)) >= 0.0:
                 raise ValueError(f"{name} is {value:g} Pa/m; it must be positive, or left out for a rigid joint")
         for name in ("fracture_opening", "fracture_slip"):
-            value = getattr(self, name)
-            if value > 0.0 and self.cohesion == 0.0 and tension == 0.0:
+            if (value := getattr(self, name)) > 0.0 and not self.bonds:
                 raise ValueError(
                     f"{name} is {value:g} m, but there is no strength to lose; give cohesion, or leave it out"
                 )

@@ -315,12 +315,9 @@ def _without_duplicates(
     shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Keep each pair of corners once, seen from the lower numbered vertex, and sort the pairs by vertex and edge."""
-    k = np.flatnonzero(corner >= 0)
-    facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
-    swap = vertex[k] > corner[k]
-    v, e, c = vertex[k], edge[k], corner[k]
-    vertex, edge, corner = vertex.copy(), edge.copy(), corner.copy()
-    vertex[k], edge[k], corner[k] = np.where(swap, c, v), np.where(swap, facing, e), np.where(swap, v, c)
+    swap, facing = (corner >= 0) & (vertex > corner), _facing_edge(shapes, vertex, edge, corner)
+    edge = np.where(swap, facing, edge)
+    vertex, corner = np.where(swap, corner, vertex), np.where(swap, vertex, corner)
     # The pair may have been found from both sides, and two corners may meet along two pairs of faces.
     low = np.minimum(edge, shapes.next_vertex[edge])
     end = np.where(corner < 0, 0, np.where(corner == low, 1, 2))
