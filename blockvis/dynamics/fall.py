@@ -164,10 +164,28 @@ def may_fall(response: solver.Response) -> bool:
     return collapsed and collapse is not None and bool(response.path) and bool(collapse.mechanism.any())
 
 
+def falls_from(response: solver.Response) -> solver.Increment | None:
+    """Give the increment at which the collapse mechanism begins, as the response has it; None where nothing stood.
+
+    It is the last equilibrium, and where a phase begins with the fall its first frame.
+    """
+    last, falls = response.path[-1:], [i for i in response.increments if i.status == solver.Status.FALLING][:1]
+    at_once = response.collapse is not None and response.collapse.reaction is None
+    return next(iter((*falls, *last) if at_once else (*last, *falls)), None)
+
+
+def with_mechanism(response: solver.Response) -> solver.Increment | None:
+    """Give the increment at which the collapse mechanism begins with that as its motion; None where none collapses."""
+    collapse, begins = response.collapse, falls_from(response)
+    if collapse is None or begins is None or not collapse.mechanism.any():
+        return None
+    return mechanics.with_motion(begins, collapse.mechanism)
+
+
 def _falling_mass(response: solver.Response) -> float:
     """Mass of the blocks that the collapse mechanism takes with it [kg]."""
-    assert response.collapse is not None
-    falling = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
+    falling = with_mechanism(response)
+    assert falling is not None
     takes = mechanics.rigid_parts(response.assembly, falling) >= 0
     return float(response.assembly.masses[takes & response.assembly.free].sum())
 

@@ -610,9 +610,8 @@ class Drawer:
         return self.assembly.n_blocks > FEW_BLOCKS
 
     def _shown(self, increment: solver.Increment) -> solver.Increment:
-        """Give the state that governs the motion of the mechanism that follows it."""
-        governs = self._swing is not None and increment is self.response.governing
-        return self._swing.increment if self._swing is not None and governs else increment
+        """Give the state at which the mechanism begins the motion of that."""
+        return self._swing.increment if self._swing is not None and increment is self._swing.begins else increment
 
     def _block_colours(self, pose: solver.Pose, increment: solver.Increment) -> np.ndarray | None:
         colours = self._standing_colours(pose, increment)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import solver
+from blockvis.dynamics.fall import falls_from
 from blockvis.results.swinging import corner_speeds, swung_increment
 from solver import mechanics
 
@@ -33,6 +34,8 @@ class Swing:
     ----------
     increment : solver.Increment
         The state it begins at, with the motion that follows.
+    begins : solver.Increment
+        That state as the response has it.
     displaced : solver.Pose
         After the motion; at the increment's own pose where nothing moves.
     parts : (n_blocks,) int array
@@ -46,6 +49,7 @@ class Swing:
     """
 
     increment: solver.Increment
+    begins: solver.Increment
     displaced: solver.Pose
     parts: np.ndarray
     moves: bool
@@ -59,16 +63,16 @@ class Swing:
 
 
 def swing_of(response: solver.Response) -> Swing:
-    """Find the mechanism that follows the last equilibrium, or the state that governs.
+    """Find the mechanism that follows the last equilibrium, the state that governs, or what is taken away at once.
 
     Parameters
     ----------
     response : solver.Response
         With an increment at least.
     """
-    last = response.governing or response.increments[0]
-    motion = last.velocity if response.collapse is None else response.collapse.mechanism
-    last = mechanics.with_motion(last, motion)
+    begins = (falls_from(response) if response.collapse is not None else response.governing) or response.increments[0]
+    motion = begins.velocity if response.collapse is None else response.collapse.mechanism
+    last = mechanics.with_motion(begins, motion)
     assembly = response.assembly
     speeds = corner_speeds(assembly, last.pose, motion)
     fastest = float(speeds.max(initial=0.0))
@@ -82,7 +86,7 @@ def swing_of(response: solver.Response) -> Swing:
         # Blocks in space are drawn after it; those in the plane stay where their hinges are.
         share = min(1.0, float(np.sqrt(TEAR * size / max(_torn(last, motion), 1e-300))))
     displaced = mechanics.swung(last.pose, share * motion)
-    return Swing(last, displaced, mechanics.rigid_parts(assembly, last), fastest > 0.0, share * motion, share)
+    return Swing(last, begins, displaced, mechanics.rigid_parts(assembly, last), fastest > 0.0, share * motion, share)
 
 
 def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:

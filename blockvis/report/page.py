@@ -253,14 +253,15 @@ def tie_rows(response: solver.Response) -> list[tuple[str, str, str]]:
 def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> list[_Frame]:
     """Choose what the page shows: the path, thinned where it is long, and the fall.
 
-    The state that governs has the hinges and sliding joints of the mechanism that follows it, as pictures and films do.
+    The state at which the mechanism begins has the hinges and sliding joints of that, as pictures and films do.
     """
     most = max(FEWEST_FRAMES, min(MOST_FRAMES, MOST_POSES // response.assembly.n_blocks))
     path, governing = response.path, response.governing
     place = {id(increment): k for k, increment in enumerate(path)}
 
     def framed_at(increment: solver.Increment) -> _Frame:
-        return _Frame(swing.increment if increment is governing else increment, place.get(id(increment), len(path)))
+        begins = increment is swing.begins
+        return _Frame(swing.increment if begins else increment, place.get(id(increment), len(path)))
 
     if fall is None or not path:
         return [framed_at(increment) for increment in _thinned(shown_increments(response), most, governing)]
@@ -282,6 +283,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
         own = model_in_space(response, swing, shown)
     else:
         own = _model_in_plane(response, shown, None if fall is None else fall.ground)
+    n_static = sum(frame.time is None for frame in frames)
     roles = {role: number for number, role in enumerate(mechanics.ROLES)}
     if not response.settlements:
         # Supports for moving hold the others where nothing settles.
@@ -310,7 +312,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
             )
         },
         "frames": _frames(response, frames),
-        "opens": next((k for k, frame in enumerate(frames) if frame.increment is swing.increment), 0),
+        "opens": next((k for k, frame in enumerate(frames) if frame.increment is swing.increment), n_static - 1),
         "ties": _drawn_ties(response, shown),
         "times": _times(frames),
         # In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import solver
+from blockvis.dynamics.fall import with_mechanism
 from blockvis.text import force_text
 from solver import mechanics
 
@@ -129,17 +130,15 @@ def certified(response: solver.Response) -> tuple[solver.Increment, ...]:
 
 
 def collapse_mechanism(response: solver.Response) -> mechanics.Mechanism | None:
-    """Find the collapse mechanism at the last equilibrium: what words, tables, curves, pictures and pages count.
+    """Find the collapse mechanism: what words, tables, curves, pictures and pages count.
 
     Returns
     -------
     solver.mechanics.Mechanism or None
         None where nothing collapses.
     """
-    collapse, last = response.collapse, _last_before(response)
-    if collapse is None or last is None or not collapse.mechanism.any():
-        return None
-    return mechanics.mechanism_of(response.assembly, mechanics.with_motion(last, collapse.mechanism))
+    begins = with_mechanism(response)
+    return None if begins is None else mechanics.mechanism_of(response.assembly, begins)
 
 
 def mechanism_text(response: solver.Response) -> str:
@@ -196,14 +195,7 @@ def loss_in(assembly: solver.Assembly, falling: solver.Increment) -> Loss:
 
 def loss_of(response: solver.Response) -> Loss | None:
     """Weigh what the collapse mechanism of a response takes with it; None where nothing collapses."""
-    collapse, last = response.collapse, _last_before(response)
-    if collapse is None or collapse.lost != "equilibrium" or last is None or not collapse.mechanism.any():
+    collapse, begins = response.collapse, with_mechanism(response)
+    if collapse is None or collapse.lost != "equilibrium" or begins is None:
         return None
-    return loss_in(response.assembly, mechanics.with_motion(last, collapse.mechanism))
-
-
-def _last_before(response: solver.Response) -> solver.Increment | None:
-    """Give the last equilibrium before a collapse, or where the fall begins where its phase has none."""
-    last, falls = response.path[-1:], [i for i in response.increments if i.status == solver.Status.FALLING][:1]
-    at_once = response.collapse is not None and response.collapse.reaction is None
-    return next(iter((*falls, *last) if at_once else (*last, *falls)), None)
+    return loss_in(response.assembly, begins)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import solver
+from blockvis.dynamics.fall import falls_from, with_mechanism
 from solver import mechanics
 
 from .swinging import swing_factors
@@ -78,22 +79,20 @@ def falling_in(response: solver.Response) -> np.ndarray:
     response : solver.Response
         With an increment in equilibrium.
     """
-    last = at_last_equilibrium(response)
+    last, begins = response.path[-1], with_mechanism(response)
     falls = last.fallen & ~last.removed
-    if response.collapse is not None and response.collapse.lost == "equilibrium":
-        falls = falls | (mechanics.rigid_parts(response.assembly, last) >= 0)
+    if begins is not None and response.collapse is not None and response.collapse.lost == "equilibrium":
+        falls = falls | (mechanics.rigid_parts(response.assembly, begins) >= 0)
     return falls
 
 
 def at_last_equilibrium(response: solver.Response) -> solver.Increment:
-    """Give the last increment in equilibrium; of what collapses with the collapse mechanism as its motion.
+    """Give the last increment in equilibrium, where the collapse mechanism begins there with that as its motion.
 
     Parameters
     ----------
     response : solver.Response
         With an increment in equilibrium.
     """
-    last, collapse = response.path[-1], response.collapse
-    if collapse is None or not collapse.mechanism.any():
-        return last
-    return mechanics.with_motion(last, collapse.mechanism)
+    last, begins = response.path[-1], with_mechanism(response)
+    return last if begins is None or falls_from(response) is not last else begins

@@ -16,6 +16,7 @@ import solver
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly
 from blockvis.cases.contents import Case
+from blockvis.dynamics.fall import falls_from, with_mechanism
 from blockvis.pictures.frame import Frame
 from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
@@ -120,7 +121,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
             raise _OutOfTime(f"took longer than {seconds:g} s, at a settlement of {increment.settlement:.6g}")
     response = run.response(kept, run.steps.ending)
     found = _numbers(response) | {"increments": n_path, "programs": n_programs}
-    falls = _falling(response)
+    falls = with_mechanism(response) or falls_from(response)
     if falls is None or "collapse_displacement" not in found:
         return found, b""
     assembly = response.assembly
@@ -166,13 +167,6 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
         # It collapses before any settlement.
         found |= {"collapse_displacement": 0.0, "bracket_low": 0.0, "bracket_high": 0.0}
     return found
-
-
-def _falling(response: solver.Response) -> solver.Increment | None:
-    """Find what moves as the mechanism does: the last equilibrium, as everywhere else, or what falls from the start."""
-    if response.collapse is not None and response.path:
-        return mechanics.with_motion(response.path[-1], response.collapse.mechanism)
-    return next((i for i in response.increments if i.status is solver.Status.FALLING), None)
 
 
 def mechanism_class(mechanism: mechanics.Mechanism) -> str:

@@ -27,8 +27,9 @@ TIME_STEPS, REFUSALS = 200, 12
 #: Movement, in block sizes, that is large against the compliance of the joints: that of the first frame of a fall.
 MECHANISM = 1e-3
 
-#: Movement in a step in time above which it is repeated, shorter, and in which nothing has moved, in block sizes.
-LARGEST_MOVEMENT, NO_MOVEMENT = 0.03, 1e-7
+#: Movement in a step in time above which it is repeated, shorter, and in which nothing has moved; and of what falls by
+#: which the joints of what stays have sprung back; in block sizes.
+LARGEST_MOVEMENT, NO_MOVEMENT, SPRUNG_BACK = 0.03, 1e-7, 0.05
 
 #: Acceleration, in units of g, and speed, in units of √(block size · g), of blocks that may be at rest.
 SLOW = 1e-3
@@ -107,35 +108,32 @@ class Fall:
         No equilibrium is known from the upper bound of the parameter on; the multiplier there is at or below zero, or
         None where equilibrium itself is lost.
         """
-        driver, model = self.driver, self.model
-        frames = list(self.frames(beyond))
-        # The first movement that is large against the compliance of the joints.
-        sizes = [float(motion_size(frame.velocity, model.length).max()) for frame in frames]
-        chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
-        velocity = frames[chosen].velocity
-        if model.live is not None and beyond.velocity is not None and sizes[chosen] <= MECHANISM * model.length:
+        driver, model, at_once = self.driver, self.model, upper_bound <= last.place.s
+        frames = list(self.frames(beyond, at_once))
+        velocity = frames[0].velocity
+        standing = motion_size(velocity, model.length).max() <= MECHANISM * model.length
+        if model.live is not None and beyond.velocity is not None and standing:
             # Where blocks stand without the live load, the mechanism is that of the path at its end.
             velocity = beyond.velocity
-        largest = max(float(motion_size(velocity, model.length).max()), 1e-300)
+        velocity = velocity / max(float(motion_size(velocity, model.length).max()), 1e-300)
         multiplier, reaction = last.measured, None
-        if upper_bound > last.place.s:
+        # A phase that begins with the fall has no equilibrium.
+        at_last = with_motion(frames[0], velocity)
+        if not at_once:
             reaction = multiplier if model.live is None else multiplier * model.live_force
-            at_last = self.reports.increment(last, velocity / largest, last.place.works)
-        else:
-            # A phase that begins with the fall has no equilibrium.
-            at_last = with_motion(frames[0], velocity / largest)
+            at_last = self.reports.increment(last, velocity, last.place.works)
         # A multiplier is interpolated to zero; an equilibrium is lost anywhere in the bracket.
         part = 0.5 if multiplier_beyond is None else last.measured / (last.measured - multiplier_beyond)
         collapse = Collapse(
             displacement=last.place.s + part * (upper_bound - last.place.s),
             bracket=(last.place.s, upper_bound),
             reaction=reaction,
-            mechanism=velocity / largest,
+            mechanism=velocity,
             unit=driver.unit,
             words=str(mechanism_of(model.assembly, at_last)),
             lost="equilibrium" if multiplier_beyond is None else "capacity",
         )
-        del at_last, last, frames[self.n_frames :]
+        del at_last, last, frames[max(self.n_frames, at_once) :]
         while frames:
             yield frames.pop(0)
         if model.live is None:
@@ -144,13 +142,16 @@ class Fall:
         what = lost if multiplier_beyond is None else "no capacity is left"
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
 
-    def frames(self, place: Place) -> Iterator[Increment]:
+    def frames(self, place: Place, at_once: bool = False) -> Iterator[Increment]:
         """Frames of the fall without live load, each a movement of the same size, until the blocks are at rest."""
         if self.model.live is not None:
             stepper = Stepper(replace(self.model, live=None), self.driver)
             reports = Reports(stepper, self.reports.number, self.reports.fell_at)
-            yield from Fall(stepper, EquilibriumChecks(stepper), reports, self.n_frames, self.on_step).frames(place)
+            fall = Fall(stepper, EquilibriumChecks(stepper), reports, self.n_frames, self.on_step)
+            yield from fall.frames(place, at_once)
             return
+        # Where something is taken away at once the joints of what stays spring back first.
+        place = self.relax(place, SPRUNG_BACK)[0] if at_once else place
         for least in (MECHANISM, *[0.1] * max(self.n_frames - 1, 0)):
             start, total = place, np.zeros_like(self.model.load)
             for moved, motion, _, _ in self.time_steps(start, 2.0 * least):

@@ -245,8 +245,7 @@ class Path:
             ending = yield from self.fall.collapse(check, place, place.s, None)
             return replace(ending, message="; ".join([*words, ending.message]))
         if not bounds.in_equilibrium:
-            frame = next(self.fall.frames(place))
-            yield frame
+            yield (frame := next(self.fall.frames(place)))
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, frame.velocity))
         # Without friction a program carries what its own check lets pass.
         least = ACCEPTED_ERROR * model.total_load / max(model.scaled_live(place.pose)[1], 1e-300)

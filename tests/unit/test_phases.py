@@ -15,6 +15,8 @@ import blockvis
 import solver
 from blockvis.cli import main
 from blockvis.generators import build
+from blockvis.pictures.swing import swing_of
+from blockvis.results.about import loss_of
 from solver import mechanics
 
 DOWN = solver.Settlement([0.0, -1.0], increment=1e-3, limit=1e-3)
@@ -167,6 +169,35 @@ def test_a_structure_that_stands_no_more_collapses_before_the_settlement() -> No
     assert response.collapse.bracket == (0.0, 0.0)
     assert "'left', 'prop' taken away before settlement 2" in response.message
     assert {increment.phase for increment in response.path} == {0}
+
+
+@pytest.mark.slow
+def test_what_only_springs_back_when_a_stone_is_taken_away_does_not_fall(tmp_path: Path) -> None:
+    structure = solver.Structure(build("arch on piers", {}), friction_coefficient=0.6)
+    aside = solver.Settlement([1.0, 0.0], increment=1e-3, limit=1e-3)
+    lost, collapsed = (
+        structure.settle(
+            [aside, aside],
+            changes=[taken_away(structure, 1, "voussoir 4")],
+            controls=solver.Controls(local_loss=local_loss, falling_frames=1),
+        )
+        for local_loss in (0.9, 0.05)
+    )
+    (loss,) = lost.losses
+    assert loss.blocks == tuple(f"voussoir {k}" for k in range(5, 11))
+    assert collapsed.collapse is not None
+    assert collapsed.collapse.words == "1 macro-block; hinge at voussoir 10 | voussoir 11"
+    blockvis.write(collapsed, tmp_path)
+    for response in (collapsed, blockvis.open_results(tmp_path)):
+        falling = loss_of(response)
+        assert falling is not None
+        assert falling.weight == pytest.approx(loss.weight)
+        falls = response.mesh(-1).cell_data["falls"].astype(bool)
+        assert tuple(np.array(structure.assembly.names)[falls]) == loss.blocks
+        # Before it is taken away, the stone stands.
+        assert not response.path[-1].removed.any()
+        assert swing_of(response).increment.removed.sum() == 1
+        assert swing_of(response).n_parts == 1
 
 
 @pytest.mark.slow
