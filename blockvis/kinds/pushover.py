@@ -168,7 +168,7 @@ class PushoverKind(AnalysisKind):
 
 
 def _largest(response: solver.Response) -> solver.Increment | None:
-    """Find the told increment of the largest multiplier; where joints or ground give, the first one is not carried."""
+    """Find the told increment of the largest multiplier, of a plateau the first; where joints give the first not."""
     path = response.path[1:] if response.interfaces.elastic else response.path
     found = [increment for increment in path if math.isfinite(increment.load_multiplier)]
     most = max((increment.load_multiplier for increment in found), default=0.0)

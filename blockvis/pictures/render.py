@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 import solver
-from blockvis.dynamics.fall import Fall, fall_of
+from blockvis.dynamics.fall import Fall, fall_of, falls_from
 from blockvis.layout.sights import Cut, Sight, read_cut, read_sight
 from blockvis.results.about import loss_of
 from blockvis.results.increments import numbered
@@ -228,13 +228,23 @@ def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
             when = f"before any {response.parameter.name}" if response.measured.is_force else "under the dead load"
             return f"no equilibrium {when}   ·   {bodies}"
         return f"{response.stop}: the motion that would follow   ·   {bodies}"
-    collapse = response.collapse
-    factor, unit = parameter_unit(in_one_unit(response))
-    low, high = (f"{factor * end:.{_digits(collapse.bracket)}g} {unit}" for end in collapse.bracket)
     loss = loss_of(response)
     what = "collapse mechanism" if loss is None or not loss.local else "local loss"
     falls = "" if loss is None else f"   ·   {100.0 * loss.share:.3g} % of W fall"
-    return f"{what}   ·   {collapse.lost} at {low}, none at {high}   ·   {bodies}{falls}"
+    return f"{what}   ·   {_collapse_place(response, response.collapse)}   ·   {bodies}{falls}"
+
+
+def _collapse_place(response: solver.Response, collapse: solver.Collapse) -> str:
+    """Say between which parameters a structure collapses; of what falls as a phase begins what was taken away there."""
+    falling = falls_from(response)
+    if collapse.reaction is None and falling is not None:
+        before = response.path[-1].removed if response.path else np.zeros(response.assembly.n_blocks, dtype=bool)
+        taken = np.flatnonzero(falling.removed & ~before)
+        away = [f"{response.assembly.listed(taken, 4)} taken away"] if len(taken) else []
+        return "   ·   ".join([*away, "falls before anything moves"])
+    factor, unit = parameter_unit(in_one_unit(response))
+    low, high = (f"{factor * end:.{_digits(collapse.bracket)}g} {unit}" for end in collapse.bracket)
+    return f"{collapse.lost} at {low}, none at {high}"
 
 
 def _digits(bracket: tuple[float, float]) -> int:

@@ -15,6 +15,7 @@ import blockvis
 import solver
 from blockvis.cli import main
 from blockvis.generators import build
+from blockvis.pictures.frame import Sheet
 from blockvis.pictures.swing import swing_of
 from blockvis.results.about import loss_of
 from solver import mechanics
@@ -172,7 +173,9 @@ def test_a_structure_that_stands_no_more_collapses_before_the_settlement() -> No
 
 
 @pytest.mark.slow
-def test_what_only_springs_back_when_a_stone_is_taken_away_does_not_fall(tmp_path: Path) -> None:
+def test_what_only_springs_back_when_a_stone_is_taken_away_does_not_fall(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     structure = solver.Structure(build("arch on piers", {}), friction_coefficient=0.6)
     aside = solver.Settlement([1.0, 0.0], increment=1e-3, limit=1e-3)
     lost, collapsed = (
@@ -198,6 +201,14 @@ def test_what_only_springs_back_when_a_stone_is_taken_away_does_not_fall(tmp_pat
         assert not response.path[-1].removed.any()
         assert swing_of(response).increment.removed.sum() == 1
         assert swing_of(response).n_parts == 1
+    told: list[dict[str, Any]] = []
+    composed = Sheet.composed
+    monkeypatch.setattr(Sheet, "composed", lambda *of, **said: told.append(said) or composed(*of, **said))
+    blockvis.draw_mechanism(collapsed, tmp_path / "mechanism.png")
+    (caption,) = told
+    assert "   'voussoir 4' taken away   ·   falls before anything moves   " in caption["detail"]
+    assert caption["detail"].endswith("phase 2 of 2")
+    assert caption["title"] == "Settlement 0.00 mm"
 
 
 @pytest.mark.slow

@@ -129,6 +129,16 @@ def test_pushed_only_so_far_it_keeps_capacity():
 
 
 @pytest.mark.thorough
+def test_of_multipliers_that_are_equal_but_for_rounding_the_first_is_the_largest(tmp_path):
+    control = solver.ControlDisplacement("block", increment=0.01, limit=0.02)
+    response = pushover(block(), control, loads=sideways(block()), friction_coefficient=0.1)
+    rising = [replace(i, load_multiplier=0.1 * (1.0 + 1e-9 * k)) for k, i in enumerate(response.path)]
+    folder = blockvis.write(replace(response, increments=tuple(rising)), tmp_path / "out")
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert len(rising) > 2
+    assert summary["largest_load_multiplier_at"] == 0.0
+
+
 def test_what_has_fallen_is_marked():
     assembly = block()
     control = solver.ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.05)
