@@ -79,13 +79,14 @@ def fall(response: solver.Response, time: float, shape: str) -> pv.UnstructuredG
     """
     import pyvista as pv
 
-    from .dynamics.fall import STANDS, may_fall
+    from .dynamics.fall import NEVER_STOOD, STANDS, may_fall
     from .results.fall_files import fall_grid, known_fall
     from .results.mechanism_arrays import falling_in
 
     found = known_fall(response)
     if found is None:
         why = STANDS if may_fall(response) else f"nothing falls here ({response.stop})"
+        why = NEVER_STOOD if response.collapse is not None and not response.path else why
         raise ValueError(f"{why}: fall(t) is of what falls; mesh(-1) is the last equilibrium")
     if math.isnan(time):
         raise ValueError(f"time is {time}; give the seconds since the last equilibrium")

@@ -37,6 +37,8 @@ STILL, RESTING = 4e-3, 0.2
 #: Blocks have fallen of which a corner has moved by more than this part of the block size; and what is said of none.
 FALLEN = 0.25
 STANDS = f"after the collapse no corner moves by more than {FALLEN:g} of a block before all rest"
+#: What is said of what falls as the first settlement begins, as something is taken away.
+NEVER_STOOD = "a fall in time begins at an equilibrium, and none is told: before the removal put a settlement of 1e-6 m"
 
 #: So much of the mass that the mechanism takes has to have fallen: by a small push a dome jams again.
 MOST = 0.5

@@ -434,6 +434,7 @@ def test_a_block_named_twice_is_taken_away_once(tmp_path: Path, capsys: pytest.C
     assert "block 'block 3' taken away before settlement 3, 2943 N" in summary["notes"][-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranged", ["", "[analysis]\nrange = true\n"])
 def test_what_falls_before_anything_moves_is_a_collapse_at_no_settlement(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], ranged: str
@@ -446,6 +447,10 @@ def test_what_falls_before_anything_moves_is_a_collapse_at_no_settlement(
     assert (summary["status"], summary["collapse_displacement"]) == ("collapsed", 0.0)
     # Both neighbours of the stone fall, of five that weigh alike.
     assert summary["falling_share"] == pytest.approx(0.4)
+    with pytest.raises(ValueError, match=r"begins at an equilibrium, and none is told: .* a settlement of 1e-6 m"):
+        blockvis.open_results(tmp_path / "out").fall(0.1)
+    assert main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out"), "--force", "--no-pictures"]) == 0
+    assert "begins at an equilibrium, and none is told" in capsys.readouterr().err
     assert main(["report", str(tmp_path / "out")]) == 0
 
 
