@@ -323,3 +323,17 @@ def test_a_mechanism_has_one_unit_of_length(words, tmp_path):
     (told,) = words
     assert " mm" in told["title"]
     assert f"equilibrium at {low:.5g} mm, none at {high:.5g} mm" in told["detail"]
+
+
+def test_the_mechanism_of_what_falls_as_a_stone_is_taken_away_names_stone_and_phase(words, tmp_path):
+    structure = solver.Structure(generators.build("arch", {"voussoirs": 5}), friction_coefficient=0.8)
+    phase = solver.Settlement([1.0, 0.0], increment=1e-3, limit=1e-3)
+    change = solver.PhaseChange(1, np.isin(structure.assembly.names, ["voussoir 3"]))
+    controls = solver.Controls(falling_frames=1)
+    draw_mechanism(
+        structure.settle([phase, phase], changes=[change], controls=controls), tmp_path / "m.png", size=SMALL
+    )
+    (said,) = words
+    assert said["title"] == "Settlement 0.00 mm"
+    assert "   'voussoir 3' taken away   ·   falls before anything moves   ·   2 moving parts   " in said["detail"]
+    assert said["detail"].endswith("40 % of W fall   ·   phase 2 of 2")
