@@ -131,10 +131,14 @@ class _Told(io.TextIOWrapper):
             super().flush()
 
 
+class _Ended(KeyboardInterrupt):
+    """The system asks the run to end, not a user to leave what it is at."""
+
+
 def _end(*_: object) -> None:
     """End as after Ctrl-C, what is found written: so queues and shutdowns ask for it, and some ask again meanwhile."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    raise KeyboardInterrupt
+    raise _Ended
 
 
 def entry() -> None:
@@ -802,6 +806,8 @@ def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | N
             unknown = "" if check else "the same path in shorter steps came to nothing"
         except TimeoutError as late:
             unknown = f"{late}; --check-steps waits for it, --no-check-steps does without"
+        except _Ended:
+            raise KeyboardInterrupt("error not known: interrupted; everything else is written") from None
         except KeyboardInterrupt:
             unknown, interrupted = "interrupted; everything else is written", True
     if check is None and options.check_steps and not interrupted:
