@@ -395,9 +395,9 @@ def _beyond_give(
     """(n,) array [m]: gaps, from those without force, beyond the give under the largest tension [N] over areas [m²]."""
     (stiffness,) = interfaces.values(assembly, contacts.block_a, contacts.block_b, "normal_stiffness")
     # Give of elastic joints is neither a gap nor a penetration.
-    gives = (stiffness > 0.0) & np.isfinite(stiffness)
-    pulled = np.divide(tension, stiffness * areas, out=np.zeros_like(gaps), where=gives & (areas > 0.0))
-    return np.where(gives, np.maximum(gaps - pulled, 0.0), gaps)
+    elastic = np.where(np.isfinite(stiffness), stiffness, 0.0)
+    pulled = np.divide(tension, elastic * areas, out=np.zeros_like(gaps), where=elastic * areas > 0.0)
+    return np.where(elastic > 0.0, np.maximum(gaps - pulled, 0.0), gaps)
 
 
 def remaining(assembly: Assembly, fallen: np.ndarray | None) -> Assembly:

@@ -226,6 +226,17 @@ def test_cohesion_acts_where_stones_that_are_not_convex_touch(name, along, area,
     assert found.multiplier == pytest.approx(along + 1e4 * area / mechanics.total_weight(assembly), rel=1e-6)
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_stone_that_is_not_convex_is_pulled_off_without_a_warning_of_numpy():
+    """Its re-entrant corner has no part of the area: a joint that does not give asked for infinity times that."""
+    outlines = [[(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)], [(-1, -1), (4, -1), (4, 4), (-1, 4)]]
+    solids = [prism(outline, low, low + 1.0) for outline, low in zip(outlines, (0.0, -1.0), strict=True)]
+    assembly = solver.Assembly.from_solids(solids, roles=["free", "fixed"], density=1.0)
+    interfaces = solver.Interfaces(solver.InterfaceLaw(tensile_strength=1e3, cohesion=1e3))
+    found = solver.Structure(assembly, interfaces).limit_load(acceleration=[0.0, 0.0, 1.0])
+    assert 0.8 < (found.multiplier - 1.0) * mechanics.total_weight(assembly) / 5e3 <= 1.0 + 1e-6
+
+
 @pytest.mark.parametrize("middle", [0.0, -0.05], ids=["straight", "slightly re-entrant"])
 def test_a_face_with_a_corner_that_is_none_is_shared_out_whole(middle):
     under = [[0, -1], [2, -1], [2, 0], [1, middle], [0, 0]]
