@@ -106,14 +106,14 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
     if low <= in_stated <= high:
         return stated, _doubt_of_template(stated, median)
     # Most drawings whose unit is wrong are in m; blocks of several m are rather bricks in another.
-    likely = "m" if COMMON[0] <= in_metres <= COMMON[1] else next(iter(_masonry_units(median)), "")
-    likely = likely or ("m" if low <= in_metres <= high else "")
+    likely = ["m"] if COMMON[0] <= in_metres <= COMMON[1] else _masonry_units(median)
+    likely = likely or (["m"] if low <= in_metres <= high else [])
     if not likely:
         return stated, ""
-    return likely, Note(
+    return likely[0], Note(
         UNIT_CLASH,
         f"unit clash: the file says its unit is {stated}, which makes the median block {in_stated:.3g} m in size; "
-        f"{likely} was assumed, which makes it {median * metres_per(likely):.3g} m; give unit=... to settle it",
+        f"{_would_make(likely, median)}: {likely[0]} was assumed; give unit=... to settle it",
     )
 
 

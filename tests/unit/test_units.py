@@ -9,7 +9,7 @@ from blockvis import read, read_layout
 def square(folder, size, stated=""):
     """A file of one square block that states a unit, or none."""
     drawing = ezdxf.new("R2000")
-    drawing.header["$INSUNITS"] = {"": 0, "in": 1, "ft": 2, "mm": 4, "cm": 5}[stated]
+    drawing.header["$INSUNITS"] = {"": 0, "in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6}[stated]
     drawing.modelspace().add_lwpolyline([(0, 0), (size, 0), (size, size), (0, size)], close=True)
     drawing.saveas(folder / "a.dxf")
     return folder / "a.dxf"
@@ -43,6 +43,12 @@ def test_choice(tmp_path, given, stated, size, unit, word):
     assert layout.unit == unit
     assert word in " ".join(notes)
     assert bool(word) == bool(notes)
+
+
+def test_the_note_of_a_unit_that_is_read_in_instead_names_the_other_one_that_is_as_possible(tmp_path):
+    layout = read_layout(square(tmp_path, 69.3, "m"))
+    assert layout.unit == "cm"
+    assert "cm would make it 0.693 m, mm 0.0693 m: cm was assumed" in " ".join(layout.notes)
 
 
 @pytest.mark.parametrize(("stated", "size", "metric"), [("in", 137.0, "mm"), ("ft", 25.0, "cm"), ("in", 50.0, "")])
