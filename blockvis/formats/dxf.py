@@ -256,7 +256,9 @@ def _turned(found: _Outlines, reading: Reading, path: Path) -> list[str]:
     unwanted, asked = _choices(found, reading)
     labels = zip(_labels(found), found.looks, strict=True)
     wanted = [not unwanted.takes(*own) and (not reading.only or asked.takes(*own)) for own in labels]
-    wanted += _wanted_lines(found, unwanted, asked)
+    # Where outlines are asked for by name, other lines are in the plane of something else, as a plan.
+    named = [not unwanted.takes(*own) and (not reading.only or asked.takes(*own)) for own in _of_lines(found)]
+    wanted += named if any(wanted) or any(named) else _wanted_lines(found, unwanted, asked)
     chosen = [points for points, is_wanted in zip(every, wanted, strict=True) if is_wanted]
     turn, notes = drawing_plane(chosen or every, f"'{path}'", reading.view)
     still = np.zeros(3)
@@ -737,8 +739,7 @@ def _chosen_lines(found: _Outlines, reading: Reading) -> tuple[Choice, list[Line
 
 def _choices(found: _Outlines, reading: Reading) -> tuple[Choice, Choice]:
     """Tell apart what is unwanted and what is asked for."""
-    lines = {name for line in found.loose for name in (line.layer, f"line {line.handle}")}
-    names = lines.union(*_labels(found))
+    names = set[str]().union(*_labels(found), *(labels for labels, _ in _of_lines(found)))
     return Choice(reading.ignore, names), Choice(reading.only, names)
 
 
@@ -753,8 +754,12 @@ def _wanted_lines(found: _Outlines, unwanted: Choice, asked: Choice) -> list[boo
     layers = {*found.layers, *(line.layer for line in found.loose)}
     looks = {look for own in (*found.looks, *(line.looks for line in found.loose)) for look in own}
     chosen = any(asked.takes([layer]) for layer in layers) or asked.takes((), looks)
-    every = [([line.layer], line.looks) for line in found.loose]
-    return [not unwanted.takes(*own) and (not chosen or asked.takes(*own)) for own in every]
+    return [not unwanted.takes(*own) and (not chosen or asked.takes(*own)) for own in _of_lines(found)]
+
+
+def _of_lines(found: _Outlines) -> list[tuple[list[str], tuple[str, ...]]]:
+    """Layer and name of each loose line, by which it can be asked for, and its looks."""
+    return [([line.layer, f"line {line.handle}"], line.looks) for line in found.loose]
 
 
 def _size(found: _Outlines) -> float:

@@ -383,6 +383,26 @@ def test_what_is_not_wanted_does_not_decide_how_a_drawing_lies(tmp_path, chosen)
     assert "elevations" not in notes
 
 
+@pytest.mark.parametrize("chosen", [{"only": "block *"}, {"ignore": "line *"}])
+@pytest.mark.parametrize("level", [True, False])
+def test_loose_lines_beside_outlines_that_are_asked_for_by_name_do_not_decide_how_a_drawing_lies(
+    tmp_path, chosen, level
+):
+    """A façade at 60° to x beside the lines of a plan, or of a section along x."""
+
+    def draw(document, space):
+        for low in (0.0, 0.5):
+            corners = [(0, low), (1, low), (1, low + 0.5), (0, low + 0.5)]
+            space.add_polyline3d([(0.5 * u, 0.75**0.5 * u, z) for u, z in corners], close=True)
+        ring = [(5 * x, 4 * y, 0) if level else (5 * x, 0, 4 * y) for x, y in SQUARE]
+        for k in range(4):
+            space.add_line(ring[k], ring[(k + 1) % 4])
+
+    layout = read_layout(saved(tmp_path, draw), **chosen)
+    assert np.ptp(np.concatenate(layout.outlines), axis=0) == pytest.approx([1.0, 1.0])
+    assert layout.n_blocks == 2
+
+
 def test_faults_of_a_file_are_noted_and_not_printed(tmp_path, capfd):
     def draw(document, space):
         space.add_lwpolyline(SQUARE, close=True)
