@@ -235,7 +235,6 @@ def _in_metres(layout: Layout, unit: str | None) -> Layout:
         if layout.dimension == 3
         else tuple(without_collinear(ring * factor) for ring in layout.outlines),
         thickness=None if layout.thickness is None else layout.thickness * metres_per(layout.thickness_unit or chosen),
-        thickness_unit="m",
         unit=chosen,
         unit_by=by,
         notes=layout.notes + ((note,) if note else ()),

@@ -49,7 +49,7 @@ class Layout:
     thickness : (n_blocks,) array [m] or None
         Out of plane; NaN for a block of which the file says nothing. Blocks in space have none.
     thickness_unit : str
-        Inside a format's reader "m" of a thickness that is no length of the drawing, "" of one in its unit.
+        In which the file has it: "m" of a thickness that is no length of the drawing, "" of one in its unit.
     unit : str
         Unit of length in which the file was read; inside a format's reader the unit that the file states, "" for none.
     unit_by : {"", "layout", "user"}

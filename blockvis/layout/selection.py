@@ -32,7 +32,8 @@ SLIVER_WIDTH = 2e-3
 #: ... and longer than this many times its own width: a chip is none.
 SLIVER_SHAPE = 20.0
 
-#: Blocks thinner or thicker than these times the root of their area were drawn in another unit than they are thick.
+#: Blocks thinner or thicker than these times the root of their area, and of the median one, were drawn in another unit
+#: than they are thick.
 THINNEST, THICKEST = 0.02, 1000.0
 
 #: A frame or background holds at least this share of all other outlines.
@@ -111,14 +112,22 @@ def noted(layout: Layout) -> Layout:
     return replace(layout, notes=(*layout.notes, *unfilled(layout), *in_words(layout.left_out), *found))
 
 
-def _thickness_doubt(layout: Layout, size: float) -> str:
-    """Doubt a thickness that the file says in another unit than its outlines; "" of one that may be."""
-    said = np.zeros(0) if layout.thickness is None else layout.thickness[np.isfinite(layout.thickness)]
-    if not len(said) or THINNEST * size <= (thickness := float(np.median(said))) <= THICKEST * size:
+def _thickness_doubt(layout: Layout, median: float) -> str:
+    """Doubt thicknesses said in another unit than outlines: far from the size of their block and the median [m]."""
+    if layout.thickness is None:
         return ""
+    # Ground may be far larger than it is thick, and a chip far smaller: stones of a usual size tell.
+    thin = layout.thickness < THINNEST * np.minimum(layout.sizes, median)
+    thick = layout.thickness > THICKEST * np.maximum(layout.sizes, median)
+    doubted = np.flatnonzero(thin | thick)
+    if not len(doubted):
+        return ""
+    first, said = doubted[0], np.isfinite(layout.thickness).sum()
+    many = f" ({len(doubted)} of {said} thicknesses are as doubtful)" if said > 1 else ""
     return (
-        f"thickness in doubt: {thickness:.3g} m of blocks {size:.3g} m across; beside outlines a file has it in the "
-        "unit of the drawing, .dxf, .svg and .msh in m: correct it there"
+        f"thickness in doubt: {layout.thickness[first]:.3g} m of block '{layout.names[first]}', "
+        f"{layout.sizes[first]:.3g} m across{many}; the file has it in {layout.thickness_unit or layout.unit}: correct "
+        "it there"
     )
 
 

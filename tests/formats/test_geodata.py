@@ -150,13 +150,19 @@ def test_a_facade_that_stands_upright_is_turned(tmp_path):
 
 
 def test_a_thickness_in_another_unit_than_its_drawing_is_doubted(tmp_path):
-    """It is in the unit of the drawing: of stones in mm, 500, and 0.5 is half a millimetre."""
+    """It is in the unit of the drawing: of stones in mm, 500, and 0.5 is half a millimetre, if of one row alone."""
     rings = (np.array(SQUARES) * 1000.0).tolist()
-    for said, metres, doubted in ((500, 0.5, False), (0.5, 0.0005, True)):
-        path = geojson(tmp_path / "mm.geojson", [polygon(ring, thickness=said) for ring in rings])
-        layout = blockvis.read_layout(path, unit="mm")
-        assert layout.thickness.tolist() == pytest.approx([metres] * 4)
-        assert ("thickness in doubt: 0.0005 m of blocks 0.283 m across" in " ".join(layout.notes)) is doubted
+    for said, doubtful in (([500] * 4, 0), ([0.5] * 4, 4), ([500, 500, 0.5, 500], 1), ([500, 0.5, 500, 0.5], 2)):
+        stones = [polygon(ring, name=f"stone {k}", thickness=said[k]) for k, ring in enumerate(rings)]
+        # Ground of 30 by 60 m is no thinner for it than the stones.
+        ground = polygon([[-3e4, -3e4], [3e4, -3e4], [3e4, 0], [-3e4, 0]], name="ground", thickness=500)
+        layout = blockvis.read_layout(geojson(tmp_path / "mm.geojson", [*stones, ground]), unit="mm")
+        assert layout.thickness.tolist() == pytest.approx([each / 1000.0 for each in said] + [0.5])
+        notes = " ".join(layout.notes)
+        assert ("thickness in doubt" in notes) == bool(doubtful)
+        if doubtful:
+            first = f"thickness in doubt: 0.0005 m of block 'stone {said.index(0.5)}', 0.283 m across"
+            assert f"{first} ({doubtful} of 5 thicknesses are as doubtful); the file has it in mm: correct it" in notes
 
 
 def test_degrees_are_refused_with_the_command_that_makes_them_metres(tmp_path):
