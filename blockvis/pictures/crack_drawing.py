@@ -73,11 +73,11 @@ def draw_cracks(
             raise ValueError("view and section are of blocks in space; these lie in the plane: leave both out")
         thickness = "lines as thick as they are open, the thickest "
         picture, keys, pixel = _drawn_in_plane(assembly, increment, joints, cracks, sheet)
-        # Stepped cracks run through joints that slide, which are drawn.
         moved = opening_and_slip(assembly, joints, increment.pose, increment.fallen)
-        for crack in cracks:
-            moved[crack.joints, 1] = 0.0
-        slip, drawn = float(np.abs(moved[slid_joints(assembly, moved), 1]).max(initial=0.0)), ", not drawn"
+        slid = slid_joints(assembly, moved)[:1]
+        slip = float(np.abs(moved[slid, 1]).max(initial=0.0))
+        # Stepped cracks run through joints that slide.
+        drawn = "" if any(np.isin(slid, crack.joints).any() for crack in cracks) else ", not drawn"
     else:
         # VTK takes seconds to import, and pictures in the plane need none.
         from .cracks_in_space import CracksInSpace

@@ -164,7 +164,7 @@ def cracks_of(
 def slid_joints(assembly: solver.Assembly, moved: np.ndarray) -> np.ndarray:
     """(n,) int array: joints that have slid by far and are not open, the farthest first.
 
-    They are no cracks, and yet a step in what a survey draws.
+    They are a step in what a survey draws, whether a stepped crack runs through them or none.
 
     Parameters
     ----------

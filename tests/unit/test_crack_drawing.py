@@ -181,3 +181,17 @@ def test_a_step_in_the_plane_is_said(tmp_path, monkeypatch):
     draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE)
     counts = "1 crack   ·   lines as thick as they are open, the thickest 30 mm"
     assert said == [f"{counts}   ·   joints slide by up to 250 mm, not drawn   ·   drawn on the layout"]
+
+
+@pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_a_step_is_said_though_it_is_part_of_a_crack(tmp_path, monkeypatch, dimension):
+    """Two blocks past each other by 250 mm and open by 5 are a crack of 5 mm, in the plane as in space."""
+    if dimension == 2:
+        assembly = solver.Assembly.from_outlines([rectangle(-1, 0, 0, 1), rectangle(0, 0, 1, 1)])
+    else:
+        assembly = solver.Assembly.from_solids([box((-1, 0, 0), (0, 1, 1)), box((0, 0, 0), (1, 1, 1))])
+    pose = solver.Pose.initial(assembly)
+    pose.positions[1, [0, -1]] += 0.005, -0.25
+    said = details(monkeypatch)
+    draw_cracks(posed(assembly, pose), -1, tmp_path / "cracks.png", size=SIZE)
+    assert said[0].endswith(" 5 mm   ·   joints slide by up to 250 mm   ·   drawn on the layout")
