@@ -15,11 +15,11 @@ from . import palette
 from .frame import framed
 
 #: A fall of so many frames needs no others; how many a mechanism has that swings out, and how far it goes, in motions
-#: of :class:`Swing`.
+#: whose fastest corner goes ``REACH``: what moves in a film is to be seen, and so its hinges may part.
 ENOUGH_FRAMES, SWING_FRAMES, SWING_REACH = 8, 15, 1.2
 
-#: The fastest corner of a mechanism goes so far, in sizes of the picture; in space less where points that carry would
-#: part by more than ``TEAR`` beyond what they do to first order: a hinge is closed, however far its sides turn.
+#: The fastest corner of a mechanism goes so far, in sizes of the picture; in space less where hinges would part by
+#: more than ``TEAR`` beyond what they do to first order: a hinge is closed, however far its sides turn.
 REACH, TEAR = 0.05, 0.002
 
 #: Up to this many parts of a mechanism are tinted one by one: each has a colour of its own.
@@ -84,7 +84,7 @@ def swing_of(response: solver.Response) -> Swing:
     motion = motion * (REACH * size / fastest if fastest > 0 else 0.0)
     if assembly.dimension == 3:
         # Blocks in space are drawn after it; those in the plane stay where their hinges are.
-        share = min(1.0, float(np.sqrt(TEAR * size / max(_torn(last, motion), 1e-300))))
+        share = min(1.0, float(np.sqrt(TEAR * size / max(_torn(assembly, last, motion), 1e-300))))
     displaced = mechanics.swung(last.pose, share * motion)
     return Swing(last, begins, displaced, mechanics.rigid_parts(assembly, last), fastest > 0.0, share * motion, share)
 
@@ -103,7 +103,7 @@ def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:
     if not swing.moves:
         return response.increments
     reaches = (SWING_REACH * (k / SWING_FRAMES) ** 2 for k in range(1 if path else 0, SWING_FRAMES + 1))
-    return (*path, *(swung_increment(swing.increment, reach * swing.motion) for reach in reaches))
+    return (*path, *(swung_increment(swing.increment, reach / swing.share * swing.motion) for reach in reaches))
 
 
 def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing) -> np.ndarray:
@@ -126,16 +126,17 @@ def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing)
     return np.where(assembly.free[:, None], tints, fill)
 
 
-def _torn(increment: solver.Increment, motion: np.ndarray) -> float:
-    """Find by how much [m] blocks on their arcs part at most where they carry each other, beyond first order.
+def _torn(assembly: solver.Assembly, increment: solver.Increment, motion: np.ndarray) -> float:
+    """Find by how much [m] hinges of blocks on their arcs part at most, beyond first order.
 
     It grows with the square of the motion, (n_blocks, n_dof) from the increment on.
     """
-    before, carrying = increment.pose, increment.contacts[increment.forces[:, 0] > 0.0]
-    after, points = mechanics.swung(before, motion), carrying.points
+    # Not those of its forces: where nothing ever stood there are none.
+    hinges = increment.contacts[mechanics.mechanism_of(assembly, increment).hinge_points]
+    before, after, points = increment.pose, mechanics.swung(increment.pose, motion), hinges.points
     of_a, of_b = (
         mechanics.carried(points, block, before, after) - mechanics.point_velocities(points, block, before, motion)
-        for block in (carrying.block_a, carrying.block_b)
+        for block in (hinges.block_a, hinges.block_b)
     )
     return float(np.linalg.norm(of_a - of_b, axis=1).max(initial=0.0))
 

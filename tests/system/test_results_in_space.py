@@ -6,7 +6,7 @@ import re
 import shutil
 import subprocess
 import warnings
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from test_report import browser, visited
 
 import blockvis
 import solver
-from blockvis import animate, draw_mechanism, draw_still, write_report
+from blockvis import animate, draw_mechanism, draw_still, generators, write_report
 from blockvis.cli import main
 from blockvis.pictures import palette
 from blockvis.pictures.drawer import Drawer, Look
@@ -509,17 +509,44 @@ def test_mechanism_is_tinted_and_shows_where_it_goes(tmp_path):
         assert near.sum() > 120
 
 
+def torn(assembly, swing):
+    """How far the sides of the hinges of a mechanism are drawn apart."""
+    before, contacts = swing.increment.pose, swing.increment.contacts
+    hinges = contacts[mechanics.mechanism_of(assembly, swing.increment).hinge_points]
+    a, b = (
+        mechanics.carried(hinges.points, block, before, swing.displaced) for block in (hinges.block_a, hinges.block_b)
+    )
+    return np.linalg.norm(a - b, axis=1).max()
+
+
+def test_a_mechanism_swings_as_far_on_the_page_as_if_its_hinges_might_part(tmp_path, monkeypatch):
+    """Where the analysis of the fall ends at once: 1.2 times as far as goes with its arrows."""
+    motions, response = [], vault_response()
+    monkeypatch.setattr(
+        "blockvis.pictures.swing.swung_increment", lambda increment, motion: (motions.append(motion), increment)[1]
+    )
+    write_report(replace(response, increments=response.path), tmp_path / "report.html")
+    swing = swing_of(response)
+    np.testing.assert_allclose(motions[-1], 1.2 / swing.share * swing.motion, atol=1e-9)
+
+
+def test_the_mechanism_of_what_never_stood_is_drawn_with_closed_hinges():
+    """No forces say there where they are."""
+    arch = generators.extruded_arch(voussoirs=8, thickness_ratio=0.05)
+    response = solver.settle(arch, solver.Settlement((1, 0, 0)), friction_coefficient=2.0)
+    assert not response.path
+    swing = swing_of(response)
+    size = framed(arch, [swing.increment.pose]).size.max()
+    assert 1e-5 * size < torn(arch, swing) < 2.5e-3 * size
+    assert 0.3 < swing.share < 0.8
+
+
 def test_a_mechanism_is_drawn_with_closed_hinges(tmp_path, monkeypatch):
     """On arcs of their own parts tear their hinges, by 34 mm here if a corner goes 5 % of the picture; arrows do."""
     response = vault_response()
     swing = swing_of(response)
-    before, contacts = swing.increment.pose, swing.increment.contacts
-    hinges = contacts[mechanics.mechanism_of(response.assembly, swing.increment).hinge_points]
-    a, b = (
-        mechanics.carried(hinges.points, block, before, swing.displaced) for block in (hinges.block_a, hinges.block_b)
-    )
-    size = framed(response.assembly, [before]).size.max()
-    assert 1e-5 * size < np.linalg.norm(a - b, axis=1).max() < 2.5e-3 * size
+    size = framed(response.assembly, [swing.increment.pose]).size.max()
+    assert 1e-5 * size < torn(response.assembly, swing) < 2.5e-3 * size
     assert 0.3 < swing.share < 0.8
     drawn = []
     monkeypatch.setattr(
