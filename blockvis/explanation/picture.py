@@ -278,27 +278,28 @@ class _Sights:
     pieces: np.ndarray | None = None
     seen: np.ndarray | None = None
 
-    def of(self, places: np.ndarray, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Find what is seen of joints (n,) int, nearest to places (n, d) [m] on them.
+    def of(self, places: np.ndarray, joints: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+        """Find what is seen of joints (n,) int, nearest to places (n, d) [m] on them first.
 
         Returns
         -------
-        places : (n, d) array [m]
-            On an edge of the joint; as given where nothing of it is seen.
+        places : list of (m, d) arrays [m]
+            On edges of each joint; the one given where nothing of it is seen.
         seen : (n,) bool array
         """
+        found, seen = list(np.array(places)[:, None]), np.ones(len(places), dtype=bool)
         if self.pieces is None or self.seen is None:
-            return places, np.ones(len(places), dtype=bool)
-        places, found = np.array(places), np.zeros(len(places), dtype=bool)
+            return found, seen
         for k, joint in enumerate(joints.tolist()):
             here = slice(*self.rings.offsets[joint : joint + 2])
             edges = self.pieces[here][self.seen[here]]
+            seen[k] = len(edges) > 0
             if len(edges):
-                places[k], found[k] = edges[np.linalg.norm(edges - places[k], axis=1).argmin()], True
-        return places, found
+                found[k] = edges[np.linalg.norm(edges - places[k], axis=1).argsort(kind="stable")]
+        return found, seen
 
 
-def _observed(canvas: _Canvas, found: Explanation) -> list[Annotation]:
+def _observed(canvas: _Canvas, found: Explanation) -> list[_Label]:
     """Draw what was observed; gives the labels of widths."""
     given, assembly, panel = found.observations, found.assembly, canvas.panel
     rings, opened = found.comparison.joints.rings, given.widths > 0.0
@@ -312,9 +313,10 @@ def _observed(canvas: _Canvas, found: Explanation) -> list[Annotation]:
     sights = canvas.blocks(solver.Pose.initial(assembly), lines, thick, [], rings)
     canvas.compass()
     at, seen = sights.of(given.places, found.comparison.own)
-    places, closed = canvas.placed(at), ~opened & seen
+    spots = [canvas.placed(each) for each in at]
+    places, closed = np.array([each[0] for each in spots]).reshape(-1, 2), ~opened & seen
     panel.plot(*places[closed].T, "o", ms=4.5, mfc="white", mec=palette.hexadecimal(palette.FAINT), zorder=4)
-    labels = _labels(panel, places, given.widths, found, seen, sizes=given.widths)
+    labels = _labels(panel, spots, given.widths, found, seen, sizes=given.widths)
     points = canvas.placed(given.points)
     strange = np.concatenate([places[list(found.unexplained)], points[list(found.unexplained_points)]])
     panel.plot(*strange.T, "o", ms=17, mfc="none", mec=palette.hexadecimal(palette.WARNING), mew=1.6, zorder=6)
@@ -341,7 +343,7 @@ def _computed(
     shown: solver.Pose,
     number: int,
     factor: float,
-) -> list[Annotation]:
+) -> list[_Label]:
     """Draw what a cause makes; gives the labels, that of the next measurement first."""
     assembly, compared, given, panel = found.assembly, found.comparison, found.observations, canvas.panel
     rings = compared.joints.rings
@@ -355,23 +357,25 @@ def _computed(
     filled = np.stack([faces.on_a[start], faces.on_a[stop], faces.on_b[stop], faces.on_b[start]], axis=1)
     between = rings.at((faces.on_a + faces.on_b) / 2.0)
     sights = canvas.blocks(shown, [], [], filled, between)
-    labels: list[Annotation] = []
+    labels: list[_Label] = []
     labelled = np.zeros(len(opening))
     if len(given.widths):
         pairs = cause.best.pairs[cause.at]
         corners = between.points[compared.corners[compared.joint[pairs]]]
         at, seen = sights.of((corners * compared.weights[pairs][..., None]).sum(axis=1), compared.joint[pairs])
-        labels = _labels(panel, canvas.placed(at), cause.best.widths[cause.at], found, seen, sizes=given.widths)
+        spots = [canvas.placed(each) for each in at]
+        labels = _labels(panel, spots, cause.best.widths[cause.at], found, seen, sizes=given.widths)
         np.maximum.at(labelled, compared.joint[pairs], cause.best.widths[cause.at])
     # Where nothing was observed at the end that gapes, the width at the other is not that of the crack.
     wider = np.flatnonzero(opening > GAPES * labelled)
     widest = compared.corners[wider, openings[0, compared.corners[wider]].argmax(axis=1)]
     at, seen = sights.of(between.points[widest], wider)
-    labels += _labels(panel, canvas.placed(at), opening[wider], found, seen, sizes=opening[wider])
+    spots = [canvas.placed(each) for each in at]
+    labels += _labels(panel, spots, opening[wider], found, seen, sizes=opening[wider])
     measurement = found.next_measurement
     if measurement is not None:
         at, _ = sights.of(between.middles()[[measurement.joint]], np.array([measurement.joint]))
-        x, y = canvas.placed(at)[0]
+        x, y = canvas.placed(at[0])[0]
         panel.plot(x, y, "D", ms=8, mfc="white", mec=palette.hexadecimal(palette.FORCE), mew=1.8, zorder=7)
         here = panel.annotate(
             f"measure here: {width_text(float(opening[measurement.joint]))}",
@@ -383,7 +387,7 @@ def _computed(
             bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none"},
             zorder=8,
         )
-        labels.insert(0, here)
+        labels.insert(0, _Label(here, np.array([[x, y]])))
     moving = [assembly.index(name) for name in cause.best.candidate.motions]
     moved = canvas.placed((pose.positions - assembly.centroids)[moving])
     if np.hypot(*moved.T).max(initial=0.0) > 0.0 and not cause.best.candidate.turns:
@@ -432,40 +436,51 @@ def _arrows(
             )
 
 
+@dataclass(frozen=True)
+class _Label:
+    """A width that is written, and (n, 2) array [m]: the places of the panel where it may be, the best first."""
+
+    written: Annotation
+    places: np.ndarray
+
+
 def _labels(
     panel: Axes,
-    places: np.ndarray,
+    places: Sequence[np.ndarray],
     widths: np.ndarray,
     found: Explanation,
     seen: np.ndarray,
     *,
     sizes: np.ndarray,
-) -> list[Annotation]:
-    """Write widths in mm at places (n, 2) of open joints, the widest first, and where one opens that was closed.
+) -> list[_Label]:
+    """Write widths in mm at places (m, 2) of each open joint, the widest first, and where one opens that was closed.
 
     The frames of those that are not seen, (n,) bool, are dashed.
     """
     least = 0.05 * found.observations.largest
     order = np.argsort(-np.maximum(sizes, widths), kind="stable")
     return [
-        panel.annotate(
-            width_text(float(widths[k])),
+        _Label(
+            panel.annotate(
+                width_text(float(widths[k])),
+                places[k][0],
+                xytext=(0, 9),
+                textcoords="offset points",
+                ha="center",
+                va="center",
+                fontsize=TEXT - 1,
+                color=palette.hexadecimal(palette.INK),
+                bbox={
+                    "boxstyle": "round,pad=0.15",
+                    "fc": "white",
+                    "ec": palette.hexadecimal(palette.OPEN),
+                    "lw": 0.7 if seen[k] else 1.1,
+                    "ls": "-" if seen[k] else DASHED,
+                },
+                gid="" if seen[k] else HIDDEN,
+                zorder=5,
+            ),
             places[k],
-            xytext=(0, 9),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=TEXT - 1,
-            color=palette.hexadecimal(palette.INK),
-            bbox={
-                "boxstyle": "round,pad=0.15",
-                "fc": "white",
-                "ec": palette.hexadecimal(palette.OPEN),
-                "lw": 0.7 if seen[k] else 1.1,
-                "ls": "-" if seen[k] else DASHED,
-            },
-            gid="" if seen[k] else HIDDEN,
-            zorder=5,
         )
         # Each is laid out before those that cover others are removed.
         for k in order[: 4 * MOST_LABELS].tolist()
@@ -473,17 +488,25 @@ def _labels(
     ]
 
 
-def _uncover(labels: Sequence[Annotation]) -> list[Annotation]:
-    """Remove each label that covers one written before it, and what is beyond the most; gives those that are left."""
-    written: list[BboxBase] = []
+def _uncover(labels: Sequence[_Label]) -> list[Annotation]:
+    """Move each label that covers one written before it, or else remove it, and what is beyond the most.
+
+    Gives those that are left.
+    """
+    drawn: list[BboxBase] = []
     left = []
     for label in labels:
-        patch = label.get_bbox_patch()
+        patch, panel = label.written.get_bbox_patch(), label.written.axes
         assert patch is not None
-        box = patch.get_window_extent()
-        if len(written) == MOST_LABELS or box.count_overlaps(written):
-            label.remove()
+        assert panel is not None
+        box, on_page = patch.get_window_extent(), panel.transData.transform(label.places)
+        boxes = (box.translated(*shift) for shift in on_page - on_page[0])
+        free = ((k, one) for k, one in enumerate(boxes) if not one.count_overlaps(drawn))
+        k, box = next(free, (-1, box))
+        if k < 0 or len(drawn) == MOST_LABELS:
+            label.written.remove()
         else:
-            written.append(box)
-            left.append(label)
+            label.written.xy = tuple(label.places[k])
+            drawn.append(box)
+            left.append(label.written)
     return left

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 from PIL import Image
 from structures import box, posed
 
@@ -466,6 +467,31 @@ def test_cracks_in_space_are_looked_at_from_where_they_are_seen(tmp_path):
     )
     # Of cracks behind the screen nothing is drawn but the dashed frames of their widths.
     assert min(seen, behind) > 2 * hidden > 0
+
+
+@pytest.mark.slow
+def test_a_width_beside_a_wider_one_is_written_elsewhere_on_its_joint(tmp_path, monkeypatch):
+    """Two widths at an edge of a bearing, 5 mm apart: the second has room elsewhere on what is seen of it."""
+    boxes = [((0, 0, -1), (0.4, 2, 0)), ((1.6, 0, -1), (2, 2, 0)), ((0, 0, 0), (2, 2, 0.4))]
+    names, roles = ["left", "right", "lintel"], ["fixed", "fixed", "free"]
+    save_layout(
+        solver.Assembly.from_solids([box(*corners) for corners in boxes], names=names, roles=roles),
+        tmp_path / "lintel.json",
+    )
+    (tmp_path / "lintel.toml").write_text(
+        "[geometry]\nfile = 'lintel.json'\n[material]\nfriction_coefficient = 0.6\n"
+        "[explain]\nsupports = ['right']\ndirections = ['down']\n[output]\nview = { azimuth = -150, elevation = 20 }\n"
+    )
+    rows = [
+        {"joint": "lintel | left", "x": 0.2 + x, "y": 0.0, "z": 0.0, "width [mm]": width}
+        for x, width in ((0.0, 4.0), (0.005, 3.7))
+    ]
+    removed = []
+    monkeypatch.setattr(
+        Annotation, "remove", lambda label: (removed.append(label.get_text()), label.set_visible(False))
+    )
+    blockvis.explain(tmp_path / "lintel.toml", rows, tmp_path / "out")
+    assert "3.7" not in removed
 
 
 @pytest.mark.slow
