@@ -322,7 +322,11 @@ def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:
             beside = {"around": _around(n, nodes, above), "materials": _materials(drawn, description)}
             shape = Trimesh(mesh.vertices, mesh.faces, process=False, metadata={**mesh.metadata, **beside})
             found.setdefault(node, (str(own), []))[1].append(shape.apply_transform(transform))
-    return [(name, parts[0] if len(parts) == 1 else concatenate(parts)) for name, parts in found.values()]
+    joined = [(name, parts[0] if len(parts) == 1 else concatenate(parts), parts) for name, parts in found.values()]
+    for _, mesh, parts in joined:
+        # Not every version of trimesh keeps it where parts are joined.
+        mesh.metadata.update(parts[0].metadata)
+    return [(name, mesh) for name, mesh, _ in joined]
 
 
 def _around(node: int, nodes: Sequence[dict[str, Any]], above: dict[int, int]) -> list[str]:
