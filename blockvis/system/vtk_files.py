@@ -40,7 +40,8 @@ def write_vtu(
         Its folder is made if it does not exist.
     strings : bool
         Whether arrays of strings are written as such, which meshio does not read; otherwise each is a field array of
-        bytes, its strings in UTF-8 with a line feed after each.
+        bytes, its strings in UTF-8 with a line feed after each, and polyhedra are in the order of their numbers of
+        corners: meshio gives their data to others otherwise.
     durable : bool
         As of :func:`blockvis.system.atomic_files.atomic_file`.
 
@@ -53,7 +54,7 @@ def write_vtu(
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
     if not strings:
-        dataset = _with_bytes(dataset)
+        dataset = _by_corners(_with_bytes(dataset))
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(dataset)
     # Written into memory first: on a full disk VTK's own writer ends the process.
@@ -86,6 +87,48 @@ def _with_bytes(dataset: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
                 written.SetName(array.GetName())
                 attributes.RemoveArray(array.GetName())
                 copy.GetFieldData().AddArray(written)
+    return copy
+
+
+def _by_corners(dataset: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
+    """Make a copy of a dataset with polyhedra in the order of their numbers of corners; others are left."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+    from vtkmodules.vtkCommonDataModel import VTK_POLYHEDRON, vtkCellArray
+
+    faces, locations = dataset.GetPolyhedronFaces(), dataset.GetPolyhedronFaceLocations()
+    if faces is None:
+        return dataset
+
+    def taken(of: vtkCellArray, order: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        starts, members = (vtk_to_numpy(array) for array in (of.GetOffsetsArray(), of.GetConnectivityArray()))
+        sizes = np.diff(starts)[order]
+        offsets = np.append(0, np.cumsum(sizes))
+        return offsets, members[np.repeat(starts[:-1][order] - offsets[:-1], sizes) + np.arange(offsets[-1])]
+
+    def cells(offsets: np.ndarray, members: np.ndarray) -> vtkCellArray:
+        array = vtkCellArray()
+        array.SetData(*(numpy_to_vtk(ids.astype(np.int64), deep=True) for ids in (offsets, members)))
+        return array
+
+    order = np.argsort(np.diff(vtk_to_numpy(dataset.GetCells().GetOffsetsArray())), kind="stable")
+    of_cells, which = taken(locations, order)
+    copy = dataset.NewInstance()
+    copy.SetPoints(dataset.GetPoints())
+    copy.SetPolyhedralCells(
+        numpy_to_vtk(np.full(len(order), VTK_POLYHEDRON, dtype=np.uint8), deep=True),
+        cells(*taken(dataset.GetCells(), order)),
+        cells(of_cells, np.arange(len(which))),
+        cells(*taken(faces, which)),
+    )
+    copy.GetPointData().ShallowCopy(dataset.GetPointData())
+    copy.SetFieldData(dataset.GetFieldData())
+    data = dataset.GetCellData()
+    for array in (data.GetArray(k) for k in range(data.GetNumberOfArrays())):
+        ordered = numpy_to_vtk(vtk_to_numpy(array)[order], deep=True)
+        ordered.SetName(array.GetName())
+        copy.GetCellData().AddArray(ordered)
+    if data.GetScalars() is not None:
+        copy.GetCellData().SetActiveScalars(data.GetScalars().GetName())
     return copy
 
 

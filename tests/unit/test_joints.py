@@ -15,6 +15,7 @@ from structures import (
     moved_and_turned,
     parted,
     posed,
+    prism,
     rectangle,
     report_of,
     stacked,
@@ -153,6 +154,32 @@ def test_a_case_chooses_the_undeformed_shape_and_files_that_meshio_reads(tmp_pat
     (tmp_path / "case.toml").write_text(text.replace("undeformed", "deformed"), encoding="utf-8")
     with pytest.raises(ValueError, match=r"\[output\] vtu is 'deformed'.*moved, undeformed"):
         blockvis.read_case(tmp_path / "case.toml")
+
+
+def test_meshio_gives_polyhedra_their_own_data(tmp_path):
+    """It puts polyhedra together by their numbers of corners, and their data by the order of these numbers."""
+    l_shaped = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], dtype=float)
+    slab = rectangle(-1, -1, 3, 3)
+    solids = [prism(l_shaped, 0.0, 1.0), prism(slab, -1.0, 0.0), prism(rectangle(1, 1, 2, 2), 0.0, 1.0)]
+    solids.append(prism(l_shaped, 1.0, 2.0))
+    roles = ["free", "moving", "free", "free"]
+    blockvis.save_layout(solver.Assembly.from_solids(solids, roles=roles), tmp_path / "stones.json")
+    text = (
+        '[geometry]\nfile = "stones.json"\n[settlement]\ndirection = [0, 0, -1]\nincrement = 0.1\nlimit = 0.1\n'
+        "[output]\nanimation = false\nvtu_strings = false\n"
+    )
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    run = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=())
+    assembly, file = run.response.assembly, run.folder / "increments" / "blocks_00000.vtu"
+    numbers, mesh = meshio.read(file), pv.read(file)
+    assert [len(cells.data) for cells in numbers.cells] == [2, 2]
+    for cells, blocks in zip(numbers.cells, numbers.cell_data["block_id"], strict=True):
+        for cell, block in zip(cells.data, blocks, strict=True):
+            assert (assembly.block_of_vertex[np.unique(np.concatenate(cell))] == block).all()
+    assert bytes(numbers.field_data["name"]).decode().splitlines() == list(assembly.names)
+    for k, block in enumerate(mesh["block_id"]):
+        n = int((assembly.block_of_vertex == block).sum())
+        assert (mesh.get_cell(k).n_points, mesh.get_cell(k).n_faces) == (n, n // 2 + 2)
 
 
 def test_joints_csv_names_the_widest_crack_first(tmp_path):
