@@ -222,7 +222,8 @@ def posed(assembly: solver.Assembly, pose: solver.Pose, force=None) -> solver.Re
     forces = np.zeros((len(contacts), assembly.dimension)) if force is None else force(contacts)
     first = arch_response().path[0]
     still = np.zeros((assembly.n_blocks, 3 * assembly.dimension - 3))
-    held = replace(first.state, pose=pose, contacts=contacts, forces=forces, velocity=still)
+    points = {"friction": np.full(len(contacts), 0.6), "displacements": np.zeros_like(contacts.points)}
+    held = replace(first.state, pose=pose, contacts=contacts, forces=forces, velocity=still, **points)
     return replace(arch_response(), assembly=assembly, increments=(replace(first, held=held),), collapse=None)
 
 
