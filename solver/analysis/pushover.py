@@ -76,7 +76,7 @@ def pushover_increments(
     start = Pose.initial(near) if pose is None else Pose(checked(pose, Pose, "pose").positions - origin, pose.rotations)
     if resume is not None:
         start = resume.start
-    model = model_of(near, loads, interfaces, controls, loads.live, ties)
+    model = model_of(near, loads, interfaces, controls, has_live=True, ties=ties)
     path = Path(model, ControlledLoad(near, control, start), 0, controls, on_step)
     steps = path.increments(partial(path.begin, start, None, ties_at, bonds_at, fallen), resume)
     return Increments(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)

@@ -131,7 +131,7 @@ def model_of(
     loads: Loads,
     interfaces: Interfaces,
     controls: Controls,
-    live: np.ndarray | None = None,
+    has_live: bool = False,
     ties: tuple[Tie, ...] = (),
 ) -> Model:
     """The units and loads of a path."""
@@ -145,7 +145,7 @@ def model_of(
         loads,
         assembly.block_size,
         force,
-        live=live,
+        has_live=has_live,
         ties=ties,
         compliance=controls.compliance_factor,
         imperfection=controls.imperfection_factor,

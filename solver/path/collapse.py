@@ -112,7 +112,7 @@ class Fall:
         frames = list(self.frames(beyond, at_once))
         velocity = frames[0].velocity
         standing = motion_size(velocity, model.length).max() <= MECHANISM * model.length
-        if model.live is not None and beyond.velocity is not None and standing:
+        if model.has_live and beyond.velocity is not None and standing:
             # Where blocks stand without the live load, the mechanism is that of the path at its end.
             velocity = beyond.velocity
         velocity = velocity / max(float(motion_size(velocity, model.length).max()), 1e-300)
@@ -120,7 +120,7 @@ class Fall:
         # A phase that begins with the fall has no equilibrium.
         at_last = with_motion(frames[0], velocity)
         if not at_once:
-            reaction = multiplier if model.live is None else multiplier * model.live_force
+            reaction = multiplier if not model.has_live else multiplier * model.live_force
             at_last = self.reports.increment(last, velocity, last.place.works)
         # A multiplier is interpolated to zero; an equilibrium is lost anywhere in the bracket.
         part = 0.5 if multiplier_beyond is None else last.measured / (last.measured - multiplier_beyond)
@@ -136,7 +136,7 @@ class Fall:
         del at_last, last, frames[max(self.n_frames, at_once) :]
         while frames:
             yield frames.pop(0)
-        if model.live is None:
+        if not model.has_live:
             return Ending(Status.COLLAPSED, str(collapse), collapse)
         lost = f"equilibrium is lost along the control at α = {multiplier:.6g},"
         what = lost if multiplier_beyond is None else "no capacity is left"
@@ -144,8 +144,8 @@ class Fall:
 
     def frames(self, place: Place, at_once: bool = False) -> Iterator[Increment]:
         """Frames of the fall without live load, each a movement of the same size, until the blocks are at rest."""
-        if self.model.live is not None:
-            stepper = Stepper(replace(self.model, live=None), self.driver)
+        if self.model.has_live:
+            stepper = Stepper(replace(self.model, has_live=False), self.driver)
             reports = Reports(stepper, self.reports.number, self.reports.fell_at)
             fall = Fall(stepper, EquilibriumChecks(stepper), reports, self.n_frames, self.on_step)
             yield from fall.frames(place, at_once)

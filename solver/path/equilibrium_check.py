@@ -90,20 +90,20 @@ class EquilibriumChecks:
         """Bounds at a place, and forces in equilibrium with the path's reaction [N or N·m], or its multiplier."""
         contacts, friction = self._contacts_at(place)
         bounds = self.bounds(place, gap)
-        target = reaction if self.model.live is None else place.multiplier
+        target = reaction if not self.model.has_live else place.multiplier
         if not bounds.in_equilibrium:
             # The forces of the program that comes nearest to equilibrium.
-            nearest = bounds.high if self.model.live is not None else self.reaction(place, contacts, bounds.forces)
+            nearest = bounds.high if self.model.has_live else self.reaction(place, contacts, bounds.forces)
             return EquilibriumCheck(place, contacts, friction, bounds.forces, nearest, bounds)
         low, high = (value if np.isfinite(value) else target for value in (bounds.low, bounds.high))
         measured = float(np.clip(target, low, max(low, high)))
-        if self.model.live is None and self.model.interfaces.ground:
+        if not self.model.has_live and self.model.interfaces.ground:
             # Ground that gives has forces by its pose; the reaction of the path has the viscosity in it.
             with suppress(NotSolved):
                 forces = self.nearest(place, gap)
                 measured = float(np.clip(self.reaction(place, contacts, forces), low, max(low, high)))
                 return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
-        determined = self.model.live is not None or bounds.high - bounds.low <= 1e-6 * max(abs(low), abs(high))
+        determined = self.model.has_live or bounds.high - bounds.low <= 1e-6 * max(abs(low), abs(high))
         try:
             forces = self.nearest(replace(place, multiplier=measured), gap, None if determined else measured)
         except NotSolved:
@@ -116,7 +116,7 @@ class EquilibriumChecks:
         """(n_contacts, d) array: a mean of the forces of the two bounds, which is in equilibrium, too."""
         if bounds.other_forces is None:
             return bounds.forces
-        if self.model.live is None:
+        if not self.model.has_live:
             of_forces, of_other = (self.reaction(place, contacts, f) for f in (bounds.forces, bounds.other_forces))
         else:
             of_forces, of_other = bounds.high, bounds.low
@@ -131,7 +131,7 @@ class EquilibriumChecks:
 
     def bounds(self, place: Place, gap: float = COMPUTED_GAP) -> EquilibriumBounds:
         """Bounds of the reaction or multiplier in equilibrium at a place."""
-        rate = None if self.model.live is not None else self.driver.rate(place.s)
+        rate = None if self.model.has_live else self.driver.rate(place.s)
         program = self._program(place, gap, rate)
         bounds = program.bounds()
         self.stepper.programs += program.programs

@@ -179,7 +179,7 @@ class Path:
             bounds = self.checks.bounds(place)
             if not bounds.in_equilibrium:
                 return None
-            if self.model.live is not None and multiplier is None:
+            if self.model.has_live and multiplier is None:
                 # A given pose may be in equilibrium with its live load only.
                 middle = bounds.high if bounds.other_forces is None else 0.5 * (bounds.low + bounds.high)
                 return self._at_rest(place, anew, middle) if np.isfinite(bounds.high) else None
@@ -249,13 +249,13 @@ class Path:
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, frame.velocity))
         # Without friction a program carries what its own check lets pass.
         least = ACCEPTED_ERROR * model.total_load / max(model.scaled_live(place.pose)[1], 1e-300)
-        if model.live is not None and not least < bounds.high < np.inf:
+        if model.has_live and not least < bounds.high < np.inf:
             if bounds.high > least:
                 message = "at a control displacement of 0 m no live load of this pattern moves the structure"
                 return Ending(Status.LOCKED, message)
             yield self.reports.falling_increment(place, np.zeros_like(model.load))
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, self.reports.nothing_carried())
-        if model.live is not None:
+        if model.has_live:
             first_state, _ = self.advance(state, self._onset())
             # What has lost its capacity by then moves along the control all the same.
             if first_state.place.multiplier <= 0.0 and not self.checks.moves_control(place):
@@ -269,7 +269,7 @@ class Path:
             place = replace(place, multiplier=check.measured)
         # What rises above the first multiplier by the joints' compliance alone is no peak; where these or ground give,
         # it is not carried.
-        peak = 0.0 if model.live is None or model.interfaces.elastic else bounds.high
+        peak = 0.0 if not model.has_live or model.interfaces.elastic else bounds.high
         self.state = replace(state, place=place, history=(place,), peak=peak)
         yield self._report(self.state, check)
         return None
@@ -283,8 +283,8 @@ class Path:
         place = self._without_viscosity(state.place)
         reaction = self._reaction(place)
         check = self.checks.check(place, reaction)
-        carries = check.bounds.in_equilibrium and (self.model.live is None or check.bounds.high > 0.0)
-        if carries and self.model.live is None and abs(check.measured - reaction) > self.tolerance * abs(reaction):
+        carries = check.bounds.in_equilibrium and (not self.model.has_live or check.bounds.high > 0.0)
+        if carries and not self.model.has_live and abs(check.measured - reaction) > self.tolerance * abs(reaction):
             # Joints that close carry along the path while they are wider open than a computed pose leaves them.
             wider = self.checks.check(place, reaction, CLOSING_GAP)
             check = wider if wider.measured == reaction else check
@@ -427,7 +427,7 @@ class Path:
 
     def _is_on_path(self, new: Place, error: StepError, length: float, refining: bool) -> bool:
         """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""
-        if self.model.live is not None and new.multiplier <= 0.0 and new.s > self._onset():
+        if self.model.has_live and new.multiplier <= 0.0 and new.s > self._onset():
             return False
         fast = error.moved > min(max(FAST * length / self.stepper.unit, NEAR), FAR)
         if not (fast or refining):
@@ -456,7 +456,7 @@ class Path:
 
     def _supports_locked(self, place: Place) -> bool:
         """Whether no movement of the blocks is compatible with that of the supports: the reaction has no bound."""
-        return self.model.live is None and bool(np.isneginf(self.checks.bounds(place).low))
+        return not self.model.has_live and bool(np.isneginf(self.checks.bounds(place).low))
 
     def _works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float, float]:
         """Works of dead and live loads, on supports and of friction in a step, with the forces at its end."""
@@ -484,7 +484,7 @@ class Path:
 
     def _remove_fallen(self, state: PathState, end: Place) -> PathState | None:
         """Continue without the blocks that have fallen; None where none have, too many, or the others fall, too."""
-        if self.model.live is not None:
+        if self.model.has_live:
             return None
         weights = self.model.assembly.masses * self.model.assembly.free * GRAVITY
         leaving = self.fall.movements(state.place, end) > FALLEN
@@ -520,7 +520,7 @@ class Path:
 
     def _multiplier_beyond(self, state: PathState, check: EquilibriumCheck, beyond: Place) -> float | None:
         """Multiplier at the place beyond, at or below zero; None where equilibrium itself is lost, not the capacity."""
-        if self.model.live is None:
+        if not self.model.has_live:
             return None
         # The gaps of elastic joints at the start tell with their lengths without force what carries there.
         bonds = state.place.bonds if self.model.interfaces.elastic else None

@@ -38,7 +38,7 @@ class Reports:
         model, place, contacts, bounds = self.model, check.place, check.contacts, check.bounds
         resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
         live, live_size = model.scaled_live(place.pose)
-        multiplier = check.measured * live_size if model.live is not None else 0.0
+        multiplier = check.measured * live_size if model.has_live else 0.0
         balance = (resultant + model.scaled_load_at(place.pose) + multiplier * live)[model.assembly.free]
         support_forces = on_supports(model, contacts, place.pose, check.forces)
         state = self._state(place, contacts, check.forces, check.friction, velocity, support_forces)
@@ -91,7 +91,7 @@ class Reports:
         self, s: float, state: State, measured: float, certificate: Certificate, status: Status
     ) -> Increment:
         """An increment, with the programs since the last one."""
-        pushed = self.model.live is not None
+        pushed = self.model.has_live
         programs, self.stepper.programs = self.stepper.programs, 0
         return Increment(
             parameter=s,
@@ -124,7 +124,7 @@ class Reports:
 
     def no_step(self, s: float, reason: str) -> Ending:
         """The ending at a step that was not solved, from a parameter s [m or rad]."""
-        live = self.model.live is not None
+        live = self.model.has_live
         turns = "it may have its largest value there: control another point or direction, or " if live else ""
         return Ending(
             Status.SOLVER_FAILED,

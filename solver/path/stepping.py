@@ -329,7 +329,7 @@ class Stepper:
         multiplier, number, members = place.multiplier * live_size, 0, is_member(start)
         while True:
             rows = ContactRows(wrench_matrix(contacts, pose, model.length), free, model.assembly.centroids)
-            control = driver.control(pose) if model.live is not None else None
+            control = driver.control(pose) if model.has_live else None
             bound, compliance = self.members.across(
                 contacts, place.tie_lengths, forces, points.bound, points.compliance
             )

@@ -65,9 +65,10 @@ class StaticProgram:
         self.closed, contacts, friction = closed, contacts[closed], friction[closed]
         least, most, cohesion = (of[closed] for of in (limits.least, limits.most, limits.cohesion))
         matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
+        on_free = matrix[free]
         carried = Admissible.of(friction, cohesion, np.full(len(contacts), np.inf), d)
         self.rays = carried.columns
-        balance = sp.csc_array(matrix[free] @ self.rays)
+        balance = sp.csc_array(on_free @ self.rays)
         self.rows, self.n = balance.shape
         self.d, self.friction, self.total, self.programs = d, carried.friction, model.total_load, 0
         # The programs are those of the normal forces beyond the least ones.
@@ -81,7 +82,7 @@ class StaticProgram:
             (self.load, live[blocks].ravel()),
             (friction, cohesion, most - least, -least, np.zeros(len(least))),
         )
-        self.non_associative = NonAssociative(contacts, pose, matrix[free], *loads, *points, self.total, d)
+        self.non_associative = NonAssociative(contacts, pose, on_free, *loads, *points, self.total, d)
         columns, objective = [balance], np.zeros(self.n)
         if self.live_size > 0.0:
             column = sp.csc_array(live[blocks].reshape(-1, 1))

@@ -27,7 +27,7 @@ class Model:
     loads: Loads
     length: float  #: [m]
     force: float  #: [N]
-    live: np.ndarray | None = None  #: (n_blocks, n_dof) [N, N·m]: whose multiplier is an unknown of every program
+    has_live: bool = False  #: whether the multiplier of the live load is an unknown of every program
     fallen: np.ndarray | None = None  #: (n_blocks,) bool: blocks that have left, without loads and contact points
     ties: tuple[Tie, ...] = ()
     compliance: float = 1.0
@@ -69,9 +69,9 @@ class Model:
     def scaled_live(self, pose: Pose) -> tuple[np.ndarray, float]:
         """(n_blocks, n_dof) array: live load on the free blocks, its largest component as drawn 1; and that one."""
         free, units = self.assembly.free[:, None], self.force * unit_lengths(self.n_dof, self.length)
-        if self.live is None:
+        if not self.has_live:
             return np.zeros((len(free), self.n_dof)), 0.0
-        size = float(np.abs(np.where(free, self.live / units, 0.0)).max(initial=0.0))
+        size = float(np.abs(np.where(free, self.loads.live / units, 0.0)).max(initial=0.0))
         return np.where(free, self.loads.live_at(pose) / units, 0.0) / (size or 1.0), size
 
     @property
@@ -82,4 +82,4 @@ class Model:
     @property
     def live_force(self) -> float:
         """Resultant of the live loads at a multiplier of 1 [N]; zero without."""
-        return 0.0 if self.live is None else float(np.linalg.norm(self.live[:, : self.dimension].sum(axis=0)))
+        return float(np.linalg.norm(self.loads.live[:, : self.dimension].sum(axis=0))) if self.has_live else 0.0
