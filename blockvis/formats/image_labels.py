@@ -68,6 +68,8 @@ class Labels:
         Pixels of no label's value, which went to the nearest label.
     is_mask : bool
         Whether all stones have one value.
+    is_of_lines : bool
+        Whether that is the paper of a drawing of lines, which is around stones, too.
     """
 
     numbers: np.ndarray
@@ -75,6 +77,7 @@ class Labels:
     background: str
     moved: int
     is_mask: bool
+    is_of_lines: bool = False
 
 
 class Photograph(ValueError):
@@ -117,6 +120,8 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
     outer: int | None
     if wanted is not None:
         outer = known.index(wanted)
+    elif found.is_of_lines:
+        outer = 1
     elif mask:
         outer = _background_of_mask(_filled(numbers, found, 0, np.inf)[0])
     else:
@@ -133,7 +138,7 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
         order[outer:] -= 1
         order[outer] = 0
     names = () if mask else tuple(word for k, word in enumerate(called) if k != outer)
-    return Labels(order[numbers], names, said, moved, mask)
+    return Labels(order[numbers], names, said, moved, mask, found.is_of_lines)
 
 
 @dataclass(frozen=True)
@@ -151,6 +156,8 @@ class _Found:
         Colour of each pixel.
     pieces : (height, width) int array
         In a noisy image what hangs together, from 1.
+    is_of_lines : bool
+        Whether the values are paper and lines that are too thin to be flat.
     """
 
     numbers: np.ndarray
@@ -158,6 +165,7 @@ class _Found:
     colours: np.ndarray
     shown: np.ndarray
     pieces: np.ndarray
+    is_of_lines: bool = False
 
 
 def _filled(numbers: np.ndarray, found: _Found, outer: int | None, reach: float) -> tuple[np.ndarray, Any]:
@@ -282,32 +290,43 @@ def _of_values(values: np.ndarray, image: Image.Image, wanted: int | None) -> _F
     share = np.bincount(place.ravel(), minlength=len(known)) / place.size
     several = image.mode in ("P", "RGB") and (image.mode == "P" or known[-1] > 255)
     shown = np.asarray(image.convert("RGB")).astype(float) if several else values[..., None].astype(float)
-    label = np.ones(len(known), dtype=bool)
-    if len(known) > 2:
-        core = ndimage.minimum_filter(place, 3) == ndimage.maximum_filter(place, 3)
-        label = np.bincount(place[core], minlength=len(known)) > 0
+    core = ndimage.minimum_filter(place, 3) == ndimage.maximum_filter(place, 3)
+    label = np.bincount(place[core], minlength=len(known)) > 0
+    if wanted is None and (label.sum() == 1 or (label.any() and shown[label[place]].min() > WHITE)):
+        drawn = _lines_on_paper(shown, label[place])
+        if drawn is not None:
+            return drawn
+    if len(known) <= 2:
+        label[:] = True
+    else:
         thin = ~label & (share >= THIN)
         if label.sum() == 2 and thin.any():
             thin &= ~_half_covered(place, label, shown) | (known == wanted)
         # Many values of some share each are a blur, not lines between stones.
         label |= thin & (thin.sum() <= max(2, label.sum()))
-        white = known[label & (known > 255)]
-        if len(white) == label.sum() > 1 and min((white >> shift & 255).min() for shift in (0, 8, 16)) > WHITE:
-            raise ValueError(
-                f"is no mask or label image: all of its {len(white)} flat colours are white (#{white[0]:06x} to "
-                f"#{white[-1]:06x}), and what is drawn on it is thin lines; fill each stone with a colour, or trace "
-                "the lines and export them as .svg or .dxf"
-            )
     if not label.any():
         raise ValueError("has no region of one value three pixels wide; give an image of more pixels")
-    unlike = np.abs(known - known[label][0]) > 2 * FLAT
-    if label.sum() == 1 < len(known) and image.mode != "P" and known[-1] <= 255 and share[unlike].sum() >= THIN:
-        # Lines of many values on one ground: the commonest of what is unlike the ground stands for them.
-        label[np.flatnonzero(unlike)[share[unlike].argmax()]] = True
     numbers = np.where(label[place], (np.cumsum(label) - 1)[place], -1).astype(np.int32)
     first = np.unique(numbers.ravel(), return_index=True)[1][-int(label.sum()) :]
     colours = shown.reshape(-1, shown.shape[2])[first]
     return _Found(numbers, tuple(map(int, known[label])), colours, shown, np.zeros((0, 0), dtype=int))
+
+
+def _lines_on_paper(shown: np.ndarray, flat: np.ndarray) -> _Found | None:
+    """Find lines, none of them flat, on what is flat, which is paper; None where there are next to none.
+
+    Parameters
+    ----------
+    shown : (height, width, 1 or 3) array
+    flat : (height, width) bool array
+    """
+    paper = np.median(shown[flat], axis=0)
+    ink = np.abs(shown - paper).max(axis=2) > FLAT
+    if ink.mean() < THIN:
+        return None
+    colours = np.stack([paper, np.median(shown[ink], axis=0)])
+    values = [int(np.round(colour) @ [65536, 256, 1][-len(colour) :]) for colour in colours]
+    return _Found(ink.astype(np.int32), (values[0], values[1]), colours, shown, np.zeros((0, 0), dtype=int), True)
 
 
 def _half_covered(place: np.ndarray, label: np.ndarray, shown: np.ndarray) -> np.ndarray:
@@ -362,7 +381,8 @@ def _of_noise(image: Image.Image) -> _Found:
     if two is not None:
         away = np.stack([np.abs(rgb - one).max(axis=2) for one in two])
         numbers = np.where(away.min(axis=0) <= 3 * FLAT, away.argmin(axis=0), -1)
-        return _Found(numbers, (0, 1), two, rgb, np.zeros((0, 0), dtype=int))
+        is_of_lines = bool(np.abs(colour - two[1]).max(axis=1).min() > 2 * FLAT)
+        return _Found(numbers, (0, 1), two, rgb, np.zeros((0, 0), dtype=int), is_of_lines)
     alike = _alike_colours(colour, weight)
     order, piece = np.full((2, n + 1), -1, dtype=np.int32)
     order[large], piece[large] = alike, np.arange(1, len(large) + 1)

@@ -123,7 +123,8 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
     if labels.is_mask and not (reading.ignore or reading.only):
         notes = (*notes, *_maybe_openings(rings, names, holes))
     layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit, notes=notes)
-    _check_holes(path, labels, regions, holes)
+    if not labels.is_of_lines:
+        _check_holes(path, labels, regions, holes)
     around = {}
     for k, inner in holes.items():
         placed = tuple(placement.placed(hole * [1.0, -1.0]) for hole in inner)
@@ -143,10 +144,11 @@ def _check_stones(path: Path, labels: Labels, regions: Regions, placement: Place
             "need another value than joints, see background"
         )
     if labels.is_mask and n == 1:
-        raise ValueError(
-            f"'{path}' shows one region of {regions.areas[0] * placement.pixel**2:.4g} m²: in a mask stones that touch "
-            "are one; leave a joint of at least a pixel between them, or give each stone a value of its own"
-        )
+        why = "in a mask stones that touch are one; leave a joint of at least a pixel between them, or give each stone "
+        why += "a value of its own"
+        if labels.is_of_lines:
+            why = "lines on paper enclose no stone; close them"
+        raise ValueError(f"'{path}' shows one region of {regions.areas[0] * placement.pixel**2:.4g} m²: {why}")
     if labels.moved > MOST_MOVED * labels.numbers.size:
         share = f"{100.0 * labels.moved / labels.numbers.size:.2g} %"
         raise ValueError(
@@ -241,7 +243,7 @@ def _notes(labels: Labels, regions: Regions, found: Outlined, placement: Placeme
     """Say how the image was read, and what was dropped."""
     height, width = labels.numbers.shape
     of = counted(len(set(regions.labels.tolist())), "label") if labels.names else "labels of a noisy image"
-    what = "a mask of stones" if labels.is_mask else of
+    what = "a drawing of lines" if labels.is_of_lines else "a mask of stones" if labels.is_mask else of
     share = f"{100.0 * np.mean(labels.numbers == 0):.3g} % ({labels.background})" if labels.background else "none"
     notes: list[str] = [
         f"{what} in {width} × {height} pixels of {1e3 * placement.pixel:.4g} mm ({placement.source}); background: "

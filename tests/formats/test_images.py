@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw, ImageFilter
+from shapely import Polygon
 
 from blockvis import generators, read, read_layout, save_layout
 from blockvis.cli import main
@@ -239,6 +240,48 @@ def test_the_scan_of_a_drawing_in_ink_is_no_mask_of_the_shades_of_its_paper(tmp_
         assert read_layout(tmp_path / name, width=3.0).n_blocks == n
 
 
+def lines_of(rings, size, ink, scale=8):
+    """A drawing of lines as programs export them: lines a pixel wide, half-covered pixels and no white alike."""
+    image = Image.new("RGB", (size[0] * scale, size[1] * scale), (255, 255, 255))
+    for ring in rings:
+        corners = [(x * scale, y * scale) for x, y in (*ring, ring[0])]
+        ImageDraw.Draw(image).line(corners, fill=ink, width=scale)
+    pixels = np.asarray(image.resize(size, Image.Resampling.LANCZOS)).astype(int)
+    off = np.random.default_rng(1).integers(0, 3, pixels.shape) * (np.random.default_rng(2).random(pixels.shape) < 0.05)
+    return Image.fromarray((pixels - off).clip(0, 255).astype("uint8"))
+
+
+@pytest.mark.parametrize("ink", [(0, 0, 0), (150, 150, 150), (200, 60, 60)])
+def test_thin_lines_on_white_are_joints(tmp_path, capsys, ink):
+    wall = [
+        [(x, y), (x + w, y), (x + w, y + 30.5), (x, y + 30.5)]
+        for k in range(4)
+        for y in [20.25 + 30.5 * k]
+        for x, w in [(20.3 + 40.2 * i - 20.1 * (k % 2 and i > 0), 40.2 - 20.1 * (k % 2 and i == 0)) for i in range(6)]
+    ]
+    lines_of(wall, (300, 180), ink).save(tmp_path / "lines.png")
+    code, out, _ = informed(capsys, tmp_path / "lines.png", "--width", 3)
+    assert (code, f"outlines        {len(wall)}\n" in out) == (0, True), out
+    assert "a drawing of lines in 300 × 180 pixels" in out
+    layout = read_layout(tmp_path / "lines.png", width=3.0)
+    drawn = sum(30.5 * (ring[1][0] - ring[0][0]) for ring in wall) * 1e-4
+    areas = [Polygon(ring).area for ring in layout.outlines]
+    assert 0.8 * drawn < sum(areas) < drawn
+
+
+def test_outlines_of_stones_in_mortar_are_read_without_the_mortar(tmp_path):
+    turns = np.linspace(0.0, 2.0 * np.pi, 30, endpoint=False)
+    stones = [
+        [(x + 18 * np.cos(t), y + 13 * np.sin(t)) for t in turns]
+        for y in range(40, 170, 32)
+        for x in range(40, 270, 42)
+    ]
+    wall = [(15, 15), (285, 15), (285, 180), (15, 180)]
+    lines_of([wall, *stones], (300, 195), (120, 120, 120)).save(tmp_path / "rubble.png")
+    layout = read_layout(tmp_path / "rubble.png", width=3.0)
+    assert (layout.n_blocks, len(layout.left_out)) == (len(stones), 2)
+
+
 def test_specks_go_to_what_is_around_them_and_are_told(tmp_path, capsys):
     image, n = drawn_wall()
     draw = ImageDraw.Draw(image)
@@ -374,7 +417,7 @@ def test_charts_and_shaded_drawings_are_refused_unless_their_specks_are_said(tmp
     says = {
         "28 of its 56 regions hold": letters,
         "specks beside": Image.fromarray(pixels),
-        "all of its 2 flat colours are white (#fefefd to #ffffff)": page,
+        "shows one region of 3.12 m²": page,
     }
     for word, image in says.items():
         image.save(tmp_path / "chart.png")
