@@ -20,8 +20,8 @@ import solver
 from solver import mechanics
 from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
-from solver.program.admissible import StaticProgram
 from solver.program.model import Model
+from solver.program.static_program import StaticProgram
 from solver.program.strength import ForceLimits
 from solver.programs import solve
 from solver.programs.problem import ConicProgram, Solution

@@ -13,8 +13,8 @@ from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import block_forces, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.program.admissible import EquilibriumBounds, StaticProgram
 from solver.program.model import Model
+from solver.program.static_program import EquilibriumBounds, StaticProgram
 from solver.programs.problem import SolveError
 from solver.tolerances import COMPUTED_GAP, SMALLEST_RATE
 

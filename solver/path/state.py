@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.program.admissible import EquilibriumBounds
+from solver.program.static_program import EquilibriumBounds
 from solver.results.increment import Bonds
 
 

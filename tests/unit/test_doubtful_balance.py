@@ -15,13 +15,13 @@ import solver
 )
 def test_a_dual_proves_forces_out_of_balance_beyond_its_own_violation(monkeypatch, violation, status):
     """A block whose centroid is 0.3 m beyond the edge it stands on, and solutions that violate as much as is said."""
-    solve_between = import_module("solver.program.admissible").solve_between
+    solve_between = import_module("solver.program.static_program").solve_between
 
     def doubtful(*program):
         solution = replace(solve_between(*program), primal_violation=violation, dual_violation=violation)
         raise solver.SolveError("no solution passed its check", solution)
 
-    monkeypatch.setattr("solver.program.admissible.solve_between", doubtful)
+    monkeypatch.setattr("solver.program.static_program.solve_between", doubtful)
     solids = [box((0.8, 0.0, 0.0), (1.8, 1.0, 1.0)), box((-1.0, 0.0, -1.0), (1.0, 1.0, 0.0))]
     assembly = solver.Assembly.from_solids(solids, roles=["free", "moving"])
     sinks = solver.Settlement(direction=(0, 0, -1), increment=0.01, limit=0.01)
