@@ -68,11 +68,11 @@ def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
         stated.append(program)
         raise StopIteration
 
-    friction, none = np.full(len(contacts), FRICTION), np.zeros(len(contacts))
+    closed = contacts[contacts.gaps <= COMPUTED_GAP * length]
+    friction, none = np.full(len(closed), FRICTION), np.zeros(len(closed))
     limits = ForceLimits(least=none, most=none + np.inf, cohesion=none)
-    closed = contacts.gaps <= COMPUTED_GAP * length
     with patch.object(solve, "run_clarabel", kept), suppress(StopIteration):
-        StaticProgram(model, Pose.initial(assembly), contacts, friction, sinks, closed, limits).bounds()
+        StaticProgram(model, Pose.initial(assembly), closed, friction, limits, none, rate=sinks).bounds()
     return stated[0], len(contacts)
 
 

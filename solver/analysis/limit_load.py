@@ -4,26 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
-import scipy.sparse as sp
 
 from solver.assembly import FIXED, Assembly, check_blocks, find_contacts
-from solver.contact_step.balance import nearest_equilibrium
 from solver.contact_step.problem import NotSolved
-from solver.contact_step.stiffness import ContactRows
-from solver.equilibrium import block_forces, wrench_matrix
-from solver.geometry.contacts import Contacts, joined_contacts
+from solver.equilibrium import block_forces
+from solver.geometry.contacts import joined_contacts
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose, moved_vertices, relative_velocities, unit_lengths
 from solver.loads import Loads, checked_loads
+from solver.path.mortar import Mortar
+from solver.path.state import Place
 from solver.path.stepping import Stepper
-from solver.program.non_associative import NonAssociative, ProgramState
-from solver.program.strength import Admissible, point_strength
-from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces, face_wrench_matrix, point_forces
+from solver.program.model import Model, mean_load
+from solver.program.non_associative import non_associative_limit
+from solver.program.static_program import ProgramState, StaticProgram
+from solver.program.strength import ForceLimits, crushing_forces
+from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces, point_forces
 from solver.programs.problem import Unbounded
-from solver.programs.solve import solve_between
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Bonds, State
 from solver.results.response import LimitLoad, LimitStatus
@@ -120,7 +119,6 @@ def find_limit_load(
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else checked(pose, Pose, "pose")
-    loads = replace(loads, dead=loads.dead_at(assembly, pose), live=loads.live_at(pose))
     for name, value in (("displacement", displacement), ("closed_gap", closed_gap)):
         if not 0.0 <= plain(value, "float", name) < np.inf:
             raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
@@ -128,19 +126,22 @@ def find_limit_load(
     told = ties_as_drawn(ties, assembly, pose) if ties_at is None else ties_at
     states = np.where(held_ties(ties, gone), told.states, ABSENT)
     told = replace(told, rest=np.where(np.isin(states, (ABSENT, BROKEN)), np.nan, told.rest), states=states)
-    problem = _Problem(
-        left, interfaces, loads, pose, closed_gap, displacement, torsion, tuple(ties), told, bonds_at, gone
-    )
-    balanced, status = problem.balanced(with_live=False), LimitStatus.FOUND
-    if balanced.falls:
+    force = mean_load(left, loads) or float(np.abs(loads.live[left.free]).max())
+    model = Model(left, interfaces, loads, left.block_size, force, has_live=True, ties=tuple(ties))
+    model = model.without(gone) if gone.any() else model
+    problem = _Problem(model, pose, closed_gap, displacement, torsion, told, bonds_at)
+    program, status = problem.program, LimitStatus.FOUND
+    balanced, unbalanced = program.without_live().most_balanced()
+    if unbalanced > FALLING_FRACTION:
         falling, status = balanced, LimitStatus.HELD
-        balanced = problem.balanced(with_live=True)
-        if balanced.falls:
+        balanced, unbalanced = program.most_balanced()
+        if unbalanced > FALLING_FRACTION:
             return problem.result(falling, LimitStatus.NO_EQUILIBRIUM, flow, 2)
     try:
         if flow == "associative":
-            return problem.result(problem.associative(balanced), status, flow, 2)
-        return problem.non_associative(balanced, status)
+            return problem.result(program.bound(-1.0, balanced), status, flow, 2)
+        state, converged, programs = non_associative_limit(program, problem.at_rest(balanced), balanced)
+        return problem.result(state, status if converged else LimitStatus.NOT_CONVERGED, flow, programs)
     except Unbounded:
         return problem.result(balanced, LimitStatus.UNBOUNDED, flow, 2)
 
@@ -158,40 +159,33 @@ def _check_options(assembly: Assembly, flow: str, torsion: str, ties: Sequence[T
 
 
 class _Problem:
-    """One geometry and its loads in units of block size and mean block load; rows of the free blocks.
-
-    Normal forces are those beyond the largest tension: it is a load of the blocks, in ``dead``. Gaps are those beyond
-    the give of joints, by which they are open or closed.
-    """
+    """The static program of one geometry, with gaps beyond the give of joints, by which they are open or closed."""
 
     def __init__(
         self,
-        assembly: Assembly,
-        interfaces: Interfaces,
-        loads: Loads,
+        model: Model,
         pose: Pose,
         closed_gap: float,
         displacement: float,
         torsion: str,
-        ties: tuple[Tie, ...],
         ties_at: TieForces,
         bonds: Bonds | None,
-        gone: np.ndarray,
     ) -> None:
-        self.assembly, self.pose, self.ties, self.ties_at, self.gone = assembly, pose, ties, ties_at, gone
-        self.length, free, d = assembly.block_size, assembly.free, assembly.dimension
-        reach = max(closed_gap, REACH * self.length) if displacement > 0.0 else closed_gap
+        assembly, interfaces, ties = model.assembly, model.interfaces, model.ties
+        reach = max(closed_gap, REACH * model.length) if displacement > 0.0 else closed_gap
         dry = interfaces.dry and bonds is None
         # Open points, too, measure the faces of joints with strength.
-        measured = reach if dry else max(reach, REACH * self.length)
+        measured = reach if dry else max(reach, REACH * model.length)
         contacts = find_contacts(assembly, moved_vertices(assembly, pose), measured)
-        contacts = contacts[~(gone[contacts.block_a] | gone[contacts.block_b])]
-        gaps, is_open = contacts.gaps, contacts.gaps > closed_gap
-        drawn = Bonds(contacts.features[:, :3], contacts.areas, (~is_open).astype(float), np.zeros(len(contacts)))
-        bonded = drawn if bonds is None else bonds.of(contacts)
-        cohesion, crushing, tension = point_strength(assembly, interfaces, contacts, bonded.areas * bonded.left)
+        contacts = model.standing(contacts)
+        mortar, place = Mortar(model), Place.unloaded(pose)
+        place = mortar.cast(place, contacts, closed_gap) if bonds is None else replace(place, bonds=bonds)
+        joints = mortar.points(place, contacts)
+        cohesion, tension, gaps = joints.cohesion, joints.tension, joints.beyond_give(contacts.gaps, -joints.tension)
+        # Give of elastic joints is neither a gap nor a penetration.
+        gaps = np.where(joints.give[:, 0] > 0.0, np.maximum(gaps, 0.0), gaps)
+        is_open, crushing = gaps > closed_gap, crushing_forces(assembly, interfaces, contacts) / model.force
         if not dry:
-            gaps = _beyond_give(assembly, interfaces, contacts, gaps - bonded.rest, tension, bonded.areas)
             number, is_open = _carrying_points(gaps, tension, closed_gap, reach)
             contacts, gaps, cohesion, tension = contacts[number], gaps[number], cohesion[number], tension[number]
             crushing = np.where(is_open | (gaps <= closed_gap), crushing[number], 0.0)
@@ -201,145 +195,75 @@ class _Problem:
             apart = slack(members, len(ties))
             members, apart = members[apart <= reach], apart[apart <= reach]
             contacts = joined_contacts([contacts, members])
-            crushing = np.append(crushing, [ties[i].strength for i in members.features[:, 1]])
+            crushing = np.append(crushing, [ties[i].strength / model.force for i in members.features[:, 1]])
             none = np.zeros(len(members))
             cohesion, friction, tension = (np.append(of, none) for of in (cohesion, friction, tension))
             gaps, is_open = np.append(gaps, apart), np.append(is_open, apart > closed_gap)
-        units = unit_lengths(loads.dead.shape[1], self.length)
-        dead, live = loads.dead[free] / units, loads.live[free] / units
-        size = float(np.abs(live).max())
-        self.force = float(np.abs(dead).sum() / len(dead)) or size
-        self.faces = Faces.of(contacts, self.length) if torsion == UNIFORM and len(contacts) else None
-        matrix = wrench_matrix(contacts, pose, self.length)
-        if self.faces is not None:
-            self.faces.refuse_not_convex(contacts, assembly)
-            matrix = face_wrench_matrix(contacts, self.faces, pose, self.length)
-        self.matrix = sp.csr_array(matrix)[np.repeat(free, len(units))]
-        self.contacts, self.gaps, self.friction = contacts, gaps, friction
+        faces = Faces.of(contacts, model.length) if torsion == UNIFORM and len(contacts) else None
+        if faces is not None:
+            faces.refuse_not_convex(contacts, assembly)
         cohesion, tension = (np.where(is_open, 0.0, strength) for strength in (cohesion, tension))
-        self.cohesion = np.maximum(cohesion - friction * tension, 0.0) / self.force
-        self.crushing, self.tension = (crushing + tension) / self.force, tension / self.force
-        self.dead = (dead / self.force).ravel()
-        self.total = float(np.abs(self.dead).sum())
-        if tension.any():
-            self.dead = self.dead - self.matrix[:, :: self.size] @ self.tension
-        self.live, self.live_size = (live / size).ravel(), size / self.force
-        self.live_force = float(np.hypot.reduce(loads.live[free, :d].sum(axis=0)))
-        # What a unit of normal force costs in multipliers of the scaled live load.
-        self.price = np.zeros(len(contacts))
+        limits = ForceLimits(-tension, crushing, np.maximum(cohesion - friction * tension, 0.0))
+        price, d = np.zeros(len(contacts)), model.dimension
         if displacement > 0.0:
+            # What a unit of normal force costs in multipliers of the scaled live load.
+            live, _ = model.scaled_live(pose)
             total = float(np.linalg.norm(live[:, :d], axis=1).sum() + np.linalg.norm(live[:, d:], axis=1).sum())
-            self.price = np.where(is_open, gaps, 0.0) / displacement * (size / total)
-
-    @property
-    def size(self) -> int:
-        """Numbers of the force of a contact point: 2 in the plane, 3 in space, 4 with the torsion of its face."""
-        return self.contacts.points.shape[1] + (self.faces is not None)
-
-    def balanced(self, *, with_live: bool) -> ProgramState:
-        """The least unbalanced force that the dead load leaves, and how the blocks move where it is not nothing."""
-        rows = len(self.dead)
-        identity = sp.identity(rows, format="csc")
-        live = sp.csc_array(self.live[:, None] * float(with_live))
-        cost = np.append(0.0, np.ones(2 * rows))
-        found = self._carried(np.zeros(len(self.price)), [live, identity, -identity], cost, np.zeros(rows))
-        multiplier = found.multiplier * with_live
-        unbalanced = np.abs(self.matrix @ found.forces.ravel() + self.dead + multiplier * self.live)
-        falls = float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * self.total
-        return replace(found, multiplier=multiplier, unbalanced=unbalanced, falls=falls)
-
-    def associative(self, balanced: ProgramState) -> ProgramState:
-        """The program of the limit load; what the dead load leaves unbalanced by rounding it may leave too.
-
-        In space it balances everything: round cones have no vertices that rounding could take away.
-        """
-        left = balanced.unbalanced if self.size == 2 else np.zeros(len(self.dead))
-        return self._carried(self.price, [sp.csc_array(self.live[:, None])], np.array([-1.0]), left)
-
-    def _carried(
-        self, price: np.ndarray, beside: list[sp.csc_array], cost: np.ndarray, left: np.ndarray
-    ) -> ProgramState:
-        """The associative program over forces that points can carry, at a price, and columns with a cost.
-
-        The price is that of normal forces; the first of the columns is that of the multiplier; ``left`` is what rows
-        may leave.
-        """
-        carried, rows = Admissible.of(self.friction, self.cohesion, self.crushing, self.size), len(self.dead)
-        columns, limits = carried.columns, [carried.limits, *[None] * len(beside)]
-        of_forces = columns.T @ (price[:, None] * np.eye(self.size)[0]).ravel()
-        solution = solve_between(
-            cost=np.append(of_forces, cost),
-            matrix=sp.csc_array(sp.block_array([[self.matrix @ columns, *beside], limits], format="csc")),
-            lower=np.append(-self.dead - left, np.zeros(len(carried.most))),
-            upper=np.append(-self.dead + left, carried.most),
-            friction=carried.friction,
-            size=self.size,
+            price = np.where(is_open, gaps, 0.0) / displacement / total
+        self.gaps, self.ties_at = gaps, ties_at
+        self.program = StaticProgram(
+            model, pose, contacts, friction, limits, price, senses=(1.0,), faces=faces, exact=True
         )
-        n = columns.shape[1]
-        forces = (columns @ solution.x[:n]).reshape(-1, self.size)
-        return ProgramState(forces, float(solution.x[n]), -solution.row_dual[:rows], left, solution.gap)
 
     def at_rest(self, balanced: ProgramState) -> np.ndarray:
         """(n,) array: normal forces of the state of least elastic energy under the dead load, where there is one."""
-        free, d = self.assembly.free, self.contacts.points.shape[1]
-        matrix = wrench_matrix(self.contacts, self.pose, self.length)
-        rows = ContactRows(matrix, free, self.assembly.centroids)
-        load, near = self.dead + balanced.multiplier * self.live, np.zeros((len(self.contacts), d))
-        near[:, 0] = self.tension
+        program, contacts = self.program, self.program.contacts
         try:
-            compliance = Stepper.joint_compliance(self.contacts)
-            forces = nearest_equilibrium(rows, near, compliance, self.friction, self.crushing, self.cohesion, load)
+            compliance = Stepper.joint_compliance(contacts)
+            forces = program.nearest(np.zeros_like(contacts.points), compliance, balanced.multiplier) - program.least
         except NotSolved:
             # In balance to rounding only: there is hardly a choice of forces.
             forces = balanced.forces
         return np.asarray(forces[:, 0])
 
-    def non_associative(self, balanced: ProgramState, found: LimitStatus) -> LimitLoad:
-        """The sequence of programs in which friction is that of the normal forces carried over."""
-        points = self.friction, self.cohesion, self.crushing, self.tension, self.price
-        equations = self.contacts, self.pose, self.matrix, self.dead, self.live
-        flow = NonAssociative(*equations, *points, self.total, self.size)
-        at_rest, associative = (balanced.forces, balanced.multiplier), partial(self.associative, balanced)
-        state, converged, programs = flow.limit(self.at_rest(balanced), at_rest, associative)
-        return self.result(state, found if converged else LimitStatus.NOT_CONVERGED, "non-associative", programs)
-
     def result(self, state: ProgramState, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
         """The state in metres and newtons, its bounds and its certificate recomputed from it."""
+        program, model = self.program, self.program.model
         velocity, multiplier = state.velocity, state.multiplier
         if status is LimitStatus.UNBOUNDED:
             velocity = np.zeros_like(velocity)
-        relative = (self.matrix.T @ velocity).reshape(-1, self.size)
-        live_power = float(self.live @ velocity)
+        relative = (program.matrix.T @ velocity).reshape(-1, program.size)
+        live_power = float(program.live @ velocity)
         # Points that are open may close by their gap in a motion whose live power is 1.
-        relative[:, 0] += self.price * max(live_power, 0.0)
-        drag = self.cohesion if state.drag is None else state.drag
-        slope = self.friction if state.drag is None else np.zeros(len(relative))
-        slip, brittle = np.linalg.norm(relative[:, 1:], axis=1), np.isfinite(self.crushing)
+        relative[:, 0] += program.price * max(live_power, 0.0)
+        drag = program.limits.cohesion if state.drag is None else state.drag
+        slope = program.friction if state.drag is None else np.zeros(len(relative))
+        slip, crushing = np.linalg.norm(relative[:, 1:], axis=1), program.limits.beyond_least
+        brittle = np.isfinite(crushing)
         # What crushes may come closer than what is rigid, at the price of its strength.
         closer = np.where(brittle, np.maximum(slope * slip - relative[:, 0], 0.0), 0.0)
-        crushed = np.where(brittle, self.crushing, 0.0) * closer
+        crushed = np.where(brittle, crushing, 0.0) * closer
         taken = float(drag @ slip + crushed.sum())
-        kinematic = (taken - float(self.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
-        kinematic += float(self.price @ state.forces[:, 0])
+        kinematic = (taken - float(program.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
+        kinematic += float(program.price @ state.forces[:, 0])
         room = relative[:, 0] + closer - slope * slip
-        balance = self.matrix @ state.forces.ravel() + self.dead + multiplier * self.live
-        total = self.total or 1.0
-        units = 1.0 / unit_lengths(self.pose.positions.shape[1] + self.pose.rotations.shape[1], self.length)
-        mechanism = np.zeros((self.assembly.n_blocks, len(units)))
-        size = float(np.abs(velocity).max(initial=0.0)) or 1.0
-        mechanism[self.assembly.free] = velocity.reshape(-1, len(units)) / size * units
+        balance = program.matrix @ state.forces.ravel() + program.dead + multiplier * program.live
+        total = model.total_load or 1.0
+        size, mechanism = float(np.abs(velocity).max(initial=0.0)) or 1.0, np.zeros_like(model.load)
+        mechanism[model.assembly.free] = velocity.reshape(-1, model.n_dof) / size
+        mechanism /= unit_lengths(model.n_dof, model.length)
         found = status not in (LimitStatus.UNBOUNDED, LimitStatus.NO_EQUILIBRIUM)
-        static = multiplier / self.live_size
-        forces = state.forces if self.faces is None else point_forces(self.contacts, self.faces, state.forces)
-        forces = forces - np.column_stack([self.tension, np.zeros((len(forces), forces.shape[1] - 1))])
+        static = multiplier * program.unit
+        forces = state.forces if program.faces is None else point_forces(program.contacts, program.faces, state.forces)
+        forces = forces + program.least
         nothing = np.inf if status is LimitStatus.UNBOUNDED else np.nan
-        in_place = replace(self.contacts, gaps=self.gaps)
+        in_place = replace(program.contacts, gaps=self.gaps)
         return LimitLoad(
             multiplier=static if found else nothing,
-            bounds=(static, kinematic / self.live_size) if found else (nothing, nothing),
+            bounds=(static, kinematic * program.unit) if found else (nothing, nothing),
             certificate=Certificate(
                 equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / total,
-                friction_excess=friction_excess(state.forces, self.friction, self.cohesion) / total,
+                friction_excess=friction_excess(state.forces, program.friction, program.limits.cohesion) / total,
                 carrying_gap=carrying_gap(in_place, forces),
                 largest_penetration=largest_penetration(in_place),
                 duality_gap=abs(kinematic - multiplier) / (1.0 + abs(multiplier)) if found else state.gap,
@@ -347,27 +271,28 @@ class _Problem:
             ),
             status=status,
             flow=flow,
-            live_force=self.live_force,
+            live_force=model.live_force,
             programs=programs,
-            torsion=POINTS if self.faces is None else UNIFORM,
-            held=self._held(forces * self.force, mechanism, state.forces[:, 0] >= self.crushing * (1.0 - USED_UP)),
+            torsion=POINTS if program.faces is None else UNIFORM,
+            held=self._held(forces * model.force, mechanism, state.forces[:, 0] >= crushing * (1.0 - USED_UP)),
         )
 
     def _held(self, forces: np.ndarray, mechanism: np.ndarray, at_strength: np.ndarray) -> State:
         """The arrays of a limit load, from forces [N], and which points carry their compressive strength."""
-        between, on_blocks = ~is_member(self.contacts), block_forces(self.contacts, self.pose, forces)
-        contacts = self.contacts[between]
+        program, model = self.program, self.program.model
+        between, on_blocks = ~is_member(program.contacts), block_forces(program.contacts, program.pose, forces)
+        contacts = program.contacts[between]
         return State(
-            pose=self.pose,
+            pose=program.pose,
             contacts=contacts,
             forces=forces[between],
-            displacements=relative_velocities(contacts, self.pose, mechanism),
-            friction=self.friction[between],
+            displacements=relative_velocities(contacts, program.pose, mechanism),
+            friction=program.friction[between],
             velocity=mechanism,
-            support_forces=np.where(self.assembly.free[:, None], 0.0, on_blocks),
-            fell_at=np.where(self.gone, -np.inf, np.nan) if self.gone.any() else np.zeros(0),
-            ties=plastic_forces(self.contacts, forces, self.ties, self.ties_at),
-            crushing=at_strength[between] if np.isfinite(self.crushing[between]).any() else at_strength[:0],
+            support_forces=np.where(model.assembly.free[:, None], 0.0, on_blocks),
+            fell_at=np.zeros(0) if model.fallen is None else np.where(model.fallen, -np.inf, np.nan),
+            ties=plastic_forces(program.contacts, forces, model.ties, self.ties_at),
+            crushing=at_strength[between] if np.isfinite(program.limits.most[between]).any() else at_strength[:0],
         )
 
 
@@ -382,22 +307,6 @@ def _carrying_points(
     apart, holds = gaps > closed_gap, tension > 0.0
     once, closing = np.flatnonzero(~apart | holds), np.flatnonzero(apart & (gaps <= reach))
     return np.append(once, closing), np.repeat([False, True], [len(once), len(closing)])
-
-
-def _beyond_give(
-    assembly: Assembly,
-    interfaces: Interfaces,
-    contacts: Contacts,
-    gaps: np.ndarray,
-    tension: np.ndarray,
-    areas: np.ndarray,
-) -> np.ndarray:
-    """(n,) array [m]: gaps, from those without force, beyond the give under the largest tension [N] over areas [m²]."""
-    (stiffness,) = interfaces.values(assembly, contacts.block_a, contacts.block_b, "normal_stiffness")
-    # Give of elastic joints is neither a gap nor a penetration.
-    elastic = np.where(np.isfinite(stiffness), stiffness, 0.0)
-    pulled = np.divide(tension, elastic * areas, out=np.zeros_like(gaps), where=elastic * areas > 0.0)
-    return np.where(elastic > 0.0, np.maximum(gaps - pulled, 0.0), gaps)
 
 
 def remaining(assembly: Assembly, fallen: np.ndarray | None) -> Assembly:

@@ -19,7 +19,7 @@ from solver.path.local_origin import at_origin, in_global_coordinates, nearer, w
 from solver.path.path import Path
 from solver.path.state import PathState
 from solver.phases import PhaseChange, loads_in, removed_before
-from solver.program.model import Model
+from solver.program.model import Model, mean_load
 from solver.results.increment import Increment, Status
 from solver.ties import Tie, check_ties
 from solver.words import checked, counted
@@ -135,8 +135,7 @@ def model_of(
     ties: tuple[Tie, ...] = (),
 ) -> Model:
     """The units and loads of a path."""
-    drawn = loads.dead_at(assembly, Pose.initial(assembly))
-    force = float(np.linalg.norm(drawn[assembly.free, : assembly.dimension], axis=1).mean())
+    force = mean_load(assembly, loads)
     if force == 0.0:
         raise ValueError("no load acts on any free block; give them a weight")
     return Model(

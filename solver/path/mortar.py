@@ -59,13 +59,13 @@ class Mortar:
     def __init__(self, model: Model) -> None:
         self.model, self.present = model, model.interfaces.mortar
 
-    def cast(self, place: Place, contacts: Contacts) -> Place:
-        """The place with all of its closed joints whole."""
+    def cast(self, place: Place, contacts: Contacts, closed_gap: float | None = None) -> Place:
+        """The place with all of its closed joints whole: with gaps up to this one [m], or what drawings may have."""
         if not self.present:
             return place
         # What is accepted of a drawing as a joint is filled.
         accepted = max(COMPUTED_GAP * self.model.length, DRAWN_GAP * float(self.model.assembly.widths.min()))
-        closed = contacts[contacts.gaps <= accepted]
+        closed = contacts[contacts.gaps <= (accepted if closed_gap is None else closed_gap)]
         whole = Bonds(closed.features[:, :3], closed.areas, np.ones(len(closed)), np.zeros(len(closed)))
         joints = self.points(replace(place, bonds=whole), closed)
         filled = (joints.strength > 0.0).any(axis=1) | (joints.give > 0.0).any(axis=1)

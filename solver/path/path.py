@@ -181,9 +181,9 @@ class Path:
                 return None
             if self.model.has_live and multiplier is None:
                 # A given pose may be in equilibrium with its live load only.
-                middle = bounds.high if bounds.other_forces is None else 0.5 * (bounds.low + bounds.high)
+                middle = bounds.high if len(bounds.forces) == 1 else 0.5 * (bounds.low + bounds.high)
                 return self._at_rest(place, anew, middle) if np.isfinite(bounds.high) else None
-            forces = bounds.forces if bounds.other_forces is None else 0.5 * (bounds.forces + bounds.other_forces)
+            forces = bounds.forces.mean(axis=0)
         contacts = self.stepper.contacts_at(place)
         beyond = forces.copy()
         beyond[:, 0] += self.stepper.mortar.points(place, contacts).tension

@@ -166,9 +166,7 @@ class Stepper:
             # Contact points with a larger gap are not looked at.
             reach = model.length / 4.0
             found = find_contacts(model.assembly, moved_vertices(model.assembly, pose), reach)
-            if model.fallen is not None:
-                found = found[~(model.fallen[found.block_a] | model.fallen[found.block_b])]
-            self._last = pose, found
+            self._last = pose, model.standing(found)
         return self._last[1]
 
     def friction(self, contacts: Contacts) -> np.ndarray:

@@ -8,10 +8,17 @@ from functools import cached_property
 import numpy as np
 
 from solver.assembly import Assembly
+from solver.geometry.contacts import Contacts
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose, unit_lengths
 from solver.loads import Loads
 from solver.ties import Tie
+
+
+def mean_load(assembly: Assembly, loads: Loads) -> float:
+    """Mean dead load of the free blocks as drawn [N]."""
+    drawn = loads.dead_at(assembly, Pose.initial(assembly))
+    return float(np.linalg.norm(drawn[assembly.free, : assembly.dimension], axis=1).mean())
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,12 @@ class Model:
     def without(self, fallen: np.ndarray) -> Model:
         """Return the model once blocks, (n_blocks,) bool array, have left it."""
         return replace(self, loads=self.loads.without(fallen), fallen=fallen)
+
+    def standing(self, contacts: Contacts) -> Contacts:
+        """Return the contact points between blocks that have not left."""
+        if self.fallen is None:
+            return contacts
+        return contacts[~(self.fallen[contacts.block_a] | self.fallen[contacts.block_b])]
 
     @cached_property
     def load(self) -> np.ndarray:
@@ -74,7 +87,7 @@ class Model:
         size = float(np.abs(np.where(free, self.loads.live / units, 0.0)).max(initial=0.0))
         return np.where(free, self.loads.live_at(pose) / units, 0.0) / (size or 1.0), size
 
-    @property
+    @cached_property
     def total_load(self) -> float:
         """Sum of the loads on the free blocks in units of the program."""
         return float(np.abs(self.scaled_load[self.assembly.free, : self.dimension]).sum())

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
-from solver.geometry.contacts import Contacts
-from solver.kinematics import Pose
 from solver.programs.problem import SolveError
 from solver.programs.solve import solve_between
 from solver.results.certificate import friction_excess
 from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, FALLING_FRACTION
+
+from .static_program import ProgramState, StaticProgram
 
 #: Part of the new normal forces in the next program where they hardly depend on the last ones,
 #: and where they do, as in vaults, whose programs go in circles with more; programs at most.
@@ -40,162 +39,133 @@ UNLIKE = np.array([0.1, 0.037, 0.071])
 UNBALANCED_COST = 1e3
 
 
-@dataclass(frozen=True)
-class ProgramState:
-    """Forces (n_contacts, d), multiplier and velocity of one program, in its units.
+def non_associative_limit(
+    program: StaticProgram, normal: np.ndarray, balanced: ProgramState, bounded: bool = False
+) -> tuple[ProgramState, bool, int]:
+    """Run the sequence: its last program or the nearest one, whether it has converged, and how many were solved.
 
-    ``unbalanced`` is what rows are, or may be, left with; ``drag`` (n_contacts,) the friction force that slip works
-    against without being in the normal forces' power.
+    It begins with normal forces (n,), and with a state in equilibrium. Raises ``Unbounded`` where friction with
+    dilatancy has no limit, unless that is known to be ``bounded``; ``SolveError`` where no program is solved.
     """
+    forces, multiplier, plane = balanced.forces, balanced.multiplier, program.size == 2
+    unbalanced = np.abs(program.matrix @ forces.ravel() + program.dead + multiplier * program.live)
+    most_excess = FRICTION_EXCESS if plane else FRICTION_EXCESS_IN_SPACE
+    # Of equal ways to carry, those that press where nothing pressed come last.
+    idle = normal <= CARRYING_FRACTION * normal.max(initial=0.0)
+    change_cost = (CHANGE_COST * _unlike(program, normal) if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
+    tried: list[tuple[np.ndarray, np.ndarray]] = []
+    nearest: ProgramState | None = None
+    least, used, programs, best_at = np.inf, normal, 1, 0
+    locked = False
+    for _ in range(PROGRAMS):
+        try:
+            state, programs = _sliding(program, normal, unbalanced, change_cost), programs + 1
+        except SolveError:
+            if nearest is None:
+                raise
+            break
+        largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
+        excess = friction_excess(state.forces, program.friction, program.limits.cohesion) / largest
+        change = abs(_gained(program, state, normal))
+        error = np.inf if state.falls else max(excess, change)
+        settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
+        if nearest is None or settled or error < least:
+            nearest, least, used, best_at = state, error, normal, programs
+        if settled or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
+            break
+        added, error = state.forces - forces, FRICTION_EXCESS_IN_SPACE * largest
+        within = friction_excess(added, program.friction) <= error + FRICTION_EXCESS * float(np.abs(added).max())
+        locks = within and state.multiplier > multiplier
+        locked |= locks
+        if not bounded and ((locks and programs > PLAIN_PROGRAMS) or (locked and largest * FRICTION_EXCESS > 1.0)):
+            # What a program adds may be added without end, unless crushing ends it (raises).
+            program.bound(-1.0, balanced)
+            bounded = True
+        forces, multiplier = state.forces, state.multiplier
+        tried = [*tried[-REMEMBERED:], (normal, forces[:, 0])]
+        normal = _next_normal(tried, programs > PLAIN_PROGRAMS and not locks)
+    converged = least <= FRICTION_EXCESS
+    if locked and not converged and not bounded:
+        program.bound(-1.0, balanced)
+    assert nearest is not None
+    if converged and not plane:
+        free = _sliding(program, used, unbalanced, 0.0 * change_cost)
+        nearest, programs = replace(nearest, velocity=free.velocity, gap=free.gap), programs + 1
+    return nearest, converged, programs
 
-    forces: np.ndarray
-    multiplier: float
-    velocity: np.ndarray
-    unbalanced: np.ndarray
-    gap: float
-    falls: bool = False
-    drag: np.ndarray | None = None
 
+def _gained(program: StaticProgram, state: ProgramState, normal: np.ndarray) -> float:
+    """Tell what the multiplier gains, to first order, once friction follows from its forces, not ``normal``.
 
-@dataclass(frozen=True)
-class NonAssociative:
-    """Rows of free blocks, with a live load, and n contact points that have limits, in units of the program.
-
-    Forces are those beyond the largest tension, which is a load of the blocks, in ``dead``.
+    As a part of the multiplier and of what friction takes.
     """
+    slip = np.linalg.norm((program.matrix.T @ state.velocity).reshape(-1, program.size)[:, 1:], axis=1)
+    gain = float((program.friction * (state.forces[:, 0] - normal)) @ slip)
+    taken = float((program.limits.cohesion + program.friction * normal) @ slip)
+    return gain / max(abs(state.multiplier) + taken, 1e-300)
 
-    contacts: Contacts
-    pose: Pose
-    matrix: sp.csr_array  #: (n_rows, size n)
-    dead: np.ndarray  #: (n_rows,)
-    live: np.ndarray  #: (n_rows,)
-    friction: np.ndarray  #: (n,)
-    cohesion: np.ndarray  #: (n,)
-    crushing: np.ndarray  #: (n,): largest normal forces
-    tension: np.ndarray  #: (n,)
-    price: np.ndarray  #: (n,): of normal forces, in multipliers
-    total: float  #: sum of the loads
-    size: int  #: numbers of a force
 
-    def limit(
-        self, normal: np.ndarray, at_rest: tuple[np.ndarray, float], associative: Callable[[], object]
-    ) -> tuple[ProgramState, bool, int]:
-        """Run the sequence: its last program or the nearest one, whether it has converged, and how many were solved.
+def _unlike(program: StaticProgram, normal: np.ndarray) -> np.ndarray:
+    """(n,) array: factors in which points differ whatever their order, by forces (n,) at rest and places."""
+    points, blocks = program.contacts.points, (program.contacts.block_a, program.contacts.block_b)
+    # Corners of two blocks on a third are at one place: what they belong to tells them apart.
+    places = points + sum(np.where(block[:, None] < 0, points, program.pose.positions[block]) for block in blocks)
+    places -= places.mean(axis=0)
+    resultants = [load.reshape(-1, 3)[:, :2].sum(axis=0) for load in (program.live, program.dead)]
+    unlike = np.column_stack([places @ np.transpose(resultants), normal])
+    return 1.0 + unlike @ (UNLIKE / np.maximum(np.abs(unlike).max(axis=0, initial=0.0), 1e-300))
 
-        It begins with normal forces (n,), and with forces and a multiplier in equilibrium. ``associative`` raises
-        ``Unbounded`` where friction with dilatancy has no limit; raises ``SolveError`` where no program is solved.
-        """
-        (forces, multiplier), plane = at_rest, self.size == 2
-        unbalanced = np.abs(self.matrix @ forces.ravel() + self.dead + multiplier * self.live)
-        most_excess = FRICTION_EXCESS if plane else FRICTION_EXCESS_IN_SPACE
-        # Of equal ways to carry, those that press where nothing pressed come last.
-        idle = normal <= CARRYING_FRACTION * normal.max(initial=0.0)
-        change_cost = (CHANGE_COST * self._unlike(normal) if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
-        tried: list[tuple[np.ndarray, np.ndarray]] = []
-        nearest: ProgramState | None = None
-        least, used, programs, best_at = np.inf, normal, 1, 0
-        locked, bounded = False, False
-        for _ in range(PROGRAMS):
-            try:
-                state, programs = self._sliding(normal, unbalanced, change_cost), programs + 1
-            except SolveError:
-                if nearest is None:
-                    raise
-                break
-            largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
-            excess = friction_excess(state.forces, self.friction, self.cohesion) / largest
-            change = abs(self._gained(state, normal))
-            error = np.inf if state.falls else max(excess, change)
-            settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
-            if nearest is None or settled or error < least:
-                nearest, least, used, best_at = state, error, normal, programs
-            if settled or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
-                break
-            added, error = state.forces - forces, FRICTION_EXCESS_IN_SPACE * largest
-            within = friction_excess(added, self.friction) <= error + FRICTION_EXCESS * float(np.abs(added).max())
-            locks = within and state.multiplier > multiplier
-            locked |= locks
-            if not bounded and ((locks and programs > PLAIN_PROGRAMS) or (locked and largest * FRICTION_EXCESS > 1.0)):
-                # What a program adds may be added without end, unless crushing ends it (raises).
-                associative()
-                bounded = True
-            forces, multiplier = state.forces, state.multiplier
-            tried = [*tried[-REMEMBERED:], (normal, forces[:, 0])]
-            normal = _next_normal(tried, programs > PLAIN_PROGRAMS and not locks)
-        converged = least <= FRICTION_EXCESS
-        if locked and not converged:
-            associative()
-        assert nearest is not None
-        if converged and not plane:
-            free = self._sliding(used, unbalanced, 0.0 * change_cost)
-            nearest, programs = replace(nearest, velocity=free.velocity, gap=free.gap), programs + 1
-        return nearest, converged, programs
 
-    def _gained(self, state: ProgramState, normal: np.ndarray) -> float:
-        """Tell what the multiplier gains, to first order, once friction follows from its forces, not ``normal``.
+def _sliding(
+    program: StaticProgram, normal: np.ndarray, unbalanced: np.ndarray, change_cost: np.ndarray
+) -> ProgramState:
+    """One program of the sequence: maximise α with |T| ≤ B; of equal α the normal forces nearest to N⁰, ``normal``.
 
-        As a part of the multiplier and of what friction takes.
-        """
-        slip = np.linalg.norm((self.matrix.T @ state.velocity).reshape(-1, self.size)[:, 1:], axis=1)
-        gain = float((self.friction * (state.forces[:, 0] - normal)) @ slip)
-        taken = float((self.cohesion + self.friction * normal) @ slip)
-        return gain / max(abs(state.multiplier) + taken, 1e-300)
-
-    def _unlike(self, normal: np.ndarray) -> np.ndarray:
-        """(n,) array: factors in which points differ whatever their order, by forces (n,) at rest and places."""
-        points, blocks = self.contacts.points, (self.contacts.block_a, self.contacts.block_b)
-        # Corners of two blocks on a third are at one place: what they belong to tells them apart.
-        places = points + sum(np.where(block[:, None] < 0, points, self.pose.positions[block]) for block in blocks)
-        places -= places.mean(axis=0)
-        resultants = [load.reshape(-1, 3)[:, :2].sum(axis=0) for load in (self.live, self.dead)]
-        unlike = np.column_stack([places @ np.transpose(resultants), normal])
-        return 1.0 + unlike @ (UNLIKE / np.maximum(np.abs(unlike).max(axis=0, initial=0.0), 1e-300))
-
-    def _sliding(self, normal: np.ndarray, unbalanced: np.ndarray, change_cost: np.ndarray) -> ProgramState:
-        """One program of the sequence: maximise α with |T| ≤ B; of equal α the normal forces nearest to N⁰, ``normal``.
-
-        Columns: the shear forces, N, p, m, α and unbalanced forces, with N - N⁰ = p - m, and a row N for each point
-        that may crush. In the plane T = (u - v) / 2 of columns u + v = 2 B; in space the disc |T| ≤ B is the cone
-        |T| ≤ B s with s = 1.
-        """
-        n, rows, size, plane = len(normal), len(self.dead), self.size, self.size == 2
-        bound, brittle = self.cohesion + self.friction * normal, np.flatnonzero(np.isfinite(self.crushing))
-        identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
-        if plane:
-            half = sp.diags_array(np.full(n, 0.5))
-            shears = sp.hstack([half, -half])
-            to_shear = self.matrix[:, 1::2] @ shears
-            level, level_is, slopes, slack = sp.hstack([eye, eye]), 2.0 * bound, np.zeros(0), unbalanced
-        else:
-            disc = np.ones((n, size)) * bound[:, None]
-            disc[:, 0] = 0.0
-            shears = sp.diags_array(disc.ravel())
-            to_shear = self.matrix @ shears
-            level = sp.csr_array((np.ones(n), (np.arange(n), size * np.arange(n))), shape=(n, size * n))
-            level_is, slopes, slack = np.ones(n), np.ones(n), np.zeros(rows)
-        first = shears.shape[1]
-        blocks = [
-            [to_shear, self.matrix[:, 0::size], None, None, sp.csr_array(self.live[:, None]), identity, -identity],
-            [level, None, None, None, None, None, None],
-            [None, eye, -eye, eye, None, None, None],
-            [None, sp.csr_array(eye)[brittle], None, None, None, None, None],
-        ]
-        # Joints that may pull press sooner: pulling takes friction away, until nothing is left that could carry.
-        released = change_cost * (1.0 + (self.tension > 0.0))
-        of_forces = [np.zeros(first), self.price, change_cost, released]
-        solution = solve_between(
-            np.concatenate([*of_forces, [-1.0], np.full(2 * rows, UNBALANCED_COST)]),
-            sp.csc_array(sp.block_array(blocks, format="csc")),
-            np.concatenate([-self.dead - slack, level_is, normal, np.zeros(len(brittle))]),
-            np.concatenate([-self.dead + slack, level_is, normal, self.crushing[brittle]]),
-            slopes,
-            size,
-        )
-        shear, x = (shears @ solution.x[:first]).reshape(n, -1), solution.x[first:]
-        forces = np.column_stack([x[:n], shear[:, int(not plane) :]])
-        multiplier, left = float(x[3 * n]), x[3 * n + 1 :][: 2 * rows].max(initial=0.0)
-        falls = bool(left > FALLING_FRACTION * self.total)
-        return ProgramState(forces, multiplier, -solution.row_dual[:rows], unbalanced, solution.gap, falls, bound)
+    Columns: the shear forces, N, p, m, α and unbalanced forces, with N - N⁰ = p - m, and a row N for each point
+    that may crush. In the plane T = (u - v) / 2 of columns u + v = 2 B; in space the disc |T| ≤ B is the cone
+    |T| ≤ B s with s = 1.
+    """
+    n, rows, size, plane = len(normal), len(program.dead), program.size, program.size == 2
+    bound, brittle = (
+        program.limits.cohesion + program.friction * normal,
+        np.flatnonzero(np.isfinite(program.limits.beyond_least)),
+    )
+    identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
+    if plane:
+        half = sp.diags_array(np.full(n, 0.5))
+        shears = sp.hstack([half, -half])
+        to_shear = program.matrix[:, 1::2] @ shears
+        level, level_is, slopes, slack = sp.hstack([eye, eye]), 2.0 * bound, np.zeros(0), unbalanced
+    else:
+        disc = np.ones((n, size)) * bound[:, None]
+        disc[:, 0] = 0.0
+        shears = sp.diags_array(disc.ravel())
+        to_shear = program.matrix @ shears
+        level = sp.csr_array((np.ones(n), (np.arange(n), size * np.arange(n))), shape=(n, size * n))
+        level_is, slopes, slack = np.ones(n), np.ones(n), np.zeros(rows)
+    first = shears.shape[1]
+    blocks = [
+        [to_shear, program.matrix[:, 0::size], None, None, sp.csr_array(program.live[:, None]), identity, -identity],
+        [level, None, None, None, None, None, None],
+        [None, eye, -eye, eye, None, None, None],
+        [None, sp.csr_array(eye)[brittle], None, None, None, None, None],
+    ]
+    # Joints that may pull press sooner: pulling takes friction away, until nothing is left that could carry.
+    released = change_cost * (1.0 + (program.limits.least < 0.0))
+    of_forces = [np.zeros(first), program.price, change_cost, released]
+    solution = solve_between(
+        np.concatenate([*of_forces, [-1.0], np.full(2 * rows, UNBALANCED_COST)]),
+        sp.csc_array(sp.block_array(blocks, format="csc")),
+        np.concatenate([-program.dead - slack, level_is, normal, np.zeros(len(brittle))]),
+        np.concatenate([-program.dead + slack, level_is, normal, program.limits.beyond_least[brittle]]),
+        slopes,
+        size,
+    )
+    shear, x = (shears @ solution.x[:first]).reshape(n, -1), solution.x[first:]
+    forces = np.column_stack([x[:n], shear[:, int(not plane) :]])
+    multiplier, left = float(x[3 * n]), x[3 * n + 1 :][: 2 * rows].max(initial=0.0)
+    falls = bool(left > FALLING_FRACTION * program.model.total_load)
+    return ProgramState(forces, multiplier, -solution.row_dual[:rows], solution.gap, falls=falls, drag=bound)
 
 
 def _next_normal(tried: list[tuple[np.ndarray, np.ndarray]], extrapolated: bool) -> np.ndarray:

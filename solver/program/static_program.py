@@ -1,22 +1,25 @@
-"""Bounds of equilibrium within friction at a pose: whether there is one, and of its reaction or multiplier."""
+"""The static program at a pose: balance of the free blocks, and the forces that contact points can carry."""
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
+from solver.contact_step.balance import nearest_equilibrium
+from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.programs.problem import LinearProgram, Solution, SolveError, Unbounded
-from solver.programs.solve import CONIC_ROUTES, solve_between, solve_lp
+from solver.programs.problem import Solution, SolveError, Unbounded
+from solver.programs.solve import CONIC_ROUTES, solve_between
 from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, FALLING_FRACTION
 
 from .model import Model
-from .non_associative import NonAssociative
 from .strength import Admissible, ForceLimits
+from .torsion import Faces, face_wrench_matrix
 
 
 @dataclass(frozen=True)
@@ -26,8 +29,8 @@ class EquilibriumBounds:
     Of the reaction [N or N·m], or of the live loads' multiplier; infinite where friction bounds neither; one whose
     program was not solved is not a number. Without an equilibrium both are the value of the forces.
 
-    Forces (n_contacts, d), in units of the program, are those of the least reaction or largest multiplier; of another
-    equilibrium where that has no bound or was not found; nearest to one where none exists.
+    Forces (k, n_contacts, d), in units of the program, are those of the bounds that were found, the least one first; of
+    another equilibrium where none was; nearest to one where none exists.
     """
 
     unbalanced: float  #: least sum of unbalanced forces over the total load: zero where an equilibrium exists
@@ -35,7 +38,6 @@ class EquilibriumBounds:
     high: float
     gap: float  #: largest relative difference of the two objectives of the programs
     forces: np.ndarray
-    other_forces: np.ndarray | None = None  #: of the other bound, where there is one
 
     @property
     def in_equilibrium(self) -> bool:
@@ -43,11 +45,38 @@ class EquilibriumBounds:
         return self.unbalanced <= FALLING_FRACTION
 
 
-class StaticProgram:
-    """The program over the forces of closed contact points, (n_contacts,) bool array, at a pose.
+@dataclass(frozen=True)
+class ProgramState:
+    """Forces (n_contacts, size), multiplier and velocity (n_rows,) of a solution, in units of the program."""
 
-    It bounds the multiplier of a live load, or the reaction along a rate of the supports, (n_blocks, n_dof) array. What
-    solves it raises ``SolveError``.
+    forces: np.ndarray  #: beyond the least ones
+    multiplier: float
+    velocity: np.ndarray
+    gap: float
+    unbalanced: np.ndarray | float = 0.0  #: (n_rows,): what is missing to balance
+    falls: bool = False
+    #: (n_contacts,): friction force that slip works against without being in the normal forces' power.
+    drag: np.ndarray | None = None
+
+
+class StaticProgram:
+    """Rows of the free blocks with a dead and a live load, and n contact points with limits, in units of the program.
+
+    Normal forces are those beyond the least ones, which are loads of the blocks, in ``dead``. The value that is bounded
+    is the multiplier of a live load, or the reaction along a rate of the supports. Methods raise ``SolveError`` where a
+    program is not solved.
+
+    Parameters
+    ----------
+    friction, price : (n,) arrays
+        The price is that of normal forces, in multipliers.
+    senses : tuple of float
+        In which the live load may act, if any.
+    rate : (n_blocks, n_dof) array, optional
+    faces : Faces, optional
+        That resist torsion in place of their points.
+    exact : bool
+        Whether a mechanism is sought: in the plane solutions are vertices, then, and balanced to the last digit.
     """
 
     def __init__(
@@ -56,65 +85,35 @@ class StaticProgram:
         pose: Pose,
         contacts: Contacts,
         friction: np.ndarray,
-        rate: np.ndarray | None,
-        closed: np.ndarray,
         limits: ForceLimits,
+        price: np.ndarray,
+        *,
+        senses: tuple[float, ...] = (),
+        rate: np.ndarray | None = None,
+        faces: Faces | None = None,
+        exact: bool = False,
     ) -> None:
-        d, blocks = model.dimension, model.assembly.free
-        free = np.repeat(blocks, model.n_dof)
-        self.closed, contacts, friction = closed, contacts[closed], friction[closed]
-        least, most, cohesion = (of[closed] for of in (limits.least, limits.most, limits.cohesion))
-        matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
-        on_free = matrix[free]
-        carried = Admissible.of(friction, cohesion, np.full(len(contacts), np.inf), d)
-        self.rays = carried.columns
-        balance = sp.csc_array(on_free @ self.rays)
-        self.rows, self.n = balance.shape
-        self.d, self.friction, self.total, self.programs = d, carried.friction, model.total_load, 0
-        # The programs are those of the normal forces beyond the least ones.
-        self.least = np.zeros((len(contacts), d))
-        self.least[:, 0] = least
-        given = matrix @ self.least.ravel()
-        self.load = model.scaled_load_at(pose).ravel()[free] + given[free]
-        self.tolerance = BALANCE_TOLERANCE * model.total_load
-        live, self.live_size = model.scaled_live(pose)
-        loads, points = (
-            (self.load, live[blocks].ravel()),
-            (friction, cohesion, most - least, -least, np.zeros(len(least))),
-        )
-        self.non_associative = NonAssociative(contacts, pose, on_free, *loads, *points, self.total, d)
-        columns, objective = [balance], np.zeros(self.n)
-        if self.live_size > 0.0:
-            column = sp.csc_array(live[blocks].reshape(-1, 1))
-            columns += [column, -column]
-            objective = np.append(objective, [1.0, -1.0])
-            self.unit, self.constant = 1.0 / self.live_size, 0.0
-        else:
-            along = np.zeros(len(free)) if rate is None else (rate / model.lengths).ravel()
-            # Relative to the speed of the supports, as the check of a solution is absolute.
-            speed = float(np.abs(along).max(initial=0.0)) or 1.0
-            along = np.where(free, 0.0, along / speed)
-            objective = self.rays.T @ (matrix.T @ along)
-            self.unit, self.constant = model.force * model.length * speed, float(along @ given)
-        self.objective, self.matrix = objective, sp.hstack(columns, format="csc")
-        self.places = np.repeat(pose.positions[blocks], model.n_dof, axis=0)
-        limited = np.flatnonzero(np.isfinite(most))
-        self.reserve = np.append((most - least)[limited], carried.most)
-        if len(self.reserve):
-            limits_of = sp.vstack([sp.csr_array(self.rays)[d * limited], carried.limits], format="csc")
-            limits_of.resize(len(self.reserve), len(objective))
-            self.matrix = sp.csc_array(sp.vstack([self.matrix, limits_of], format="csc"))
-            # Places are of programs in the plane, where cohesion has a row for either sign.
-            sticky = np.repeat(contacts.points[cohesion > 0.0], 2, axis=0)
-            self.places = np.vstack([self.places, contacts.points[limited], sticky])
+        self.model, self.pose, self.contacts, self.faces = model, pose, contacts, faces
+        self.friction, self.limits, self.price, self.senses, self.exact = friction, limits, price, senses, exact
+        self.size, self.programs = model.dimension + (faces is not None), 0
+        free, at = np.repeat(model.assembly.free, model.n_dof), (pose, model.length)
+        rows = wrench_matrix(contacts, *at) if faces is None else face_wrench_matrix(contacts, faces, *at)
+        self.matrix = sp.csr_array(rows)[free]  # (n_rows, size n)
+        self.least = limits.least[:, None] * np.eye(model.dimension)[0]
+        self.dead = model.scaled_load_at(pose).ravel()[free] + self.matrix[:, :: self.size] @ limits.least
+        live, live_size = model.scaled_live(pose)
+        along = np.zeros(len(free)) if rate is None else np.where(free, 0.0, (rate / model.lengths).ravel())
+        # Relative to the speed of the supports, as the check of a solution is absolute.
+        speed = float(np.abs(along).max(initial=0.0)) or 1.0
+        self.live, self.work = live.ravel()[free], rows.T @ along / speed
+        self.unit = 1.0 / live_size if senses else model.force * model.length * speed
+        self.carried = Admissible.of(friction, limits.cohesion, limits.beyond_least, self.size)
 
-    def in_equilibrium(self, least: float = 0.0) -> bool:
-        """Whether an equilibrium within friction exists, with more than so much of a live load, in block weights."""
-        balanced, unbalanced = self.most_balanced()
-        if unbalanced > FALLING_FRACTION or self.live_size == 0.0:
-            return unbalanced <= FALLING_FRACTION
-        most = self.bound(-1.0, balanced)
-        return most is None or self.value(most) * self.live_size > least
+    def without_live(self) -> StaticProgram:
+        """Return the program under the dead load alone."""
+        one = copy(self)
+        one.senses = ()
+        return one
 
     def bounds(self) -> EquilibriumBounds:
         """Bound the reaction or the multiplier of all equilibria within friction.
@@ -126,80 +125,115 @@ class StaticProgram:
         balanced, unbalanced = self.most_balanced()
         if unbalanced > FALLING_FRACTION:
             value = self.value(balanced)
-            return EquilibriumBounds(unbalanced, value, value, balanced.gap, self.forces(balanced))
-        values, found = {}, []
-        for sign in (1.0, -1.0) if self.live_size == 0.0 else (-1.0, 1.0):
-            values[sign] = np.nan
+            return EquilibriumBounds(unbalanced, value, value, balanced.gap, np.array([balanced.forces + self.least]))
+        values, found = {1.0: np.nan, -1.0: np.nan}, []
+        for sense in values:
             try:
-                solution = self.bound(sign, balanced)
+                found.append(self.bound(sense, balanced))
+                values[sense] = self.value(found[-1])
+            except Unbounded:
+                values[sense] = -sense * np.inf
             except SolveError:
                 # A bound may stay unknown, except that of a pushover.
-                if sign < 0.0 < self.live_size:
+                if self.senses and sense < 0.0:
                     raise
-                continue
-            values[sign] = -sign * np.inf if solution is None else self.value(solution)
-            found += [] if solution is None else [solution]
         # Where blocks are wedged neither bound is finite.
-        forces = [self.forces(solution) for solution in found or [balanced]]
-        gap = max(solution.gap for solution in (balanced, *found))
-        return EquilibriumBounds(unbalanced, values[1.0], values[-1.0], gap, *forces)
+        forces = np.array([state.forces + self.least for state in found or [balanced]])
+        gap = max(state.gap for state in (balanced, *found))
+        return EquilibriumBounds(unbalanced, values[1.0], values[-1.0], gap, forces)
 
-    def bound(self, sign: float, balanced: Solution) -> Solution | None:
-        """Least or, by sign, largest value in equilibrium; None without a bound.
+    def value(self, state: ProgramState) -> float:
+        """Reaction [N or N·m] or multiplier of a state."""
+        if self.senses:
+            return state.multiplier * self.unit
+        return float(self.work @ (state.forces + self.least).ravel()) * self.unit
 
-        The rounding that leaves the balanced solution out of balance may do so here.
+    def bound(self, sense: float, balanced: ProgramState) -> ProgramState:
+        """Least, by sense 1, or largest value in equilibrium, by -1, less what open points cost.
+
+        The rounding that leaves the balanced state out of balance may do so here. Raises ``Unbounded``.
         """
-        try:
-            missing, beyond = self._imbalance(balanced)
-            return self._solve(sign * self.objective, self.matrix, missing - beyond, CONIC_ROUTES)
-        except Unbounded:
-            return None
+        of_forces = sense * self.work
+        of_forces[:: self.size] += self.price
+        solution = self._solved(of_forces, sense * np.array(self.senses), [], CONIC_ROUTES, balanced.unbalanced)
+        return self._state(solution)
 
-    def most_balanced(self) -> tuple[Solution, float]:
+    def most_balanced(self) -> tuple[ProgramState, float]:
         """Find forces of least imbalance, and their unbalanced forces over the total load, 0 where that is rounding."""
-        unit = sp.eye_array(self.matrix.shape[0], self.rows)
-        matrix = sp.hstack([self.matrix, unit, -unit], format="csc")
-        cost = np.append(np.zeros(self.matrix.shape[1]), np.ones(2 * self.rows))
+        rows, k = len(self.dead), len(self.senses)
+        unit, cost = sp.eye_array(rows), np.append(np.zeros(k), np.ones(2 * rows))
+        routes = (*CONIC_ROUTES[1::-1], *CONIC_ROUTES[2:])
+        first, is_rounding = self.carried.columns.shape[1] + k, False
         try:
-            solution = self._solve(cost, matrix, np.zeros(self.rows), (*CONIC_ROUTES[1::-1], *CONIC_ROUTES[2:]))
+            solution = self._solved(np.zeros_like(self.work), cost, [unit, -unit], routes)
         except SolveError as error:
             best = error.best
             if best is None:
                 raise
-            if best.violation <= ACCEPTED_ERROR and self._unbalanced(best) <= ACCEPTED_ERROR:
-                return best, 0.0
+            left = float(best.x[first:][: 2 * rows].sum()) / self.model.total_load
+            is_rounding = best.violation <= ACCEPTED_ERROR and left <= ACCEPTED_ERROR
             # The dual objective bounds the forces out of balance from below, but for its violation along the forces.
             doubt = best.dual_violation * (1.0 + float(np.abs(best.row_dual).max())) * float(np.abs(best.x).sum())
-            if best.dual_objective <= 2.0 * best.gap + doubt:
+            if not is_rounding and best.dual_objective <= 2.0 * best.gap + doubt:
                 raise
             solution = best
-        return solution, self._unbalanced(solution)
+        missing, beyond = unbalanced = solution.x[first:][: 2 * rows].reshape(2, -1)
+        left = 0.0 if is_rounding else float(unbalanced.sum()) / (self.model.total_load or 1.0)
+        return self._state(solution, missing - beyond), left
 
-    def _solve(
-        self, cost: np.ndarray, matrix: sp.csc_array, imbalance: np.ndarray, routes: tuple[str, ...]
+    def nearest(
+        self, reference: np.ndarray, compliance: np.ndarray, multiplier: float = 0.0, reaction: float | None = None
+    ) -> np.ndarray:
+        """(n, d) array: forces in equilibrium nearest to the reference, by the compliance, (n, d) arrays each.
+
+        Under a multiplier of the live load, and with a reaction [N or N·m] where one is given. Raises ``NotSolved``.
+        """
+        assembly, least, unit_reaction, beyond = self.model.assembly, self.least, None, 0.0
+        matrix = wrench_matrix(self.contacts, self.pose, self.model.length)
+        if reaction is not None:
+            unit_reaction = self.work.reshape(least.shape)
+            beyond = reaction / self.unit - float((unit_reaction * least).sum())
+        return least + nearest_equilibrium(
+            ContactRows(matrix, assembly.free, assembly.centroids),
+            reference - least,
+            compliance,
+            self.friction,
+            self.limits.beyond_least,
+            self.limits.cohesion,
+            self.dead + multiplier * self.live,
+            unit_reaction,
+            beyond,
+        )
+
+    def _solved(
+        self,
+        of_forces: np.ndarray,
+        cost: np.ndarray,
+        unbalanced: list[sp.sparray],
+        routes: tuple[str, ...],
+        left: np.ndarray | float = 0.0,
     ) -> Solution:
+        """Minimise the cost of forces, (size n,), and of the columns beside them, with what rows are left with."""
         self.programs += 1
-        right, none = -self.load - imbalance, np.zeros_like(self.reserve)
-        if self.d == 3:
-            lower, upper = np.append(right, none), np.append(right, self.reserve)
-            return solve_between(cost, matrix, lower, upper, self.friction, 3, routes)
-        lower, upper = np.append(right - self.tolerance, none), np.append(right + self.tolerance, self.reserve)
-        return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, places=self.places))
+        carried, right = self.carried, -self.dead - left
+        beside = [*(sp.csc_array(sense * self.live[:, None]) for sense in self.senses), *unbalanced]
+        blocks = [[self.matrix @ carried.columns, *beside], [carried.limits, *[None] * len(beside)]]
+        tolerance = 0.0 if self.exact or self.size > 2 else BALANCE_TOLERANCE * self.model.total_load
+        places = np.repeat(self.pose.positions[self.model.assembly.free], self.model.n_dof, axis=0)
+        return solve_between(
+            np.append(carried.columns.T @ of_forces, cost),
+            sp.csc_array(sp.block_array(blocks, format="csc")),
+            np.append(right - tolerance, np.zeros_like(carried.most)),
+            np.append(right + tolerance, carried.most),
+            carried.friction,
+            self.size,
+            routes,
+            np.vstack([places, self.contacts.points[carried.limited]]),
+            self.exact,
+        )
 
-    def _imbalance(self, balanced: Solution) -> np.ndarray:
-        """(2, n_rows) array: unbalanced forces of either sense of a solution of least imbalance."""
-        return balanced.x[self.matrix.shape[1] :][: 2 * self.rows].reshape(2, -1)
-
-    def _unbalanced(self, balanced: Solution) -> float:
-        """Sum of the unbalanced forces of a solution of least imbalance, over the total load."""
-        return float(self._imbalance(balanced).sum()) / self.total
-
-    def value(self, solution: Solution) -> float:
-        """Reaction [N or N·m] or multiplier of a solution."""
-        return (float(self.objective @ solution.x[: len(self.objective)]) + self.constant) * self.unit
-
-    def forces(self, solution: Solution) -> np.ndarray:
-        """(n_contacts, d) array: contact forces of a solution, in units of the program."""
-        forces = np.zeros((len(self.closed), self.d))
-        forces[self.closed] = (self.rays @ solution.x[: self.n]).reshape(-1, self.d) + self.least
-        return forces
+    def _state(self, solution: Solution, unbalanced: np.ndarray | float = 0.0) -> ProgramState:
+        columns, rows, k = self.carried.columns, len(self.dead), len(self.senses)
+        x, beside = np.split(solution.x, [columns.shape[1]])
+        forces, multiplier = (columns @ x).reshape(-1, self.size), float(np.dot(self.senses, beside[:k]))
+        return ProgramState(forces, multiplier, -solution.row_dual[:rows], solution.gap, unbalanced)

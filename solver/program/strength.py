@@ -13,18 +13,10 @@ from solver.geometry.contacts import Contacts
 from solver.interfaces import Interfaces
 
 
-def point_strength(
-    assembly: Assembly, interfaces: Interfaces, contacts: Contacts, bonded: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(n_contacts,) arrays [N]: cohesive shear force, largest normal force and largest tension of each contact point.
-
-    The parts of their areas that are ``bonded``, (n_contacts,) array [m²], have cohesion and tension.
-    """
-    names = ("cohesion", "compressive_strength", "tensile_strength")
-    cohesion, strength, tension = interfaces.values(assembly, contacts.block_a, contacts.block_b, *names)
-    crushing = np.multiply(strength, contacts.areas, out=np.full(len(contacts), np.inf), where=np.isfinite(strength))
-    friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-    return cohesion * bonded, crushing, largest_tension(tension, cohesion, friction) * bonded
+def crushing_forces(assembly: Assembly, interfaces: Interfaces, contacts: Contacts) -> np.ndarray:
+    """(n_contacts,) array [N]: largest normal force of each contact point, infinite where nothing crushes."""
+    (strength,) = interfaces.values(assembly, contacts.block_a, contacts.block_b, "compressive_strength")
+    return np.multiply(strength, contacts.areas, out=np.full(len(contacts), np.inf), where=np.isfinite(strength))
 
 
 def largest_tension(tension: np.ndarray, cohesion: np.ndarray, friction: np.ndarray) -> np.ndarray:
@@ -40,6 +32,15 @@ class ForceLimits:
     most: np.ndarray
     cohesion: np.ndarray
 
+    @property
+    def beyond_least(self) -> np.ndarray:
+        """(n,) array: largest normal forces beyond the least ones."""
+        return np.asarray(self.most - self.least)
+
+    def __getitem__(self, chosen: np.ndarray) -> ForceLimits:
+        """Choose some of the contact points, by a mask or their numbers."""
+        return ForceLimits(self.least[chosen], self.most[chosen], self.cohesion[chosen])
+
 
 @dataclass(frozen=True)
 class Admissible:
@@ -52,6 +53,7 @@ class Admissible:
     columns: sp.csc_array  #: (size n, m)
     limits: sp.csc_array  #: (k, m)
     most: np.ndarray  #: (k,)
+    limited: np.ndarray  #: (k,) int: contact point of each
     friction: np.ndarray  #: (j,)
 
     @classmethod
@@ -72,7 +74,8 @@ class Admissible:
             limited = np.concatenate([size * (n + np.arange(p)), size * brittle])
             limits = sp.csc_array((np.ones(p + q), (np.arange(p + q), limited)), shape=(p + q, columns.shape[1]))
             most = np.concatenate([cohesion[sticky], crushing[brittle]])
-            return cls(columns, limits, most, np.concatenate([friction, np.ones(p)]))
+            slopes = np.concatenate([friction, np.ones(p)])
+            return cls(columns, limits, most, np.concatenate([sticky, brittle]), slopes)
         rays = friction_rays(friction)
         values = np.tile([1.0, -1.0], p)
         shear = sp.csc_array((values, (np.repeat(2 * sticky + 1, 2), np.arange(2 * p))), shape=(2 * n, 2 * p))
@@ -81,4 +84,6 @@ class Admissible:
         each = sp.eye_array(2 * (n + p), format="csr")[2 * n :]
         normal = sp.csr_array(columns)[2 * brittle] if q else sp.csr_array((0, columns.shape[1]))
         limits = sp.csc_array(sp.vstack([each, normal], format="csc"))
-        return cls(columns, limits, np.concatenate([np.repeat(cohesion[sticky], 2), crushing[brittle]]), np.zeros(0))
+        sticky = np.repeat(sticky, 2)
+        most = np.concatenate([cohesion[sticky], crushing[brittle]])
+        return cls(columns, limits, most, np.concatenate([sticky, brittle]), np.zeros(0))

@@ -70,16 +70,19 @@ def solve_between(
     friction: np.ndarray,
     size: int,
     routes: Sequence[str] = CONIC_ROUTES,
+    places: np.ndarray | None = None,
+    vertex: bool = True,
 ) -> Solution:
     """Minimise cost · x with lower ≤ A x ≤ upper, the first columns in round cones: without any, a linear program.
 
-    Cones are those of :class:`ConicProgram`, routes are ``CONIC_ROUTES`` in the order in which they are tried. With
-    cones, the first n numbers of x are those of the program, and the first multipliers those of the equations, where
-    the limits are equal; the slack of the other rows follows. Raises as :func:`solve_lp` does.
+    Places, and whether a vertex is sought, are those of linear programs: a vertex is one mechanism; an interior point,
+    a mean of several, lets fixed-point iterations drift. Cones are those of :class:`ConicProgram`, routes are
+    ``CONIC_ROUTES`` in the order in which they are tried. With cones, the first n numbers of x are those of the
+    program, and the first multipliers those of the equations, where the limits are equal; the slack of the other rows
+    follows. Raises as :func:`solve_lp` does.
     """
     if len(friction) == 0:
-        # A vertex is one mechanism; an interior point, a mean of several, lets fixed-point iterations drift.
-        return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper), vertex=True)
+        return solve_lp(LinearProgram(cost, matrix, lower, upper, places), vertex=vertex)
     rows_of, equal = sp.csr_array(matrix), lower == upper
     below, above = np.flatnonzero(~equal & np.isfinite(lower)), np.flatnonzero(~equal & np.isfinite(upper))
     rows = sp.vstack([rows_of[equal], rows_of[below], rows_of[above]])
