@@ -10,10 +10,10 @@ import numpy as np
 from solver.assembly import FIXED, Assembly, check_blocks, find_contacts
 from solver.contact_step.problem import NotSolved
 from solver.equilibrium import block_forces
-from solver.geometry.contacts import joined_contacts
 from solver.interfaces import Interfaces
 from solver.kinematics import Pose, moved_vertices, relative_velocities, unit_lengths
 from solver.loads import Loads, checked_loads
+from solver.path.members import Members
 from solver.path.mortar import Mortar
 from solver.path.state import Place
 from solver.path.stepping import Stepper
@@ -34,9 +34,7 @@ from solver.ties import (
     check_ties,
     held_ties,
     is_member,
-    member_contacts,
     plastic_forces,
-    present_members,
     slack,
     ties_as_drawn,
 )
@@ -171,40 +169,33 @@ class _Problem:
         ties_at: TieForces,
         bonds: Bonds | None,
     ) -> None:
-        assembly, interfaces, ties = model.assembly, model.interfaces, model.ties
+        assembly, interfaces, members, d = model.assembly, model.interfaces, Members(model), model.dimension
         reach = max(closed_gap, REACH * model.length) if displacement > 0.0 else closed_gap
-        dry = interfaces.dry and bonds is None
         # Open points, too, measure the faces of joints with strength.
-        measured = reach if dry else max(reach, REACH * model.length)
-        contacts = find_contacts(assembly, moved_vertices(assembly, pose), measured)
-        contacts = model.standing(contacts)
-        mortar, place = Mortar(model), Place.unloaded(pose)
+        measured = reach if interfaces.dry and bonds is None else max(reach, REACH * model.length)
+        contacts = model.standing(find_contacts(assembly, moved_vertices(assembly, pose), measured))
+        mortar, place = Mortar(model), members.installed(Place.unloaded(pose), 0, ties_at)
         place = mortar.cast(place, contacts, closed_gap) if bonds is None else replace(place, bonds=bonds)
-        joints = mortar.points(place, contacts)
-        cohesion, tension, gaps = joints.cohesion, joints.tension, joints.beyond_give(contacts.gaps, -joints.tension)
+        contacts = members.beside(contacts, pose, place.tie_lengths)
+        joints, tied = mortar.points(place, contacts), is_member(contacts)
         # Give of elastic joints is neither a gap nor a penetration.
+        gaps = joints.beyond_give(contacts.gaps, -joints.tension)
         gaps = np.where(joints.give[:, 0] > 0.0, np.maximum(gaps, 0.0), gaps)
-        is_open, crushing = gaps > closed_gap, crushing_forces(assembly, interfaces, contacts) / model.force
-        if not dry:
-            number, is_open = _carrying_points(gaps, tension, closed_gap, reach)
-            contacts, gaps, cohesion, tension = contacts[number], gaps[number], cohesion[number], tension[number]
-            crushing = np.where(is_open | (gaps <= closed_gap), crushing[number], 0.0)
+        gaps[tied] = slack(contacts[tied], len(model.ties))
+        # Members are plastic.
+        crushing = crushing_forces(assembly, interfaces, contacts) / model.force
+        crushing[tied] = members.strength[contacts.features[tied, 1]]
+        number, is_open = _carrying_points(gaps, joints.tension, closed_gap, reach)
+        contacts, gaps = contacts[number], gaps[number]
+        crushing = np.where(is_open | (gaps <= closed_gap), crushing[number], 0.0)
+        cohesion, tension = (np.where(is_open, 0.0, of[number]) for of in (joints.cohesion, joints.tension))
         friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-        if ties:
-            members = member_contacts(ties, assembly, pose, ties_at.rest, present_members(ties, ties_at.rest))
-            apart = slack(members, len(ties))
-            members, apart = members[apart <= reach], apart[apart <= reach]
-            contacts = joined_contacts([contacts, members])
-            crushing = np.append(crushing, [ties[i].strength / model.force for i in members.features[:, 1]])
-            none = np.zeros(len(members))
-            cohesion, friction, tension = (np.append(of, none) for of in (cohesion, friction, tension))
-            gaps, is_open = np.append(gaps, apart), np.append(is_open, apart > closed_gap)
+        friction = np.where(is_member(contacts), 0.0, friction)
         faces = Faces.of(contacts, model.length) if torsion == UNIFORM and len(contacts) else None
         if faces is not None:
             faces.refuse_not_convex(contacts, assembly)
-        cohesion, tension = (np.where(is_open, 0.0, strength) for strength in (cohesion, tension))
         limits = ForceLimits(-tension, crushing, np.maximum(cohesion - friction * tension, 0.0))
-        price, d = np.zeros(len(contacts)), model.dimension
+        price = np.zeros(len(contacts))
         if displacement > 0.0:
             # What a unit of normal force costs in multipliers of the scaled live load.
             live, _ = model.scaled_live(pose)
