@@ -111,21 +111,20 @@ class EquilibriumChecks:
         forces[:, closed] = bounds.forces
         return replace(bounds, forces=forces)
 
-    def limit_multiplier(self, place: Place) -> tuple[float, bool]:
-        """Multiplier of the limit load without dilatancy at a place at rest, and whether its sequence has converged.
+    def limit_multiplier(self, place: Place) -> float | None:
+        """Multiplier of the limit load without dilatancy at a place at rest; None where its sequence has not converged.
 
-        Infinite where no program of it was solved.
+        Where friction with dilatancy has no limit the path does not begin.
         """
         program, closed = self._program(place, COMPUTED_GAP)
         forces = self.stepper.transferred(place, self._contacts_at(place)[0])[0][closed] - program.least
         resting = ProgramState(forces, place.multiplier / program.unit, np.zeros_like(program.dead), 0.0)
         try:
-            # Where friction with dilatancy has no limit the path does not begin.
             limit, converged, programs = non_associative_limit(program, forces[:, 0], resting, bounded=True)
         except SolveError:
-            return np.inf, False
+            return None
         self.stepper.programs += programs
-        return limit.multiplier * program.unit, converged
+        return limit.multiplier * program.unit if converged else None
 
     def moves_control(self, place: Place) -> bool:
         """Whether the control displacement grows in the mechanism of the largest multiplier at a place."""

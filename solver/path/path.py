@@ -12,6 +12,7 @@ from solver.equilibrium import wrench_matrix
 from solver.kinematics import Pose, put_together
 from solver.loads import GRAVITY
 from solver.program.model import Model
+from solver.program.static_program import EquilibriumBounds
 from solver.programs.problem import SolveError
 from solver.results.increment import Bonds, Increment, Status
 from solver.ties import TieForces, is_member
@@ -260,12 +261,12 @@ class Path:
             # What has lost its capacity by then moves along the control all the same.
             if first_state.place.multiplier <= 0.0 and not self.checks.moves_control(place):
                 raise ValueError(self.driver.misdirected)
-            # A pushover starts from its limit load.
-            limit, converged = self.checks.limit_multiplier(place)
-            check = self._check(replace(place, multiplier=limit))
-            if not converged:
-                warning = "the limit load of friction without dilatancy has not converged: the path may carry less"
+            # A pushover starts from its limit load or, where that is not found, from what its path carries.
+            limit, carried = self.checks.limit_multiplier(place), first_state.place.multiplier
+            if limit is None:
+                warning = "the limit load of friction without dilatancy has not converged: its path carries this"
                 self.reports.notes.append((0.0, warning))
+            check = self._check(replace(place, multiplier=carried if limit is None else limit), known=bounds)
             place = replace(place, multiplier=check.measured)
         # What rises above the first multiplier by the joints' compliance alone is no peak; where these or ground give,
         # it is not carried.
@@ -534,9 +535,11 @@ class Path:
         """Reaction of the forces of a place [N or N·m]."""
         return 0.0 if place.contacts is None else self.checks.reaction(place, place.contacts, place.forces)
 
-    def _check(self, place: Place, reaction: float | None = None) -> EquilibriumCheck:
-        """Equilibrium and bounds at a place."""
-        check = self.checks.check(place, self._reaction(place) if reaction is None else reaction)
+    def _check(
+        self, place: Place, reaction: float | None = None, known: EquilibriumBounds | None = None
+    ) -> EquilibriumCheck:
+        """Equilibrium and bounds at a place, unless these are known."""
+        check = self.checks.check(place, self._reaction(place) if reaction is None else reaction, known=known)
         if not check.bounds.in_equilibrium:
             check = self.checks.check(place, check.measured, CLOSING_GAP)
         return check

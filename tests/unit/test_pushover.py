@@ -2,6 +2,7 @@ import json
 import pkgutil
 from dataclasses import replace
 from functools import cache, partial
+from importlib import import_module
 from itertools import pairwise
 
 import numpy as np
@@ -257,13 +258,23 @@ def test_the_first_multiplier_of_a_pushover_is_of_the_prestress_that_ties_are_dr
     assert found[1] > found[0] + 0.2
 
 
-def test_a_first_multiplier_that_has_not_converged_is_noted(monkeypatch):
+def test_a_first_multiplier_that_has_not_converged_is_noted_and_that_of_the_path(monkeypatch):
     structure, control, _ = beside()
     monkeypatch.setattr("solver.program.non_associative.PROGRAMS", 1)
-    first, second, *_ = structure.pushover(replace(control, limit=1e-4)).path
+    first, second, *_ = structure.pushover(replace(control, limit=1e-3)).path
     assert "at 0 m: the limit load of friction without dilatancy has not converged" in first.notes[0]
-    assert first.load_multiplier <= first.largest
+    assert first.load_multiplier == pytest.approx(second.load_multiplier, rel=1e-6)
+    assert first.load_multiplier < first.largest
     assert not second.notes
+
+
+def test_the_bounds_at_the_start_of_a_pushover_are_found_once(monkeypatch):
+    program, found = import_module("solver.program.static_program").StaticProgram, []
+    bounds = program.bounds
+    monkeypatch.setattr(program, "bounds", lambda asked: found.append(asked) or bounds(asked))
+    structure, control, _ = beside()
+    response = structure.pushover(replace(control, limit=1e-3, increment=1e-3))
+    assert len(found) == len(response.path) == 2
 
 
 def test_far_from_the_origin_a_pushover_is_what_it_is_near():
