@@ -129,19 +129,19 @@ def find_limit_load(
     model = model.without(gone) if gone.any() else model
     problem = _Problem(model, pose, closed_gap, displacement, torsion, told, bonds_at)
     program, status = problem.program, LimitStatus.FOUND
-    balanced, unbalanced = program.without_live().most_balanced()
+    balanced, unbalanced = program.most_balanced(with_live=False)
     if unbalanced > FALLING_FRACTION:
         falling, status = balanced, LimitStatus.HELD
         balanced, unbalanced = program.most_balanced()
         if unbalanced > FALLING_FRACTION:
-            return problem.result(falling, LimitStatus.NO_EQUILIBRIUM, flow, 2)
+            return problem.result(falling, LimitStatus.NO_EQUILIBRIUM, flow)
     try:
         if flow == "associative":
-            return problem.result(program.bound(-1.0, balanced), status, flow, 2)
-        state, converged, programs = non_associative_limit(program, problem.at_rest(balanced), balanced)
-        return problem.result(state, status if converged else LimitStatus.NOT_CONVERGED, flow, programs)
+            return problem.result(program.bound(-1.0, balanced), status, flow)
+        state, converged = non_associative_limit(program, problem.at_rest(balanced), balanced)
+        return problem.result(state, status if converged else LimitStatus.NOT_CONVERGED, flow)
     except Unbounded:
-        return problem.result(balanced, LimitStatus.UNBOUNDED, flow, 2)
+        return problem.result(balanced, LimitStatus.UNBOUNDED, flow)
 
 
 def _check_options(assembly: Assembly, flow: str, torsion: str, ties: Sequence[Tie]) -> None:
@@ -217,7 +217,7 @@ class _Problem:
             forces = balanced.forces
         return np.asarray(forces[:, 0])
 
-    def result(self, state: ProgramState, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
+    def result(self, state: ProgramState, status: LimitStatus, flow: str) -> LimitLoad:
         """The state in metres and newtons, its bounds and its certificate recomputed from it."""
         program, model = self.program, self.program.model
         velocity, multiplier = state.velocity, state.multiplier
@@ -263,7 +263,7 @@ class _Problem:
             status=status,
             flow=flow,
             live_force=model.live_force,
-            programs=programs,
+            programs=program.programs,
             torsion=POINTS if program.faces is None else UNIFORM,
             held=self._held(forces * model.force, mechanism, state.forces[:, 0] >= crushing * (1.0 - USED_UP)),
         )

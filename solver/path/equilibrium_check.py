@@ -36,8 +36,8 @@ class EquilibriumChecks:
     def in_equilibrium(self, place: Place, gap: float = COMPUTED_GAP, part: float = 0.0) -> bool:
         """Whether points with gaps up to this one [block sizes] hold a place with some, or a part, of its live load."""
         program, _ = self._program(place, gap)
-        balanced, unbalanced = program.most_balanced()
         self.stepper.programs += 1
+        balanced, unbalanced = program.most_balanced()
         if unbalanced > FALLING_FRACTION or not program.senses:
             return unbalanced <= FALLING_FRACTION
         self.stepper.programs += 1
@@ -120,10 +120,10 @@ class EquilibriumChecks:
         forces = self.stepper.transferred(place, self._contacts_at(place)[0])[0][closed] - program.least
         resting = ProgramState(forces, place.multiplier / program.unit, np.zeros_like(program.dead), 0.0)
         try:
-            limit, converged, programs = non_associative_limit(program, forces[:, 0], resting, bounded=True)
+            limit, converged = non_associative_limit(program, forces[:, 0], resting, bounded=True)
         except SolveError:
             return None
-        self.stepper.programs += programs
+        self.stepper.programs += program.programs
         return limit.multiplier * program.unit if converged else None
 
     def moves_control(self, place: Place) -> bool:

@@ -70,11 +70,6 @@ class Model:
         """(n_dof,) array [m or 1]: units of movements in the program."""
         return np.where(np.arange(self.n_dof) < self.dimension, self.length, 1.0)
 
-    @property
-    def scaled_load(self) -> np.ndarray:
-        """(n_blocks, n_dof) array: the load in units of the program."""
-        return self.load / (self.force * unit_lengths(self.n_dof, self.length))
-
     def scaled_load_at(self, pose: Pose) -> np.ndarray:
         """(n_blocks, n_dof) array: the load at a pose, which it has followed, in units of the program."""
         return self.loads.dead_at(self.assembly, pose) / (self.force * unit_lengths(self.n_dof, self.length))
@@ -90,7 +85,7 @@ class Model:
     @cached_property
     def total_load(self) -> float:
         """Sum of the loads on the free blocks in units of the program."""
-        return float(np.abs(self.scaled_load[self.assembly.free, : self.dimension]).sum())
+        return float(np.abs(self.load[self.assembly.free, : self.dimension]).sum()) / self.force
 
     @property
     def live_force(self) -> float:

@@ -41,8 +41,8 @@ UNBALANCED_COST = 1e3
 
 def non_associative_limit(
     program: StaticProgram, normal: np.ndarray, balanced: ProgramState, bounded: bool = False
-) -> tuple[ProgramState, bool, int]:
-    """Run the sequence: its last program or the nearest one, whether it has converged, and how many were solved.
+) -> tuple[ProgramState, bool]:
+    """Run the sequence: its last program or the nearest one, and whether it has converged.
 
     It begins with normal forces (n,), and with a state in equilibrium. Raises ``Unbounded`` where friction with
     dilatancy has no limit, unless that is known to be ``bounded``; ``SolveError`` where no program is solved.
@@ -55,11 +55,10 @@ def non_associative_limit(
     change_cost = (CHANGE_COST * _unlike(program, normal) if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
     tried: list[tuple[np.ndarray, np.ndarray]] = []
     nearest: ProgramState | None = None
-    least, used, programs, best_at = np.inf, normal, 1, 0
-    locked = False
-    for _ in range(PROGRAMS):
+    least, used, best_at, locked = np.inf, normal, 0, False
+    for number in range(1, PROGRAMS + 1):
         try:
-            state, programs = _sliding(program, normal, unbalanced, change_cost), programs + 1
+            state = _sliding(program, normal, unbalanced, change_cost)
         except SolveError:
             if nearest is None:
                 raise
@@ -70,28 +69,28 @@ def non_associative_limit(
         error = np.inf if state.falls else max(excess, change)
         settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
         if nearest is None or settled or error < least:
-            nearest, least, used, best_at = state, error, normal, programs
-        if settled or (least <= FRICTION_EXCESS and programs - best_at == NO_NEARER):
+            nearest, least, used, best_at = state, error, normal, number
+        if settled or (least <= FRICTION_EXCESS and number - best_at == NO_NEARER):
             break
         added, error = state.forces - forces, FRICTION_EXCESS_IN_SPACE * largest
         within = friction_excess(added, program.friction) <= error + FRICTION_EXCESS * float(np.abs(added).max())
         locks = within and state.multiplier > multiplier
         locked |= locks
-        if not bounded and ((locks and programs > PLAIN_PROGRAMS) or (locked and largest * FRICTION_EXCESS > 1.0)):
+        if not bounded and ((locks and number >= PLAIN_PROGRAMS) or (locked and largest * FRICTION_EXCESS > 1.0)):
             # What a program adds may be added without end, unless crushing ends it (raises).
             program.bound(-1.0, balanced)
             bounded = True
         forces, multiplier = state.forces, state.multiplier
         tried = [*tried[-REMEMBERED:], (normal, forces[:, 0])]
-        normal = _next_normal(tried, programs > PLAIN_PROGRAMS and not locks)
+        normal = _next_normal(tried, number >= PLAIN_PROGRAMS and not locks)
     converged = least <= FRICTION_EXCESS
     if locked and not converged and not bounded:
         program.bound(-1.0, balanced)
     assert nearest is not None
     if converged and not plane:
         free = _sliding(program, used, unbalanced, 0.0 * change_cost)
-        nearest, programs = replace(nearest, velocity=free.velocity, gap=free.gap), programs + 1
-    return nearest, converged, programs
+        nearest = replace(nearest, velocity=free.velocity, gap=free.gap)
+    return nearest, converged
 
 
 def _gained(program: StaticProgram, state: ProgramState, normal: np.ndarray) -> float:
@@ -125,6 +124,7 @@ def _sliding(
     that may crush. In the plane T = (u - v) / 2 of columns u + v = 2 B; in space the disc |T| ≤ B is the cone
     |T| ≤ B s with s = 1.
     """
+    program.programs += 1
     n, rows, size, plane = len(normal), len(program.dead), program.size, program.size == 2
     bound, brittle = (
         program.limits.cohesion + program.friction * normal,

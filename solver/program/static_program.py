@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -109,12 +108,6 @@ class StaticProgram:
         self.unit = 1.0 / live_size if senses else model.force * model.length * speed
         self.carried = Admissible.of(friction, limits.cohesion, limits.beyond_least, self.size)
 
-    def without_live(self) -> StaticProgram:
-        """Return the program under the dead load alone."""
-        one = copy(self)
-        one.senses = ()
-        return one
-
     def bounds(self) -> EquilibriumBounds:
         """Bound the reaction or the multiplier of all equilibria within friction.
 
@@ -158,14 +151,14 @@ class StaticProgram:
         solution = self._solved(of_forces, sense * np.array(self.senses), [], CONIC_ROUTES, balanced.unbalanced)
         return self._state(solution)
 
-    def most_balanced(self) -> tuple[ProgramState, float]:
+    def most_balanced(self, *, with_live: bool = True) -> tuple[ProgramState, float]:
         """Find forces of least imbalance, and their unbalanced forces over the total load, 0 where that is rounding."""
         rows, k = len(self.dead), len(self.senses)
         unit, cost = sp.eye_array(rows), np.append(np.zeros(k), np.ones(2 * rows))
         routes = (*CONIC_ROUTES[1::-1], *CONIC_ROUTES[2:])
         first, is_rounding = self.carried.columns.shape[1] + k, False
         try:
-            solution = self._solved(np.zeros_like(self.work), cost, [unit, -unit], routes)
+            solution = self._solved(np.zeros_like(self.work), cost, [unit, -unit], routes, with_live=with_live)
         except SolveError as error:
             best = error.best
             if best is None:
@@ -179,7 +172,8 @@ class StaticProgram:
             solution = best
         missing, beyond = unbalanced = solution.x[first:][: 2 * rows].reshape(2, -1)
         left = 0.0 if is_rounding else float(unbalanced.sum()) / (self.model.total_load or 1.0)
-        return self._state(solution, missing - beyond), left
+        state = self._state(solution)
+        return replace(state, multiplier=state.multiplier * with_live, unbalanced=missing - beyond), left
 
     def nearest(
         self, reference: np.ndarray, compliance: np.ndarray, multiplier: float = 0.0, reaction: float | None = None
@@ -212,11 +206,12 @@ class StaticProgram:
         unbalanced: list[sp.sparray],
         routes: tuple[str, ...],
         left: np.ndarray | float = 0.0,
+        with_live: bool = True,
     ) -> Solution:
         """Minimise the cost of forces, (size n,), and of the columns beside them, with what rows are left with."""
         self.programs += 1
         carried, right = self.carried, -self.dead - left
-        beside = [*(sp.csc_array(sense * self.live[:, None]) for sense in self.senses), *unbalanced]
+        beside = [*(sp.csc_array(with_live * sense * self.live[:, None]) for sense in self.senses), *unbalanced]
         blocks = [[self.matrix @ carried.columns, *beside], [carried.limits, *[None] * len(beside)]]
         tolerance = 0.0 if self.exact or self.size > 2 else BALANCE_TOLERANCE * self.model.total_load
         places = np.repeat(self.pose.positions[self.model.assembly.free], self.model.n_dof, axis=0)
@@ -232,8 +227,8 @@ class StaticProgram:
             self.exact,
         )
 
-    def _state(self, solution: Solution, unbalanced: np.ndarray | float = 0.0) -> ProgramState:
+    def _state(self, solution: Solution) -> ProgramState:
         columns, rows, k = self.carried.columns, len(self.dead), len(self.senses)
         x, beside = np.split(solution.x, [columns.shape[1]])
         forces, multiplier = (columns @ x).reshape(-1, self.size), float(np.dot(self.senses, beside[:k]))
-        return ProgramState(forces, multiplier, -solution.row_dual[:rows], solution.gap, unbalanced)
+        return ProgramState(forces, multiplier, -solution.row_dual[:rows], solution.gap)
