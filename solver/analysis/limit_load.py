@@ -219,27 +219,12 @@ class _Problem:
 
     def result(self, state: ProgramState, status: LimitStatus, flow: str) -> LimitLoad:
         """The state in metres and newtons, its bounds and its certificate recomputed from it."""
-        program, model = self.program, self.program.model
-        velocity, multiplier = state.velocity, state.multiplier
+        program, model, multiplier = self.program, self.program.model, state.multiplier
         if status is LimitStatus.UNBOUNDED:
-            velocity = np.zeros_like(velocity)
-        relative = (program.matrix.T @ velocity).reshape(-1, program.size)
-        live_power = float(program.live @ velocity)
-        # Points that are open may close by their gap in a motion whose live power is 1.
-        relative[:, 0] += program.price * max(live_power, 0.0)
-        drag = program.limits.cohesion if state.drag is None else state.drag
-        slope = program.friction if state.drag is None else np.zeros(len(relative))
-        slip, crushing = np.linalg.norm(relative[:, 1:], axis=1), program.limits.beyond_least
-        brittle = np.isfinite(crushing)
-        # What crushes may come closer than what is rigid, at the price of its strength.
-        closer = np.where(brittle, np.maximum(slope * slip - relative[:, 0], 0.0), 0.0)
-        crushed = np.where(brittle, crushing, 0.0) * closer
-        taken = float(drag @ slip + crushed.sum())
-        kinematic = (taken - float(program.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
-        kinematic += float(program.price @ state.forces[:, 0])
-        room = relative[:, 0] + closer - slope * slip
+            state = replace(state, velocity=np.zeros_like(state.velocity))
+        velocity, (kinematic, violation) = state.velocity, program.kinematic(state)
         balance = program.matrix @ state.forces.ravel() + program.dead + multiplier * program.live
-        total = model.total_load or 1.0
+        total, crushing = model.total_load or 1.0, program.limits.beyond_least
         size, mechanism = float(np.abs(velocity).max(initial=0.0)) or 1.0, np.zeros_like(model.load)
         mechanism[model.assembly.free] = velocity.reshape(-1, model.n_dof) / size
         mechanism /= unit_lengths(model.n_dof, model.length)
@@ -258,7 +243,7 @@ class _Problem:
                 carrying_gap=carrying_gap(in_place, forces),
                 largest_penetration=largest_penetration(in_place),
                 duality_gap=abs(kinematic - multiplier) / (1.0 + abs(multiplier)) if found else state.gap,
-                kinematic_violation=float(np.maximum(-room, 0.0).max(initial=0.0)) / size,
+                kinematic_violation=violation / size,
             ),
             status=status,
             flow=flow,

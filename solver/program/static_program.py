@@ -175,6 +175,25 @@ class StaticProgram:
         state = self._state(solution)
         return replace(state, multiplier=state.multiplier * with_live, unbalanced=missing - beyond), left
 
+    def kinematic(self, state: ProgramState) -> tuple[float, float]:
+        """Multiplier by the power balance of a state's mechanism, and by how much this leaves the duals of the cones.
+
+        Infinite where the live load has no power.
+        """
+        velocity = state.velocity
+        relative, live_power = (self.matrix.T @ velocity).reshape(-1, self.size), float(self.live @ velocity)
+        # Points that are open may close by their gap in a motion whose live power is 1.
+        relative[:, 0] += self.price * max(live_power, 0.0)
+        drag, slope = (self.limits.cohesion, self.friction) if state.drag is None else (state.drag, 0.0)
+        slip, strength = np.linalg.norm(relative[:, 1:], axis=1), self.limits.beyond_least
+        # What crushes may come closer than what is rigid, at the price of its strength.
+        brittle = np.isfinite(strength)
+        closer = np.where(brittle, np.maximum(slope * slip - relative[:, 0], 0.0), 0.0)
+        taken = float(drag @ slip + np.where(brittle, strength, 0.0) @ closer)
+        value = (taken - float(self.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
+        missing = np.maximum(slope * slip - closer - relative[:, 0], 0.0)
+        return value + float(self.price @ state.forces[:, 0]), float(missing.max(initial=0.0))
+
     def nearest(
         self, reference: np.ndarray, compliance: np.ndarray, multiplier: float = 0.0, reaction: float | None = None
     ) -> np.ndarray:
