@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from solver.programs.problem import SolveError
+from solver.programs.problem import LinearProgram, SolveError
 from solver.programs.solve import solve_between
 from solver.results.certificate import friction_excess
 from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, FALLING_FRACTION
@@ -153,14 +153,13 @@ def _sliding(
     # Joints that may pull press sooner: pulling takes friction away, until nothing is left that could carry.
     released = change_cost * (1.0 + (program.limits.least < 0.0))
     of_forces = [np.zeros(first), program.price, change_cost, released]
-    solution = solve_between(
-        np.concatenate([*of_forces, [-1.0], np.full(2 * rows, UNBALANCED_COST)]),
-        sp.csc_array(sp.block_array(blocks, format="csc")),
-        np.concatenate([-program.dead - slack, level_is, normal, np.zeros(len(brittle))]),
-        np.concatenate([-program.dead + slack, level_is, normal, program.limits.beyond_least[brittle]]),
-        slopes,
-        size,
+    stated = LinearProgram(
+        cost=np.concatenate([*of_forces, [-1.0], np.full(2 * rows, UNBALANCED_COST)]),
+        matrix=sp.csc_array(sp.block_array(blocks, format="csc")),
+        lower=np.concatenate([-program.dead - slack, level_is, normal, np.zeros(len(brittle))]),
+        upper=np.concatenate([-program.dead + slack, level_is, normal, program.limits.beyond_least[brittle]]),
     )
+    solution = solve_between(stated, slopes, size)
     shear, x = (shears @ solution.x[:first]).reshape(n, -1), solution.x[first:]
     forces = np.column_stack([x[:n], shear[:, int(not plane) :]])
     multiplier, left = float(x[3 * n]), x[3 * n + 1 :][: 2 * rows].max(initial=0.0)

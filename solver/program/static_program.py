@@ -12,7 +12,7 @@ from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.programs.problem import Solution, SolveError, Unbounded
+from solver.programs.problem import LinearProgram, Solution, SolveError, Unbounded
 from solver.programs.solve import CONIC_ROUTES, solve_between
 from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, FALLING_FRACTION
 
@@ -234,17 +234,14 @@ class StaticProgram:
         blocks = [[self.matrix @ carried.columns, *beside], [carried.limits, *[None] * len(beside)]]
         tolerance = 0.0 if self.exact or self.size > 2 else BALANCE_TOLERANCE * self.model.total_load
         places = np.repeat(self.pose.positions[self.model.assembly.free], self.model.n_dof, axis=0)
-        return solve_between(
-            np.append(carried.columns.T @ of_forces, cost),
-            sp.csc_array(sp.block_array(blocks, format="csc")),
-            np.append(right - tolerance, np.zeros_like(carried.most)),
-            np.append(right + tolerance, carried.most),
-            carried.friction,
-            self.size,
-            routes,
-            np.vstack([places, self.contacts.points[carried.limited]]),
-            self.exact,
+        program = LinearProgram(
+            cost=np.append(carried.columns.T @ of_forces, cost),
+            matrix=sp.csc_array(sp.block_array(blocks, format="csc")),
+            lower=np.append(right - tolerance, np.zeros_like(carried.most)),
+            upper=np.append(right + tolerance, carried.most),
+            places=np.vstack([places, self.contacts.points[carried.limited]]),
         )
+        return solve_between(program, carried.friction, self.size, routes, vertex=self.exact)
 
     def _state(self, solution: Solution) -> ProgramState:
         columns, rows, k = self.carried.columns, len(self.dead), len(self.senses)

@@ -36,7 +36,8 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, v
     """Solve a linear program, trying one route after another until a solution passes its check.
 
     Routes are ``BAND`` or names out of ``ROUTES``, chosen by size by default; with ``vertex`` those that find one, up
-    to ``CROSSOVER_ROWS`` rows. Raises ``Unbounded`` where a ray proves that there is no minimum, and where no solution
+    to ``CROSSOVER_ROWS`` rows: it is one mechanism, while an interior point, a mean of several, lets fixed-point
+    iterations drift. Raises ``Unbounded`` where a ray proves that there is no minimum, and where no solution
     passes ``SolveError``, which lists what each route ended with.
     """
     rows, columns = program.matrix.shape
@@ -63,33 +64,29 @@ def _first_accepted(runs: Mapping[str, Callable[[], tuple[Solution | None, str]]
 
 
 def solve_between(
-    cost: np.ndarray,
-    matrix: sp.csc_array,
-    lower: np.ndarray,
-    upper: np.ndarray,
+    linear: LinearProgram,
     friction: np.ndarray,
     size: int,
     routes: Sequence[str] = CONIC_ROUTES,
-    places: np.ndarray | None = None,
+    *,
     vertex: bool = True,
 ) -> Solution:
-    """Minimise cost · x with lower ≤ A x ≤ upper, the first columns in round cones: without any, a linear program.
+    """Solve a linear program, or with friction, (k,), one whose first columns are in round cones in place of x ≥ 0.
 
-    Places, and whether a vertex is sought, are those of linear programs: a vertex is one mechanism; an interior point,
-    a mean of several, lets fixed-point iterations drift. Cones are those of :class:`ConicProgram`, routes are
-    ``CONIC_ROUTES`` in the order in which they are tried. With cones, the first n numbers of x are those of the
-    program, and the first multipliers those of the equations, where the limits are equal; the slack of the other rows
-    follows. Raises as :func:`solve_lp` does.
+    Cones are those of :class:`ConicProgram`, routes are ``CONIC_ROUTES`` in the order in which they are tried. With
+    cones, the first n numbers of x are those of the program, and the first multipliers those of the equations, where
+    the limits are equal; the slack of the other rows follows. Raises as :func:`solve_lp` does.
     """
     if len(friction) == 0:
-        return solve_lp(LinearProgram(cost, matrix, lower, upper, places), vertex=vertex)
+        return solve_lp(linear, vertex=vertex)
+    matrix, lower, upper = linear.matrix, linear.lower, linear.upper
     rows_of, equal = sp.csr_array(matrix), lower == upper
     below, above = np.flatnonzero(~equal & np.isfinite(lower)), np.flatnonzero(~equal & np.isfinite(upper))
     rows = sp.vstack([rows_of[equal], rows_of[below], rows_of[above]])
     slack = np.concatenate([np.full(len(below), -1.0), np.ones(len(above))])
     slack_columns = sp.vstack([sp.csr_array((int(equal.sum()), len(slack))), sp.diags_array(slack)])
     program = ConicProgram(
-        cost=np.concatenate([cost, np.zeros(len(slack))]),
+        cost=np.concatenate([linear.cost, np.zeros(len(slack))]),
         matrix=sp.csc_array(sp.hstack([rows, slack_columns], format="csc")),
         right=np.concatenate([lower[equal], lower[below], upper[above]]),
         friction=friction,

@@ -17,8 +17,8 @@ def test_a_dual_proves_forces_out_of_balance_beyond_its_own_violation(monkeypatc
     """A block whose centroid is 0.3 m beyond the edge it stands on, and solutions that violate as much as is said."""
     solve_between = import_module("solver.program.static_program").solve_between
 
-    def doubtful(*program):
-        solution = replace(solve_between(*program), primal_violation=violation, dual_violation=violation)
+    def doubtful(*program, **options):
+        solution = replace(solve_between(*program, **options), primal_violation=violation, dual_violation=violation)
         raise solver.SolveError("no solution passed its check", solution)
 
     monkeypatch.setattr("solver.program.static_program.solve_between", doubtful)

@@ -242,7 +242,8 @@ def pyramids(given, rays):
 
 def solved_by_cones(given):
     """Its solution by the route of programs whose rows are equations."""
-    return solve_between(given.cost, given.matrix, given.right, given.right, given.friction, given.size)
+    stated = LinearProgram(given.cost, given.matrix, given.right, given.right)
+    return solve_between(stated, given.friction, given.size)
 
 
 @settings(max_examples=15, deadline=None)
@@ -332,9 +333,10 @@ def test_bounds_of_rows_in_programs_with_and_without_cones():
     """Largest N with N ≤ 3 and N + T ≥ 1: what is left of a row to its bounds becomes columns."""
     cost, matrix = np.array([-1.0, 0.0, 0.0]), sp.csc_array(np.array([[0.0, 1.0, 0], [1.0, 0.0, 0], [1.0, 1.0, 0]]))
     lower, upper = np.array([0.5, 0.0, 1.0]), np.array([0.5, 3.0, 9.0])
-    found = solve_between(cost, matrix, lower, upper, np.array([0.5]), 3)
+    program = LinearProgram(cost, matrix, lower, upper)
+    found = solve_between(program, np.array([0.5]), 3)
     np.testing.assert_allclose(found.x[:2], [3.0, 0.5], atol=1e-7)
-    alone = solve_between(cost, matrix, lower, upper, np.zeros(0), 3)
+    alone = solve_between(program, np.zeros(0), 3)
     np.testing.assert_allclose(alone.x[:2], [3.0, 0.5], atol=1e-7)
 
 
