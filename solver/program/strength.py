@@ -57,7 +57,7 @@ class Admissible:
     friction: np.ndarray  #: (j,)
 
     @classmethod
-    def of(cls, friction: np.ndarray, cohesion: np.ndarray, crushing: np.ndarray, size: int = 2) -> Admissible:
+    def of(cls, friction: np.ndarray, cohesion: np.ndarray, crushing: np.ndarray, size: int) -> Admissible:
         """All (N, T) with 0 ≤ N ≤ crushing and |T| ≤ friction · N + cohesion, (n,) arrays each.
 
         In the plane the cone of dry friction is spanned by its two rays; cohesion adds a shear force of either sign. In
