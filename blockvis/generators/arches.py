@@ -11,6 +11,7 @@ import solver
 from blockvis.layout.outlines import without_collinear
 from solver import mechanics
 
+from .assembled import assembled
 from .dimensions import MOST_VOUSSOIRS, above_zero, whole
 
 
@@ -279,6 +280,15 @@ def segmental_joints(span: float, rise: float, thickness: float, voussoirs: int)
     return joints, angles
 
 
+def flat_joints(left: float, right: float, bottom: float, depth: float, skew: float, voussoirs: int) -> np.ndarray:
+    """(voussoirs + 1, 2, 2) array [m]: joints of a flat arch, whose ends lean outwards by ``skew`` [degrees]."""
+    spread = depth * math.tan(math.radians(skew))
+    lower = np.linspace(left, right, voussoirs + 1)
+    upper = np.linspace(left - spread, right + spread, voussoirs + 1)
+    levels = np.broadcast_to([bottom, bottom + depth], (voussoirs + 1, 2))
+    return np.stack([np.stack([lower, upper], axis=1), levels], axis=2)
+
+
 def voussoir_outlines(joints: np.ndarray) -> list[np.ndarray]:
     """Outline the n voussoirs between (n + 1, 2, 2) joints [m], from left to right."""
     return [np.array([a[0], a[1], b[1], b[0]]) for a, b in pairwise(joints)]
@@ -300,16 +310,11 @@ def _on_springers(
     depth: float,
 ) -> solver.Assembly:
     """Put an arch between a fixed springer on the left and a moving one on the right, twice its thickness deep."""
-    n = len(outlines)
-    outlines = list(outlines)
-    for joint, angle, sense in ((bearings[0], angles[0], 1.0), (bearings[-1], angles[-1], -1.0)):
+    springers = []
+    sides = (("left springer", mechanics.FIXED, 0, 1.0), ("right springer", mechanics.MOVING, -1, -1.0))
+    for name, role, end, sense in sides:
+        joint, angle = bearings[end], angles[end]
         away = 2.0 * thickness * sense * np.array([-math.sin(angle), math.cos(angle)])
-        outlines.append(np.array([joint[0], joint[1], joint[1] + away, joint[0] + away]))
-    return solver.Assembly.from_outlines(
-        outlines,
-        names=[*(f"voussoir {i + 1}" for i in range(n)), "left springer", "right springer"],
-        roles=[mechanics.FREE] * n + [mechanics.FIXED, mechanics.MOVING],
-        materials=["stone"] * n + ["ground"] * 2,
-        density=above_zero("density", density, "kg/m³"),
-        thickness=above_zero("depth", depth),
-    )
+        springers.append((name, role, np.array([joint[0], joint[1], joint[1] + away, joint[0] + away])))
+    free = [(f"voussoir {i}", outline) for i, outline in enumerate(outlines, start=1)]
+    return assembled(free, springers, density=density, depth=depth)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
 from blockvis.layout.outlines import without_collinear
 
-from .bonds import SHORTEST_BRICK, head_joints
+from .bonds import SHORTEST_BRICK
+from .patterns import coursed
 from .slivers import without_slivers
 
 #: All corners lie on a grid of this fraction of the brick height, so that cuts leave no slivers of rounding errors.
@@ -38,87 +39,55 @@ class Bond:
     brick_length: float
     brick_height: float
 
-    @property
-    def grid(self) -> float:
-        """Spacing of the grid on which all corners lie [m]."""
-        return GRID * self.brick_height
 
-
-@dataclass(frozen=True)
-class Brick:
-    """A brick, or a part of one that an opening cuts.
-
-    Attributes
-    ----------
-    course : int
-        From 0 at the bottom.
-    shape : shapely.Polygon [m]
-    """
-
-    course: int
-    shape: shapely.Polygon
-
-
-def lay_bricks(bond: Bond, width: float, courses: int) -> list[Brick]:
-    """Lay the bricks of a wall without openings.
+def cut_bricks(
+    bond: Bond, width: float, courses: int, rings: Sequence[np.ndarray]
+) -> tuple[list[np.ndarray], list[int]]:
+    """Lay the bricks of a wall and cut them along rings, inside of which there are none.
 
     Parameters
     ----------
     bond : Bond
     width : float [m]
     courses : int
-
-    Returns
-    -------
-    list of Brick
-        Course by course from the left; the lower left corner of the wall is (0, 0).
-    """
-    bricks = []
-    levels = bond.brick_height * np.arange(courses + 1)
-    for course in range(courses):
-        joints = head_joints(bond.kind, course, width, bond.brick_length)
-        for left, right in pairwise(joints):
-            bricks.append(Brick(course, shapely.box(left, levels[course], right, levels[course + 1])))
-    shapes = shapely.set_precision([brick.shape for brick in bricks], bond.grid)
-    return [replace(brick, shape=shape) for brick, shape in zip(bricks, shapes, strict=True)]
-
-
-def cut_bricks(bond: Bond, bricks: Sequence[Brick], rings: Sequence[np.ndarray]) -> list[Brick]:
-    """Cut bricks along rings and drop the parts inside.
-
-    Parameters
-    ----------
-    bond : Bond
-    bricks : sequence of Brick
     rings : sequence of (n, 2) arrays [m]
 
     Returns
     -------
-    list of Brick
-        Each in one piece; a sliver is joined to the neighbour with which it makes the most convex block.
+    outlines : list of (n, 2) arrays [m]
+        Course by course from the left; the lower left corner of the wall is (0, 0). A sliver is joined to the neighbour
+        with which it makes the most convex block.
+    course : list of int
+        Of each, from 0 at the bottom.
     """
-    kept = list(bricks)
+    height, grid = bond.brick_height, GRID * bond.brick_height
+    boxes = coursed(bond.kind, width, courses * height, (bond.brick_length, height), 0)
+    kept = [(shape, round(shape.bounds[1] / height)) for shape in shapely.set_precision(boxes, grid)]
     for ring in rings:
         hole = shapely.Polygon(ring)
         shapely.prepare(hole)
-        pieces: list[Brick] = []
-        for brick in kept:
-            if not hole.intersects(brick.shape):
-                pieces.append(brick)
+        pieces: list[tuple[shapely.Polygon, int]] = []
+        for shape, course in kept:
+            if not hole.intersects(shape):
+                pieces.append((shape, course))
                 continue
-            rest = shapely.set_precision(brick.shape.difference(hole), bond.grid)
-            parts = shapely.get_parts(rest)
-            pieces += [Brick(brick.course, part) for part in parts if part.area > 0.0]
+            rest = shapely.set_precision(shape.difference(hole), grid)
+            pieces += [(part, course) for part in shapely.get_parts(rest) if part.area > 0.0]
         kept = pieces
-    whole = without_slivers(
-        [brick.shape for brick in kept], lambda shape, _: _is_sliver(bond, shape), bond.brick_height, bond.grid
-    )
-    return [Brick(kept[piece].course, shape) for shape, piece in whole]
+    whole = without_slivers([shape for shape, _ in kept], lambda shape, _: _is_sliver(bond, shape), height, grid)
+    laid = sorted(((shape, kept[piece][1]) for shape, piece in whole), key=lambda one: (one[1], one[0].bounds[:2]))
+    outlines = [without_collinear(shapely.get_coordinates(shape)[:-1], 1e-9) for shape, _ in laid]
+    return outlines, [course for _, course in laid]
 
 
-def brick_outline(brick: Brick) -> np.ndarray:
-    """(n, 2) array [m]: corners of a brick, without collinear points."""
-    return without_collinear(shapely.get_coordinates(brick.shape)[:-1], 1e-9)
+def places_in(courses: Iterable[int]) -> list[str]:
+    """Name the places of stones that are given from the left, by course and number in it, both from 1: "1-1", "1-2"."""
+    counted: Counter[int] = Counter()
+    found = []
+    for course in courses:
+        counted[course] += 1
+        found.append(f"{course + 1}-{counted[course]}")
+    return found
 
 
 def _is_sliver(bond: Bond, shape: shapely.Polygon) -> bool:

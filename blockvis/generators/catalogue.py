@@ -23,8 +23,8 @@ from .walls import facade, panel, wall
 #: A link of a docstring, and the last part of what it names.
 _LINK = re.compile(r":\w+:`~?(?:\w+\.)*(\w+)`")
 
-#: Every layout by its name.
-LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
+#: Layouts of blocks in the plane, and in space, by their names.
+IN_PLANE: dict[str, Callable[..., solver.Assembly]] = {
     "arch": arch,
     "segmental arch": segmental_arch,
     "pointed arch": pointed_arch,
@@ -36,6 +36,8 @@ LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
     "panel": panel,
     "wall": wall,
     "facade": facade,
+}
+IN_SPACE: dict[str, Callable[..., solver.Assembly]] = {
     "extruded arch": extruded_arch,
     "barrel vault": barrel_vault,
     "dome": dome,
@@ -46,21 +48,7 @@ LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
     "T corner": t_corner,
     "two-leaf wall": two_leaf_wall,
 }
-
-
-#: Those of blocks in space.
-IN_SPACE = (
-    "extruded arch",
-    "barrel vault",
-    "dome",
-    "cross vault",
-    "pavilion vault",
-    "church bay",
-    "L corner",
-    "T corner",
-    "two-leaf wall",
-)
-
+LAYOUTS = IN_PLANE | IN_SPACE
 
 #: Kinds of parameters without a unit, in plain words.
 _KINDS = {"float": "", "int": "whole number", "int, optional": "whole number, optional", "bool": "true or false"}

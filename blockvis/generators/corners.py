@@ -10,8 +10,8 @@ import solver
 from blockvis.layout.solids import Solid, box
 from solver import mechanics
 
+from .assembled import assembled
 from .dimensions import above_zero, at_least_zero, whole
-from .solids import assembled
 
 #: Walls of a corner and a junction stand on strips of ground this fraction of a brick wider to each side.
 GROUND = 0.25

@@ -10,8 +10,8 @@ import solver
 from blockvis.layout.solids import Solid, between
 from solver import mechanics
 
+from .assembled import assembled
 from .dimensions import above_zero, true_or_false, whole
-from .solids import assembled
 
 #: Most stones around a dome.
 MOST_LUNES = 720

@@ -15,7 +15,7 @@ from blockvis.layout.outlines import without_collinear
 from solver.mechanics import counted
 
 from .bonds import BRICKWORK
-from .bricks import LOWEST_BRICK, NARROWEST
+from .bricks import LOWEST_BRICK, NARROWEST, places_in
 from .dimensions import MOST_BLOCKS, above_zero, at_least_zero, choice, whole
 from .heads import HEADS, LESS, Units, head_of, top_of
 from .patterns import LEANS, PATTERNS, bedded, coursed, rubble
@@ -439,12 +439,8 @@ def _numbered(joined: Sequence[shapely.Polygon], pattern: Pattern) -> list[tuple
         return [(f"stone {k}", joined[i]) for k, i in enumerate(order.tolist(), start=1)]
     courses = np.floor(np.array([shape.bounds[1] for shape in joined]) / height + 1e-6).astype(int)
     order = np.lexsort((middles[:, 0], courses))
-    named, position, course = [], 0, -1
-    for i in order.tolist():
-        position = position + 1 if courses[i] == course else 1
-        course = int(courses[i])
-        named.append((f"{'stone' if pattern.bond not in BRICKWORK else 'brick'} {course + 1}-{position}", joined[i]))
-    return named
+    word = "brick" if pattern.bond in BRICKWORK else "stone"
+    return [(f"{word} {place}", joined[i]) for place, i in zip(places_in(courses[order].tolist()), order, strict=True)]
 
 
 def _without_tongues(piece: shapely.Polygon, height: float, grid: float) -> list[shapely.Polygon]:

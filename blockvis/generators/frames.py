@@ -11,6 +11,7 @@ from blockvis.layout.outlines import rectangle, without_collinear
 from solver import mechanics
 
 from .arches import segmental_joints, voussoir_outlines
+from .assembled import assembled
 from .dimensions import above_zero, whole
 
 MIRROR = np.array([-1.0, 1.0])
@@ -48,16 +49,12 @@ def column(
     n = whole("blocks", blocks, 1)
     width, height = above_zero("width", width), above_zero("block_height", block_height)
     levels = height * np.arange(n + 1)
-    outlines = [rectangle(-width / 2.0, low, width / 2.0, high) for low, high in pairwise(levels)]
-    outlines.append(rectangle(-width, -height, width, 0.0))
-    return solver.Assembly.from_outlines(
-        outlines,
-        names=[*(f"block {i + 1}" for i in range(n)), "ground"],
-        roles=[mechanics.FREE] * n + [mechanics.MOVING],
-        materials=["stone"] * n + ["ground"],
-        density=above_zero("density", density, "kg/m³"),
-        thickness=above_zero("depth", depth),
-    )
+    free = [
+        (f"block {i}", rectangle(-width / 2.0, low, width / 2.0, high))
+        for i, (low, high) in enumerate(pairwise(levels), start=1)
+    ]
+    ground = ("ground", mechanics.MOVING, rectangle(-width, -height, width, 0.0))
+    return assembled(free, [ground], density=density, depth=depth)
 
 
 def portal(
@@ -262,13 +259,5 @@ def _on_two_feet(
             named += [(f"{side} {part} {i + 1}", outline * mirror) for i, outline in enumerate(outlines)]
     margin = (outer - inner) / 4.0
     ground = rectangle(max(inner - margin, 0.25 * inner), -(outer - inner) / 2.0, outer + margin, 0.0)
-    n = len(named)
-    named += [("ground left", ground * MIRROR), ("ground right", ground)]
-    return solver.Assembly.from_outlines(
-        [outline for _, outline in named],
-        names=[name for name, _ in named],
-        roles=[mechanics.FREE] * n + [mechanics.FIXED, mechanics.MOVING],
-        materials=["stone"] * n + ["ground"] * 2,
-        density=above_zero("density", density, "kg/m³"),
-        thickness=above_zero("depth", depth),
-    )
+    grounds = [("ground left", mechanics.FIXED, ground * MIRROR), ("ground right", mechanics.MOVING, ground)]
+    return assembled(named, grounds, density=density, depth=depth)

@@ -12,8 +12,8 @@ from blockvis.layout.solids import Solid, between, box, outward
 from solver import mechanics
 
 from .arches import segmental_joints
+from .assembled import assembled
 from .dimensions import above_zero, true_or_false, whole
-from .solids import assembled
 
 #: An arm of a stone on a diagonal is at least this fraction of a stone long.
 SHORTEST_ARM = 0.3

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from .arches import segmental_joints, voussoir_outlines
-from .openings import Opening, head_joints_of, odd
+from .arches import flat_joints, segmental_joints, voussoir_outlines
+from .openings import odd
 
 #: Heads that an opening may be given.
 HEADS = ("auto", "lintel", "flat arch", "arch", "none")
@@ -208,12 +208,8 @@ def _wedges(top: Top, share: float, units: Units) -> list[shapely.Polygon]:
     """Wedges of a flat arch, as those of rectangular walls."""
     deep = units.depth_of_ring(top.span)
     level = units.level_above(top.crown, deep) if share == 1.0 else top.crown + share * deep
-    opening = Opening(
-        x=top.left, y=top.springing, width=top.span, height=0.0, head="flat arch", depth=level - top.springing,
-        bearing=units.bearing, rise=0.0, skew=SKEW, voussoirs=odd(top.span / units.height),
-    )  # fmt: skip
-    joints = head_joints_of(opening)
-    assert joints is not None
+    depth = level - top.springing
+    joints = flat_joints(top.left, top.left + top.span, top.springing, depth, SKEW, odd(top.span / units.height))
     return [shapely.Polygon(outline) for outline in voussoir_outlines(joints)]
 
 

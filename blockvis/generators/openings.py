@@ -12,7 +12,7 @@ import numpy as np
 from blockvis.layout.outlines import rectangle
 from blockvis.text import refuse_unknown
 
-from .arches import segmental_joints, voussoir_outlines
+from .arches import flat_joints, segmental_joints, voussoir_outlines
 from .dimensions import above_zero, at_least_zero, choice, finite, whole
 
 HEADS = ("lintel", "flat arch", "segmental arch", "round arch", "none")
@@ -147,11 +147,7 @@ def head_joints_of(opening: Opening) -> np.ndarray | None:
         joints[0, 0], joints[-1, 0] = (opening.x, opening.top), (opening.x + opening.width, opening.top)
         return joints
     if opening.head == "flat arch":
-        lower = np.linspace(opening.x, opening.x + opening.width, n + 1)
-        spread = opening.depth * math.tan(math.radians(opening.skew))
-        upper = np.linspace(opening.x - spread, opening.x + opening.width + spread, n + 1)
-        levels = np.broadcast_to([opening.top, opening.top + opening.depth], (n + 1, 2))
-        return np.stack([np.stack([lower, upper], axis=1), levels], axis=2)
+        return flat_joints(opening.x, opening.x + opening.width, opening.top, opening.depth, opening.skew, n)
     return None
 
 

@@ -8,8 +8,8 @@ import solver
 from blockvis.layout.solids import Solid, extruded
 
 from .arches import arch
+from .assembled import assembled
 from .dimensions import above_zero, whole
-from .solids import assembled
 
 
 def extruded_arch(

@@ -17,8 +17,9 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from .arches import segmental_joints
+from .assembled import assembled
 from .bonds import BONDS, SHORTEST_BRICK
-from .bricks import LOWEST_BRICK, Bond, brick_outline, cut_bricks, lay_bricks
+from .bricks import LOWEST_BRICK, Bond, cut_bricks, places_in
 from .dimensions import MOST_BLOCKS, above_zero, choice, finite, pair, whole
 from .openings import Opening, checked_opening, head_joints_of, head_outlines, opening_ring
 
@@ -92,35 +93,18 @@ def wall(
     holes = _placed(bonded, openings, width, height)
     rings = [opening_ring(opening, joints) for opening, joints in holes]
     _check_room(bonded, rings, width, height)
-    laid = cut_bricks(bonded, lay_bricks(bonded, width, courses), rings)
-    laid.sort(key=lambda brick: (brick.course, brick.shape.bounds[0], brick.shape.bounds[1]))
-    outlines, names, materials = [], [], []
-    position, course = 0, -1
-    for brick in laid:
-        position = position + 1 if brick.course == course else 1
-        course = brick.course
-        outlines.append(brick_outline(brick))
-        names.append(f"brick {course + 1}-{position}")
-        materials.append("brick")
+    outlines, courses_of = cut_bricks(bonded, width, courses, rings)
+    free = [(f"brick {place}", outline) for place, outline in zip(places_in(courses_of), outlines, strict=True)]
+    materials = ["brick"] * len(free)
     for number, (opening, joints) in enumerate(holes, start=1):
-        for i, outline in enumerate(head_outlines(opening, joints), start=1):
-            outlines.append(outline)
-            names.append(f"voussoir {number}-{i}" if joints is not None else f"lintel {number}")
-            materials.append("stone")
-    roles = [mechanics.FREE] * len(outlines)
-    for name, role, outline in _ground(width, bonded.brick_length, settling):
-        outlines.append(outline)
-        names.append(name)
-        materials.append("ground")
-        roles.append(role)
-    return solver.Assembly.from_outlines(
-        outlines,
-        names=names,
-        roles=roles,
-        materials=materials,
-        density=above_zero("density", density, "kg/m³"),
-        thickness=above_zero("depth", depth),
-    )
+        heads = head_outlines(opening, joints)
+        free += [
+            (f"voussoir {number}-{i}" if joints is not None else f"lintel {number}", outline)
+            for i, outline in enumerate(heads, start=1)
+        ]
+        materials += ["stone"] * len(heads)
+    ground = _ground(width, bonded.brick_length, settling)
+    return assembled(free, ground, density=density, depth=depth, material=materials)
 
 
 def facade(

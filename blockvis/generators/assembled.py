@@ -1,0 +1,45 @@
+"""Assemblies of named blocks on their supports."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import solver
+from solver import mechanics
+
+from .dimensions import above_zero
+
+
+def assembled(
+    free: Sequence[tuple[str, Any]],
+    supports: Sequence[tuple[str, str, Any]],
+    *,
+    density: float,
+    depth: float | None = None,
+    material: str | Sequence[str] = "stone",
+) -> solver.Assembly:
+    """Make an assembly of named blocks on their supports.
+
+    Parameters
+    ----------
+    free : sequence of (name, shape)
+        Shapes are (n, 2) arrays [m] in the plane, Solids in space.
+    supports : sequence of (name, role, shape)
+    density : float [kg/m³]
+    depth : float, optional [m]
+        Out of plane.
+    material : str, or one per block
+        Of the free blocks; supports are "ground".
+    """
+    shapes = [shape for _, shape in free] + [shape for _, _, shape in supports]
+    materials = [material] * len(free) if isinstance(material, str) else list(material)
+    of_blocks: dict[str, Any] = {
+        "names": [name for name, _ in free] + [name for name, _, _ in supports],
+        "roles": [mechanics.FREE] * len(free) + [role for _, role, _ in supports],
+        "materials": materials + ["ground"] * len(supports),
+        "density": above_zero("density", density, "kg/m³"),
+    }
+    if depth is None:
+        return solver.Assembly.from_solids(shapes, **of_blocks)
+    return solver.Assembly.from_outlines(shapes, thickness=above_zero("depth", depth), **of_blocks)
