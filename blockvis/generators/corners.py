@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 from itertools import pairwise
 
 import solver
@@ -56,9 +56,9 @@ def l_corner(
         # In every second course the wall along y has the corner.
         along = _cuts(width if course % 2 else 0.0, n * length, length, width)
         beside = _cuts(0.0 if course % 2 else width, m * length, length, width)
-        row = _Row((0.0, width), (course * height, (course + 1) * height))
-        stones += row.along_x(f"brick {course + 1}", along)
-        stones += row.along_y(f"cross brick {course + 1}", beside)
+        faces, levels = (0.0, width), (course * height, (course + 1) * height)
+        stones += _laid(f"brick {course + 1}", along, faces, levels)
+        stones += _laid(f"cross brick {course + 1}", beside, faces, levels, along_y=True)
     wide = GROUND * length
     grounds = [
         ("ground", mechanics.FIXED, box((-wide, -wide, -height), (n * length + wide, width, 0.0))),
@@ -105,18 +105,18 @@ def t_corner(
     half, far = n * length / 2.0, width + m * length
     stones: list[tuple[str, Solid]] = []
     for course in range(whole("courses", courses, 1)):
-        levels = course * height, (course + 1) * height
-        row, cross = _Row((0.0, width), levels), _Row((-width / 2.0, width / 2.0), levels)
+        faces, levels = (0.0, width), (course * height, (course + 1) * height)
         # In every second course the wall across reaches through to the outer face.
         right = _cuts((width if course % 2 else length) / 2.0, half, length, width)
         left = [-x for x in right[::-1]]
+        name = f"brick {course + 1}"
         if course % 2:
-            stones += row.along_x(f"brick {course + 1}", left)
-            stones += row.along_x(f"brick {course + 1}", right, len(left) - 1)
+            stones += _laid(name, left, faces, levels)
+            stones += _laid(name, right, faces, levels, begun=len(left) - 1)
         else:
-            stones += row.along_x(f"brick {course + 1}", left + right)
+            stones += _laid(name, left + right, faces, levels)
         beside = _cuts(0.0 if course % 2 else width, far, length, width)
-        stones += cross.along_y(f"cross brick {course + 1}", beside)
+        stones += _laid(f"cross {name}", beside, (-width / 2.0, width / 2.0), levels, along_y=True)
     wide = GROUND * length
     grounds = [
         ("ground", mechanics.FIXED, box((-half - wide, -wide, -height), (half + wide, width, 0.0))),
@@ -220,24 +220,18 @@ def _cuts(start: float, end: float, length: float, least: float) -> list[float]:
     return [*cuts, end]
 
 
-@dataclass(frozen=True)
-class _Row:
-    """A course of a wall: where it begins and ends across its length, and its levels [m]."""
-
-    across: tuple[float, float]
-    levels: tuple[float, float]
-
-    def along_x(self, name: str, cuts: list[float], begun: int = 0) -> list[tuple[str, Solid]]:
-        """Lay bricks along x between these joints, and number them."""
-        (front, back), (low, high) = self.across, self.levels
-        return [
-            (f"{name}-{begun + k}", box((a, front, low), (b, back, high)))
-            for k, (a, b) in enumerate(pairwise(cuts), start=1)
-        ]
-
-    def along_y(self, name: str, cuts: list[float]) -> list[tuple[str, Solid]]:
-        """Lay bricks along y between these joints, and number them."""
-        (left, right), (low, high) = self.across, self.levels
-        return [
-            (f"{name}-{k}", box((left, a, low), (right, b, high))) for k, (a, b) in enumerate(pairwise(cuts), start=1)
-        ]
+def _laid(
+    name: str,
+    cuts: Sequence[float],
+    faces: tuple[float, float],
+    levels: tuple[float, float],
+    *,
+    along_y: bool = False,
+    begun: int = 0,
+) -> list[tuple[str, Solid]]:
+    """Lay the bricks of a course along x, or along y, between these joints, and number them."""
+    bricks = []
+    for k, (start, end) in enumerate(pairwise(cuts), start=begun + 1):
+        sides = (faces, (start, end)) if along_y else ((start, end), faces)
+        bricks.append((f"{name}-{k}", box(*zip(*sides, levels, strict=True))))
+    return bricks

@@ -62,12 +62,7 @@ def cross_vault(
     """
     arc = _Arc.of(span, rise, thickness, voussoirs)
     stones = _crossing(arc, width, stone, bonded)
-    corner = _corner(arc.bearing, width / 2.0)
-    springers = [
-        (f"springer {quarter + 1}", mechanics.MOVING if quarter == 0 else mechanics.FIXED, _turned(corner, quarter))
-        for quarter in range(4)
-    ]
-    return assembled(stones, springers, density=density)
+    return assembled(stones, _supports("springer", _corner(arc.bearing, width / 2.0)), density=density)
 
 
 def church_bay(
@@ -119,16 +114,13 @@ def church_bay(
     corner = _corner(arc.bearing, width / 2.0)
     stones += [(f"springer {quarter + 1}", _turned(corner, quarter)) for quarter in range(4)]
     levels = top - height + height * np.arange(n + 1) / n
-    grounds = []
     for quarter in range(4):
         for k, (low, high) in enumerate(pairwise(levels.tolist())):
             drum = box((inner, inner, low), (inner + side, inner + side, high))
             stones.append((f"pier {quarter + 1}-{k + 1}", _turned(drum, quarter)))
-        wide = 0.2 * side
-        foot = box((inner - wide, inner - wide, levels[0] - wide), (*[inner + side + wide] * 2, float(levels[0])))
-        role = mechanics.MOVING if quarter == 0 else mechanics.FIXED
-        grounds.append((f"ground {quarter + 1}", role, _turned(foot, quarter)))
-    return assembled(stones, grounds, density=density)
+    wide = 0.2 * side
+    foot = box((inner - wide, inner - wide, levels[0] - wide), (*[inner + side + wide] * 2, float(levels[0])))
+    return assembled(stones, _supports("ground", foot), density=density)
 
 
 def _crossing(arc: _Arc, width: float, stone: float, bonded: bool) -> list[tuple[str, Solid]]:
@@ -213,12 +205,14 @@ def pavilion_vault(
                 solid = _along_y(section, start, end)
                 stones.append((f"side {quarter + 1}-{course}-{k + 1}", _turned(solid, quarter)))
     stones.append(("keystone", _square(arc.crown)))
-    low, high = _mirrored(arc.bearing, -1.0), _mirrored(arc.bearing, 1.0)
-    springers = [
-        (f"springer {side + 1}", mechanics.MOVING if side == 0 else mechanics.FIXED, _turned(between(low, high), side))
-        for side in range(4)
-    ]
-    return assembled(stones, springers, density=density)
+    springer = between(_mirrored(arc.bearing, -1.0), _mirrored(arc.bearing, 1.0))
+    return assembled(stones, _supports("springer", springer), density=density)
+
+
+def _supports(name: str, solid: Solid) -> list[tuple[str, str, Solid]]:
+    """Put a support at each of four corners or sides, of which the first moves."""
+    roles = [mechanics.MOVING, *[mechanics.FIXED] * 3]
+    return [(f"{name} {k + 1}", role, _turned(solid, k)) for k, role in enumerate(roles)]
 
 
 @dataclass(frozen=True)

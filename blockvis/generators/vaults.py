@@ -41,7 +41,9 @@ def extruded_arch(
     >>> extruded_arch(voussoirs=12).dimension
     3
     """
-    return _vault(radius, thickness_ratio, embrace, voussoirs, depth, density, 1, 1, "voussoir {0}")
+    depth = above_zero("depth", depth)
+    plane = arch(radius=radius, thickness_ratio=thickness_ratio, embrace=embrace, voussoirs=voussoirs, density=density)
+    return _extruded(plane, depth, density, "voussoir {0}")
 
 
 def barrel_vault(
@@ -86,40 +88,16 @@ def barrel_vault(
     >>> barrel_vault(voussoirs=12, stones=3).n_blocks
     44
     """
-    along = whole("stones", stones, 1)
-    return _vault(
-        radius,
-        thickness_ratio,
-        embrace,
-        voussoirs,
-        above_zero("length", length),
-        density,
-        along,
-        whole("springers", springers, 1),
-        "stone {0}-{1}",
-    )
+    along, length = whole("stones", stones, 1), above_zero("length", length)
+    n = whole("springers", springers, 1)
+    plane = arch(radius=radius, thickness_ratio=thickness_ratio, embrace=embrace, voussoirs=voussoirs, density=density)
+    return _extruded(plane, length, density, "stone {0}-{1}", along, n)
 
 
-def _vault(
-    radius: float,
-    thickness_ratio: float,
-    embrace: float,
-    voussoirs: int,
-    length: float,
-    density: float,
-    stones: int,
-    springers: int,
-    name: str,
+def _extruded(
+    plane: solver.Assembly, length: float, density: float, name: str, stones: int = 1, springers: int = 1
 ) -> solver.Assembly:
-    """Extrude the circular arch of these dimensions, cut along y in stones and springers."""
-    plane = arch(
-        radius=radius,
-        thickness_ratio=thickness_ratio,
-        embrace=embrace,
-        voussoirs=voussoirs,
-        density=density,
-        depth=length,
-    )
+    """Extrude an arch along y, cut there in stones and springers."""
     straight = length * np.linspace(-0.5, 0.5, stones + 1)
     broken = np.unique(np.concatenate([straight[[0, -1]], (straight[1:] + straight[:-1]) / 2.0]))
     free: list[tuple[str, Solid]] = []
