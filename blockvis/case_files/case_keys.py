@@ -33,6 +33,7 @@ from blockvis.cases.key import (
     Section,
     ValueKind,
     one_of,
+    pair_of,
     whole,
 )
 from blockvis.cases.profiles import PROFILE, PROFILES
@@ -171,7 +172,7 @@ _PLACES = ValueKind(
     {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
     _places,
 )
-_LEVELS = replace(PAIR, read=lambda table, key: table.pair(key.name, words="[bottom, top]"))
+_LEVELS = pair_of("[bottom, top]")
 # Of the kinds that there are when a case is read.
 _KIND = replace(one_of(tuple(KINDS)), read=lambda table, key: table.text(key.name, among=tuple(KINDS)))
 _PUSHES = replace(PAIR, read=_direction_of_pressure)

@@ -25,6 +25,7 @@ from blockvis.cases.toml_table import Table, shortened, toml_value
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats import FORMATS
 from blockvis.kinds.kinds import KINDS
+from blockvis.kinds.pushover import CONTROL
 from blockvis.text import as_key, files_like
 from solver import mechanics
 
@@ -400,7 +401,7 @@ def _controls(
     overlap_tolerance: float | None,
 ) -> solver.Controls:
     """Make the controls; what drives a path says how exact its steps are to be, and a case has one path."""
-    tolerances = [one["step_tolerance"] for one in phases] + [control.fraction("step_tolerance")]
+    tolerances = [one["step_tolerance"] for one in phases] + [CONTROL.key("step_tolerance").read(control)]
     losses = [one["local_loss"] for one in phases]
     return solver.Controls(
         increments=asked["increments"],

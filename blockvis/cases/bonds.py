@@ -18,11 +18,11 @@ from blockvis.layout.regions import Choice, Region, regions_of
 from blockvis.layout.selection import sorted_out
 from solver.mechanics import counted
 
-from .key import NOT_NEGATIVE, PAIR, POSITIVE, TEXTS, Key, Section, one_of, whole
+from .key import NOT_NEGATIVE, POSITIVE, TEXTS, Key, Section, one_of, pair_of, whole
 from .toml_table import Table
 
 _DEFAULT = Pattern()
-_SIZE = replace(PAIR, read=lambda table, key: table.pair(key.name, words="[length, height]"))
+_SIZE = pair_of("[length, height]")
 
 BOND = Section(
     "bond",

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-from .key import FRACTION, NOT_NEGATIVE, NUMBERS, PAIR, POSITIVE, TEXTS, TRUE_OR_FALSE, Key, Section, ValueKind
+from .key import FRACTION, NOT_NEGATIVE, NUMBERS, POSITIVE, TEXTS, TRUE_OR_FALSE, Key, Section, ValueKind, pair_of
 from .toml_table import Table, shortened
 
-_RANGE = replace(PAIR, read=lambda table, key: table.pair(key.name, words="[least, largest]"))
+_RANGE = pair_of("[least, largest]")
 
 #: Directions in which a support may have moved, as the case file names them.
 DIRECTIONS = ("down", "up", "left", "right", "rotation", "front", "back", "outward", "inward")

@@ -41,24 +41,8 @@ def _list_of(item: Mapping[str, Any], least: int, most: int | None = None) -> di
     return {"type": "array", "items": item, "minItems": least} | ({} if most is None else {"maxItems": most})
 
 
-#: Quantities that cannot be negative, by their unit.
-_QUANTITIES = {"m": "a length in m", "Pa": "a stress in Pa"}
-
-
-def read_not_negative(table: Table, key: Key) -> float | None:
-    """Read a number of at least 0."""
-    value: float | None = table.number(key.name)
-    if value is not None and value < 0.0:
-        raise table.error(key.name, f"is {value:g}; give {_QUANTITIES.get(key.unit, 'a number')} of at least 0")
-    return value
-
-
-def _true_or_false(table: Table, key: Key) -> bool | None:
-    return None if table.take(key.name) is None else table.boolean(key.name)
-
-
-def _texts(table: Table, key: Key) -> tuple[str, ...] | None:
-    return None if table.take(key.name) is None else table.texts(key.name)
+#: What numbers that cannot be negative are, by their unit.
+_QUANTITIES = {"m": "length in m", "Pa": "stress in Pa"}
 
 
 def _outline(table: Table, key: Key) -> list[Any]:
@@ -71,37 +55,50 @@ def _outline(table: Table, key: Key) -> list[Any]:
     return corners
 
 
-NUMBER = ValueKind("number", {"type": "number"}, lambda table, key: table.number(key.name))
-POSITIVE = ValueKind(
-    "number above 0",
-    {"type": "number", "exclusiveMinimum": 0},
-    lambda table, key: table.number(key.name, positive=True),
+def _number(words: str, schema: Mapping[str, Any], fits: Callable[[float], bool]) -> ValueKind:
+    """Make a kind of numbers with limits."""
+
+    def read(table: Table, key: Key) -> float | None:
+        value: float | None = table.number(key.name)
+        if value is not None and not fits(value):
+            quantity = words.replace("number of", f"{_QUANTITIES.get(key.unit, 'number')} of")
+            raise table.error(key.name, f"is {value:g}; give a {quantity}")
+        return value
+
+    return ValueKind(words, {"type": "number"} | dict(schema), read)
+
+
+def pair_of(words: str) -> ValueKind:
+    """Make the kind of two numbers; ``words`` says in the error what they are."""
+    numbers = _list_of({"type": "number"}, 2, 2)
+    return ValueKind("two numbers", numbers, lambda table, key: table.vector(key.name, (2,), f"two numbers {words}"))
+
+
+NUMBER = _number("number", {}, lambda value: True)
+POSITIVE = _number("number above 0", {"exclusiveMinimum": 0}, lambda value: value > 0.0)
+FRACTION = _number(
+    "number above 0 and below 1", {"exclusiveMinimum": 0, "exclusiveMaximum": 1}, lambda value: 0.0 < value < 1.0
 )
-FRACTION = ValueKind(
-    "number above 0 and below 1",
-    {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1},
-    lambda table, key: table.fraction(key.name),
-)
-SHARE = ValueKind(
-    "number from 0 to 1",
-    {"type": "number", "minimum": 0, "maximum": 1},
-    lambda table, key: table.share(key.name),
-)
-NOT_NEGATIVE = ValueKind("number of at least 0", {"type": "number", "minimum": 0}, read_not_negative)
-TRUE_OR_FALSE = ValueKind("true or false", {"type": "boolean"}, _true_or_false)
+SHARE = _number("number from 0 to 1", {"minimum": 0, "maximum": 1}, lambda value: 0.0 <= value <= 1.0)
+NOT_NEGATIVE = _number("number of at least 0", {"minimum": 0}, lambda value: value >= 0.0)
+TRUE_OR_FALSE = ValueKind("true or false", {"type": "boolean"}, lambda table, key: table.boolean(key.name))
 TEXT = ValueKind("text", {"type": "string"}, lambda table, key: table.text(key.name))
 TEXTS = ValueKind(
     "text, or list of texts",
     {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]},
-    _texts,
+    lambda table, key: table.texts(key.name),
 )
-PAIR = ValueKind("two numbers", _list_of({"type": "number"}, 2, 2), lambda table, key: table.pair(key.name))
+PAIR = pair_of("[x, y]")
 VECTOR = ValueKind(
     "two numbers, in space three",
     _list_of({"type": "number"}, 2, 3),
     lambda table, key: table.vector(key.name),
 )
-TRIPLE = ValueKind("three numbers", _list_of({"type": "number"}, 3, 3), lambda table, key: table.triple(key.name))
+TRIPLE = ValueKind(
+    "three numbers",
+    _list_of({"type": "number"}, 3, 3),
+    lambda table, key: table.vector(key.name, (3,), "three numbers [x, y, z]"),
+)
 NUMBERS = ValueKind("list of numbers", _list_of({"type": "number"}, 1), lambda table, key: table.numbers(key.name))
 OUTLINE = ValueKind("list of at least three corners", _list_of(_list_of({"type": "number"}, 2, 2), 3), _outline)
 

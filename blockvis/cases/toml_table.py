@@ -44,44 +44,19 @@ class Table:
                 raise self.error(key, f"{'is' if number is value else 'holds'} {shortened(number)}; {remedy}")
         return value
 
-    def number(self, key: str, default: float | None = None, *, positive: bool = False) -> Any:
-        """Read a finite number as a float; None if it is missing and has no default."""
-        value = self.take(key, default)
+    def number(self, key: str) -> Any:
+        """Read a finite number as a float; None if it is missing."""
+        value = self.take(key)
         if value is None:
             return None
         if not is_number(value):
             raise self.error(key, f"is {shortened(value)}; give a {'finite ' * isinstance(value, float)}number")
-        if positive and value <= 0.0:
-            raise self.error(key, f"is {value:g}; give a positive number")
         return float(value)
 
-    def fraction(self, key: str) -> float | None:
-        """Read a number between 0 and 1, neither of them itself; None if it is missing."""
-        value = self.number(key)
-        if value is not None and not 0.0 < value < 1.0:
-            raise self.error(key, f"is {value:g}; give a number above 0 and below 1")
-        return None if value is None else float(value)
-
-    def share(self, key: str) -> float | None:
-        """Read a number from 0 to 1; None if it is missing."""
-        value = self.number(key)
-        if value is not None and not 0.0 <= value <= 1.0:
-            raise self.error(key, f"is {value:g}; give a number from 0 to 1")
-        return None if value is None else float(value)
-
-    def pair(self, key: str, words: str = "[x, y]") -> Any:
-        """Read two finite numbers; ``words`` says in the error what they are."""
-        return self._vector(key, (2,), f"two numbers {words}")
-
-    def vector(self, key: str) -> Any:
-        """Read two finite numbers, or in space three."""
-        return self._vector(key, (2, 3), "two numbers [x, y], or in space three [x, y, z]")
-
-    def triple(self, key: str) -> Any:
-        """Read three finite numbers."""
-        return self._vector(key, (3,), "three numbers [x, y, z]")
-
-    def _vector(self, key: str, lengths: Sequence[int], words: str) -> tuple[float, ...] | None:
+    def vector(
+        self, key: str, lengths: Sequence[int] = (2, 3), words: str = "two numbers [x, y], or in space three [x, y, z]"
+    ) -> Any:
+        """Read as many finite numbers as are in ``lengths``; ``words`` says in the error what they are."""
         value = self.take(key)
         if value is None:
             return None
@@ -100,10 +75,10 @@ class Table:
             raise self.error(key, f"is '{value}'{nearest(value, among)}; choose from {', '.join(among)}")
         return value
 
-    def boolean(self, key: str) -> bool:
-        """Read true or false; false if it is missing."""
-        value = self.take(key, False)
-        if not isinstance(value, bool):
+    def boolean(self, key: str) -> bool | None:
+        """Read true or false; None if it is missing."""
+        value = self.take(key)
+        if value is not None and not isinstance(value, bool):
             raise self.error(key, f"is {shortened(value)}; give true or false")
         return value
 
@@ -117,9 +92,11 @@ class Table:
             raise self.error(key, f"is {value!r}; give a list of numbers")
         return tuple(float(v) for v in value)
 
-    def texts(self, key: str) -> tuple[str, ...]:
-        """Read a text, or a list of texts; empty if it is missing."""
-        value = self.take(key, [])
+    def texts(self, key: str) -> tuple[str, ...] | None:
+        """Read a text, or a list of texts; None if it is missing."""
+        value = self.take(key)
+        if value is None:
+            return None
         words = [value] if isinstance(value, str) else value
         if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
             raise self.error(key, f'is {shortened(value)}; give texts in quotes, ["first", "second *"]')

@@ -239,7 +239,7 @@ def filled(
     rest = _without(rest, holes, grid)
     area = rest.area
     bearing = length / 2.0 if pattern.bearing is None else pattern.bearing
-    units = Units(length=length, height=height, bearing=bearing, base=0.0, grid=grid)
+    units = Units(length=length, height=height, bearing=bearing, grid=grid)
     stones, rest, lacking = _heads(holes, rest, pattern, units)
     quoins = _quoins(solid, rest, pattern, grid)
     stones += [(f"quoin {k}", shape) for k, shape in enumerate(quoins, start=1)]

@@ -53,8 +53,6 @@ class Units:
         Of a course, and width of a voussoir along the intrados.
     bearing : float [m]
         Of a lintel on either side.
-    base : float [m]
-        Level from which courses count.
     grid : float [m]
         Spacing of the grid on which corners lie.
     """
@@ -62,7 +60,6 @@ class Units:
     length: float
     height: float
     bearing: float
-    base: float
     grid: float
 
     def depth_of_ring(self, span: float) -> float:
@@ -71,7 +68,7 @@ class Units:
 
     def level_above(self, y: float, least: float) -> float:
         """Find the first joint of a course that lies so far above a level, or a little less."""
-        return self.base + self.height * math.ceil((y + least - self.base) / self.height - 0.4)
+        return self.height * math.ceil((y + least) / self.height - 0.4)
 
 
 @dataclass(frozen=True)

@@ -367,7 +367,7 @@ def test_a_drawing_of_the_damaged_arch_is_explained(folder, tmp_path):
         ("joint,width [mm]\nvoussoir 1 | voussoir 2,3,5\n", "line 2: has 3 cells, and the first line 2; where numbers"),
         (
             "block,dx [mm],dy [mm],uncertainty [mm]\nvoussoir 1,3,2,-1\n",
-            "line 2: uncertainty [mm] is -1; give a positive number",
+            "line 2: uncertainty [mm] is -1; give a number above 0",
         ),
         ("block,dx,dy\nvoussoir 1,3,2\n", "line 2: dx puts 'voussoir 1' 3.61 m from where it is drawn"),
         ("x,y,width\n0,0.5,2\n", "line 2: width is 2 m, more than a block is wide"),

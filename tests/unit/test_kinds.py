@@ -73,7 +73,7 @@ class TiltKind(AnalysisKind):
     measured = mechanics.Quantity("reserve", "r", "")
 
     def read(self, top: Any, analysis: Any) -> float:
-        return analysis.number("tilt_step", 0.02, positive=True)
+        return analysis.number("tilt_step") or 0.02
 
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
         return AnalysisRun(

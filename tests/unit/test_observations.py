@@ -122,7 +122,7 @@ def test_a_support_that_is_cut_is_named_by_its_name_or_its_pieces():
         (f"joint,width\n{CROWN},nan\n", "line 2: width is nan; give a finite number"),
         (f"joint,width\n{CROWN},\n", "line 2: width is missing"),
         (f"joint,width\n{CROWN},4.5\n", "is it in mm"),
-        (f"joint,width,uncertainty\n{CROWN},0.004,0\n", "uncertainty is 0; give a positive number"),
+        (f"joint,width,uncertainty\n{CROWN},0.004,0\n", "uncertainty is 0; give a number above 0"),
         (f"joint,width\n{CROWN},0\n", "nothing has opened or moved"),
         ("joint,width\nvoussoir 3,0.004\n", 'name two blocks as "A | B"'),
         ("joint,width\nvousoir 3 | voussoir 4,0.004\n", r"'vousoir 3' is no block \(did you mean 'voussoir \d'\?\)"),

@@ -252,7 +252,7 @@ def test_a_trough_and_its_mirror_open_the_wall_alike(tmp_path):
         ('{ kind = "gauss", centre = 1 }', "did you mean 'gaussian'"),
         ('{ kind = "gaussian", inflection = 1 }', r"\[settlement.profile\] centre is missing"),
         ('{ kind = "gaussian", centre = 1 }', r"\[settlement.profile\] inflection is missing"),
-        ('{ kind = "gaussian", centre = 1, inflection = -1 }', "inflection is -1; give a positive number"),
+        ('{ kind = "gaussian", centre = 1, inflection = -1 }', "inflection is -1; give a number above 0"),
         (
             "{ centre = 1, inflection = 1, points = [[0, 1], [1, 0]] }",
             "points is of kind 'points'",

@@ -311,8 +311,8 @@ def test_strength_from_the_case_file(tmp_path, capsys):
             "crushing along the path of a settlement is not followed",
         ),
         (CASE.format("tensile_strength = 1e5"), "[material] tensile_strength is 100000 Pa, above cohesion / friction"),
-        (CASE.format("normal_stiffness = -1.0"), "[material] normal_stiffness is -1; give a positive number"),
-        (CASE.format("compressive_strength = 0.0"), "[material] compressive_strength is 0; give a positive number"),
+        (CASE.format("normal_stiffness = -1.0"), "[material] normal_stiffness is -1; give a number above 0"),
+        (CASE.format("compressive_strength = 0.0"), "[material] compressive_strength is 0; give a number above 0"),
         (CASE.format("").replace("2000.0", "-1.0"), "[material] cohesion is -1; give a stress in Pa of at least 0"),
     ):
         with pytest.raises(ValueError, match=re.escape(words)):

@@ -79,7 +79,7 @@ def test_area_and_modulus_give_the_stiffness(tmp_path):
         ({"to": [0.25, 0.5]}, "both ends are in the block 'left'"),
         ({"to": {"block": "rihgt", "point": [0, 0]}}, "no block is called 'rihgt'"),
         ({"from": {"fixed": [0, 1]}, "to": {"fixed": [1, 1]}}, "both ends are in the ground"),
-        ({"strength": -5.0}, "[ties 'iron'] strength is -5; give a positive number"),
+        ({"strength": -5.0}, "[ties 'iron'] strength is -5; give a number above 0"),
         ({"kind": "prop", "to": [0.25, 1.5]}, "a prop has no length: both ends are at (0.25, 1.5)"),
         ({"kind": "chain"}, "choose from tie, prop, bar"),
         ({"area": 1e-4}, "stiffness and area or modulus are both given"),
