@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 
 import solver
+from blockvis.layout.outlines import ring_of
 from blockvis.layout.triangulation import triangles_of_ring
 
 #: Pieces less than this across, in block sizes, are rounding of the drawing.
@@ -128,6 +129,6 @@ def _filling(polygon: shapely.Polygon) -> list[np.ndarray]:
     """Counter-clockwise triangles that fill a polygon in plan, (3, 2) each."""
     if len(polygon.interiors):
         triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-        return [np.array(shapely.orient_polygons(one).exterior.coords)[:3] for one in triangles]
-    ring = np.array(shapely.orient_polygons(polygon).exterior.coords)[:-1]
+        return [ring_of(one) for one in triangles]
+    ring = ring_of(polygon)
     return [ring[corners] for corners in triangles_of_ring(ring)]

@@ -11,7 +11,7 @@ import shapely
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import CHANGED, Note
-from blockvis.layout.outlines import without_collinear
+from blockvis.layout.outlines import largest_piece, without_collinear
 from solver.mechanics import counted
 
 from .bonds import BRICKWORK
@@ -491,9 +491,7 @@ def _with_mortar(stones: list[tuple[str, shapely.Polygon]], joint: float) -> lis
         reach = shape.buffer(joint, join_style="mitre")
         free = shapely.difference(reach, beside)
         drawn = shapely.intersection(free.buffer(-joint / 2.0, join_style="mitre"), shape)
-        parts = [part for part in shapely.get_parts(drawn) if part.geom_type == "Polygon"]
-        largest = max(parts, key=lambda part: part.area, default=shapely.Polygon())
+        left = largest_piece(drawn)
         # What mortar would hide stays as it is, a stone that touches.
-        left = shapely.Polygon(largest.exterior) if largest.area > 0.2 * shape.area else shape
-        reduced.append((name, left))
+        reduced.append((name, left if left.area > 0.2 * shape.area else shape))
     return reduced

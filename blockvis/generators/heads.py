@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from blockvis.layout.outlines import ring_of
+
 from .arches import flat_joints, segmental_joints, voussoir_outlines
 from .openings import odd
 
@@ -123,7 +125,7 @@ def top_of(opening: shapely.Polygon) -> Top:
     >>> top_of(shapely.box(0, 0, 1, 2)).chain.tolist()
     [[0.0, 2.0], [1.0, 2.0]]
     """
-    ring = np.array(shapely.orient_polygons(opening).exterior.coords)[:-1]
+    ring = ring_of(opening)
     near = 1e-3 * float(np.ptp(ring[:, 0]))
     ends = []
     for side in (ring[:, 0] >= ring[:, 0].max() - near, ring[:, 0] <= ring[:, 0].min() + near):

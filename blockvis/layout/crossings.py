@@ -11,7 +11,7 @@ import numpy as np
 from .layout import Layout
 from .left_out import LeftOut
 from .notes import CHANGED, Note
-from .outlines import without_collinear
+from .outlines import around_hole, ring_of, without_collinear
 
 #: The largest piece of an outline that crosses itself is the block if it holds at least this share of its area.
 WHOLE = 0.98
@@ -50,7 +50,7 @@ def uncrossed(layout: Layout) -> Layout:
         if share < WHOLE:
             reasons[i] = _refusal(layout.names[i], layout.outlines[i], piece if largest.area > area else None, share)
             continue
-        reduced[i] = without_collinear(np.array(shapely.orient_polygons(largest).exterior.coords)[:-1])
+        reduced[i] = without_collinear(ring_of(largest))
         lost = max(lost, 1.0 - share)
     if reduced:
         first = next(iter(reduced))
@@ -85,12 +85,8 @@ def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:
             f"{100.0 * share:.3g} % of its area; redraw it as one outline, or as several"
         )
         return LeftOut("crossing", ring, message)
-    holes = tuple(np.array(inner.coords)[:-1] for inner in around.interiors)
-    x, y = holes[0].mean(axis=0)
-    message = (
-        f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
-    )
-    return LeftOut("hole", np.array(around.exterior.coords)[:-1], message, holes=holes)
+    border, *holes = (np.array(one.coords)[:-1] for one in (around.exterior, *around.interiors))
+    return around_hole(name, border, holes)
 
 
 def _crossing(shape: object) -> np.ndarray:

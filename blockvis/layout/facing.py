@@ -108,11 +108,7 @@ def faced(
         if not (rough & np.isin(one, members)).any():
             continue
         held = [n for n, k in enumerate(members) if anchored[faces.block[k]]]
-        if held:
-            plane = sides[held[0]] * faces.planes[members[held[0]]]
-        else:
-            rings = [faces.rings[k] for k in members]
-            plane = _common_plane(rings, sides, faces.planes[members], faces.areas[members])
+        plane = sides[held[0]] * faces.planes[members[held[0]]] if held else _common_plane(faces, members, sides)
         for k, side in zip(members, sides, strict=True):
             if not anchored[faces.block[k]]:
                 planes[k], changed[k] = side * plane, True
@@ -182,14 +178,9 @@ def _joints(faces: _Faces, near: float, exact: float) -> tuple[np.ndarray, np.nd
     one, other = _near_boxes(faces, near)
     pair = np.einsum("ij,ij->i", faces.planes[one, :3], faces.planes[other, :3]) < OPPOSITE
     one, other = _near_planes(faces, one[pair], other[pair], near, exact)
-    found = [(a, b, gap) for a, b in zip(one.tolist(), other.tolist(), strict=True) if (gap := _gap(faces, a, b, near))]
-    if not found:
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
-    return (
-        np.array([a for a, _, _ in found]),
-        np.array([b for _, b, _ in found]),
-        np.array([gap[0] for _, _, gap in found]),
-    )
+    gaps = np.array([_gap(faces, a, b) for a, b in zip(one.tolist(), other.tolist(), strict=True)], dtype=float)
+    found = np.abs(gaps) <= near
+    return one[found], other[found], gaps[found]
 
 
 def _near_boxes(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray]:
@@ -246,12 +237,12 @@ def _in_line(faces: _Faces, chosen: np.ndarray, near: float) -> tuple[np.ndarray
         )
         for a, b in zip(one.tolist(), other.tolist(), strict=True)
     ]
-    flat = np.array(off) <= 2.0 * near if len(off) else np.zeros(0, dtype=bool)
+    flat = np.array(off, dtype=float) <= 2.0 * near
     return one[flat], other[flat]
 
 
-def _gap(faces: _Faces, a: int, b: int, near: float) -> tuple[float] | None:
-    """Measure the gap of two faces where they cover each other, the largest by amount; None if they are no joint."""
+def _gap(faces: _Faces, a: int, b: int) -> float:
+    """Measure the gap of two faces where they cover each other, the largest by amount; NaN where they do not."""
     import shapely
 
     normal = faces.planes[a, :3] - faces.planes[b, :3]
@@ -264,13 +255,12 @@ def _gap(faces: _Faces, a: int, b: int, near: float) -> tuple[float] | None:
     flat = [shape if shape.is_valid else shape.buffer(0.0) for shape in flat]
     common = flat[0].intersection(flat[1])
     if common.area <= COVERS * min(faces.areas[a], faces.areas[b]):
-        return None
+        return np.nan
     corners = middle + shapely.get_coordinates(common) @ frame.T
     # The height of each plane above the corners of what both cover, along the common normal.
     heights = [(faces.planes[k, 3] - corners @ faces.planes[k, :3]) / (faces.planes[k, :3] @ normal) for k in (a, b)]
     gap = heights[1] - heights[0]
-    largest = float(gap[np.abs(gap).argmax()])
-    return (largest,) if abs(largest) <= near else None
+    return float(gap[np.abs(gap).argmax()])
 
 
 def _groups(faces: _Faces, one: np.ndarray, other: np.ndarray, near: float) -> list[tuple[list[int], np.ndarray]]:
@@ -288,29 +278,32 @@ def _flat_groups(
     faces: _Faces, members: list[int], pairs: list[tuple[int, int]], near: float
 ) -> list[tuple[list[int], np.ndarray]]:
     """Keep a group whose faces lie near one plane; cut another up, by the pairs that cover each other most."""
-    sides = np.where(faces.planes[members, :3] @ faces.planes[members[0], :3] > 0.0, 1.0, -1.0)
-    rings = [faces.rings[k] for k in members]
-    plane = _common_plane(rings, sides, faces.planes[members], faces.areas[members])
-    if len(members) == 2 or max(float(np.abs(ring @ plane[:3] - plane[3]).max()) for ring in rings) <= near:
-        return [(members, sides)]
+
+    def is_flat(group: list[int]) -> bool:
+        if len(group) == 2:
+            return True
+        plane = _common_plane(faces, group, _sides(faces, group))
+        return all(np.abs(faces.rings[k] @ plane[:3] - plane[3]).max() <= near for k in group)
+
+    if is_flat(members):
+        return [(members, _sides(faces, members))]
     groups: dict[int, list[int]] = {k: [k] for k in members}
     for a, b in sorted(pairs, key=lambda pair: -min(faces.areas[pair[0]], faces.areas[pair[1]])):
         joined = groups[a] if groups[a] is groups[b] else groups[a] + groups[b]
-        side = np.where(faces.planes[joined, :3] @ faces.planes[joined[0], :3] > 0.0, 1.0, -1.0)
-        rings = [faces.rings[k] for k in joined]
-        plane = _common_plane(rings, side, faces.planes[joined], faces.areas[joined])
-        if len(joined) == 2 or max(float(np.abs(ring @ plane[:3] - plane[3]).max()) for ring in rings) <= near:
-            for k in joined:
-                groups[k] = joined
+        if is_flat(joined):
+            groups |= dict.fromkeys(joined, joined)
     once = {id(group): group for group in groups.values() if len(group) > 1}
-    return [
-        (group, np.where(faces.planes[group, :3] @ faces.planes[group[0], :3] > 0.0, 1.0, -1.0))
-        for group in once.values()
-    ]
+    return [(group, _sides(faces, group)) for group in once.values()]
 
 
-def _common_plane(rings: Sequence[np.ndarray], sides: np.ndarray, planes: np.ndarray, areas: np.ndarray) -> np.ndarray:
+def _sides(faces: _Faces, members: list[int]) -> np.ndarray:
+    """(n,) array: 1 for faces that are seen as the first of them, -1 for those seen from the other side."""
+    return np.where(faces.planes[members, :3] @ faces.planes[members[0], :3] > 0.0, 1.0, -1.0)
+
+
+def _common_plane(faces: _Faces, members: list[int], sides: np.ndarray) -> np.ndarray:
     """(4,) array: the plane nearest to faces, as the first of them is seen."""
+    rings, planes, areas = [faces.rings[k] for k in members], faces.planes[members], faces.areas[members]
     if len(rings) <= 2:
         normal = (sides[:, None] * planes[:, :3] * areas.min()).sum(axis=0)
     else:

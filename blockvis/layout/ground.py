@@ -15,7 +15,7 @@ from solver import mechanics
 
 from .inspect import Inspection
 from .layout import Layout
-from .outlines import without_collinear
+from .outlines import largest_piece, without_collinear
 from .repair import repaired
 from .simplify import default_tolerance, simplified
 
@@ -359,18 +359,13 @@ def _bedded(
         ("ground left", mechanics.FIXED, start, split.at),
         ("ground right", mechanics.MOVING, split.at, end),
     ):
-        half = _largest(ground.intersection(shapely.box(left, floor - depth, right, floor + 1e3 * depth)))
-        if half is not None:
+        half = largest_piece(ground.intersection(shapely.box(left, floor - depth, right, floor + 1e3 * depth)))
+        if not half.is_empty:
             # Rounding, and the zero that is no negative one, make a file that people read.
             corners = np.round(shapely.get_coordinates(half.exterior)[:-1], 10 - int(np.floor(np.log10(depth)))) + 0.0
             corners = _from_lowest_left(corners)
             halves.append({"name": name, "role": role, "outline": corners.tolist()})
     return halves
-
-
-def _largest(shape: Any) -> Any:
-    parts = [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon" and part.area > 0.0]
-    return max(parts, key=lambda part: part.area, default=None)
 
 
 def _from_lowest_left(ring: np.ndarray) -> np.ndarray:

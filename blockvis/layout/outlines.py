@@ -157,6 +157,31 @@ def _upright(points: np.ndarray) -> tuple[np.ndarray, float] | None:
     return (own, reliefs[1]) if reliefs[1] < 0.5 * reliefs[0] else (axis, reliefs[0])
 
 
+def largest_piece(shape: Any) -> Any:
+    """Outer border of the largest piece of a shape, a polygon without holes; an empty one of a shape without area."""
+    import shapely
+
+    # Beside lines, pieces may lie in a collection within the collection.
+    pieces = [piece for piece in shapely.get_parts(shapely.get_parts(shape)) if piece.area > 0.0]
+    return shapely.Polygon(max(pieces, key=lambda piece: float(piece.area)).exterior) if pieces else shapely.Polygon()
+
+
+def ring_of(polygon: Any) -> np.ndarray:
+    """(n, 2) array: the corners around a polygon, counter-clockwise."""
+    import shapely
+
+    return np.array(shapely.orient_polygons(polygon).exterior.coords)[:-1]
+
+
+def around_hole(name: str, outline: np.ndarray, holes: Sequence[np.ndarray]) -> LeftOut:
+    """Say that a block has a hole; its outline and those of its holes are (n, 2) arrays."""
+    x, y = holes[0].mean(axis=0)
+    message = (
+        f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
+    )
+    return LeftOut("hole", outline, message, holes=tuple(holes))
+
+
 def share_in(inner: Any, outer: Any) -> float:
     """Fraction of the area of one shape that lies in another."""
     return float(inner.intersection(outer).area / inner.area) if inner.intersects(outer) else 0.0
@@ -285,12 +310,9 @@ def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> tuple[
     ring = without_collinear(rings[0] if ring_area(rings[0]) > 0 else rings[0][::-1])
     if len(rings) == 1:
         return ring, None
-    x, y = rings[1].mean(axis=0)
     if len(filled(rings)) == 1:
-        message = (
-            f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
-        )
-        return ring, LeftOut("hole", ring, message, holes=tuple(rings[1:]))
+        return ring, around_hole(name, ring, rings[1:])
+    x, y = rings[1].mean(axis=0)
     message = (
         f"block '{name}' is in {len(rings)} separate pieces, one around ({x:.6g}, {y:.6g}); give each its own block"
     )

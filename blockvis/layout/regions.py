@@ -15,7 +15,7 @@ from solver import mechanics
 from .layout import Layout
 from .left_out import LeftOut, matches
 from .notes import CHANGED, Note
-from .outlines import share_in
+from .outlines import largest_piece, share_in
 from .roles import roles_of
 from .selection import ANNOTATIONS, labels_of
 
@@ -206,11 +206,9 @@ def _polygon(ring: np.ndarray) -> Any:
 
     if len(ring) < 3:
         return None
-    shape: Any = shapely.Polygon(ring)
-    if not shape.is_valid:
-        shape = max(shapely.get_parts(shapely.make_valid(shape)), key=lambda part: part.area)
-    shape = shapely.Polygon(shape.exterior) if shape.geom_type == "Polygon" else shape
-    return shape if shape.geom_type == "Polygon" and shape.area > 0.0 else None
+    shape = shapely.Polygon(ring)
+    shape = largest_piece(shape if shape.is_valid else shapely.make_valid(shape))
+    return None if shape.is_empty else shape
 
 
 def _is_beside(one: _Drawn) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +12,7 @@ from solver.mechanics import counted
 from .joints.close import Closing, FoldedOutline, close_joints, proposed
 from .joints.trimming import overlapping
 from .left_out import LeftOut
+from .surfaces import same_points
 
 #: Outlines closer than this fraction of the narrowest extent of a block, corner by corner, are one drawn twice.
 SAME = 1e-3
@@ -39,21 +39,16 @@ def duplicates(blocks: Sequence[np.ndarray]) -> list[tuple[int, int]]:
     """
     centres = np.array([(corners.min(axis=0) + corners.max(axis=0)) / 2.0 for corners in blocks])
     sizes = np.array([float(np.ptp(corners, axis=0).max()) for corners in blocks])
-    cell = 4.0 * SAME * float(np.median(sizes)) or 1.0
-    found: dict[int, int] = {}
-    # Grids shifted by half a cell along each axis: no grid line separates a pair in all of them.
-    for shift in itertools.product((0.0, 0.5), repeat=centres.shape[1]):
-        places: dict[tuple[float, ...], list[int]] = {}
-        for i, place in enumerate(np.floor(centres / cell + shift).tolist()):
-            if i in found:
-                continue
-            earlier = places.setdefault(tuple(place), [])
-            twin = next((k for k in earlier if _same(blocks[k], blocks[i])), None)
-            if twin is None:
-                earlier.append(i)
-            else:
-                found[i] = twin
-    return sorted((first, later) for later, first in found.items())
+    found: list[tuple[int, int]] = []
+    unlike: dict[int, list[int]] = {}
+    for i, place in enumerate(same_points(centres, 2.0 * SAME * float(np.median(sizes))).tolist()):
+        earlier = unlike.setdefault(place, [])
+        twin = next((k for k in earlier if _same(blocks[k], blocks[i])), None)
+        if twin is None:
+            earlier.append(i)
+        else:
+            found.append((twin, i))
+    return sorted(found)
 
 
 def _same(one: np.ndarray, other: np.ndarray) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.linked import linked
+from blockvis.layout.outlines import largest_piece, ring_of
 
 #: Points along the outlines are this fraction of the joint thickness apart.
 SPACING = 0.2
@@ -128,7 +129,7 @@ def share_out(
     simple = shapely.coverage_simplify(np.array(cells), SIMPLER * size)
     if anchored.any():
         simple = _along_anchored(simple, np.array(cells), np.flatnonzero(anchored), grid)
-    rings = [np.array(shapely.orient_polygons(cell).exterior.coords)[:-1] for cell in simple]
+    rings = [ring_of(cell) for cell in simple]
     fixed = np.concatenate([np.zeros((0, 2)), *(rings[i] for i in np.flatnonzero(anchored))])
     found = [ring + origin for ring in _without_short_edges(rings, SHORTEST * size, fixed)]
     return [np.asarray(outlines[i]) if anchored[i] else ring for i, ring in enumerate(found)]
@@ -276,8 +277,8 @@ def _joined_faces(faces: np.ndarray, drawn: Any, grid: float) -> Any:
     import shapely
 
     union = shapely.union_all(faces, grid_size=grid) if len(faces) else drawn
-    pieces = [piece for piece in shapely.get_parts(union) if piece.geom_type == "Polygon"] or [drawn]
-    return shapely.Polygon(max(pieces, key=lambda piece: float(piece.area)).exterior)
+    piece = largest_piece(union)
+    return drawn if piece.is_empty else piece
 
 
 def _along_anchored(simple: np.ndarray, cells: np.ndarray, anchored: np.ndarray, grid: float) -> np.ndarray:

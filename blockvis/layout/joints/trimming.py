@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.layout.outlines import without_collinear
+from blockvis.layout.outlines import largest_piece, ring_of, without_collinear
 from solver import mechanics
 
 from .facing_edges import CLOSED, Edges, Facing
@@ -70,25 +70,15 @@ def extended_to_lines(
         )
         wide = shapely.Polygon(extended_rings[block]).buffer(0)
         shape = shapely.union_all([shapes[block].buffer(0), shapely.intersection(wide, strip)])
-        piece = _largest_piece(shape, [shapes[j] for j in tree.query(shape).tolist() if j != block])
-        if piece is not None:
+        others = [shapes[j].buffer(0) for j in tree.query(shape).tolist() if j != block]
+        piece = largest_piece(shapely.difference(shape, shapely.union_all(others)))
+        if not piece.is_empty:
             shapes[block] = piece
-            final[block] = np.array(shapely.orient_polygons(piece).exterior.coords)[:-1]
+            final[block] = ring_of(piece)
     involved = {int(edges.block[edge]) for k in uncommon for edge in (found.edge_a[k], found.edge_b[k])}
     return merge_close_corners(
         final, sorted(involved), anchored, MERGED * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max())
     )
-
-
-def _largest_piece(shape: Any, others: Sequence[Any]) -> Any:
-    """Cut others out of a shape, and take the outer border of its largest piece; None where nothing is left."""
-    import shapely
-
-    cut = shapely.difference(shape, shapely.union_all([other.buffer(0) for other in others]))
-    piece = max(shapely.get_parts(cut), key=shapely.area, default=None)
-    if piece is None or piece.geom_type != "Polygon" or piece.area <= 0.0:
-        return None
-    return shapely.Polygon(piece.exterior)
 
 
 def _extended_edges(
@@ -154,11 +144,9 @@ def separated(rings: list[np.ndarray], anchored: np.ndarray, thickness: float, c
         small, large = sorted(shapes, key=lambda k: (bool(anchored[k]), shapes[k].area))
         if anchored[small]:
             continue
-        cut = shapely.difference(shapes[small], shapes[large])
-        pieces = [piece for piece in getattr(cut, "geoms", [cut]) if piece.geom_type == "Polygon"]
-        if pieces:
-            whole = shapely.Polygon(max(pieces, key=lambda piece: piece.area).exterior)
-            result[small] = np.array(shapely.orient_polygons(whole).exterior.coords)[:-1]
+        piece = largest_piece(shapely.difference(shapes[small], shapes[large]))
+        if not piece.is_empty:
+            result[small] = ring_of(piece)
     return result
 
 
