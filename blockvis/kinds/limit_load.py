@@ -85,6 +85,20 @@ class LimitLoadSettings:
 
 
 @dataclass(frozen=True)
+class Standing:
+    """Where blocks stand after a settlement, what ties do there and which mortar is left; as drawn by default."""
+
+    pose: solver.Pose | None = None
+    ties: mechanics.TieForces | None = None
+    bonds: mechanics.Bonds | None = None
+
+    @classmethod
+    def at(cls, increment: solver.Increment) -> Standing:
+        """Take them of an increment of the settlement."""
+        return cls(increment.pose, increment.ties, increment.bonds)
+
+
+@dataclass(frozen=True)
 class LimitLoadCheckpoint:
     """Where limit loads go on from, after one of them, to the same bits.
 
@@ -94,19 +108,13 @@ class LimitLoadCheckpoint:
         Found so far, in the order of the increments that report them; numbers alone.
     settlement : solver.mechanics.PathState, optional
         Where the settlement stands along which they are asked for.
-    pose : solver.Pose, optional
+    standing : Standing
         Where the settlement ended that comes before the places of a load.
-    ties : solver.mechanics.TieForces, optional
-        What ties did there.
-    bonds : solver.mechanics.Bonds, optional
-        The mortar that was left there.
     """
 
     limits: tuple[solver.LimitLoad, ...]
     settlement: mechanics.PathState | None = None
-    pose: solver.Pose | None = None
-    ties: mechanics.TieForces | None = None
-    bonds: mechanics.Bonds | None = None
+    standing: Standing = Standing()
 
 
 class LimitLoadKind(AnalysisKind):
@@ -421,8 +429,8 @@ def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, foun
     case = run.given.case
     shown = found[-1] if found else None
     if not case.settlements and shown is None:
-        shown = _limit_state(run, run.given.loads, None, None, 0)
-        yield replace(shown, checkpoint=_checkpoint(run))
+        shown = _limit_state(run, run.given.loads, Standing(), 0)
+        yield replace(shown, checkpoint=LimitLoadCheckpoint(_numbers(run)))
     before = None if resume is None else resume.settlement
     steps = settlement_steps(run.given, before, whole=True)
     programs = 0
@@ -432,12 +440,14 @@ def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, foun
             yield _read_for_multipliers(increment)
         elif _wanted(case, increment):
             # In equilibrium under the dead load: the settlement has proved it.
-            state = _limit_state(run, run.given.loads, increment.pose, increment, programs)
+            state = _limit_state(run, run.given.loads, Standing.at(increment), programs)
+            seconds = state.seconds + increment.seconds
+            state = replace(state, parameter=increment.parameter, phase=increment.phase, seconds=seconds)
             if shown is None or _is_last_wanted(case, increment):
                 state = replace(state, notes=(*state.notes, *_closing_note(run, increment, shown is None)))
             shown, programs = replace(state, status=solver.Status.EQUILIBRIUM), 0
             reached = increment.checkpoint
-            yield replace(shown, checkpoint=None if reached is None else _checkpoint(run, settlement=reached))
+            yield replace(shown, checkpoint=None if reached is None else LimitLoadCheckpoint(_numbers(run), reached))
     ending = steps.ending
     if ending.stop is not solver.Status.LIMIT_REACHED:
         if ending.stop is solver.Status.COLLAPSED and shown is not None:
@@ -456,12 +466,12 @@ def _over_places(
     found: Sequence[solver.Increment],
 ) -> Steps:
     """Limit states for each place of a moving load at the end of the settlements; then the mechanism of the lowest."""
-    standing, programs = run.given.loads, 0
-    pose, ties, bonds = (None, None, None) if resume is None else (resume.pose, resume.ties, resume.bonds)
+    dead, programs = run.given.loads, 0
+    standing = Standing() if resume is None else resume.standing
     steps = settlement_steps(run.given, whole=True) if resume is None else without_increments()
     for increment in steps:
         programs += increment.programs
-        pose, ties, bonds = increment.pose, increment.ties, increment.bonds
+        standing = Standing.at(increment)
         if increment.status == solver.Status.FALLING:
             yield _read_for_multipliers(increment)
     if steps.ending.stop is not solver.Status.LIMIT_REACHED:
@@ -474,9 +484,9 @@ def _over_places(
             # The dead load alone has no equilibrium: nor has it with the live load elsewhere.
             break
         else:
-            loads = standing.with_forces(run.given.assembly, live(number), "live")
-            state = replace(_limit_state(run, loads, pose, None, programs, ties, bonds), parameter=float(x))
-            if (stays := _staying_open(run, loads, pose, ties, bonds)) is not None:
+            loads = dead.with_forces(run.given.assembly, live(number), "live")
+            state = replace(_limit_state(run, loads, standing, programs), parameter=float(x))
+            if (stays := _staying_open(run, loads, standing)) is not None:
                 run.limits[-1] = replace(run.limits[-1], staying_open=stays.multiplier)
                 state = replace(state, programs=state.programs + stays.increment.programs)
             if number == 0 and (words := _closing_words(run)):
@@ -485,9 +495,9 @@ def _over_places(
         if shown is None or mechanics.lowest([shown.load_multiplier, state.load_multiplier]):
             chosen, shown = number, state
         if number >= len(found):
-            yield replace(state, checkpoint=_checkpoint(run, pose=pose, ties=ties, bonds=bonds))
+            yield replace(state, checkpoint=LimitLoadCheckpoint(_numbers(run), standing=standing))
     # A load that moves is kept at the place that governs.
-    run.given = replace(run.given, loads=standing.with_forces(run.given.assembly, live(chosen), "live"))
+    run.given = replace(run.given, loads=dead.with_forces(run.given.assembly, live(chosen), "live"))
     assert shown is not None
     yield from _swinging(run.given.assembly, shown)
     ending = _limit_ending(run.limits[chosen])
@@ -501,16 +511,9 @@ def _read_for_multipliers(increment: solver.Increment) -> solver.Increment:
     return replace(increment, measured=increment.load_multiplier)
 
 
-def _checkpoint(
-    run: AnalysisRun,
-    *,
-    settlement: mechanics.PathState | None = None,
-    pose: solver.Pose | None = None,
-    ties: mechanics.TieForces | None = None,
-    bonds: mechanics.Bonds | None = None,
-) -> LimitLoadCheckpoint:
-    limits = tuple(replace(limit, held=None, analysed=None) for limit in run.limits)
-    return LimitLoadCheckpoint(limits, settlement, pose, ties, bonds)
+def _numbers(run: AnalysisRun) -> tuple[solver.LimitLoad, ...]:
+    """Limit loads so far without their arrays."""
+    return tuple(replace(limit, held=None, analysed=None) for limit in run.limits)
 
 
 def _wanted(case: Case, increment: solver.Increment) -> bool:
@@ -543,69 +546,42 @@ def _differs(limit: solver.LimitLoad, least: float) -> bool:
     return math.isfinite(least) and not math.isclose(limit.multiplier, least, rel_tol=NOTABLE)
 
 
-def _staying_open(
-    run: AnalysisRun,
-    loads: solver.Loads,
-    pose: solver.Pose | None,
-    ties: mechanics.TieForces | None,
-    bonds: mechanics.Bonds | None,
-) -> solver.LimitLoad | None:
+def _staying_open(run: AnalysisRun, loads: solver.Loads, at: Standing) -> solver.LimitLoad | None:
     """Find the last limit load where joints that are open stay so; None where they do, or unknown."""
     # Without dilatancy it takes many programs, not one more.
     asked = _closing_words(run) and run.given.case.settings.flow == FLOWS[0]
     if not asked or math.isnan(run.limits[-1].multiplier):
         return None
-    return _limit(run, loads, pose, ties, bonds, 0.0)
+    return _limit(run, loads, at, 0.0)
 
 
 def _closing_note(run: AnalysisRun, at: solver.Increment, first: bool) -> list[str]:
     """Say within which displacement open joints may close, at the first state, and α where they do not."""
     words, limit = _closing_words(run), run.limits[-1]
-    stays = _staying_open(run, run.given.loads, at.pose, at.ties, at.bonds)
+    stays = _staying_open(run, run.given.loads, Standing.at(at))
     if stays is not None and _differs(limit, least := stays.multiplier):
         where = f"{at.parameter:.6g} {run.given.case.settlements[at.phase].unit}"
         return [f"at a settlement of {where} α = {limit.multiplier:.6g}, {least:.6g} without: {words}"]
     return [words] if words and first else []
 
 
-def _limit_state(
-    run: AnalysisRun,
-    loads: solver.Loads,
-    pose: solver.Pose | None,
-    at: solver.Increment | None,
-    programs: int,
-    ties: mechanics.TieForces | None = None,
-    bonds: mechanics.Bonds | None = None,
-) -> solver.Increment:
+def _limit_state(run: AnalysisRun, loads: solver.Loads, at: Standing, programs: int) -> solver.Increment:
     started = time.perf_counter()
-    ties, bonds = (ties, bonds) if at is None else (at.ties, at.bonds)
-    limit = _limit(run, loads, pose, ties, bonds, _displacement(run.given.case, run.given.assembly))
+    limit = _limit(run, loads, at, _displacement(run.given.case, run.given.assembly))
     run.limits.append(limit)
     state = limit.increment
-    return replace(
-        state,
-        parameter=0.0 if at is None else at.parameter,
-        phase=0 if at is None else at.phase,
-        programs=state.programs + programs,
-        seconds=time.perf_counter() - started + (0.0 if at is None else at.seconds),
-    )
+    seconds = time.perf_counter() - started
+    return replace(state, parameter=0.0, phase=0, programs=state.programs + programs, seconds=seconds)
 
 
-def _limit(
-    run: AnalysisRun,
-    loads: solver.Loads,
-    pose: solver.Pose | None,
-    ties: mechanics.TieForces | None,
-    bonds: mechanics.Bonds | None,
-    displacement: float,
-) -> solver.LimitLoad:
+def _limit(run: AnalysisRun, loads: solver.Loads, at: Standing, displacement: float) -> solver.LimitLoad:
     """Find a limit load whose open joints may close within a displacement [m]."""
     case, assembly = run.given.case, run.given.assembly
     try:
         return solver.Structure(assembly, run.given.interfaces, loads, ties=run.given.ties).limit_load(
-            pose=pose,
-            ties_at=ties,
-            bonds_at=bonds,
+            pose=at.pose,
+            ties_at=at.ties,
+            bonds_at=at.bonds,
             flow=case.settings.flow,
             torsion=case.settings.torsion,
             displacement=displacement,
