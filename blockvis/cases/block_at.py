@@ -21,7 +21,6 @@ def distances_to(assembly: solver.Assembly, point: ArrayLike) -> np.ndarray:
 
     Parameters
     ----------
-    assembly : solver.Assembly
     point : (d,) sequence [m]
     """
     if assembly.dimension == 2:
@@ -50,9 +49,7 @@ def note_outside(assembly: solver.Assembly, point: Sequence[float], block: int, 
 
     Parameters
     ----------
-    assembly : solver.Assembly
     point : (d,) sequence [m]
-    block : int
     where : str
         File, table and key.
     role : str
@@ -80,9 +77,10 @@ def block_at(
 
     Of several that meet there it is the one into which a direction leads, then the one whose centroid is nearest.
 
+    ValueError if none of them that is left holds the point; names the nearest and how far it is.
+
     Parameters
     ----------
-    assembly : solver.Assembly
     point : (d,) sequence [m]
     chosen : (n,) int array
         The blocks it may be.
@@ -92,11 +90,6 @@ def block_at(
         File, table and key, for the message.
     gone : (n_blocks,) bool array
         Blocks that have been taken away before, which hold nothing.
-
-    Raises
-    ------
-    ValueError
-        If none of them that is left holds the point; names the nearest and how far it is.
     """
     apart = distances_to(assembly, point)
     holding = chosen[apart[chosen] <= ON_EDGE * assembly.block_size]

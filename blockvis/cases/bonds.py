@@ -90,11 +90,12 @@ def bonded(
 ) -> Layout:
     """Fill walls of a drawing with the stones of their bonds.
 
+    ValueError for an outline that is missing or open, an opening outside of its wall, a brick longer than its wall.
+
     Parameters
     ----------
     layout : Layout
         Of all outlines of the drawing, as :func:`blockvis.formats.read.read_outlines` gives it.
-    bondings : sequence of Bonding
     where : str
         The case file or command, for messages.
     roles : mapping of str to str, optional
@@ -106,11 +107,6 @@ def bonded(
     -------
     Layout
         The stones, each on the layer of its wall, after what else is drawn.
-
-    Raises
-    ------
-    ValueError
-        For an outline that is missing or open, an opening outside of its wall, a brick longer than its wall.
     """
     if layout.dimension == 3:
         raise ValueError(f"{where}: bond: '{layout.source}' draws blocks in space; a bond fills outlines in the plane")

@@ -51,16 +51,13 @@ THICKNESS = 1.0
 def case_assembly(case: Case) -> solver.Assembly:
     """Build the assembly of a case.
 
+    ValueError for a layout that cannot be read or built, for a file whose unit is in doubt while the case gives none,
+    and for settlements without a moving support.
+
     Returns
     -------
     solver.Assembly
         Of its layout file or parametric layout, with roles, supports, materials and imperfections.
-
-    Raises
-    ------
-    ValueError
-        For a layout that cannot be read or built, for a file whose unit is in doubt while the case gives none, and for
-        settlements without a moving support.
     """
     sketch = without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[0]
     _refuse_doubted_unit(case, sketch)
@@ -303,10 +300,7 @@ def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
 def case_changes(case: Case, assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> tuple[solver.PhaseChange, ...]:
     """Find what changes between the settlements of a case: what is taken away, and loads that begin to act.
 
-    Raises
-    ------
-    ValueError
-        For a name that no block or no tie has.
+    ValueError for a name that no block or no tie has.
     """
     changes = [
         solver.PhaseChange(one.phase - 1, removed_blocks(one, assembly), ties=removed_ties(one, ties))

@@ -15,10 +15,7 @@ from .role_places import INTO_SPACE
 def check_coordinates(case: Case, assembly: solver.Assembly) -> None:
     """Refuse directions, points and forces of two numbers for blocks in space, and of three in the plane.
 
-    Raises
-    ------
-    ValueError
-        Names the key, and how many numbers it needs.
+    ValueError names the key, and how many numbers it needs.
     """
     d = assembly.dimension
     control = case.settings if isinstance(case.settings, solver.ControlDisplacement) else None

@@ -21,7 +21,6 @@ def extrados(assembly: solver.Assembly, chosen: np.ndarray, surface: float) -> t
 
     Parameters
     ----------
-    assembly : solver.Assembly
     chosen : (n_blocks,) bool array
         Whose pieces are looked for; all blocks hide what is below them.
     surface : float [m]

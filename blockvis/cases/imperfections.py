@@ -75,10 +75,7 @@ class Imperfection:
 def read_imperfection(table: Table, section: Section = IMPERFECTIONS) -> Imperfection:
     """Read and check the imperfection of a table, of a case or, without a seed, of a study.
 
-    Raises
-    ------
-    ValueError
-        For a value that is not as the table says, and a factor that may become negative or 0.
+    ValueError for a value that is not as the table says, and a factor that may become negative or 0.
     """
     values = section.read(table)
     kind = values["kind"]
@@ -106,16 +103,12 @@ def joint_scatter(imperfections: Sequence[Imperfection]) -> solver.JointScatter 
 def imperfect(assembly: solver.Assembly, imperfections: Sequence[Imperfection]) -> solver.Assembly:
     """Scatter the corners and densities of an assembly.
 
+    ValueError for displacements of corners that are too large for the blocks.
+
     Parameters
     ----------
-    assembly : solver.Assembly
     imperfections : sequence of Imperfection
         Those of friction do not change the assembly: see :func:`joint_scatter`.
-
-    Raises
-    ------
-    ValueError
-        For displacements of corners that are too large for the blocks.
     """
     for one in imperfections:
         if one.kind == "density":
@@ -135,16 +128,12 @@ def _uniform(imperfection: Imperfection, *shape: int) -> np.ndarray:
 def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solver.Assembly:
     """Move the corners of an assembly at random; faces stay plane and joints closed.
 
+    ValueError for displacements that are too large for the blocks.
+
     Parameters
     ----------
-    assembly : solver.Assembly
     imperfection : Imperfection
         Of kind "vertices".
-
-    Raises
-    ------
-    ValueError
-        For displacements that are too large for the blocks.
 
     Notes
     -----

@@ -75,10 +75,11 @@ def loads_of(
 ) -> solver.Loads:
     """Sum self-weight and the loads that do not move and act from the start.
 
+    ValueError for a pattern that matches no free block that is left, a point in none of those it matches, and for an
+    edge that a block does not have.
+
     Parameters
     ----------
-    entries : sequence of LoadCase
-    assembly : solver.Assembly
     source : Path
         The case file, for messages.
     gone : (n_blocks,) bool array
@@ -90,12 +91,6 @@ def loads_of(
     -------
     solver.Loads
         [N, N·m]
-
-    Raises
-    ------
-    ValueError
-        For a pattern that matches no free block that is left, a point in none of those it matches, and for an edge
-        that a block does not have.
     """
     loads = solver.self_weight(assembly)
     # Loads of the drawing act on it before anything is taken away, but for a pressure, which meets what is left.
@@ -140,6 +135,8 @@ def moving_loads(
 ) -> tuple[np.ndarray, Callable[[int], solver.PointForces]]:
     """Find the load that moves.
 
+    ValueError for a position above no block, or above a support.
+
     Parameters
     ----------
     entries, assembly, source
@@ -151,11 +148,6 @@ def moving_loads(
         Empty if no load moves.
     live : function of int
         The live load at a position, by its number.
-
-    Raises
-    ------
-    ValueError
-        For a position above no block, or above a support.
     """
     moving = next(((number, load) for number, load in enumerate(entries, start=1) if load.positions), None)
     if moving is None:

@@ -85,11 +85,6 @@ class Profile:
 def bearing_points(assembly: solver.Assembly, supports: Sequence[int | Sequence[int]]) -> np.ndarray:
     """Find the middle of where free blocks stand on each support, or group of supports; of its top where none does.
 
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    supports : sequence of int or of sequences of int
-
     Returns
     -------
     (n, d) array [m]
@@ -222,20 +217,16 @@ def with_profiles(
 ) -> tuple[solver.Settlement, ...]:
     """Give each support its own motion, where a settlement has a profile.
 
+    ValueError for a support that a profile names and that is no moving support.
+
     Parameters
     ----------
-    settlements : sequence of solver.Settlement
     profiles : sequence of Profile or None
         One per settlement, or none at all.
     assembly : solver.Assembly
         Its ground cut for the profiles.
     source : Path
         The case file, for messages.
-
-    Raises
-    ------
-    ValueError
-        For a support that a profile names and that is no moving support.
     """
     found = []
     for k, given in enumerate(settlements):
@@ -285,8 +276,6 @@ def cut_ground(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    profiles : sequence of Profile or None
     chosen : sequence of int, optional
         Supports that are cut whatever the profiles; by default the moving ones over which a profile bends.
 

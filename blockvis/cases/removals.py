@@ -57,13 +57,7 @@ def read_removal(table: Table) -> Removal:
 
 
 def removed_blocks(removal: Removal, assembly: solver.Assembly) -> np.ndarray:
-    """(n_blocks,) bool array: blocks that a table takes away.
-
-    Raises
-    ------
-    ValueError
-        For a name that no block has.
-    """
+    """(n_blocks,) bool array: blocks that a table takes away; ValueError for a name that no block has."""
     found = {pattern: blocks_matching(pattern, assembly) for pattern in removal.blocks}
     return np.isin(assembly.names, _matching(found, assembly.names, f"{removal.where} blocks", "block"))
 
@@ -77,10 +71,7 @@ def gone_in(removals: Sequence[Removal], assembly: solver.Assembly, phase: int) 
 def removed_ties(removal: Removal, ties: Sequence[solver.Tie]) -> tuple[str, ...]:
     """Names of the ties that a table takes away.
 
-    Raises
-    ------
-    ValueError
-        For a name that no tie has, and a tie that is installed later.
+    ValueError for a name that no tie has, and a tie that is installed later.
     """
     names = [tie.name for tie in ties]
     found = {pattern: named_like(pattern, names) for pattern in removal.ties}

@@ -46,15 +46,12 @@ class RolePlace:
 def read_places(roles: Table) -> tuple[RolePlace, ...]:
     """Read the roles by place of a case.
 
+    ValueError for a place that is not understood.
+
     Parameters
     ----------
     roles : Table
         ``[roles]``.
-
-    Raises
-    ------
-    ValueError
-        For a place that is not understood.
     """
     return tuple(
         _place(kind, table, f"{roles.source}: [roles] {kind}")
@@ -89,16 +86,12 @@ def _place(kind: str, table: Table, where: str) -> RolePlace:
 def with_roles_by_place(layout: Layout, places: Sequence[RolePlace]) -> Layout:
     """Give the blocks of a layout the roles of their places, over what the file says.
 
+    ValueError for a place with no block, or all of them, and for a coordinate that the layout does not have.
+
     Parameters
     ----------
-    layout : Layout
     places : sequence of RolePlace
         A later one holds over an earlier.
-
-    Raises
-    ------
-    ValueError
-        For a place with no block, or all of them, and for a coordinate that the layout does not have.
     """
     if not places:
         return layout

@@ -153,16 +153,12 @@ TIES = Section(
 def read_ties(tables: Sequence[Table], layers: Sequence[str]) -> tuple[TieCase, ...]:
     """Read the tables [[ties]].
 
+    ValueError for keys that do not go together, or a name used twice.
+
     Parameters
     ----------
-    tables : sequence of Table
     layers : sequence of str
         ``[geometry] ties``.
-
-    Raises
-    ------
-    ValueError
-        For keys that do not go together, or a name used twice.
     """
     found: list[TieCase] = []
     for table in tables:
@@ -220,6 +216,8 @@ def _tie(table: Table) -> TieCase:
 def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tuple[Layout, tuple[LeftOut, ...]]:
     """Take the lines that are ties out of what a drawing leaves out.
 
+    ValueError where a layer has no line, or has something else.
+
     Parameters
     ----------
     sketch : Layout
@@ -234,11 +232,6 @@ def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tu
     sketch : Layout
         With one note on its ties instead of those on lines left out.
     lines : tuple of LeftOut
-
-    Raises
-    ------
-    ValueError
-        Where a layer has no line, or has something else.
     """
     if not layers:
         return sketch, ()
@@ -271,16 +264,12 @@ def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tu
 def drawn_ties(entries: Sequence[TieCase], lines: Sequence[LeftOut]) -> list[TieCase]:
     """List the ties of a case, those of layers with the ends of their lines.
 
+    ValueError for a line that is bent, and a name used twice.
+
     Parameters
     ----------
-    entries : sequence of TieCase
     lines : sequence of LeftOut
         As of :func:`without_tie_lines`.
-
-    Raises
-    ------
-    ValueError
-        For a line that is bent, and a name used twice.
     """
     found: list[TieCase] = []
     for entry in entries:
@@ -310,18 +299,14 @@ def ties_of(
 ) -> tuple[solver.Tie, ...]:
     """Find the blocks that hold the ends of ties.
 
+    ValueError for an end in no block that is left, both in one, a tie without length; names the tie and the remedy.
+
     Parameters
     ----------
     entries : sequence of TieCase
         As of :func:`drawn_ties`.
-    assembly : solver.Assembly
     gone : mapping of int to (n_blocks,) bool array
         By phase: blocks that have been taken away before ties are installed.
-
-    Raises
-    ------
-    ValueError
-        For an end in no block that is left, both in one, a tie without length; names the tie and the remedy.
     """
     return tuple(_in_blocks(entry, assembly, gone[entry.phase]) for entry in entries)
 

@@ -254,7 +254,6 @@ def segmental_joints(span: float, rise: float, thickness: float, voussoirs: int)
     span, rise : float [m]
         Of the intrados.
     thickness : float [m]
-    voussoirs : int
 
     Returns
     -------

@@ -47,9 +47,7 @@ def cut_bricks(
 
     Parameters
     ----------
-    bond : Bond
     width : float [m]
-    courses : int
     rings : sequence of (n, 2) arrays [m]
 
     Returns

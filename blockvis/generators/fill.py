@@ -215,7 +215,6 @@ def filled(
     ----------
     wall : shapely.Polygon [m]
     openings : sequence of shapely.Polygon [m]
-    pattern : Pattern
     taken : shapely geometry, optional [m]
         Where other blocks stand in the wall.
     mortar : bool

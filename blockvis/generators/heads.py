@@ -151,7 +151,6 @@ def head_of(
         Where there is wall and no other head.
     near : float [m]
         Distance to the next opening beside it.
-    units : Units
 
     Returns
     -------

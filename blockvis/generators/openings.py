@@ -71,6 +71,8 @@ def checked_opening(
 ) -> Opening:
     """Make an opening of its keys, with defaults from the size of the bricks.
 
+    ValueError for impossible values; names the opening, the key and the remedy.
+
     Parameters
     ----------
     values : mapping
@@ -79,11 +81,6 @@ def checked_opening(
     number : int
         From 1, for messages.
     brick_length, brick_height, wall_height : float [m]
-
-    Raises
-    ------
-    ValueError
-        For impossible values; names the opening, the key and the remedy.
     """
     where = f"opening {number}"
     if not isinstance(values, Mapping):

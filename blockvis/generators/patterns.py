@@ -79,7 +79,6 @@ def rubble(width: float, height: float, stone: float, flatness: float, seed: int
         Length of a stone in the mean.
     flatness : float
         Length over height of a stone in the mean.
-    seed : int
 
     Notes
     -----

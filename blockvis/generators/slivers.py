@@ -27,7 +27,6 @@ def without_slivers(
     ----------
     shapes : sequence of shapely.Polygon [m]
         Side by side.
-    is_sliver : function of a shape and the number of the piece it is, or is mainly made of
     height : float [m]
         Of a brick.
     grid : float [m]

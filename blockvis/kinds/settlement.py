@@ -270,8 +270,6 @@ def settlement_steps(
 
     Parameters
     ----------
-    given : RunInput
-    resume : solver.mechanics.PathState, optional
     whole : bool
         Whether the first loss of a block ends it, because what comes after is asked of the whole structure.
     """

@@ -50,6 +50,9 @@ def assemble(
 ) -> solver.Assembly:
     """Make an assembly of a layout.
 
+    ValueError for an unknown role, a key of ``roles`` that matches no block, a support without a volume, an overlap
+    deeper than the tolerance, and a length that is none.
+
     Parameters
     ----------
     layout : Layout
@@ -77,12 +80,6 @@ def assemble(
     outline_tolerance : float, optional [m]
         Corners within this distance of a simpler outline are dropped; by default a hundredth of the size of a block
         where outlines have more than 24 corners in the mean, else 0.
-
-    Raises
-    ------
-    ValueError
-        For an unknown role, a key of ``roles`` that matches no block, a support without a volume, an overlap
-        deeper than the tolerance, and a length that is none.
     """
     _check_lengths(layout, joint_thickness, overlap_tolerance, closing, outline_tolerance)
     where = layout.source or "layout"
@@ -231,17 +228,14 @@ def _with_supports(layout: Layout, supports: Sequence[Mapping[str, Any]]) -> Lay
 def supports_of(supports: Sequence[Mapping[str, Any]], dimension: int) -> Layout:
     """Make a layout of supports that a drawing does not contain.
 
+    ValueError names the support and the key.
+
     Parameters
     ----------
     supports : sequence of mappings
         As of :func:`assemble`.
     dimension : {2, 3}
         Of the drawing.
-
-    Raises
-    ------
-    ValueError
-        Names the support and the key.
     """
     in_space = dimension == 3
     known = {"name", "role", "outline", "density", "material", "stiffness", "levels" if in_space else "thickness"}

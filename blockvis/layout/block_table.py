@@ -40,18 +40,13 @@ def rows_of(layout: Layout) -> list[dict[str, Any]]:
 def with_rows(layout: Layout, rows: Sequence[Any], *, own: bool = False) -> Layout:
     """Put the values of a block table, one row per block, into a layout.
 
+    ValueError for a thickness or density that is no number, and for an unknown role.
+
     Parameters
     ----------
-    layout : Layout
-    rows : sequence of mappings
     own : bool
         Whether our own writer put them beside the geometry, with thicknesses in metres: these stay when somebody scales
         the drawing, or says another unit.
-
-    Raises
-    ------
-    ValueError
-        For a thickness or density that is no number, and for an unknown role.
     """
     entries: list[Mapping[str, Any]] = [row if isinstance(row, dict) else {} for row in rows]
 

@@ -70,11 +70,9 @@ def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:
 
     Parameters
     ----------
-    name : str
     ring : (n, 2) array [m]
     around : shapely.Polygon or None
         Of an outline that goes in along a line, around a hole and back.
-    share : float
     """
     import shapely
 

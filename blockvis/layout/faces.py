@@ -70,7 +70,6 @@ def fitted(points: np.ndarray, faces: list[list[int]], near: float) -> PlaneSoli
     Parameters
     ----------
     points : (n, 3) array
-    faces : list of lists of int
     near : float
         Largest warp, in the unit of the points.
     """
@@ -126,7 +125,6 @@ def moved_to_planes(
     Parameters
     ----------
     points : (n, 3) array
-    faces : sequence of sequences of int
     planes : (n_faces, 4) array
         Unit normals and distances from the origin.
     first : (n_faces,) bool array, optional

@@ -215,7 +215,6 @@ def standing(layout: Layout, thickness: float) -> Layout:
 
     Parameters
     ----------
-    layout : Layout
     thickness : float [m]
         Of blocks for which the layout has none.
     """

@@ -60,6 +60,8 @@ def is_flat(points: np.ndarray) -> bool:
 def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[np.ndarray, str]:
     """Take the two coordinates in which a flat drawing extends.
 
+    ValueError for coordinates that are not finite, and for points that are not in a plane, or not in that of the view.
+
     Parameters
     ----------
     points : (n, 2) or (n, 3) array
@@ -74,11 +76,6 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
         (x, y); of a drawing that stands upright (x, z) or (y, z).
     note : str
         "" if the drawing lies in the plane of x and y.
-
-    Raises
-    ------
-    ValueError
-        For coordinates that are not finite, and for points that are not in a plane, or not in that of the view.
     """
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
@@ -99,6 +96,8 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
 def drawing_plane(lines: Sequence[np.ndarray], where: str, view: str | None = None) -> tuple[np.ndarray, list[str]]:
     """Find the plane of a drawing of lines, which may have a relief: walls are traced on scans, at any angle.
 
+    ValueError for coordinates that are not finite, and for a drawing without area in the view.
+
     Parameters
     ----------
     lines : sequence of (n, 3) arrays
@@ -114,11 +113,6 @@ def drawing_plane(lines: Sequence[np.ndarray], where: str, view: str | None = No
         Its rows: the directions of x, y and across the drawing.
     notes : list of str
         What that changes.
-
-    Raises
-    ------
-    ValueError
-        For coordinates that are not finite, and for a drawing without area in the view.
     """
     points = np.concatenate(lines)
     spread = spread_of(points, where)
@@ -237,6 +231,9 @@ def outlines_of_cells(
 ) -> list[np.ndarray]:
     """Find the outline of each block: the edges that belong to one of its cells only.
 
+    ValueError for a block with a hole, in several pieces, with an outline that meets itself, or with no outline, unless
+    ``unusable`` takes it up.
+
     Parameters
     ----------
     points : (n_points, 2) array
@@ -253,12 +250,6 @@ def outlines_of_cells(
     -------
     list of (n, 2) arrays
         Counter-clockwise, without collinear points.
-
-    Raises
-    ------
-    ValueError
-        For a block with a hole, in several pieces, with an outline that meets itself, or with no outline, unless
-        ``unusable`` takes it up.
     """
     counts = np.array([len(cell) for cell in cells])
     flat = np.concatenate([np.asarray(cell, dtype=np.int64) for cell in cells])

@@ -85,11 +85,13 @@ def regions_of(
 ) -> tuple[list[list[Region]], Layout]:
     """Find the walls that are to be filled.
 
+    ValueError where no closed outline is on a layer, and for an opening outside of the walls; names the drawing, layer
+    and place.
+
     Parameters
     ----------
     layout : Layout
         Of all outlines of a drawing.
-    choices : sequence of Choice
     roles : mapping of str to str, optional
         Supports are neither walls nor openings.
 
@@ -99,12 +101,6 @@ def regions_of(
         For each choice.
     Layout
         What else is drawn.
-
-    Raises
-    ------
-    ValueError
-        Where no closed outline is on a layer, and for an opening outside of the walls; names the drawing, layer and
-        place.
     """
     drawn = _drawn(layout)
     role = roles_of(layout, roles or {}, all_match=False)

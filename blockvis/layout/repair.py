@@ -105,6 +105,8 @@ def repaired(
 ) -> tuple[list[np.ndarray], list[str]]:
     """Resolve the overlaps of the outlines of an assembly and close its joints.
 
+    ValueError for an overlap deeper than the tolerance, naming both blocks, and for an outline that cannot be closed.
+
     Parameters
     ----------
     assembly : Assembly
@@ -127,11 +129,6 @@ def repaired(
     outlines : list of (n, 2) arrays [m]
     notes : list of str
         What was changed.
-
-    Raises
-    ------
-    ValueError
-        For an overlap deeper than the tolerance, naming both blocks, and for an outline that cannot be closed.
     """
     outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
     free = ~anchored if not anchored.all() else anchored

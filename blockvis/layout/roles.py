@@ -57,7 +57,6 @@ def dropped_twins(layout: Layout, twins: Sequence[tuple[int, int]], roles: Mappi
 
     Parameters
     ----------
-    layout : Layout
     twins : sequence of (int, int)
         The first and its later copy.
     roles : mapping of str to {"free", "fixed", "moving"}

@@ -70,6 +70,8 @@ def sorted_out(
 ) -> Layout:
     """Leave out what is no block, with a note per kind and layer, and doubt the unit.
 
+    ValueError if a pattern of ``only`` matches nothing, no block is left, or something cannot be left out unasked.
+
     Parameters
     ----------
     layout : Layout
@@ -78,11 +80,6 @@ def sorted_out(
         Layers, groups, materials and names of blocks, or patterns of them; kinds of entities and colours.
     window : sequence of float
         x0, y0, x1, y1 [m] of what is read, or none.
-
-    Raises
-    ------
-    ValueError
-        If a pattern of ``only`` matches nothing, no block is left, or something cannot be left out unasked.
     """
     where = f"'{layout.source}'" if layout.source else "the drawing"
     layout = within_window(without_ignored(layout, ignore, only), window)
@@ -134,16 +131,12 @@ def _thickness_doubt(layout: Layout, median: float) -> str:
 def without_ignored(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
     """Leave out what the caller asks to leave out.
 
+    ValueError if a pattern of ``only`` matches nothing.
+
     Parameters
     ----------
-    layout : Layout
     ignore, only : sequences of str
         Layers, groups, materials and names of blocks, or patterns of them.
-
-    Raises
-    ------
-    ValueError
-        If a pattern of ``only`` matches nothing.
     """
     if not ignore and not only:
         return layout
@@ -209,7 +202,6 @@ def without_surroundings(layout: Layout, only: Sequence[str] = ()) -> Layout:
 
     Parameters
     ----------
-    layout : Layout
     only : sequence of str
         What the caller asks for by name stays.
 

@@ -73,10 +73,7 @@ _SECTION_REMEDY = 'give "x", "y" or "z", "y = 1.2" in m, or { point = [x, y, z],
 def read_sight(value: Any) -> Sight:
     """Read a view: a word of :data:`SIGHTS`, or azimuth and elevation [degrees].
 
-    Raises
-    ------
-    ValueError
-        With what is wrong and the remedy; whoever reads it puts the name of the key before.
+    ValueError with what is wrong and the remedy; whoever reads it puts the name of the key before.
 
     Examples
     --------
@@ -103,10 +100,7 @@ def read_sight(value: Any) -> Sight:
 def read_cut(value: Any) -> Cut:
     """Read a section: an axis, a place on it, or a point [m] and a normal.
 
-    Raises
-    ------
-    ValueError
-        As of :func:`read_sight`.
+    ValueError as of :func:`read_sight`.
 
     Examples
     --------

@@ -52,10 +52,7 @@ IMPERIAL, METRIC, RARE = ("in", "ft", "yd"), ("mm", "cm", "m"), ("dm", "in", "ft
 def metres_per(unit: str) -> float:
     """Metres per unit of length, or of a number of them, as a drawing at a scale has it.
 
-    Raises
-    ------
-    ValueError
-        For an unknown unit, and a number of them that is not above 0.
+    ValueError for an unknown unit, and a number of them that is not above 0.
 
     Examples
     --------

@@ -9,26 +9,14 @@ VIEWS = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 
 def checked_view(view: str | None) -> str | None:
-    """Return the view if it is one.
-
-    Raises
-    ------
-    ValueError
-        For any other word.
-    """
+    """Return the view if it is one; ValueError for any other word."""
     if view is not None and view not in VIEWS:
         raise ValueError(f"view '{view}' is not known; the views are {', '.join(VIEWS)}")
     return view
 
 
 def checked_dimension(dimension: int | str | None) -> int | None:
-    """Return the dimension, None for "auto".
-
-    Raises
-    ------
-    ValueError
-        For anything but 2, 3 and "auto".
-    """
+    """Return the dimension, None for "auto"; ValueError for anything but 2, 3 and "auto"."""
     if dimension in (None, "auto"):
         return None
     if dimension not in (2, 3) or isinstance(dimension, bool):

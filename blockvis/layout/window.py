@@ -20,10 +20,7 @@ BEYOND = 1e-6
 def checked_window(window: Sequence[float] | None) -> tuple[float, ...]:
     """Return the corners x0, y0, x1, y1 of a window [m], () for none.
 
-    Raises
-    ------
-    ValueError
-        For anything but two corners, the lower left one first.
+    ValueError for anything but two corners, the lower left one first.
     """
     if window is None or len(window) == 0:
         return ()
@@ -36,17 +33,14 @@ def checked_window(window: Sequence[float] | None) -> tuple[float, ...]:
 def within_window(layout: Layout, window: Sequence[float]) -> Layout:
     """Keep what lies within a window; what crosses its edge is left out, and what lies beyond is counted in a note.
 
+    ValueError if no block lies within it; says from where to where the drawing goes.
+
     Parameters
     ----------
     layout : Layout
         In the plane, lengths in m.
     window : sequence of float
         x0, y0, x1, y1 [m], or none.
-
-    Raises
-    ------
-    ValueError
-        If no block lies within it; says from where to where the drawing goes.
     """
     if len(window) == 0:
         return layout

@@ -146,6 +146,8 @@ def close_joints(
 ) -> Closing:
     """Move facing edges onto the line midway between them, or give the mortar to the nearest stone.
 
+    ValueError with the number of the outline, if "faces" would fold one.
+
     Parameters
     ----------
     outlines : sequence of (n, 2) arrays [m]
@@ -164,11 +166,6 @@ def close_joints(
         Surfaces of mortar as drawn, with the stones as their holes; the nearest stone takes all of it, however wide.
     laid : (n_blocks,) bool array, optional
         Blocks between which a gap is no joint.
-
-    Raises
-    ------
-    ValueError
-        With the number of the outline, if "faces" would fold one.
     """
     anchored = np.zeros(len(outlines), dtype=bool) if anchored is None else np.asarray(anchored, dtype=bool)
     if method == "auto":

@@ -252,7 +252,6 @@ def straight_share(outlines: Sequence[np.ndarray], found: Facing) -> float:
     Parameters
     ----------
     outlines : sequence of (n, 2) arrays [m]
-    found : Facing
 
     Returns
     -------

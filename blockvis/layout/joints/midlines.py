@@ -41,8 +41,6 @@ def common_lines(found: Facing, edges: Edges, anchored: np.ndarray, closed: floa
 
     Parameters
     ----------
-    found : Facing
-    edges : Edges
     anchored : (n_blocks,) bool array
         Blocks that keep their outline.
     closed : float [m]
@@ -143,7 +141,6 @@ def moved_outlines(edges: Edges, lines: dict[int, Line], longest: float) -> list
 
     Parameters
     ----------
-    edges : Edges
     lines : {edge: line}
         Edges without a line stay.
     longest : float [m]

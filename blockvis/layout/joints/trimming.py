@@ -35,8 +35,6 @@ def extended_to_lines(
     ----------
     base : list of (n, 2) arrays [m]
         Outlines with the common lines applied.
-    edges : Edges
-    found : Facing
     uncommon : list of int
         Stretches without a common line.
     lines : {edge: line}
