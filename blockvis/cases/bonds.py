@@ -57,15 +57,7 @@ BOND = Section(
 
 @dataclass(frozen=True)
 class Bonding:
-    """A table [[bond]].
-
-    Attributes
-    ----------
-    choice : Choice
-        What of the drawing is filled.
-    pattern : Pattern
-    thickness : float or None [m]
-    """
+    """A table [[bond]]: what of the drawing is filled, with which pattern, and how thick the wall is [m]."""
 
     choice: Choice
     pattern: Pattern

@@ -16,28 +16,10 @@ DIRECTIONS = ("down", "up", "left", "right", "rotation", "front", "back", "outwa
 
 @dataclass(frozen=True)
 class ExplainSettings:
-    """What ``blockvis explain`` looks for.
+    """What ``blockvis explain`` looks for, by the keys of :data:`EXPLAIN`.
 
-    Attributes
-    ----------
-    supports : tuple of tuples of str
-        Supports, or groups of them that move as one; each support of the drawing by default.
-    directions : tuple of str
-        Of :data:`DIRECTIONS`; where empty, those that are usual in the plane or in space.
-    trough : bool, optional
-        Whether troughs of the ground are candidates; by default where the structure stands on three places or more.
-    centres, inflections : tuple of float [m]
-        Of troughs; a few over the width of the structure by default.
-    friction : (float, float), optional
-        Range of the friction coefficient; by default from 0.8 to 1.25 times that of the case.
-    limit : float, optional [m]
-        Largest displacement of a support.
-    model_uncertainty : float
-        Standard deviation of computed widths, as a fraction of the observed ones.
-    place_uncertainty : float, optional [m]
-        Within which a crack at x, y may be another joint of the model; half a block by default.
-    outliers : float
-        Probability that an observation has another cause.
+    Supports that moved as one stand in one tuple; without ``directions`` those count that are usual in the plane or in
+    space.
     """
 
     supports: tuple[tuple[str, ...], ...] = ()

@@ -30,17 +30,7 @@ REMOVE = Section(
 
 @dataclass(frozen=True)
 class Removal:
-    """A table [[remove]].
-
-    Attributes
-    ----------
-    phase : int
-        Number of the settlement, from 1, before which they are taken away.
-    blocks, ties : tuple of str
-        Names or patterns.
-    where : str
-        File and table, for messages.
-    """
+    """A table [[remove]], by its keys; ``where`` are file and table, for messages."""
 
     phase: int
     blocks: tuple[str, ...] = ()

@@ -50,22 +50,9 @@ class TieEnd:
 
 @dataclass(frozen=True)
 class TieCase:
-    """One entry of ``[[ties]]``.
+    """One entry of ``[[ties]]``, by its keys; ``where`` are file and table, for messages.
 
-    Attributes
-    ----------
-    name : str
-    ends : tuple of TieEnd
-        Two, or none of the lines of a layer.
-    layer : str
-        Whose lines are ties with these properties.
-    stiffness : float, optional [N/m]
-    area, modulus : float, optional [m², Pa]
-        Instead.
-    kind, strength, brittle, prestress, phase
-        As of :class:`solver.Tie`.
-    where : str
-        File and table, for messages.
+    It has two ends, or none where it says how the lines of a layer are.
     """
 
     name: str

@@ -51,28 +51,7 @@ OF_KINDS = {
 
 @dataclass(frozen=True)
 class Pattern:
-    """How a wall is laid.
-
-    Attributes
-    ----------
-    bond : str
-        One of :data:`PATTERNS`.
-    brick : (float, float) [m]
-        Length and height, joint included.
-    joint : float [m]
-        Thickness of the mortar left open around each stone; 0 for stones that touch.
-    heads : {"auto", "lintel", "flat arch", "arch", "none"}
-    bearing : float, optional [m]
-        Of lintels; half a brick by default.
-    quoins : (float, float), optional [m]
-        Length and height of larger stones at the upright ends, every second one half as long.
-    stone : float, optional [m]
-        Mean length of the stones of rubble; the length of a brick by default.
-    flatness : float
-        Length over height of the stones of rubble.
-    seed : int
-        Of random lengths and outlines.
-    """
+    """How a wall is laid: the parameters of :func:`bond`, checked."""
 
     bond: str = "running"
     brick: tuple[float, float] = (0.25, 0.075)

@@ -29,7 +29,7 @@ _OF_HEADS = {
 
 @dataclass(frozen=True)
 class Opening:
-    """A rectangular opening in a wall, and its head.
+    """A rectangular opening in a wall, and its head, one of :data:`HEADS`.
 
     Attributes
     ----------
@@ -37,16 +37,14 @@ class Opening:
         Lower left corner; y is the sill, 0 for a door.
     width, height : float [m]
         Of the rectangle; an arch springs at its top.
-    head : {"lintel", "flat arch", "segmental arch", "round arch", "none"}
     depth : float [m]
         Height of a lintel or flat arch, thickness of an arch.
     bearing : float [m]
         Of a lintel, on either side.
     rise : float [m]
-        Of a segmental arch, at the intrados.
+        Of an arch, at the intrados.
     skew : float [degrees]
         Lean of the skewbacks of a flat arch from the vertical.
-    voussoirs : int
     """
 
     x: float

@@ -64,19 +64,7 @@ MOST_LISTED = 8
 
 @dataclass(frozen=True)
 class LimitLoadSettings:
-    """Keys of the case file that limit loads have for themselves.
-
-    Attributes
-    ----------
-    flow : str
-        One of ``FLOWS``.
-    torsion : str
-        One of ``TORSIONS``.
-    capacity_at : tuple of float, optional [m or rad]
-        Settlements at which limit loads are wanted; all by default.
-    displacement : float, optional [m]
-        Within which joints that a settlement has opened may close.
-    """
+    """Keys of the case file that limit loads have for themselves; see :attr:`LimitLoadKind.keys`."""
 
     flow: str = "associative"
     capacity_at: tuple[float, ...] | None = None

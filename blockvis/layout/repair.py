@@ -115,14 +115,10 @@ def repaired(
     overlap_tolerance : float, optional [m]
         Deeper overlaps are an error; by default 0.04 of the width of a typical block (twice its area over its
         perimeter).
-    anchored : (n_blocks,) bool array
-        Blocks that keep their outline.
     closing : {"auto", "faces", "voronoi"}
         How joints are closed; see :func:`blockvis.layout.joints.close.close_joints`.
     mortar : sequence of LeftOut
         Surfaces of mortar as drawn, with the stones as their holes.
-    laid : (n_blocks,) bool array, optional
-        Blocks between which a gap is no joint.
 
     Returns
     -------

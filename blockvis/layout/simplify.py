@@ -29,12 +29,10 @@ def default_tolerance(outlines: Sequence[np.ndarray]) -> float:
 
 
 def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[np.ndarray], str]:
-    """Drop corners of outlines; edges that blocks share stay shared.
+    """Drop corners of outlines, (n, 2) arrays [m]; edges that blocks share stay shared.
 
     Parameters
     ----------
-    outlines : sequence of (n, 2) arrays [m]
-        Counter-clockwise.
     tolerance : float [m]
         Farthest that a dropped corner may lie from the outline that is left.
 
@@ -77,12 +75,22 @@ def _shortened(
     chains: Sequence[Sequence[tuple[int, ...]]], kept: Collection[int], points: np.ndarray, tolerance: float
 ) -> list[np.ndarray]:
     """Put outlines together again of their chains, those of kept blocks as they are, the others simplified."""
+    import shapely
+
     whole = {_key(chain) for block in kept for chain in chains[block]}
+    keys = list({_key(chain) for parts in chains for chain in parts})
+    lines = [shapely.LineString(points[list(key)]) for key in keys]
+    simple = shapely.simplify(lines, tolerance, preserve_topology=False)
     short = {
-        key: key if key in whole else _simple(key, points, tolerance)
-        for key in {_key(chain) for parts in chains for chain in parts}
+        key: shapely.get_coordinates(line if key in whole else shorter)
+        for key, line, shorter in zip(keys, lines, simple, strict=True)
     }
-    return [points[[i for chain in parts for i in _turned(short[_key(chain)], chain)[:-1]]] for parts in chains]
+
+    def along(chain: tuple[int, ...]) -> np.ndarray:
+        found = short[_key(chain)]
+        return found if _key(chain) == chain else found[::-1]
+
+    return [np.concatenate([along(chain)[:-1] for chain in parts]) for parts in chains]
 
 
 def _shared_corners(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -130,29 +138,6 @@ def _chains(ids: np.ndarray, points: np.ndarray, nodes: np.ndarray) -> list[tupl
 def _key(chain: tuple[int, ...]) -> tuple[int, ...]:
     """Write a chain in the direction in which both its blocks simplify it."""
     return min(chain, chain[::-1])
-
-
-def _turned(simple: tuple[int, ...], chain: tuple[int, ...]) -> tuple[int, ...]:
-    return simple if _key(chain) == chain else simple[::-1]
-
-
-def _simple(chain: tuple[int, ...], points: np.ndarray, tolerance: float) -> tuple[int, ...]:
-    """Drop the corners of a chain that lie within the tolerance [m] of what is left."""
-    places = points[list(chain)]
-    kept, open_parts = {0, len(chain) - 1}, [(0, len(chain) - 1)]
-    while open_parts:
-        i, j = open_parts.pop()
-        if j - i < 2:
-            continue
-        along, offset = places[j] - places[i], places[i + 1 : j] - places[i]
-        length = float(np.hypot(*along))
-        t = np.clip(offset @ along / max(length, 1e-300) ** 2, 0.0, 1.0)
-        apart = np.hypot(*(offset - t[:, None] * along).T)
-        k = int(np.argmax(apart))
-        if apart[k] > tolerance:
-            kept.add(i + 1 + k)
-            open_parts += [(i, i + 1 + k), (i + 1 + k, j)]
-    return tuple(chain[k] for k in sorted(kept))
 
 
 def _spoilt(found: list[np.ndarray], drawn: Sequence[np.ndarray], tolerance: float) -> set[int]:

@@ -89,11 +89,7 @@ def proposed(outlines: Sequence[np.ndarray], method: str = "auto", laid: np.ndar
 
     Parameters
     ----------
-    outlines : sequence of (n, 2) arrays [m]
-        Counter-clockwise.
     method : {"auto", "faces", "voronoi"}
-    laid : (n_blocks,) bool array, optional
-        Blocks between which a gap is no joint.
     """
     thickness, found = proposed_thickness(outlines, laid)
     if method == "auto":
@@ -150,8 +146,6 @@ def close_joints(
 
     Parameters
     ----------
-    outlines : sequence of (n, 2) arrays [m]
-        Counter-clockwise.
     thickness : float [m]
         Widest gap that is a joint.
     overlap : float [m]
@@ -164,8 +158,6 @@ def close_joints(
         edges that move would fold an outline.
     mortar : sequence of LeftOut
         Surfaces of mortar as drawn, with the stones as their holes; the nearest stone takes all of it, however wide.
-    laid : (n_blocks,) bool array, optional
-        Blocks between which a gap is no joint.
     """
     anchored = np.zeros(len(outlines), dtype=bool) if anchored is None else np.asarray(anchored, dtype=bool)
     if method == "auto":

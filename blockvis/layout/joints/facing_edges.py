@@ -104,14 +104,10 @@ def facing_edges(
 
     Parameters
     ----------
-    outlines : sequence of (n, 2) arrays [m]
-        Counter-clockwise.
     reach : float [m]
         Widest gap.
     overlap : float [m]
         Deepest overlap.
-    laid : (n_blocks,) bool array, optional
-        Blocks between which a gap is no joint.
 
     Notes
     -----
@@ -199,13 +195,6 @@ def _nearest(found: Facing, edges: Edges) -> Facing:
 def proposed_thickness(outlines: Sequence[np.ndarray], laid: np.ndarray | None = None) -> tuple[float, Facing]:
     """Propose the joint thickness that closes the mortar joints of a drawing.
 
-    Parameters
-    ----------
-    outlines : sequence of (n, 2) arrays [m]
-        Counter-clockwise.
-    laid : (n_blocks,) bool array, optional
-        Blocks between which a gap is no joint.
-
     Returns
     -------
     thickness : float [m]
@@ -249,10 +238,6 @@ def rounded_up(length: float) -> float:
 def straight_share(outlines: Sequence[np.ndarray], found: Facing) -> float:
     """Share of the length of joints between straight faces: parallel, or long compared with their blocks.
 
-    Parameters
-    ----------
-    outlines : sequence of (n, 2) arrays [m]
-
     Returns
     -------
     float
@@ -275,7 +260,6 @@ def open_shares(outlines: Sequence[np.ndarray], found: Facing, rounding: float) 
 
     Parameters
     ----------
-    outlines : sequence of (n, 2) arrays [m]
     found : Facing
         Stretches with a gap, as of :func:`proposed_thickness`.
     rounding : float [m]

@@ -41,8 +41,6 @@ def common_lines(found: Facing, edges: Edges, anchored: np.ndarray, closed: floa
 
     Parameters
     ----------
-    anchored : (n_blocks,) bool array
-        Blocks that keep their outline.
     closed : float [m]
         Gap that is a rounding error.
 

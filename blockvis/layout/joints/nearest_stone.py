@@ -91,8 +91,6 @@ def share_out(
 
     Parameters
     ----------
-    outlines : sequence of (n, 2) arrays [m]
-        Counter-clockwise.
     thickness : float [m]
         Gaps up to this width are mortar, and the pockets between such gaps.
     anchored : (n_blocks,) bool array
@@ -144,11 +142,6 @@ def _shape(ring: np.ndarray) -> Any:
 
 def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
     """Propose the joint thickness that closes the joints between stones of any shape.
-
-    Parameters
-    ----------
-    outlines : sequence of (n, 2) arrays [m]
-        Counter-clockwise.
 
     Returns
     -------

@@ -38,8 +38,6 @@ def extended_to_lines(
     uncommon : list of int
         Stretches without a common line.
     lines : {edge: line}
-    anchored : (n_blocks,) bool array
-        Blocks that keep their outline.
     thickness : float [m]
         Of the joints.
 
@@ -112,8 +110,6 @@ def separated(rings: list[np.ndarray], anchored: np.ndarray, thickness: float, c
     ----------
     rings : list of (n, 2) arrays [m]
         Counter-clockwise.
-    anchored : (n_blocks,) bool array
-        Blocks that keep their outline.
     thickness : float [m]
         Of the joints.
     closed : float [m]
@@ -191,8 +187,6 @@ def merge_close_corners(
     rings : list of (n, 2) arrays [m]
     involved : list of int
         Blocks whose corners may move.
-    anchored : (n_blocks,) bool array
-        Blocks whose corners stay.
     reach : float [m]
         Corners closer than this are merged.
     closed : float [m]
