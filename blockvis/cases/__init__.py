@@ -1,1 +1,4 @@
-"""What a case holds, and the assembly, interfaces and loads that are built of it."""
+"""What a case holds, and the assembly, interfaces and loads that are built of it.
+
+``source`` is the case file, and ``where`` file, table and key: both are for messages.
+"""

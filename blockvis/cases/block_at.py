@@ -86,8 +86,6 @@ def block_at(
         The blocks it may be.
     towards : (d,) sequence
         Of a force at the point.
-    where : str
-        File, table and key, for the message.
     gone : (n_blocks,) bool array
         Blocks that have been taken away before, which hold nothing.
     """

@@ -88,8 +88,6 @@ def bonded(
     ----------
     layout : Layout
         Of all outlines of the drawing, as :func:`blockvis.formats.read.read_outlines` gives it.
-    where : str
-        The case file or command, for messages.
     roles : mapping of str to str, optional
         Supports are not filled.
     mortar : bool

@@ -132,8 +132,6 @@ def distribution_of(values: Mapping[str, Any], table: Table) -> Distribution:
     ----------
     values : mapping
         As a section with :data:`DISTRIBUTION_KEYS` and :data:`FORMS` reads them.
-    table : Table
-        For messages.
     """
     kind = values["distribution"]
     numbers = {key: float(values[key]) for key in FORMS.keys(kind) if values[key] is not None}

@@ -80,8 +80,6 @@ def loads_of(
 
     Parameters
     ----------
-    source : Path
-        The case file, for messages.
     gone : (n_blocks,) bool array
         Blocks that have been taken away before the loads begin to act: they neither carry them nor shield others.
     phase : int, optional

@@ -225,8 +225,6 @@ def with_profiles(
         One per settlement, or none at all.
     assembly : solver.Assembly
         Its ground cut for the profiles.
-    source : Path
-        The case file, for messages.
     """
     found = []
     for k, given in enumerate(settlements):

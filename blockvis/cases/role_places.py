@@ -33,8 +33,6 @@ class RolePlace:
     ranges : tuple of (str, float, float)
         Coordinates "x", "y", "z" with their least and largest values [m].
     role : str
-    where : str
-        File, table and key, for messages.
     """
 
     kind: str

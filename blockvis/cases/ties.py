@@ -211,8 +211,6 @@ def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tu
         Read with the layers ignored.
     layers : sequence of str
         Or patterns of them.
-    source : Path
-        The case file, for messages.
 
     Returns
     -------

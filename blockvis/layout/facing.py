@@ -79,8 +79,6 @@ def faced(
     Parameters
     ----------
     solids : sequence of Solid [m]
-    names : sequence of str
-        For the note.
     tolerance : float, optional [m]
         Gaps and overlaps up to this are faced; by default 0.01 of the width of a typical block.
     anchored : (n_blocks,) bool array, optional

@@ -65,8 +65,6 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
     Parameters
     ----------
     points : (n, 2) or (n, 3) array
-    where : str
-        The file, for messages.
     view : {"xy", "xz", "yz"}, optional
         The coordinates to take; by default those in which the drawing extends.
 
@@ -102,8 +100,6 @@ def drawing_plane(lines: Sequence[np.ndarray], where: str, view: str | None = No
     ----------
     lines : sequence of (n, 3) arrays
         Outlines and lines: where each is level, they lie in x and y, one above the other.
-    where : str
-        The file, for messages.
     view : {"xy", "xz", "yz"}, optional
         The coordinates to take of a drawing that lies in no plane, by default x and y; those of one that does.
 
