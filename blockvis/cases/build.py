@@ -209,20 +209,18 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
         notes.append(
             f"density {light:g} kg/m³ is lighter than masonry; if it is in {unit}, give {factor * light:.4g} kg/m³"
         )
-    steps = [s.increment for s in case.settlements if s.unit == "m"]
-    block = float(np.median(sizes)) if len(sizes) else np.inf
-    if steps and max(steps) > block:
-        notes.append(
-            f"[settlement] increment = {max(steps):g} m is {max(steps) / block:.3g} times the size of the median "
-            f"block, {block:.3g} m: is it in mm? {1e-3 * max(steps):g} m"
-        )
-    limits = [s.limit for s in case.settlements if s.unit == "m"]
-    whole = float(np.ptp(assembly.vertices, axis=0).max())
-    if limits and max(limits) > max(FARTHEST_LIMIT * whole, solver.Settlement.limit):
-        notes.append(
-            f"[settlement] limit = {max(limits):g} m is {max(limits) / whole:.3g} times the size of the structure, "
-            f"{whole:.3g} m: is it in mm? {1e-3 * max(limits):g} m"
-        )
+    whole, block = float(np.ptp(assembly.vertices, axis=0).max()), float(np.median(sizes)) if len(sizes) else np.inf
+    farthest = max(FARTHEST_LIMIT * whole, solver.Settlement.limit)
+    for key, most, size, what in (
+        ("increment", block, block, "size of the median block"),
+        ("limit", farthest, whole, "size of the structure"),
+    ):
+        largest = max((getattr(s, key) for s in case.settlements if s.unit == "m"), default=0.0)
+        if largest > most:
+            notes.append(
+                f"[settlement] {key} = {largest:g} m is {largest / size:.3g} times the {what}, {size:.3g} m: "
+                f"is it in mm? {1e-3 * largest:g} m"
+            )
     for note in notes:
         if note:
             warnings.warn(f"{case.source}: {note}", stacklevel=3)

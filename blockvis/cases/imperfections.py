@@ -56,16 +56,7 @@ ITERATIONS = 5
 
 @dataclass(frozen=True)
 class Imperfection:
-    """One entry of ``[[imperfections]]``.
-
-    Attributes
-    ----------
-    kind : str
-        "vertices": each coordinate of the displacement of a corner [m]; "friction": a factor on the coefficient of each
-        pair of blocks; "density": a factor on that of each block.
-    distribution : Distribution
-    seed : int
-    """
+    """One entry of ``[[imperfections]]``, by its keys."""
 
     kind: str
     distribution: Distribution

@@ -19,31 +19,10 @@ from .topmost import force_on_top_in_space
 
 @dataclass(frozen=True)
 class LoadCase:
-    """One entry of ``[[loads]]``.
+    """One entry of ``[[loads]]``, by its keys [N, N·m, Pa, m].
 
-    Attributes
-    ----------
-    kind : str
-        "dead" or "live".
-    blocks : str
-        A name or pattern.
-    weight_fraction : (2,) tuple, in space (3,), optional
-    force : (2,) tuple, in space (3,) [N]
-    point : (2,) tuple, in space (3,) [m], optional
-        Of several blocks the force acts on the one that holds it.
-    moment : float, in space (3,) tuple [N·m]
-    pressure : float, optional [Pa]
-        On the first faces in the way of ``direction``, or on ``edge``.
-    direction : (2,) tuple
-        In which the pressure pushes.
-    edge : int, optional
-        Number of the edge, from 1, that the pressure pushes into: counter-clockwise from the first corner.
-    positions : tuple of float [m]
-        Places x of a force that moves over the topmost surface of the structure; empty for other loads.
-    y : float, optional [m]
-        Of all positions, in space.
-    phase : int
-        Number of the settlement, from 1, from which on it acts.
+    Directions, forces and points have two coordinates, in space three, and so has a moment there. ``edge`` counts from
+    1, counter-clockwise from the first corner; ``positions`` are the places x of a load that moves, none of others.
     """
 
     kind: str = "dead"

@@ -86,9 +86,8 @@ def segmental_arch(
         Radial.
     voussoirs : int
         Number of voussoirs, quadrilaterals with all four corners on the circles.
-    density : float [kg/m³]
-    depth : float [m]
-        Out of plane.
+    density, depth
+        As in :func:`arch`.
 
     Returns
     -------
@@ -120,13 +119,10 @@ def pointed_arch(
     ----------
     span, rise : float [m]
         Of the intrados; the rise is at least half the span. A rise of 0.866 spans is the equilateral arch.
-    thickness : float [m]
-        Radial.
     voussoirs : int
         An even number has a joint at the apex, an odd number a keystone.
-    density : float [kg/m³]
-    depth : float [m]
-        Out of plane.
+    thickness, density, depth
+        As in :func:`segmental_arch`.
 
     Returns
     -------
@@ -180,13 +176,10 @@ def basket_handle_arch(
     ----------
     span, rise : float [m]
         Of the intrados; the rise is between 0.134 and 0.5 spans.
-    thickness : float [m]
-        Radial.
     voussoirs : int
         Number of voussoirs, equally long along the intrados.
-    density : float [kg/m³]
-    depth : float [m]
-        Out of plane.
+    thickness, density, depth
+        As in :func:`segmental_arch`.
 
     Returns
     -------

@@ -154,9 +154,8 @@ def two_leaf_wall(
         Every so many courses have headers, the first of them at that height; at most ``courses``.
     header_spacing : int
         In these courses every so many whole bricks, from the first on, are replaced by two headers side by side.
-    brick_length, brick_height : float [m]
-        A brick is half as wide as it is long.
-    density : float [kg/m³]
+    brick_length, brick_height, density
+        As in :func:`l_corner`.
 
     Returns
     -------

@@ -78,9 +78,8 @@ def portal(
     column_blocks : int
         In each column.
     lintel_height : float [m]
-    density : float [kg/m³]
-    depth : float [m]
-        Out of plane.
+    density, depth
+        As in :func:`column`.
 
     Returns
     -------
@@ -130,9 +129,8 @@ def arch_on_piers(
         From the ground to the springing of the intrados.
     pier_blocks : int
         In each pier, 1 for a monolith; the top block has the skewback.
-    density : float [kg/m³]
-    depth : float [m]
-        Out of plane.
+    density, depth
+        As in :func:`column`.
 
     Returns
     -------
@@ -169,21 +167,14 @@ def buttressed_arch(
 
     Parameters
     ----------
-    span, rise, thickness : float [m]
-        Of the arch, as in :func:`arch_on_piers`.
-    voussoirs : int
-    pier_width, pier_height : float [m]
-    pier_blocks : int
-        In each pier.
+    span, rise, thickness, voussoirs, pier_width, pier_height, pier_blocks, density, depth
+        As in :func:`arch_on_piers`.
     buttress_width, buttress_top : float [m]
         Width of a buttress at the ground and at its top.
     buttress_height : float [m]
         At most that of the pier.
     buttress_blocks : int
         Courses of a buttress.
-    density : float [kg/m³]
-    depth : float [m]
-        Out of plane.
 
     Returns
     -------

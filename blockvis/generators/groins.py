@@ -82,14 +82,13 @@ def church_bay(
 
     Parameters
     ----------
-    span, rise, thickness, voussoirs, width, stone
+    span, rise, thickness, voussoirs, width, stone, density
         As in :func:`cross_vault`.
     pier : float [m]
         Side of a pier in plan, outwards from the inner corner of the vault's support.
     pier_height : float [m]
     pier_stones : int
         Number of stones of a pier.
-    density : float [kg/m³]
 
     Returns
     -------
@@ -165,15 +164,12 @@ def pavilion_vault(
     ----------
     span, rise : float [m]
         Of the intrados between opposite walls; the rise is at most half the span.
-    thickness : float [m]
-        Radial.
     voussoirs : int
         Number of courses from wall to wall over the keystone, an odd number.
-    stone : float [m]
-        Length of a stone along its course; the joints of neighbouring courses are half a stone apart.
     bonded : bool
         Whether stones on the diagonals reach into both sides, or are cut along the diagonal.
-    density : float [kg/m³]
+    thickness, stone, density
+        As in :func:`cross_vault`.
 
     Returns
     -------

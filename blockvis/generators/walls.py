@@ -130,7 +130,6 @@ def facade(
     ----------
     bricks, courses : int
         Brick lengths along the façade, and courses.
-    brick_length, brick_height : float [m]
     storeys, windows : int
         Rows of windows, and windows in each.
     window_bricks : float
@@ -143,9 +142,8 @@ def facade(
         Rise of each arch at the intrados, in courses.
     settling_from : float [m], optional
         The ground from this x to the right is a moving support; the right third by default.
-    density : float [kg/m³]
-    depth : float [m]
-        Out of plane.
+    brick_length, brick_height, density, depth
+        As in :func:`wall`.
 
     Returns
     -------
@@ -237,9 +235,8 @@ def panel(
     x_s : float [m], optional
         The base is fixed under x < x_s and moves under x > x_s; the middle by default.
     block_height : float [m]
-    density : float [kg/m³]
-    depth : float [m]
-        Out of plane.
+    density, depth
+        As in :func:`wall`.
 
     Returns
     -------

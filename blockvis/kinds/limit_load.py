@@ -129,16 +129,16 @@ class LimitLoadKind(AnalysisKind):
 
     def refuse(self, settings: LimitLoadSettings, case: Case) -> None:
         """Refuse keys of limit loads."""
-        if settings.flow != "associative":
-            raise ValueError(
-                f'{case.source}: [analysis] flow "{settings.flow}" belongs to kind = "{self.name}"; a {case.analysis} '
-                "follows the geometry, in which friction never dilates"
-            )
-        if settings.torsion != "points":
-            raise ValueError(
-                f'{case.source}: [analysis] torsion "{settings.torsion}" belongs to kind = "{self.name}"; a '
-                f"{case.analysis} has the torsion of its contact points"
-            )
+        reasons = {
+            "flow": "follows the geometry, in which friction never dilates",
+            "torsion": "has the torsion of its contact points",
+        }
+        for key, reason in reasons.items():
+            if (value := getattr(settings, key)) != getattr(LimitLoadSettings, key):
+                raise ValueError(
+                    f'{case.source}: [analysis] {key} "{value}" belongs to kind = "{self.name}"; a {case.analysis} '
+                    f"{reason}"
+                )
         if settings.displacement is not None:
             raise _displacement_without_settlement(case)
         if settings.capacity_at is not None:
@@ -188,21 +188,15 @@ class LimitLoadKind(AnalysisKind):
         """List the limit loads; of the one that governs its bounds, flow and status, too."""
         chosen, states = response.governing, response.limit_states
         limit = next((limit for limit, state in states if state is chosen), states[0][0] if states else None)
+        governing = {} if limit is None else _stored(limit)
         summary: dict[str, Any] = {
             "settlements": [asdict(settlement) for settlement in response.settlements],
-            "limit_load_multiplier": None if limit is None else finite(limit.multiplier),
-            "limit_load_bounds": None if limit is None else [finite(bound) for bound in limit.bounds],
-            "limit_load_flow": None if limit is None else limit.flow,
-            "limit_load_status": None if limit is None else str(limit.status),
-            "live_load": None if limit is None else limit.live_force,
+            **{f"limit_load_{key}": governing.get(key) for key in ("multiplier", "bounds", "flow", "status")},
+            "live_load": governing.get("live_load"),
             "limit_loads": [
                 {
                     "increment": number,
-                    "multiplier": finite(limit.multiplier),
-                    "bounds": [finite(bound) for bound in limit.bounds],
-                    "status": str(limit.status),
-                    "flow": limit.flow,
-                    "live_load": limit.live_force,
+                    **_stored(limit),
                     "programs": limit.programs,
                     **({"torsion": limit.torsion} if limit.torsion != "points" else {}),
                     **({} if limit.staying_open is None else {"staying_open": finite(limit.staying_open)}),
@@ -386,6 +380,17 @@ def _capacity_at_without_settlement(case: Case) -> ValueError:
         f'{case.source}: [analysis] capacity_at asks for limit loads (kind = "limit load") of loads that stand still, '
         "along a [settlement]"
     )
+
+
+def _stored(limit: solver.LimitLoad) -> dict[str, Any]:
+    """List what summary.json says of a limit load."""
+    return {
+        "multiplier": finite(limit.multiplier),
+        "bounds": [finite(bound) for bound in limit.bounds],
+        "status": str(limit.status),
+        "flow": limit.flow,
+        "live_load": limit.live_force,
+    }
 
 
 def _stored_limits(summary: Mapping[str, Any], increments: Sequence[solver.Increment]) -> tuple[solver.LimitLoad, ...]:

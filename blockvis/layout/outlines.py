@@ -77,15 +77,12 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
     """
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
-    spread = spread_of(points, where)
-    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
+    spread, flat = _flat_views(points, where, view)
     if not flat:
         raise ValueError(
             f"{where} is not flat: its points spread over {spread[0]:.4g} × {spread[1]:.4g} × {spread[2]:.4g}; "
             "draw the blocks in the plane, or give closed prismatic bodies"
         )
-    if view is not None and view not in flat:
-        raise ValueError(f'{where} lies in {flat[0]}: seen as {view} it has no area; give view = "{flat[0]}", or none')
     chosen = view or flat[0]
     note = "" if chosen == "xy" else upright_note(chosen)
     return points[:, VIEWS[chosen]], note
@@ -111,10 +108,7 @@ def drawing_plane(lines: Sequence[np.ndarray], where: str, view: str | None = No
         What that changes.
     """
     points = np.concatenate(lines)
-    spread = spread_of(points, where)
-    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
-    if view is not None and flat and view not in flat:
-        raise ValueError(f'{where} lies in {flat[0]}: seen as {view} it has no area; give view = "{flat[0]}", or none')
+    spread, flat = _flat_views(points, where, view)
     chosen = view or (flat[0] if flat else "xy")
     turn, notes = np.eye(3)[[*VIEWS[chosen], axis_across(chosen)]], [] if chosen == "xy" else [upright_note(chosen)]
     if flat:
@@ -129,6 +123,15 @@ def drawing_plane(lines: Sequence[np.ndarray], where: str, view: str | None = No
     text = f"the drawing stands upright at {angle:.3g}° to x: its lengths in that direction and z were read as (x, y)"
     ignored = f"; its relief of {relief:.3g} across was ignored" if relief > FLAT * spread.max() else ""
     return np.array([first, [0.0, 0.0, 1.0], [first[1], -first[0], 0.0]]), [Note(UPRIGHT, text + ignored)]
+
+
+def _flat_views(points: np.ndarray, where: str, view: str | None) -> tuple[np.ndarray, list[str]]:
+    """(3,) array: how far points spread, and in which views they are flat; ValueError for a view in which not."""
+    spread = spread_of(points, where)
+    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
+    if view is not None and flat and view not in flat:
+        raise ValueError(f'{where} lies in {flat[0]}: seen as {view} it has no area; give view = "{flat[0]}", or none')
+    return spread, flat
 
 
 def _upright(points: np.ndarray) -> tuple[np.ndarray, float] | None:

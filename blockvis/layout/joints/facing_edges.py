@@ -218,10 +218,16 @@ def proposed_thickness(outlines: Sequence[np.ndarray], laid: np.ndarray | None =
     widest = found.gaps.max(axis=1)
     joints = found.lengths >= widest
     joints = joints if joints.any() else np.ones(len(found), dtype=bool)
-    order = np.argsort(widest[joints])
-    width, share = widest[joints][order], np.cumsum(found.lengths[joints][order])
-    common = width[np.searchsorted(share, JOINTS * share[-1])]
+    width = widest[joints]
+    common = common_width(width, found.lengths[joints], JOINTS)
     return rounded_up(float(width[width <= WEDGE * common].max())), found
+
+
+def common_width(widths: np.ndarray, lengths: np.ndarray, share: float) -> float:
+    """Find the width [m] that bounds those of a share of the length of joints."""
+    order = np.argsort(widths)
+    summed = np.cumsum(lengths[order])
+    return float(widths[order][np.searchsorted(summed, share * summed[-1])])
 
 
 def search_reach(outlines: Sequence[np.ndarray]) -> float:

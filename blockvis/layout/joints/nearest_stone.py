@@ -17,6 +17,8 @@ from blockvis.layout.left_out import LeftOut
 from blockvis.layout.linked import linked
 from blockvis.layout.outlines import largest_piece, ring_of
 
+from .facing_edges import common_width
+
 #: Points along the outlines are this fraction of the joint thickness apart.
 SPACING = 0.2
 
@@ -160,9 +162,7 @@ def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
     near = local <= REACH * size
     if not near.any() or local[near].max() < 1e-6 * size:
         return 0.0, REACH * size
-    order = np.argsort(local[near])
-    share = np.cumsum(gaps.weights[near][order])
-    common = local[near][order][np.searchsorted(share, JOINTS * share[-1])]
+    common = common_width(local[near], gaps.weights[near], JOINTS)
     return float(local[local <= WIDER * common].max()), REACH * size
 
 
