@@ -18,7 +18,7 @@ from blockvis.cases.key import Key, Section
 from blockvis.layout.ground import COURSE, Ground, block_size, ground_of, with_role
 from blockvis.layout.inspect import Inspection
 from blockvis.layout.notes import UNIT, UNIT_CLASH, kind_of
-from blockvis.layout.units import better_unit
+from blockvis.layout.units import units_instead
 from blockvis.text import as_key, as_toml, rounded_length
 from solver import mechanics
 from solver.mechanics import counted
@@ -152,7 +152,7 @@ def relative_to(folder: Path, drawing: str | Path) -> str:
 
 def unit_instead(found: Inspection) -> tuple[str, str]:
     """Find the unit in which a drawing is masonry, where its own is in doubt, and why; both "" where it is not."""
-    unit = better_unit(found.layout.unit, float(np.median(found.layout.sizes)))
+    unit = next(iter(units_instead(found.layout.unit, float(np.median(found.layout.sizes)))), "")
     if not unit or found.layout.unit_by:
         return "", ""
     doubted = _note(found, UNIT).partition(": say so")[0]

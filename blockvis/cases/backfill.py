@@ -42,15 +42,10 @@ def read_backfill(table: Table) -> dict[str, Any]:
 
 
 def backfills(entries: Sequence[Mapping[str, Any]], assembly: solver.Assembly) -> tuple[solver.Backfill, ...]:
-    """Make the fills of a case, over blocks that several of them name one on another.
+    """Make the fills of a case, as :func:`read_backfill` reads them; several over a block lie one on another.
 
     ValueError for a name that no free block has, a surface below the extrados of a block, blocks of which none sees it,
     and two fills over a block up to the same surface.
-
-    Parameters
-    ----------
-    entries : sequence of mappings
-        As of :func:`read_backfill`.
     """
     laid = [lay_backfill(assembly, **entry) for entry in entries]
     for number, fill in enumerate(laid):

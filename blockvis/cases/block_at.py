@@ -17,12 +17,7 @@ ON_EDGE = 1e-6
 
 
 def distances_to(assembly: solver.Assembly, point: ArrayLike) -> np.ndarray:
-    """(n_blocks,) array [m]: how far each block as drawn is from a point, zero for those that hold it.
-
-    Parameters
-    ----------
-    point : (d,) sequence [m]
-    """
+    """(n_blocks,) array [m]: how far each block as drawn is from a point [m], zero for those that hold it."""
     if assembly.dimension == 2:
         outlines = np.array([shapely.Polygon(assembly.outline(block)) for block in range(assembly.n_blocks)])
         return np.asarray(shapely.distance(outlines, shapely.Point(point)))
@@ -45,15 +40,9 @@ def distances_to(assembly: solver.Assembly, point: ArrayLike) -> np.ndarray:
 
 
 def note_outside(assembly: solver.Assembly, point: Sequence[float], block: int, where: str, role: str) -> None:
-    """Warn of a point further outside the block that goes with it than a block is large.
+    """Warn of a point [m] further outside the block that goes with it than a block is large.
 
-    Parameters
-    ----------
-    point : (d,) sequence [m]
-    where : str
-        File, table and key.
-    role : str
-        What the block does, as "on which the force acts".
+    ``role`` says what the block does, as "on which the force acts".
     """
     corners = assembly.vertices[assembly.block_of_vertex == block]
     apart = float(np.linalg.norm(point - np.clip(point, corners.min(axis=0), corners.max(axis=0))))

@@ -19,7 +19,7 @@ from blockvis.layout.facing import DEFAULT_FACING
 from blockvis.layout.inspect import DENSITY
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.repair import DeepOverlap
-from blockvis.layout.units import better_unit, doubt
+from blockvis.layout.units import doubt, units_instead
 from blockvis.text import nearest
 from solver import mechanics
 from solver.mechanics import counted, steep_note
@@ -49,15 +49,10 @@ THICKNESS = 1.0
 
 
 def case_assembly(case: Case) -> solver.Assembly:
-    """Build the assembly of a case.
+    """Build the assembly of a case, with roles, supports, materials and imperfections.
 
     ValueError for a layout that cannot be read or built, for a file whose unit is in doubt while the case gives none,
     and for settlements without a moving support.
-
-    Returns
-    -------
-    solver.Assembly
-        Of its layout file or parametric layout, with roles, supports, materials and imperfections.
     """
     sketch = without_tie_lines(_drawn_layout(case), case.tie_layers, case.source)[0]
     _refuse_doubted_unit(case, sketch)
@@ -139,9 +134,9 @@ def _refuse_doubted_unit(case: Case, sketch: layout.Layout) -> None:
     if case.file is None or sketch.unit_by or case.bonds:
         return
     size = float(np.median(sketch.sizes))
-    better = better_unit(sketch.unit, size)
+    better = units_instead(sketch.unit, size)
     if better:
-        remedy = f'give [geometry] unit = "{better}", or unit = "{sketch.unit}" if it is right'
+        remedy = f'give [geometry] unit = "{better[0]}", or unit = "{sketch.unit}" if it is right'
         raise ValueError(f"{case.source}: '{case.file.name}': {doubt(sketch.unit, size, remedy=remedy)}")
 
 

@@ -123,15 +123,10 @@ class Distribution:
 
 
 def distribution_of(values: Mapping[str, Any], table: Table) -> Distribution:
-    """Make the distribution of a table, and check that its numbers go together.
+    """Make the distribution of a table, read with :data:`DISTRIBUTION_KEYS`, and check that its numbers go together.
 
     ValueError for a number that must be above 0, limits in the wrong order, and limits between which the variable
     almost never is.
-
-    Parameters
-    ----------
-    values : mapping
-        As a section with :data:`DISTRIBUTION_KEYS` and :data:`FORMS` reads them.
     """
     kind = values["distribution"]
     numbers = {key: float(values[key]) for key in FORMS.keys(kind) if values[key] is not None}

@@ -17,13 +17,9 @@ UPRIGHT = 1e-9
 
 
 def extrados(assembly: solver.Assembly, chosen: np.ndarray, surface: float) -> tuple[np.ndarray, np.ndarray]:
-    """Find the pieces of blocks that look upwards and see a level surface; what stands above it hides nothing.
+    """Find the pieces of chosen blocks that look upwards and see a level surface [m], under whatever other blocks hide.
 
-    Parameters
-    ----------
-    chosen : (n_blocks,) bool array
-        Whose pieces are looked for; all blocks hide what is below them.
-    surface : float [m]
+    What stands above the surface hides nothing.
 
     Returns
     -------

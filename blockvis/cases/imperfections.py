@@ -92,14 +92,9 @@ def joint_scatter(imperfections: Sequence[Imperfection]) -> solver.JointScatter 
 
 
 def imperfect(assembly: solver.Assembly, imperfections: Sequence[Imperfection]) -> solver.Assembly:
-    """Scatter the corners and densities of an assembly.
+    """Scatter the corners and densities of an assembly; friction scatters by :func:`joint_scatter`.
 
     ValueError for displacements of corners that are too large for the blocks.
-
-    Parameters
-    ----------
-    imperfections : sequence of Imperfection
-        Those of friction do not change the assembly: see :func:`joint_scatter`.
     """
     for one in imperfections:
         if one.kind == "density":

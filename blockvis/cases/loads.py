@@ -110,21 +110,9 @@ def _plus(loads: solver.Loads, kind: str, more: np.ndarray) -> solver.Loads:
 def moving_loads(
     entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path
 ) -> tuple[np.ndarray, Callable[[int], solver.PointForces]]:
-    """Find the load that moves.
+    """Find the load that moves: its (n,) positions [m], none where none does, and the live load at each, by number.
 
     ValueError for a position above no block, or above a support.
-
-    Parameters
-    ----------
-    entries, assembly, source
-        As of :func:`loads_of`.
-
-    Returns
-    -------
-    positions : (n,) array [m]
-        Empty if no load moves.
-    live : function of int
-        The live load at a position, by its number.
     """
     moving = next(((number, load) for number, load in enumerate(entries, start=1) if load.positions), None)
     if moving is None:

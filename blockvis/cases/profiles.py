@@ -83,12 +83,7 @@ class Profile:
 
 
 def bearing_points(assembly: solver.Assembly, supports: Sequence[int | Sequence[int]]) -> np.ndarray:
-    """Find the middle of where free blocks stand on each support, or group of supports; of its top where none does.
-
-    Returns
-    -------
-    (n, d) array [m]
-    """
+    """(n, d) array [m]: the middle of where free blocks stand on each support, or group, or of its top if none does."""
     contacts = mechanics.find_contacts(assembly, assembly.vertices, 2.0 * TOUCHING * assembly.block_size)
     found = []
     for one in supports:
@@ -215,16 +210,9 @@ def with_profiles(
     assembly: solver.Assembly,
     source: Path,
 ) -> tuple[solver.Settlement, ...]:
-    """Give each support its own motion, where a settlement has a profile.
+    """Give each support its own motion, where a settlement has a profile, and the ground is cut for it.
 
     ValueError for a support that a profile names and that is no moving support.
-
-    Parameters
-    ----------
-    profiles : sequence of Profile or None
-        One per settlement, or none at all.
-    assembly : solver.Assembly
-        Its ground cut for the profiles.
     """
     found = []
     for k, given in enumerate(settlements):
@@ -270,17 +258,9 @@ def _check_support(name: str, assembly: solver.Assembly, where: str) -> None:
 def cut_ground(
     assembly: solver.Assembly, profiles: Sequence[Profile | None], *, chosen: Sequence[int] | None = None
 ) -> solver.Assembly:
-    """Cut supports that carry several blocks under the joints between these, where a profile bends over them.
+    """Cut supports under the joints between blocks they carry: those chosen, or over which a profile bends.
 
-    Parameters
-    ----------
-    chosen : sequence of int, optional
-        Supports that are cut whatever the profiles; by default the moving ones over which a profile bends.
-
-    Returns
-    -------
-    solver.Assembly
-        The pieces of a support "ground" are named "ground 1", "ground 2" ... from left to right.
+    The pieces of a support "ground" are named "ground 1", "ground 2" ... from left to right.
     """
     if assembly.dimension != 2:
         return assembly

@@ -42,15 +42,7 @@ class RolePlace:
 
 
 def read_places(roles: Table) -> tuple[RolePlace, ...]:
-    """Read the roles by place of a case.
-
-    ValueError for a place that is not understood.
-
-    Parameters
-    ----------
-    roles : Table
-        ``[roles]``.
-    """
+    """Read the roles by place of ``[roles]``; ValueError for a place that is not understood."""
     return tuple(
         _place(kind, table, f"{roles.source}: [roles] {kind}")
         for kind in PLACES
@@ -82,14 +74,9 @@ def _place(kind: str, table: Table, where: str) -> RolePlace:
 
 
 def with_roles_by_place(layout: Layout, places: Sequence[RolePlace]) -> Layout:
-    """Give the blocks of a layout the roles of their places, over what the file says.
+    """Give the blocks of a layout the roles of their places, over what the file says, a later one over an earlier.
 
     ValueError for a place with no block, or all of them, and for a coordinate that the layout does not have.
-
-    Parameters
-    ----------
-    places : sequence of RolePlace
-        A later one holds over an earlier.
     """
     if not places:
         return layout

@@ -138,14 +138,9 @@ TIES = Section(
 
 
 def read_ties(tables: Sequence[Table], layers: Sequence[str]) -> tuple[TieCase, ...]:
-    """Read the tables [[ties]].
+    """Read the tables [[ties]], whose layers are those of ``[geometry] ties``.
 
     ValueError for keys that do not go together, or a name used twice.
-
-    Parameters
-    ----------
-    layers : sequence of str
-        ``[geometry] ties``.
     """
     found: list[TieCase] = []
     for table in tables:
@@ -247,14 +242,9 @@ def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tu
 
 
 def drawn_ties(entries: Sequence[TieCase], lines: Sequence[LeftOut]) -> list[TieCase]:
-    """List the ties of a case, those of layers with the ends of their lines.
+    """List the ties of a case, those of layers with the ends of their lines, as :func:`without_tie_lines` gives these.
 
     ValueError for a line that is bent, and a name used twice.
-
-    Parameters
-    ----------
-    lines : sequence of LeftOut
-        As of :func:`without_tie_lines`.
     """
     found: list[TieCase] = []
     for entry in entries:
@@ -282,16 +272,9 @@ def drawn_ties(entries: Sequence[TieCase], lines: Sequence[LeftOut]) -> list[Tie
 def ties_of(
     entries: Sequence[TieCase], assembly: solver.Assembly, gone: Mapping[int, np.ndarray]
 ) -> tuple[solver.Tie, ...]:
-    """Find the blocks that hold the ends of ties.
+    """Find the blocks that hold the ends of ties, by :func:`drawn_ties`, among those not ``gone`` in their phase.
 
     ValueError for an end in no block that is left, both in one, a tie without length; names the tie and the remedy.
-
-    Parameters
-    ----------
-    entries : sequence of TieCase
-        As of :func:`drawn_ties`.
-    gone : mapping of int to (n_blocks,) bool array
-        By phase: blocks that have been taken away before ties are installed.
     """
     return tuple(_in_blocks(entry, assembly, gone[entry.phase]) for entry in entries)
 

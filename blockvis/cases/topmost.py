@@ -12,17 +12,10 @@ from .block_at import ON_EDGE
 
 
 def force_on_top_in_space(assembly: solver.Assembly, x: float, y: float, force: Sequence[float]) -> solver.PointForces:
-    """Put a force on the topmost surface at a place in plan.
+    """Put a force, (3,) [N], on the topmost surface at a place in plan [m].
 
-    ValueError where nothing is below, or a support.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-        In space.
-    x, y : float [m]
-        Of blocks that meet there at one height the one with the smallest x carries it.
-    force : (3,) sequence [N]
+    Of blocks that meet there at one height the one with the smallest x carries it. ValueError where nothing is
+    below, or a support.
     """
     parts = assembly.polyhedra.parts
     faces, starts = parts.solids.faces(parts.solids.vertices), parts.solids.faces_of_block[:-1]

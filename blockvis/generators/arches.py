@@ -221,19 +221,9 @@ def basket_handle_arch(
 
 
 def radial_joints(inner: float, outer: float, angles: np.ndarray) -> np.ndarray:
-    """Lay out the joints of an arch along a circle about the origin.
+    """(n, 2, 2) array [m]: joints along a circle about the origin; axis 1 is the end on the intrados or the extrados.
 
-    Parameters
-    ----------
-    inner, outer : float [m]
-        Radii of the intrados and the extrados.
-    angles : (n,) array [rad]
-        Counter-clockwise from the x axis.
-
-    Returns
-    -------
-    (n, 2, 2) array [m]
-        Joint, end on the intrados or the extrados, coordinate.
+    Radii are in m, angles (n,) in rad, counter-clockwise from the x axis.
     """
     ends = [[(r * math.cos(a), r * math.sin(a)) for r in (inner, outer)] for a in angles.tolist()]
     return np.array(ends)

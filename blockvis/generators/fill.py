@@ -188,17 +188,7 @@ def filled(
     *,
     mortar: bool = True,
 ) -> Layout:
-    """Fill a wall with stones; see :func:`bond`.
-
-    Parameters
-    ----------
-    wall : shapely.Polygon [m]
-    openings : sequence of shapely.Polygon [m]
-    taken : shapely geometry, optional [m]
-        Where other blocks stand in the wall.
-    mortar : bool
-        Whether the joints of the pattern are left open.
-    """
+    """Fill a wall with stones around what is ``taken``; see :func:`bond`. Joints may be left open for the mortar."""
     # Far from the origin, as in maps, corners have no digits left for a grid.
     corner = np.array(wall.bounds[:2])
     wall, *holes = [_shifted(shape, -corner) for shape in (wall, *openings)]

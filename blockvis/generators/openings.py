@@ -67,18 +67,10 @@ class Opening:
 def checked_opening(
     values: Mapping[str, Any], number: int, *, brick_length: float, brick_height: float, wall_height: float
 ) -> Opening:
-    """Make an opening of its keys, with defaults from the size of the bricks.
+    """Make an opening of its keys, with defaults from the size of the bricks [m].
 
-    ValueError for impossible values; names the opening, the key and the remedy.
-
-    Parameters
-    ----------
-    values : mapping
-        Keys as in :class:`Opening`; ``x``, ``y``, ``width`` and ``height`` are required. The head is a lintel by
-        default, or none if the opening reaches the top of the wall.
-    number : int
-        From 1, for messages.
-    brick_length, brick_height, wall_height : float [m]
+    ``x``, ``y``, ``width`` and ``height`` are required; the head is a lintel by default, or none if the opening reaches
+    the top of the wall. ValueError for impossible values; names the opening, the key and the remedy.
     """
     where = f"opening {number}"
     if not isinstance(values, Mapping):

@@ -31,15 +31,7 @@ LEANS = 1e-3
 def coursed(kind: str, width: float, height: float, brick: tuple[float, float], seed: int) -> list[shapely.Polygon]:
     """Lay the bricks of a bond over a rectangle from (0, 0), course by course; the last course may reach beyond it.
 
-    Parameters
-    ----------
-    kind : str
-        One of :data:`PATTERNS` but "rubble".
-    width, height : float [m]
-    brick : (float, float) [m]
-        Length and height.
-    seed : int
-        Of the lengths of ashlar.
+    Lengths are in m; a brick is its length and height. The seed is of the lengths of ashlar.
     """
     length, high = brick
     boxes: list[shapely.Polygon] = []
@@ -142,14 +134,7 @@ def _closed(cells: list[shapely.Polygon], shortest: float) -> list[shapely.Polyg
 
 
 def bedded(stones: list[shapely.Polygon], wall: shapely.Geometry) -> list[shapely.Polygon]:
-    """Turn joints that reach an upright rim of the wall towards the level, so that no stone slides out there.
-
-    Parameters
-    ----------
-    stones : list of shapely.Polygon [m]
-        Side by side in the wall, without holes.
-    wall : shapely geometry [m]
-    """
+    """Turn joints that reach an upright rim of the wall towards the level, so that no stone slides out there."""
     kept = [np.array(stone.exterior.coords)[:-1] for stone in stones]
     for key, pair in _joints_at_rim(kept, wall).items():
         moved = [found for found in (_levelled(kept[i], key) for i in pair) if found is not None]

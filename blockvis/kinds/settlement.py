@@ -268,10 +268,7 @@ def settlement_steps(
 ) -> mechanics.Increments:
     """Follow the settlements of a case under the dead load alone; without settlements there are no increments.
 
-    Parameters
-    ----------
-    whole : bool
-        Whether the first loss of a block ends it, because what comes after is asked of the whole structure.
+    The first loss of a block ends them where what comes after is asked of the ``whole`` structure.
     """
     case = given.case
     if not case.settlements:
@@ -293,15 +290,7 @@ def settlement_steps(
 
 
 def not_reached(before: mechanics.Ending, what: str) -> mechanics.Ending:
-    """Say how an analysis ends whose settlement did not reach its limit.
-
-    Parameters
-    ----------
-    before : solver.mechanics.Ending
-        Of the settlement.
-    what : str
-        What that means for the analysis.
-    """
+    """Say how an analysis ends whose settlement did not reach its limit; ``what`` says what that means for it."""
     if before.stop is solver.Status.COLLAPSED:
         return mechanics.Ending(solver.Status.NO_INITIAL_EQUILIBRIUM, f"the settlement alone: {before.message}; {what}")
     return mechanics.Ending(before.stop, f"during the settlement: {before.message}")

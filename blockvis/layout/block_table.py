@@ -16,13 +16,10 @@ from .notes import CHANGED, Note
 
 
 def rows_of(layout: Layout) -> list[dict[str, Any]]:
-    """Write the block table of a layout.
+    """Write the block table of a layout, one row per block.
 
-    Returns
-    -------
-    list of dict
-        One row per block: ``name``, and ``group``, ``role``, ``material``, ``thickness`` [m] and ``density`` [kg/m³] if
-        the layout has them.
+    It has ``name``, and ``group``, ``role``, ``material``, ``thickness`` [m] and ``density`` [kg/m³] if the layout has
+    them.
     """
     rows = []
     for i in range(layout.n_blocks):
@@ -40,13 +37,8 @@ def rows_of(layout: Layout) -> list[dict[str, Any]]:
 def with_rows(layout: Layout, rows: Sequence[Any], *, own: bool = False) -> Layout:
     """Put the values of a block table, one row per block, into a layout.
 
-    ValueError for a thickness or density that is no number, and for an unknown role.
-
-    Parameters
-    ----------
-    own : bool
-        Whether our own writer put them beside the geometry, with thicknesses in metres: these stay when somebody scales
-        the drawing, or says another unit.
+    Rows that our ``own`` writer put beside the geometry have thicknesses in metres: these stay when somebody scales the
+    drawing, or says another unit. ValueError for a thickness or density that is no number, and for an unknown role.
     """
     entries: list[Mapping[str, Any]] = [row if isinstance(row, dict) else {} for row in rows]
 
@@ -106,13 +98,7 @@ def on_layer(row: Mapping[str, Any], layer: str) -> dict[str, Any]:
 
 
 def moved_notes(moved: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> list[str]:
-    """Say which blocks lie on other layers than the rows say that were written with them.
-
-    Parameters
-    ----------
-    moved : sequence of (mapping, mapping)
-        The row as it was written, and as it holds.
-    """
+    """Say which blocks lie on other layers than their rows say; ``moved`` has each row as written, and as it holds."""
 
     def listed(some: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> str:
         words = [f"'{row.get('name', '')}' on '{row['group']}'" for _, row in some[:6]]

@@ -18,17 +18,9 @@ WHOLE = 0.98
 
 
 def uncrossed(layout: Layout) -> Layout:
-    """Reduce outlines that cross or touch themselves to their largest piece, or leave them out.
+    """Reduce outlines that cross or touch themselves to their largest piece, with a note, or leave them out.
 
-    Parameters
-    ----------
-    layout : Layout
-        Lengths in m.
-
-    Returns
-    -------
-    Layout
-        With a note on what was reduced. An outline without area stays: it is no crossing.
+    An outline without area stays: it is no crossing.
     """
     import shapely
 
@@ -66,13 +58,9 @@ def uncrossed(layout: Layout) -> Layout:
 
 
 def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:
-    """Say why an outline cannot be reduced to its largest piece, which is ``around`` a hole, or has too small a share.
+    """Say why an outline, (n, 2) array [m], cannot be reduced to its largest piece, which has too small a share.
 
-    Parameters
-    ----------
-    ring : (n, 2) array [m]
-    around : shapely.Polygon or None
-        Of an outline that goes in along a line, around a hole and back.
+    Or it goes in along a line ``around`` a hole and back: this polygon then.
     """
     import shapely
 

@@ -47,14 +47,7 @@ class PlaneSolid:
 
 
 def with_plane_faces(points: np.ndarray, triangles: np.ndarray) -> PlaneSolid:
-    """Join the triangles around a body to plane faces, and fit planes to those that are warped.
-
-    Parameters
-    ----------
-    points : (n, 3) array
-    triangles : (m, 3) int array
-        All seen in the same sense from outside.
-    """
+    """Join triangles around a body, all seen in one sense, to plane faces; fit planes to those that are warped."""
     used, index = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], index.reshape(-1, 3)
     if volume(points, triangles) < 0.0:
@@ -65,14 +58,7 @@ def with_plane_faces(points: np.ndarray, triangles: np.ndarray) -> PlaneSolid:
 
 
 def fitted(points: np.ndarray, faces: list[list[int]], near: float) -> PlaneSolid:
-    """Fit a plane to each face and move the corners to where planes meet; what is warped by more is cut in triangles.
-
-    Parameters
-    ----------
-    points : (n, 3) array
-    near : float
-        Largest warp, in the unit of the points.
-    """
+    """Fit a plane to each face, or cut it if it is warped by more than ``near``; move corners to where planes meet."""
     rings = bent_in_triangles(points, faces, near)
     planes = planes_of(points, rings)
     warp = off_planes(points, rings, planes)
@@ -85,17 +71,9 @@ def fitted(points: np.ndarray, faces: list[list[int]], near: float) -> PlaneSoli
 
 
 def flattened(points: np.ndarray, faces: list[list[int]], planes: np.ndarray, first: np.ndarray | None = None) -> Solid:
-    """Move the corners of a block to its planes until its faces are plane.
+    """Move the corners of a block to its planes until its faces are plane, and cut those that stay warped.
 
-    Parameters
-    ----------
-    points, faces, planes, first
-        As of :func:`moved_to_planes`; the planes of other faces than ``first`` give way where more than three meet.
-
-    Returns
-    -------
-    Solid
-        With faces that stay warped cut into triangles.
+    Where more than three meet, the planes of other faces than ``first`` give way; see :func:`moved_to_planes`.
     """
     moved = moved_to_planes(points, faces, planes, first)
     near = ROUNDING * width_of(moved, faces)

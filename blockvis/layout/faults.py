@@ -40,15 +40,7 @@ class Faults:
 
 
 def faults_of(layout: Layout, known: Sequence[int] = ()) -> Faults:
-    """Find what is wrong with the shapes of a drawing.
-
-    Parameters
-    ----------
-    layout : Layout
-        As read: its blocks may have any shape.
-    known : sequence of int
-        Blocks that are at fault for a reason that their shape does not show.
-    """
+    """Find what is wrong with the shapes of a drawing as read, and blocks ``known`` to be at fault otherwise."""
     if layout.dimension == 3:
         open_edges = [_open_edges(*solid) for solid in layout.solids]
         blocks = {k for k, edges in enumerate(open_edges) if len(edges)} | set(known)

@@ -110,11 +110,8 @@ def with_role(found: Inspection, role: str) -> list[int]:
 def ground_of(found: Inspection) -> Ground:
     """Say what stands and what settles, of what a drawing says and shows.
 
-    Returns
-    -------
-    Ground
-        Supports as the drawing says, or as names and layers say; otherwise blocks that touch the ground in a point,
-        an edge or a slope, and below the others a ground that their bottoms lie on.
+    Supports are as the drawing says, or as names and layers say; otherwise blocks that touch the ground in a point, an
+    edge or a slope, and below the others a ground that their bottoms lie on.
     """
     fixed = with_role(found, mechanics.FIXED)
     if with_role(found, mechanics.MOVING):

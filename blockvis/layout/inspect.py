@@ -176,18 +176,7 @@ class Inspection:
 
 
 def inspected(layout: Layout) -> Inspection:
-    """Measure a layout.
-
-    Parameters
-    ----------
-    layout : Layout
-        As read, duplicates included.
-
-    Raises
-    ------
-    Refused
-        For outlines in the plane that are no blocks.
-    """
+    """Measure a layout as read, duplicates included; Refused for outlines in the plane that are no blocks."""
     twins = duplicates(layout.every_corner)
     dropped = dropped_twins(layout, twins, {})
     kept = np.array([i for i in range(layout.n_blocks) if i not in dropped])

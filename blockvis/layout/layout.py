@@ -213,10 +213,7 @@ def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> 
 def standing(layout: Layout, thickness: float) -> Layout:
     """Put a layout of the plane into space: upright, extruded along y by half of its thickness to each side.
 
-    Parameters
-    ----------
-    thickness : float [m]
-        Of blocks for which the layout has none.
+    Blocks for which the layout has none get the given thickness [m].
     """
     depth = np.full(layout.n_blocks, np.nan) if layout.thickness is None else layout.thickness
     depth = np.where(np.isnan(depth), thickness, depth)

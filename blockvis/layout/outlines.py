@@ -181,14 +181,9 @@ def share_in(inner: Any, outer: Any) -> float:
 
 
 def filled(rings: Sequence[np.ndarray]) -> list[tuple[int, list[int]]]:
-    """Numbers of the outlines of one shape that are filled, each with those of its holes.
+    """Numbers of the (n, d) outlines of one shape in a plane that are filled, each with those of its holes.
 
     Of outlines that lie in each other every second is filled; one that crosses itself lies in none and holds none.
-
-    Parameters
-    ----------
-    rings : sequence of (n, 2) or (n, 3) arrays
-        In space in one plane.
     """
     import shapely
 

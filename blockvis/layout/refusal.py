@@ -34,13 +34,7 @@ class Refused(ValueError):
 
 @contextmanager
 def carrying(drawn: Callable[[], Layout]) -> Iterator[None]:
-    """Give what is refused within the geometry that it is about.
-
-    Parameters
-    ----------
-    drawn : callable
-        Makes the layout; called where something is refused only.
-    """
+    """Give what is refused within the layout that it is about; it is ``drawn`` where something is refused only."""
     try:
         yield
     except Refused as error:

@@ -45,21 +45,9 @@ def deep_overlaps(layout: Layout) -> list[tuple[int, int]]:
 def proposed_ignore(
     layout: Layout, pairs: Sequence[tuple[int, int]], read_without: Callable[[Sequence[str]], Layout]
 ) -> str:
-    """Propose what to leave out so that no blocks overlap.
+    """Propose what to leave out so that no blocks overlap, by the pairs that do; "" where no small set has a name.
 
-    Parameters
-    ----------
-    layout : Layout
-        As read.
-    pairs : sequence of (int, int)
-        Its blocks that overlap.
-    read_without : function of patterns
-        Reads the same drawing without what they name.
-
-    Returns
-    -------
-    str
-        With the options and what they do, "" where no small set has a name.
+    ``read_without`` reads the same drawing without what patterns name.
     """
     if not pairs or max(len(pairs), layout.n_blocks) > MOST:
         return ""

@@ -25,18 +25,7 @@ ROUNDING = 2e-6
 
 
 def duplicates(blocks: Sequence[np.ndarray]) -> list[tuple[int, int]]:
-    """Find blocks that are drawn twice.
-
-    Parameters
-    ----------
-    blocks : sequence of (n, d) arrays [m]
-        Corners of each block.
-
-    Returns
-    -------
-    list of (int, int)
-        The first block and its later copy.
-    """
+    """Find blocks that are drawn twice, by their (n, d) corners [m]: the first of each, and its later copy."""
     centres = np.array([(corners.min(axis=0) + corners.max(axis=0)) / 2.0 for corners in blocks])
     sizes = np.array([float(np.ptp(corners, axis=0).max()) for corners in blocks])
     found: list[tuple[int, int]] = []
@@ -62,13 +51,7 @@ def _same(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def overlaps(assembly: solver.Assembly, tolerance: float) -> list[tuple[int, int, float]]:
-    """Find pairs of blocks that overlap by more than a tolerance [m].
-
-    Returns
-    -------
-    list of (int, int, float)
-        Both blocks and the depth [m], the deepest overlap first.
-    """
+    """Find pairs of blocks that overlap by more than a tolerance [m], and the depth [m], the deepest overlap first."""
     i, j, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
     return [(int(i[k]), int(j[k]), float(depth[k])) for k in np.argsort(-depth)]
 

@@ -53,14 +53,7 @@ def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True
 
 
 def dropped_twins(layout: Layout, twins: Sequence[tuple[int, int]], roles: Mapping[str, str]) -> set[int]:
-    """Which of two blocks that are drawn in the same place goes: the later, or the first where only the later holds.
-
-    Parameters
-    ----------
-    twins : sequence of (int, int)
-        The first and its later copy.
-    roles : mapping of str to {"free", "fixed", "moving"}
-    """
+    """Which of two blocks drawn in one place goes: the later copy, or the first where only the later holds."""
     said = roles_of(layout, roles, all_match=False)
     return {first if said[first] == mechanics.FREE != said[copy] else copy for first, copy in twins}
 

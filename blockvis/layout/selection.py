@@ -19,7 +19,7 @@ from .left_out import LeftOut, in_words, matches
 from .linked import linked
 from .notes import LEFT_OUT, UNIT, Note
 from .outlines import ring_area, ring_width
-from .unfilled import unfilled
+from .unfilled import walls_to_fill
 from .units import doubt
 from .window import within_window
 
@@ -96,7 +96,7 @@ def sorted_out(
         if ground is not None and any(item.kind in UNREAD for item in layout.left_out):
             why = f"{first.message if first else asked}{counted}"
             raise ValueError(f"{where}: nothing but a background is left, '{ground.name}': {why}")
-        wall = next((f"; {note}" for note in unfilled(layout)), "")
+        wall = next((f"; {words}" for words in walls_to_fill(layout).values()), "")
         raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}{wall}")
     return noted(layout)
 
@@ -106,7 +106,8 @@ def noted(layout: Layout) -> Layout:
     size = float(np.median(layout.sizes))
     doubted = "" if layout.unit_by == "user" else doubt(layout.unit, size)
     found = [Note(UNIT, words) for words in (doubted, _thickness_doubt(layout, size)) if words]
-    return replace(layout, notes=(*layout.notes, *unfilled(layout), *in_words(layout.left_out), *found))
+    walls = [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]
+    return replace(layout, notes=(*layout.notes, *walls, *in_words(layout.left_out), *found))
 
 
 def _thickness_doubt(layout: Layout, median: float) -> str:
@@ -129,14 +130,9 @@ def _thickness_doubt(layout: Layout, median: float) -> str:
 
 
 def without_ignored(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
-    """Leave out what the caller asks to leave out.
+    """Leave out what patterns of layers, groups, materials and names of blocks ask to leave out.
 
     ValueError if a pattern of ``only`` matches nothing.
-
-    Parameters
-    ----------
-    ignore, only : sequences of str
-        Layers, groups, materials and names of blocks, or patterns of them.
     """
     if not ignore and not only:
         return layout

@@ -123,15 +123,7 @@ def between(first: ArrayLike, second: ArrayLike) -> Solid:
 
 
 def extruded(outline: ArrayLike, first: float, last: float) -> Solid:
-    """Extrude an outline of the upright plane along y.
-
-    Parameters
-    ----------
-    outline : (n, 2) array [m]
-        Corners x, z.
-    first, last : float [m]
-        y at which the block begins and ends.
-    """
+    """Extrude an outline of the upright plane, (n, 2) array of x, z [m], along y between two places [m]."""
     ring = np.asarray(outline, dtype=float)
 
     def at(y: float) -> np.ndarray:
@@ -141,15 +133,7 @@ def extruded(outline: ArrayLike, first: float, last: float) -> Solid:
 
 
 def prism(outline: ArrayLike, bottom: float, top: float) -> Solid:
-    """Extrude an outline in plan upwards.
-
-    Parameters
-    ----------
-    outline : (n, 2) array [m]
-        Corners x, y.
-    bottom, top : float [m]
-        z at which the block begins and ends.
-    """
+    """Extrude an outline in plan, (n, 2) array of x, y [m], upwards between two levels [m]."""
     ring = np.asarray(outline, dtype=float)
     return between(*(np.column_stack([ring, np.full(len(ring), z)]) for z in (bottom, top)))
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .left_out import LeftOut
-from .notes import LEFT_OUT, Note
 from .outlines import share_in
 
 if TYPE_CHECKING:
@@ -29,26 +28,10 @@ COUNTED = "; as it is, what lies in it counts as blocks, and the wall as none"
 MOST = 200
 
 
-def unfilled(layout: Layout) -> list[Note]:
-    """Say of each wall that a drawing holds as an outline with openings how it is filled.
-
-    Parameters
-    ----------
-    layout : Layout
-        With what was left out of the drawing.
-    """
-    return [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]
-
-
 def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
     """Find layers, or else names, of walls that a drawing holds as outlines with openings, and say how to fill them.
 
-    Parameters
-    ----------
-    layout : Layout
-        With what was left out of the drawing.
-    pages : bool
-        Whether what is black, with all on it white, may be a wall: icons draw stones on a page so.
+    What is black, with all on it white, is no wall where such ``pages`` are not asked for: icons draw stones so.
     """
     if layout.dimension == 3 or layout.n_blocks > MOST:
         return {}

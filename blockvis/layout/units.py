@@ -142,31 +142,16 @@ def _would_make(units: Sequence[str], size: float) -> str:
     return ", ".join(said + [f"{unit} {size * UNITS[unit]:.3g} m" for unit in others if unit in METRIC])
 
 
-def better_unit(unit: str, size: float) -> str:
-    """Find the unit that makes blocks masonry whose unit is doubted.
+def units_instead(unit: str, size: float) -> list[str]:
+    """List the units that make blocks masonry whose unit is doubted, the likeliest first; none without doubt.
 
-    Parameters
-    ----------
-    unit : str
-        In which the drawing was read.
-    size : float [m]
-        Root of the area of the median block, as read.
-
-    Returns
-    -------
-    str
-        "" if there is nothing to doubt, or no such unit.
+    The size [m] is the root of the area of the median block, as read in the unit.
 
     Examples
     --------
-    >>> better_unit("m", 130.0)
-    'mm'
+    >>> units_instead("m", 130.0)
+    ['mm', 'cm']
     """
-    return next(iter(_units_instead(unit, size)), "")
-
-
-def _units_instead(unit: str, size: float) -> list[str]:
-    """List the units that make blocks masonry whose unit is doubted; arguments as of :func:`better_unit`."""
     doubted = size > 0.0 and not DOUBTED[0] <= size <= DOUBTED[1]
     return _masonry_units(size / metres_per(unit), (*RARE, "km")) if doubted else []
 
@@ -174,19 +159,7 @@ def _units_instead(unit: str, size: float) -> list[str]:
 def doubt(unit: str, size: float, *, remedy: str = 'say so under [geometry] unit = "{}", or by --unit {}') -> str:
     """Doubt the unit of a drawing whose blocks are far larger or smaller than those of masonry.
 
-    Parameters
-    ----------
-    unit : str
-        In which the drawing was read.
-    size : float [m]
-        Root of the area of the median block, as read.
-    remedy : str
-        How to give another unit.
-
-    Returns
-    -------
-    str
-        A note that names the units that would make the blocks masonry; "" if there is nothing to doubt.
+    The arguments are those of :func:`units_instead`, and how to give another unit; "" if there is nothing to doubt.
 
     Examples
     --------
@@ -196,7 +169,7 @@ def doubt(unit: str, size: float, *, remedy: str = 'say so under [geometry] unit
     if DOUBTED[0] <= size <= DOUBTED[1] or size <= 0.0:
         return ""
     doubted = f"unit {unit} in doubt: it makes the median block {size:.3g} m across"
-    others = _units_instead(unit, size)
+    others = units_instead(unit, size)
     if not others:
         return f"{doubted}; no other unit makes it masonry"
     return f"{doubted}; {_would_make(others, size / metres_per(unit))}: {remedy.format(others[0], others[0])}"

@@ -33,14 +33,8 @@ def checked_window(window: Sequence[float] | None) -> tuple[float, ...]:
 def within_window(layout: Layout, window: Sequence[float]) -> Layout:
     """Keep what lies within a window; what crosses its edge is left out, and what lies beyond is counted in a note.
 
-    ValueError if no block lies within it; says from where to where the drawing goes.
-
-    Parameters
-    ----------
-    layout : Layout
-        In the plane, lengths in m.
-    window : sequence of float
-        x0, y0, x1, y1 [m], or none.
+    The window is x0, y0, x1, y1 [m], or empty. ValueError, with from where to where the drawing goes, if no block lies
+    within it.
     """
     if len(window) == 0:
         return layout

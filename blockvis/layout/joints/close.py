@@ -85,12 +85,7 @@ class Proposal:
 
 
 def proposed(outlines: Sequence[np.ndarray], method: str = "auto", laid: np.ndarray | None = None) -> Proposal:
-    """Propose how the joints of a drawing are closed.
-
-    Parameters
-    ----------
-    method : {"auto", "faces", "voronoi"}
-    """
+    """Propose how the joints of a drawing are closed; the method is one of :data:`WAYS`."""
     thickness, found = proposed_thickness(outlines, laid)
     if method == "auto":
         method = chosen_method(outlines, found)

@@ -242,13 +242,7 @@ def rounded_up(length: float) -> float:
 
 
 def straight_share(outlines: Sequence[np.ndarray], found: Facing) -> float:
-    """Share of the length of joints between straight faces: parallel, or long compared with their blocks.
-
-    Returns
-    -------
-    float
-        1 without joints.
-    """
+    """Share of the length of joints between straight faces, parallel or long beside their blocks; 1 without joints."""
     if len(found) == 0:
         return 1.0
     edges = edges_of(outlines)
@@ -262,19 +256,8 @@ def straight_share(outlines: Sequence[np.ndarray], found: Facing) -> float:
 def open_shares(outlines: Sequence[np.ndarray], found: Facing, rounding: float) -> tuple[float, float]:
     """Share of the length of all joints that is open, and of the open length how much has as much opposite of it.
 
-    Mortar lies on both sides of a block, a crack on one of them.
-
-    Parameters
-    ----------
-    found : Facing
-        Stretches with a gap, as of :func:`proposed_thickness`.
-    rounding : float [m]
-        Gaps up to this width count as closed.
-
-    Returns
-    -------
-    open_share, opposite_share : float
-        1 and 1 without joints.
+    Both are 1 without joints. Mortar lies on both sides of a block, a crack on one of them. ``found`` are stretches
+    with a gap, as of :func:`proposed_thickness`; gaps up to the rounding [m] count as closed.
     """
     wide = found.chosen(found.gaps.max(axis=1) > rounding)
     length = float(wide.lengths.sum())

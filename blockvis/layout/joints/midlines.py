@@ -135,18 +135,9 @@ def _own_lines(
 
 
 def moved_outlines(edges: Edges, lines: dict[int, Line], longest: float) -> list[np.ndarray]:
-    """Move edges onto lines; the corners are where consecutive edges then meet.
+    """Move edges onto lines, those without a line not; the corners are where consecutive edges then meet.
 
-    Parameters
-    ----------
-    lines : {edge: line}
-        Edges without a line stay.
-    longest : float [m]
-        A corner moves at most this far; beyond it the mitre is cut off.
-
-    Returns
-    -------
-    list of (n, 2) arrays [m]
+    A corner moves by at most ``longest`` [m]; beyond it the mitre is cut off.
     """
     rings = []
     for first, last in zip(edges.offsets[:-1], edges.offsets[1:], strict=True):

@@ -143,14 +143,9 @@ def _shape(ring: np.ndarray) -> Any:
 
 
 def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
-    """Propose the joint thickness that closes the joints between stones of any shape.
+    """Propose the joint thickness [m] that closes the joints between stones of any shape, 0 without gaps.
 
-    Returns
-    -------
-    thickness : float [m]
-        0 without gaps.
-    reach : float [m]
-        How far was looked: a thickness near it is the limit of the search, not a measurement.
+    And say how far [m] was looked: a thickness near it is the limit of the search, not a measurement.
     """
     import shapely
 
@@ -292,15 +287,9 @@ def _along_anchored(simple: np.ndarray, cells: np.ndarray, anchored: np.ndarray,
 
 
 def _without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.ndarray) -> list[np.ndarray]:
-    """Let edges shorter than a length [m] shrink to a point, in all outlines that share them.
+    """Let edges shorter than a length [m] shrink to a point, in all outlines that share them; ``fixed`` corners stay.
 
-    Parameters
-    ----------
-    rings : list of (n, 2) arrays [m]
-        Neighbours share their corners to the last digit.
-    shortest : float [m]
-    fixed : (n, 2) array [m]
-        Corners that stay.
+    Outlines that are neighbours share their corners to the last digit.
     """
     import shapely
 

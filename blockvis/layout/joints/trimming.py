@@ -31,19 +31,7 @@ def extended_to_lines(
 ) -> list[np.ndarray]:
     """Extend one edge of each stretch without a common line to the other one, and cut its block along it.
 
-    Parameters
-    ----------
-    base : list of (n, 2) arrays [m]
-        Outlines with the common lines applied.
-    uncommon : list of int
-        Stretches without a common line.
-    lines : {edge: line}
-    thickness : float [m]
-        Of the joints.
-
-    Returns
-    -------
-    list of (n, 2) arrays [m]
+    ``base`` are outlines with the common lines applied, ``uncommon`` the stretches, ``thickness`` that of joints [m].
     """
     import shapely
 
@@ -244,16 +232,7 @@ def _merged(moved: np.ndarray, ring: np.ndarray, closed: float) -> np.ndarray:
 
 
 def with_corners_on_edges(ring: np.ndarray, points: np.ndarray, index: Any, closed: float) -> np.ndarray:
-    """Add every given point that lies on an edge of the ring to its corners.
-
-    Parameters
-    ----------
-    ring, points : (n, 2) arrays [m]
-    index : scipy.spatial.cKDTree
-        Of the points.
-    closed : float [m]
-        A point closer than this to an edge lies on it.
-    """
+    """Add every given point within ``closed`` [m] of an edge of a ring to its corners; ``index`` is their cKDTree."""
     result = []
     for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
         along = end - start
