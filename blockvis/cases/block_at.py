@@ -62,21 +62,10 @@ def block_at(
     where: str,
     gone: np.ndarray,
 ) -> int:
-    """Find the block that holds a point.
+    """Find the block, among those chosen, that holds a point [m]; what is ``gone`` holds nothing.
 
-    Of several that meet there it is the one into which a direction leads, then the one whose centroid is nearest.
-
-    ValueError if none of them that is left holds the point; names the nearest and how far it is.
-
-    Parameters
-    ----------
-    point : (d,) sequence [m]
-    chosen : (n,) int array
-        The blocks it may be.
-    towards : (d,) sequence
-        Of a force at the point.
-    gone : (n_blocks,) bool array
-        Blocks that have been taken away before, which hold nothing.
+    Of several that meet there it is the one into which a direction leads, as of a force, then the one whose centroid is
+    nearest. ValueError if none of them that is left holds the point; names the nearest and how far it is.
     """
     apart = distances_to(assembly, point)
     holding = chosen[apart[chosen] <= ON_EDGE * assembly.block_size]

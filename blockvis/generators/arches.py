@@ -230,18 +230,12 @@ def radial_joints(inner: float, outer: float, angles: np.ndarray) -> np.ndarray:
 
 
 def segmental_joints(span: float, rise: float, thickness: float, voussoirs: int) -> tuple[np.ndarray, np.ndarray]:
-    """Lay out the joints of a segmental arch, the middle of its span at x = 0.
-
-    Parameters
-    ----------
-    span, rise : float [m]
-        Of the intrados.
-    thickness : float [m]
+    """Lay out the joints of a segmental arch by span and rise of its intrados [m], which springs at y = 0 around x = 0.
 
     Returns
     -------
     joints : (voussoirs + 1, 2, 2) array [m]
-        From left to right; the intrados springs at y = 0.
+        From left to right.
     angles : (voussoirs + 1,) array [rad]
     """
     span, rise, thickness = above_zero("span", span), above_zero("rise", rise), above_zero("thickness", thickness)

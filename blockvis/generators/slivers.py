@@ -23,6 +23,8 @@ def without_slivers(
 ) -> list[tuple[shapely.Polygon, int]]:
     """Join slivers to the neighbours with which they make the most convex blocks, the smallest first.
 
+    ``is_sliver`` is asked of a shape and the number of the piece it is, or is mainly made of.
+
     Parameters
     ----------
     shapes : sequence of shapely.Polygon [m]

@@ -226,16 +226,9 @@ def _with_supports(layout: Layout, supports: Sequence[Mapping[str, Any]]) -> Lay
 
 
 def supports_of(supports: Sequence[Mapping[str, Any]], dimension: int) -> Layout:
-    """Make a layout of supports that a drawing does not contain.
+    """Make a layout of supports that a drawing does not contain, as :func:`assemble` takes them.
 
     ValueError names the support and the key.
-
-    Parameters
-    ----------
-    supports : sequence of mappings
-        As of :func:`assemble`.
-    dimension : {2, 3}
-        Of the drawing.
     """
     in_space = dimension == 3
     known = {"name", "role", "outline", "density", "material", "stiffness", "levels" if in_space else "thickness"}

@@ -100,18 +100,14 @@ def moved_to_planes(
 ) -> np.ndarray:
     """Move the corners of a block to where the planes of their faces meet, as little as that takes.
 
+    Where more than three planes meet nearly in a point, to the point nearest to them, and first to the planes of
+    the faces that are ``first``, (n_faces,) bool array.
+
     Parameters
     ----------
     points : (n, 3) array
     planes : (n_faces, 4) array
         Unit normals and distances from the origin.
-    first : (n_faces,) bool array, optional
-        Faces whose planes come before those of the others, where more than three meet.
-
-    Returns
-    -------
-    (n, 3) array
-        Where more than three planes meet nearly in a point, the point nearest to them.
     """
     before = np.zeros(len(planes), dtype=bool) if first is None else first
     around: list[list[int]] = [[] for _ in points]

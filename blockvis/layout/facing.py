@@ -74,20 +74,10 @@ def facing_tolerance(
 def faced(
     solids: Sequence[Solid], names: Sequence[str], tolerance: float | None = None, anchored: np.ndarray | None = None
 ) -> Facing:
-    """Give the faces on both sides of each joint one plane.
+    """Give the faces on both sides of each joint one plane; a joint in one plane already stays as it is, bit for bit.
 
-    Parameters
-    ----------
-    solids : sequence of Solid [m]
-    tolerance : float, optional [m]
-        Gaps and overlaps up to this are faced; by default 0.01 of the width of a typical block.
-    anchored : (n_blocks,) bool array, optional
-        Blocks that keep their faces.
-
-    Returns
-    -------
-    Facing
-        A joint whose faces are in one plane already stays as it is, bit for bit.
+    Gaps and overlaps up to a tolerance [m] are faced, by default 0.01 of the width of a typical block. ``anchored``,
+    (n_blocks,) bool array, are blocks that keep their faces.
     """
     widths = np.array([width_of(*solid) for solid in solids])
     width = float(np.median(widths))

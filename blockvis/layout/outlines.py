@@ -381,15 +381,9 @@ def _fits(a: np.ndarray, dropped: np.ndarray, b: np.ndarray, limit: float) -> bo
 
 
 def chords_of(sweep: float, radius: float, tolerance: float | None = None) -> int:
-    """Count the equal chords that stay within a tolerance of an arc.
+    """Count the equal chords that stay within a tolerance, by default a thousandth of the radius, of an arc.
 
-    Parameters
-    ----------
-    sweep : float [rad]
-    radius : float
-        Of an ellipse the larger half axis.
-    tolerance : float, optional
-        Largest distance between arc and chord; a thousandth of the radius by default.
+    The sweep is in rad; the radius of an ellipse is the larger half axis.
     """
     allowed = 1e-3 if tolerance is None else min(max(tolerance / max(radius, 1e-300), 1e-12), 1.0)
     widest = min(LARGEST_CHORD, 2.0 * math.acos(1.0 - allowed))

@@ -74,22 +74,14 @@ def metres_per(unit: str) -> float:
 
 
 def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str, str]:
-    """Choose the unit in which a file is read.
+    """Choose the unit in which a file is read, and say why; "" if the stated unit is taken.
+
+    The unit that is ``given`` by the caller always holds; ``stated`` is that of the file, "" for none.
 
     Parameters
     ----------
-    given : str or None
-        Unit that the caller asks for; it always holds.
-    stated : str
-        Unit that the file states, "" for none.
     sizes : (n_blocks,) array
         Root of the area of each block, in the unit of the file.
-
-    Returns
-    -------
-    unit : str
-    note : str
-        The reason; "" if the stated unit is taken.
     """
     median = float(np.median(sizes)) if len(sizes) else 1.0
     if given is not None:

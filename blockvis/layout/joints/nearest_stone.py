@@ -89,20 +89,9 @@ def share_out(
     anchored: np.ndarray,
     mortar: Sequence[LeftOut] = (),
 ) -> list[np.ndarray]:
-    """Give mortar to the nearest stone.
+    """Give mortar to the nearest stone that is not anchored: gaps up to a thickness [m], and pockets between such gaps.
 
-    Parameters
-    ----------
-    thickness : float [m]
-        Gaps up to this width are mortar, and the pockets between such gaps.
-    anchored : (n_blocks,) bool array
-        Blocks that keep their place: the mortar beside them goes to the others.
-    mortar : sequence of LeftOut
-        Surfaces of mortar as drawn, with the stones as their holes; holes without a stone are openings.
-
-    Returns
-    -------
-    list of (n, 2) arrays [m]
+    And surfaces of mortar as drawn, with the stones as their holes; holes without a stone are openings.
     """
     import shapely
 

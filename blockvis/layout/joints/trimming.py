@@ -103,10 +103,6 @@ def separated(rings: list[np.ndarray], anchored: np.ndarray, thickness: float, c
     closed : float [m]
         Overlap that is a rounding error.
 
-    Returns
-    -------
-    list of (n, 2) arrays [m]
-
     Notes
     -----
     Where the joints of a crossing miss each other a little, its corners are merged; where blocks still overlap
@@ -179,10 +175,6 @@ def merge_close_corners(
         Corners closer than this are merged.
     closed : float [m]
         A corner closer than this to an edge lies on it.
-
-    Returns
-    -------
-    list of (n, 2) arrays [m]
 
     Notes
     -----
