@@ -20,8 +20,8 @@ from .joints.close import WAYS
 from .layout import Layout
 from .notes import changes_analysis
 from .outlines import ring_width
-from .repair import duplicates, overlaps, refuse_overlaps, repaired
-from .roles import checked_role, dropped_twins, roles_of, twins_note
+from .repair import overlaps, refuse_overlaps, repaired
+from .roles import checked_role, roles_of, told_apart, twins_note
 from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
 from .solids import prism, width_of
@@ -160,12 +160,8 @@ def _check_lengths(
 
 def without_twins(layout: Layout, roles: Mapping[str, str]) -> tuple[Layout, str]:
     """Drop blocks that are drawn in the place of another, and say which; "" for none."""
-    twins = duplicates(layout.every_corner)
-    if not twins:
-        return layout, ""
-    dropped = dropped_twins(layout, twins, roles)
-    kept = [i for i in range(layout.n_blocks) if i not in dropped]
-    return layout.chosen(kept), twins_note(layout, twins, dropped)
+    twins, kept = told_apart(layout, roles)
+    return (layout.chosen(kept), twins_note(layout, twins, kept)) if twins else (layout, "")
 
 
 def _left_overlaps(assembly: solver.Assembly, accepted: float) -> str:

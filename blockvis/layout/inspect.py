@@ -19,8 +19,8 @@ from .joints.close import Proposal, proposed
 from .joints.facing_edges import Facing, open_shares, rounded_up
 from .layout import Layout
 from .refusal import carrying
-from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
-from .roles import dropped_twins, roles_of
+from .repair import DEFAULT_OVERLAP, ROUNDING, overlaps
+from .roles import roles_of, told_apart
 from .simplify import default_tolerance, simplified
 from .solids import size_of, width_of
 
@@ -177,9 +177,7 @@ class Inspection:
 
 def inspected(layout: Layout) -> Inspection:
     """Measure a layout as read, duplicates included; Refused for outlines in the plane that are no blocks."""
-    twins = duplicates(layout.every_corner)
-    dropped = dropped_twins(layout, twins, {})
-    kept = np.array([i for i in range(layout.n_blocks) if i not in dropped])
+    twins, kept = told_apart(layout, {})
     drawn = layout.chosen(kept)
     roles = tuple(roles_of(layout, {}))
     free = np.array([roles[i] == mechanics.FREE for i in kept])

@@ -12,8 +12,8 @@ import solver
 from .facing import faced, facing_tolerance
 from .layout import Layout
 from .left_out import matches
-from .repair import DEFAULT_OVERLAP, duplicates, overlaps
-from .roles import dropped_twins
+from .repair import DEFAULT_OVERLAP, overlaps
+from .roles import told_apart
 
 #: What is left out is less than this part of the blocks: else it is the others that are the drawing.
 LESS = 0.5
@@ -30,8 +30,7 @@ MOST = 20_000
 
 def deep_overlaps(layout: Layout) -> list[tuple[int, int]]:
     """Find the pairs of blocks of which a run refuses the overlap, drawn twice or not."""
-    dropped = dropped_twins(layout, duplicates(layout.every_corner), {})
-    kept = [i for i in range(layout.n_blocks) if i not in dropped]
+    kept = told_apart(layout, {})[1]
     drawn = layout.chosen(kept)
     if layout.dimension == 3:
         assembly = solver.Assembly.from_solids(faced(drawn.solids, drawn.names).solids, names=drawn.names)
@@ -39,7 +38,7 @@ def deep_overlaps(layout: Layout) -> list[tuple[int, int]]:
     else:
         assembly = solver.Assembly.from_outlines(drawn.outlines, names=drawn.names)
         allowed = DEFAULT_OVERLAP * float(np.median(assembly.widths))
-    return [(kept[i], kept[j]) for i, j, _ in overlaps(assembly, allowed)]
+    return [(int(kept[i]), int(kept[j])) for i, j, _ in overlaps(assembly, allowed)]
 
 
 def proposed_ignore(

@@ -5,11 +5,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from blockvis.text import by_similarity
 from solver import mechanics
 
 from .layout import Layout
 from .left_out import matches
+from .repair import duplicates
 
 
 def checked_role(role: str, whose: str) -> str:
@@ -52,15 +55,21 @@ def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True
     return found
 
 
-def dropped_twins(layout: Layout, twins: Sequence[tuple[int, int]], roles: Mapping[str, str]) -> set[int]:
-    """Which of two blocks drawn in one place goes: the later copy, or the first where only the later holds."""
-    said = roles_of(layout, roles, all_match=False)
-    return {first if said[first] == mechanics.FREE != said[copy] else copy for first, copy in twins}
+def told_apart(layout: Layout, roles: Mapping[str, str]) -> tuple[list[tuple[int, int]], np.ndarray]:
+    """Find pairs of blocks drawn in one place, first and later copy, and the (n,) blocks that stay.
+
+    The copy goes, or the first where only the copy holds.
+    """
+    twins = duplicates(layout.every_corner)
+    said = roles_of(layout, roles, all_match=False) if twins else []
+    dropped = [first if said[first] == mechanics.FREE != said[copy] else copy for first, copy in twins]
+    return twins, np.setdiff1d(np.arange(layout.n_blocks), dropped)
 
 
-def twins_note(layout: Layout, twins: Sequence[tuple[int, int]], dropped: set[int]) -> str:
+def twins_note(layout: Layout, twins: Sequence[tuple[int, int]], kept: np.ndarray) -> str:
     """Say which blocks were dropped, and in favour of which."""
-    pairs = [(copy, first) if copy in dropped else (first, copy) for first, copy in twins]
+    stays = set(kept.tolist())
+    pairs = [(first, copy) if copy in stays else (copy, first) for first, copy in twins]
     listed = ", ".join(f"'{layout.names[gone]}' = '{layout.names[kept]}'" for gone, kept in pairs[:20])
     more = f" and {len(twins) - 20} more" if len(twins) > 20 else ""
     said = "is drawn twice and was dropped" if len(twins) == 1 else "are drawn twice and were dropped"
