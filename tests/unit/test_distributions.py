@@ -56,7 +56,7 @@ def test_mean_and_deviation_of_a_lognormal_are_its_own():
         ({"distribution": "nromal", "mean": 0, "deviation": 1}, ("nromal", "did you mean 'normal'")),
         ({"mean": 0}, ("distribution is missing", "uniform")),
         ({"distribution": "normal", "mean": 0.6}, ("deviation is missing",)),
-        ({"distribution": "normal", "mean": 0.6, "deviation": 0.0}, ("deviation is 0", "positive")),
+        ({"distribution": "normal", "mean": 0.6, "deviation": 0.0}, ("deviation is 0", "above 0")),
         ({"distribution": "normal", "mean": "x", "deviation": 1}, ("mean is 'x'", "number")),
         ({"distribution": "normal", "mean": 0.6, "devation": 1}, ("did you mean 'deviation'",)),
         ({"distribution": "uniform", "lower": 2, "upper": 1}, ("lower is 2 and upper is 1",)),
