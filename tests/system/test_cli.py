@@ -108,7 +108,7 @@ def test_a_layout_in_place_of_the_case_file_is_named(capsys):
         ('"right springer"', '"right sprinter"', ("right sprinter", "right springer")),
         ('"right springer" = "moving"', '"right springer" = "fixed"', ("moving", "right springer")),
         ('= "moving"', '= "sliding"', ("sliding", "free, fixed, moving")),
-        ("increment = 0.01", "increment = -0.01", ("increment", "positive")),
+        ("increment = 0.01", "increment = -0.01", ("increment", "above 0")),
         ("direction = [1.0, 0.0]", "direction = [0, 0]", ("direction",)),
         ("direction = [1.0, 0.0]", 'direction = "right"', ("direction", "two numbers")),
         ("density = 2000.0", 'density = "heavy"', ("density", "number")),
