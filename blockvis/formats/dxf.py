@@ -13,20 +13,21 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.layout.block_table import layer_of, moved_notes, on_layer, rows_of, with_rows
+from blockvis.layout.block_table import layer_of, on_layer, rows_of
 from blockvis.layout.choice import Choice, look_of
 from blockvis.layout.layout import Layout
-from blockvis.layout.left_out import LeftOut, passed_over
+from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import CHANGED, Note, kind_of
-from blockvis.layout.outlines import chords_of, drawing_plane, filled
+from blockvis.layout.outlines import chords_of, drawing_plane, filled, spread_of
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import metres_per
 from solver.mechanics import counted
 
-from .arcs import Arc, with_shared_corners
+from .arcs import Arc
 from .bodies import Bodies
+from .drawing import Drawing, Line, Outline, Stroke, is_chain, joined_ends
 from .dxf_bodies import DrawnMesh, drawn_mesh, is_mesh, layout_of_meshes, meshes_of_faces
-from .loose_lines import Faces, Line, faces_of_lines, is_chain, joined_ends, joined_note, nothing_closed
+from .loose_lines import nothing_closed, with_faces
 from .reading import Reading
 
 #: How a binary file begins.
@@ -65,60 +66,25 @@ _CURVES = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE", "ARC", "LINE
 
 
 @dataclass
-class _Outlines:
-    """Outlines and loose lines found so far, and what was skipped."""
+class _Found(Drawing):
+    """What was found so far; 3DFACEs are outlines, too, unless they enclose bodies."""
 
-    rings: list[np.ndarray] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    layers: list[str] = field(default_factory=list)
-    rows: list[dict[str, Any]] = field(default_factory=list)
-    looks: list[tuple[str, ...]] = field(default_factory=list)
-    within: list[tuple[str, ...]] = field(default_factory=list)
-    offs: list[float] = field(default_factory=list)
-    arcs: list[tuple[Arc, ...]] = field(default_factory=list)
-    loose: list[Line] = field(default_factory=list)
-    skipped: Counter[str] = field(default_factory=Counter)
     hidden: Counter[str] = field(default_factory=Counter)
-    misses: list[float] = field(default_factory=list)
-    left_out: list[LeftOut] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
     meshes: list[DrawnMesh] = field(default_factory=list)
-    faces: list[int] = field(default_factory=list)
+    faces: list[Outline] = field(default_factory=list)
 
-    def add(self, ring: np.ndarray, entity: Any, handle: str, off: float = 0.0, arcs: tuple[Arc, ...] = ()) -> None:
-        """Add an outline (n, 3) whose chords are up to ``off`` from its curves, of which some are arcs."""
-        self.rings.append(ring)
-        self.offs.append(off)
-        self.arcs.append(arcs)
-        self.layers.append(str(entity.dxf.layer))
-        self.names.append(f"block {handle}")
-        self.rows.append(_own_data(entity))
-        self.within.append(())
-        self.looks.append(_looks(entity))
+    def add(self, entity: Any, handle: str, stroke: Stroke) -> None:
+        """Add an outline, (n, 3) points."""
+        row = self._row(entity, f"block {handle}")
+        self.outlines.append(stroke.as_(Outline, row=row, looks=_looks(entity)))
 
-    @property
-    def of_outlines(self) -> tuple[list[Any], ...]:
-        """Lists with an item for each outline."""
-        return self.rings, self.names, self.layers, self.rows, self.looks, self.offs, self.arcs, self.within
-
-    def append(
-        self,
-        ring: np.ndarray,
-        level: float,
-        layer: str,
-        name: str,
-        looks: tuple[str, ...],
-        within: tuple[str, ...] = (),
-    ) -> None:
-        """Add an outline (n, 2) that lines make, at a level."""
-        self.within.append(within)
-        self.rings.append(np.column_stack([ring, np.full(len(ring), level)]))
-        self.offs.append(0.0)
-        self.arcs.append(())
-        self.layers.append(layer)
-        self.names.append(name)
-        self.rows.append({})
-        self.looks.append(looks)
+    def _row(self, entity: Any, name: str) -> dict[str, Any]:
+        """Row of an outline on its layer, with what our own writer put beside it."""
+        layer, own = str(entity.dxf.layer), _own_data(entity)
+        moved = bool(own) and _layer_name(own).lower() != layer.lower()
+        row = {**_said_by(layer), "name": name, **(on_layer(own, layer) if moved else own)}
+        self.moved += [(own, row)] if moved else []
+        return row
 
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
@@ -156,7 +122,7 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     tolerance = None if reading.chord_tolerance is None else reading.chord_tolerance / in_metres
     frozen = {layer.dxf.name for layer in document.layers if layer.is_frozen()}
     shut = frozen | {layer.dxf.name for layer in document.layers if layer.is_off()}
-    found = _Outlines(notes=doubts)
+    found = _Found(notes=doubts)
     for entity, handle in _bounded(document.modelspace(), path, frozen):
         if entity.dxf.layer in shut:
             found.hidden[entity.dxf.layer] += 1
@@ -164,27 +130,26 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
             found.skipped[f"invisible {entity.dxftype()}"] += 1
         else:
             _add(entity, handle, found, tolerance)
-    closed = meshes_of_faces([(found.layers[k], found.names[k], found.rings[k]) for k in found.faces], path)
+    closed = meshes_of_faces([(one.row["group"], one.row["name"], one.points) for one in found.faces], path)
     if closed:
         found.meshes += closed
-        for k in reversed(found.faces):
-            for each in found.of_outlines:
-                del each[k]
+        found.outlines = [one for one in found.outlines if one not in found.faces]
     meshes = _chosen_meshes(found, reading)
     if meshes:
         return layout_of_meshes(meshes, path, reading, stated, _faults(audit) + _skipped(found))
-    found.notes += _turned(found, reading, path)
-    faces = _with_loose(found, reading, tolerance)
-    if not found.rings and all(item.kind == "open" for item in found.left_out):
+    _turn(found, reading, path)
+    found.notes += _faults(audit)
+    _add_faces(found, reading, tolerance)
+    if found.is_open:
         seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
-        listed = "; ".join(words for words in (nothing_closed(faces), seen) if words) or "nothing"
+        listed = "; ".join(words for words in (nothing_closed(found.left_out), seen) if words) or "nothing"
         raise Refused(
             f"'{path}' has no closed outline in its model space (found: {listed}); draw each block as a closed "
             "polyline",
-            Layout((), (), unit=stated, left_out=tuple(found.left_out)),
+            found.layout(stated),
         )
-    found.notes += _faults(audit)
-    return _layout(found, faces, stated)
+    found.notes += _skipped(found)
+    return found.layout(stated, own=True)
 
 
 def _unit(document: Any, reading: Reading) -> tuple[str, list[str]]:
@@ -197,46 +162,23 @@ def _unit(document: Any, reading: Reading) -> tuple[str, list[str]]:
     ]
 
 
-def _layout(found: _Outlines, faces: Faces, stated: str) -> Layout:
-    """Make a layout of what was found; ``stated`` is the unit that the file states."""
-    notes = found.notes + faces.notes + joined_note(found.misses, _size(found))
-    notes += _skipped(found)
-    layout = Layout(
-        blocks=tuple(ring[:, :2] for ring in found.rings),
-        names=tuple(found.names),
-        unit=stated,
-        notes=tuple(notes),
-        left_out=tuple(item.turned(np.eye(item.points.shape[1])[:2]) for item in found.left_out),
-        looks=tuple(found.looks),
-        within=tuple(found.within),
-    )
-    moved = [
-        row and _layer_name(row).lower() != layer.lower() for row, layer in zip(found.rows, found.layers, strict=True)
-    ]
-    own = [
-        on_layer(row, layer) if was else row for row, layer, was in zip(found.rows, found.layers, moved, strict=True)
-    ]
-    rows = [
-        {"group": layer, **({"material": layer} if layer != "0" else {}), "name": name, **row}
-        for layer, name, row in zip(found.layers, found.names, own, strict=True)
-    ]
-    notes = moved_notes([pair for pair, was in zip(zip(found.rows, rows, strict=True), moved, strict=True) if was])
-    return with_rows(replace(layout, notes=(*layout.notes, *notes)), rows, own=True)
+def _said_by(layer: str) -> dict[str, Any]:
+    """Say what a layer says of a block on it."""
+    return {"group": layer, **({"material": layer} if layer != "0" else {})}
 
 
-def _chosen_meshes(found: _Outlines, reading: Reading) -> list[DrawnMesh]:
+def _chosen_meshes(found: _Found, reading: Reading) -> list[DrawnMesh]:
     """Take the bodies that are asked for, where no outline is; count the others, or the outlines, as skipped."""
     meshes = [mesh for mesh in found.meshes if reading.wants([mesh.layer, mesh.name])]
-    outlines = [layer for layer, name in zip(found.layers, found.names, strict=True) if reading.wants([layer, name])]
-    if meshes and not outlines:
-        flat = len(found.rings) + len(found.loose)
+    if meshes and not any(reading.wants([one.row["group"], one.row["name"]]) for one in found.outlines):
+        flat = len(found.outlines) + len(found.loose)
         found.skipped.update({"outlines and lines beside bodies in space": flat} if flat else {})
         return meshes
     found.skipped.update(Counter(mesh.curved or "body in space" for mesh in found.meshes))
     return []
 
 
-def _skipped(found: _Outlines) -> list[str]:
+def _skipped(found: _Found) -> list[str]:
     """Count what was skipped in notes."""
     hidden = {f"on '{layer}'": n for layer, n in found.hidden.items()}
     return [*passed_over(found.skipped), *passed_over(hidden, "skipped on layers that are off or frozen")]
@@ -248,31 +190,28 @@ def _faults(audit: Any) -> list[str]:
     return [Note(CHANGED, f"repaired or passed over: {counted(faults, 'fault')} of the file")] if faults else []
 
 
-def _turned(found: _Outlines, reading: Reading, path: Path) -> list[str]:
-    """Turn a drawing, of which what is wanted stands upright, into the plane of x and y; say what that changes."""
-    every = [*found.rings, *(line.points for line in found.loose)]
-    if not every or not all(np.isfinite(points).all() for points in every):
-        return []
-    unwanted, asked = _choices(found, reading)
-    labels = zip(_labels(found), found.looks, strict=True)
-    wanted = [not unwanted.takes(*own) and (not reading.only or asked.takes(*own)) for own in labels]
+def _turn(found: _Found, reading: Reading, path: Path) -> None:
+    """Turn a drawing, of which what is wanted stands upright, into the plane of x and y; note what that changes."""
+    unwanted, asked = found.choices(reading)
+
+    def wants(strokes: Sequence[Line | Outline]) -> list[np.ndarray]:
+        kept = (one for one in strokes if not unwanted.takes(one.labels, one.looks))
+        return [one.points for one in kept if not reading.only or asked.takes(one.labels, one.looks)]
+
+    chosen = [*wants(found.outlines), *wants(found.loose)]
     # Where outlines are asked for by name, other lines are in the plane of something else, as a plan.
-    named = [not unwanted.takes(*own) and (not reading.only or asked.takes(*own)) for own in _of_lines(found)]
-    wanted += named if any(wanted) or any(named) else _wanted_lines(found, unwanted, asked)
-    chosen = [points for points, is_wanted in zip(every, wanted, strict=True) if is_wanted]
+    lines = zip(found.loose, _wanted_lines(found, unwanted, asked), strict=True)
+    chosen = chosen or [line.points for line, is_wanted in lines if is_wanted]
+    every = [stroke.points for stroke in found.strokes]
+    if not every:
+        return
+    spread_of(np.concatenate(every), f"'{path}'")
     turn, notes = drawing_plane(chosen or every, f"'{path}'", reading.view)
-    still = np.zeros(3)
-    found.rings = [ring @ turn.T for ring in found.rings]
-    found.arcs = [tuple(arc.mapped(turn, still) for arc in arcs) for arcs in found.arcs]
-    found.loose = [
-        replace(line, points=line.points @ turn.T, curves=tuple(arc.mapped(turn, still) for arc in line.curves))
-        for line in found.loose
-    ]
-    found.left_out = [item.turned(turn) for item in found.left_out]
+    found.turn(turn[:2])
     if found.faces:
         remedy = "; 3DFACEs of a layer are read as bodies in space where they close one"
         notes = [Note(CHANGED, f"{note}{remedy}") if kind_of(note) == CHANGED else note for note in notes]
-    return notes
+    found.notes += notes
 
 
 def _bounded(entities: Any, path: Path, frozen: Set[str]) -> Iterator[tuple[Any, str]]:
@@ -374,17 +313,18 @@ def _inserted(insert: Any, path: Path) -> Iterator[Any]:
         ) from None
 
 
-def _points(curve: Any, tolerance: float | None) -> tuple[np.ndarray, float]:
-    """(n, 3) array: points of a path, its arcs replaced by chords, both ends included; how far these are off it."""
+def _flattened(curve: Any, tolerance: float | None) -> Stroke:
+    """Replace the curves of a path by chords; (n, 3) points, both ends included."""
     box = np.array([(p.x, p.y, p.z) for p in curve.control_vertices()])
     size = float(np.ptp(box, axis=0).max()) if len(box) and np.isfinite(box).all() else 0.0
     if not curve.has_curves or size == 0.0:
-        return box, 0.0
+        return Stroke(points=box)
     distance = max(1e-3 * size if tolerance is None else tolerance, 1e-6 * size)
-    return np.array([(p.x, p.y, p.z) for p in curve.flattening(distance, segments=2)]), distance
+    points = np.array([(p.x, p.y, p.z) for p in curve.flattening(distance, segments=2)])
+    return Stroke(points=points, off_others=distance)
 
 
-def _add(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
+def _add(entity: Any, handle: str, found: _Found, tolerance: float | None) -> None:
     kind = entity.dxftype()
     if entity.dxf.layer == NEVER_DRAWN:
         found.skipped[f"{kind} on {NEVER_DRAWN}"] += 1
@@ -398,19 +338,19 @@ def _add(entity: Any, handle: str, found: _Outlines, tolerance: float | None) ->
         found.skipped[f"reference to another file ('{entity.dxf.name}')" if kind == "INSERT" else kind] += 1
 
 
-def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
+def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None) -> None:
     from ezdxf.path import make_path
 
     kind = entity.dxftype()
     if kind in ("SOLID", "TRACE", "3DFACE"):
-        ring = np.array([(p.x, p.y, p.z) for p in entity.wcs_vertices()])
-        found.faces += [len(found.rings)] if kind == "3DFACE" else []
-        found.add(ring, entity, handle)
+        found.add(entity, handle, Stroke(points=np.array([(p.x, p.y, p.z) for p in entity.wcs_vertices()])))
+        found.faces += found.outlines[-1:] if kind == "3DFACE" else []
         return
     if kind == "SPLINE":
         clamped = _clamped(entity.control_points, entity.weights, entity.knots, entity.dxf.degree)
         entity.control_points, entity.weights, entity.knots = clamped
-    points, off, arcs = _circular(entity, tolerance) or (*_points(make_path(entity), tolerance), ())
+    stroke = _circular(entity, tolerance) or _flattened(make_path(entity), tolerance)
+    points = stroke.points
     if len(points) < 2:
         found.skipped[f"{kind} without length"] += 1
         return
@@ -420,22 +360,15 @@ def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | No
             f"{kind} {handle} on layer '{entity.dxf.layer}' has a point at {bad}; coordinates must be finite numbers"
         )
     closes = bool(getattr(entity, "is_closed", False) or getattr(entity, "closed", False))
-    joined = joined_ends(points) if kind not in ("LINE", "ARC") else None
+    single = kind in ("LINE", "ARC")
+    joined = None if single else joined_ends(points, closes and len(points) > 3)
     if joined is not None:
-        ring, miss = joined
-        # A closed polyline may have a short last edge: it stays.
-        short = closes and miss > CLOSES * float(np.ptp(points, axis=0).max())
-        found.add(points if short else ring, entity, handle, off, arcs)
-        found.misses += [] if closes else [miss]
+        found.add(entity, handle, replace(stroke, points=joined[0]))
+        found.misses.append(joined[1])
         return
-    if closes and kind not in ("LINE", "ARC") and len(points) > 3:
-        found.add(points, entity, handle, off, arcs)
-        return
-    layer, must_close = str(entity.dxf.layer), kind not in ("LINE", "ARC")
-    drawn = _line_type(entity)
-    found.loose.append(
-        Line(points, layer, handle, must_close, _looks(entity), off, arcs, drawn, _is_chain(entity, drawn))
-    )
+    named = {"layer": str(entity.dxf.layer), "name": f"line {handle}", "handle": handle, "must_close": not single}
+    dashes = {"line_type": (drawn := _line_type(entity)), "chain": _is_chain(entity, drawn)}
+    found.loose.append(stroke.as_(Line, looks=_looks(entity), **named, **dashes))
 
 
 def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, Any, Any]:
@@ -465,8 +398,8 @@ def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, A
     return (found[:, :-1] / found[:, -1:]).tolist(), found[:, -1].tolist() if len(weights) else [], ends.tolist()
 
 
-def _circular(entity: Any, tolerance: float | None) -> tuple[np.ndarray, float, tuple[Arc, ...]] | None:
-    """(n, 3) array: points of lines and circular arcs, how far chords are off, and the arcs; None for other entities.
+def _circular(entity: Any, tolerance: float | None) -> Stroke | None:
+    """(n, 3) points of lines and circular arcs, and these; None for other entities.
 
     The chords are measured on the arcs themselves: ezdxf's paths replace an arc by a cubic first, which deviates from
     it by up to 2.7e-4 of the radius.
@@ -475,39 +408,37 @@ def _circular(entity: Any, tolerance: float | None) -> tuple[np.ndarray, float, 
     if kind == "SPLINE" and entity.dxf.degree == 1 and len(entity.control_points):
         # Straight from corner to corner: ezdxf would put a smooth curve through them.
         straight = np.array([(*point,) for point in entity.control_points])
-        return (np.concatenate([straight, straight[:1]]) if entity.closed else straight), 0.0, ()
+        return Stroke(points=np.concatenate([straight, straight[:1]]) if entity.closed else straight)
     if kind == "ELLIPSE":
         # It lies in the world, not in a plane of its own.
         axes = np.array([(*axis,) for axis in (entity.dxf.major_axis, entity.minor_axis)]).T
-        arc = _ellipse(np.array((*entity.dxf.center,)), axes, entity.dxf.start_param, entity.dxf.end_param, tolerance)
-        return _on(arc), arc.off, (arc,)
+        return _ellipse((*entity.dxf.center,), axes, entity.dxf.start_param, entity.dxf.end_param, tolerance)
     if kind in ("CIRCLE", "ARC"):
         begin, end = (0.0, 360.0) if kind == "CIRCLE" else (entity.dxf.start_angle, entity.dxf.end_angle)
         start, sweep = math.radians(begin), math.radians((end - begin) % 360.0 or 360.0)
-        arc = _arc(0, entity.dxf.center, abs(float(entity.dxf.radius)), start, sweep, tolerance)
-        flat, arcs = _on(arc), [arc]
+        flat = _along(_arc(0, entity.dxf.center, abs(float(entity.dxf.radius)), start, sweep, tolerance))
         level = float(entity.dxf.center.z)
     elif kind == "LWPOLYLINE":
-        flat, arcs = _with_bulges([(x, y, b) for x, y, b in entity.get_points("xyb")], bool(entity.closed), tolerance)
+        flat = _with_bulges([(x, y, b) for x, y, b in entity.get_points("xyb")], bool(entity.closed), tolerance)
         level = float(entity.dxf.elevation)
     elif kind == "POLYLINE" and entity.is_2d_polyline and not entity.dxf.flags & 6:
         corners = [(v.dxf.location.x, v.dxf.location.y, float(v.dxf.bulge)) for v in entity.vertices]
-        flat, arcs = _with_bulges(corners, bool(entity.is_closed), tolerance)
-        level = float(entity.dxf.elevation.z) if entity.dxf.hasattr("elevation") else 0.0
+        flat, level = _with_bulges(corners, bool(entity.is_closed), tolerance), _level(entity)
     else:
         return None
-    return _in_world(entity, flat, arcs, level)
+    return _in_world(entity, flat, level)
 
 
-def _in_world(
-    entity: Any, flat: np.ndarray, arcs: list[Arc], level: float
-) -> tuple[np.ndarray, float, tuple[Arc, ...]]:
-    """Put points and arcs of an entity's own plane into space, and say how far chords are off."""
+def _level(entity: Any) -> float:
+    return float(entity.dxf.elevation.z) if entity.dxf.hasattr("elevation") else 0.0
+
+
+def _in_world(entity: Any, flat: Stroke, level: float) -> Stroke:
+    """Put what lies in an entity's own plane into space."""
     system = entity.ocs()
     own = np.array([(*system.to_wcs(axis),) for axis in np.eye(3).tolist()]).T
-    points = np.array([(*system.to_wcs((x, y, level)),) for x, y in flat]).reshape(-1, 3)
-    placed = tuple(arc.mapped(own[:, :2], level * own[:, 2]) for arc in arcs)
-    return points, max((arc.off for arc in arcs), default=0.0), placed
+    points = np.array([(*system.to_wcs((x, y, level)),) for x, y in flat.points]).reshape(-1, 3)
+    return replace(flat.mapped(own[:, :2], level * own[:, 2]), points=points)
 
 
 def _arc(first: int, centre: Any, radius: float, start: float, sweep: float, tolerance: float | None) -> Arc:
@@ -516,22 +447,21 @@ def _arc(first: int, centre: Any, radius: float, start: float, sweep: float, tol
     return Arc(first, n, np.array([centre.x, centre.y]), radius * np.eye(2), start, sweep)
 
 
-def _ellipse(centre: np.ndarray, axes: np.ndarray, start: float, end: float, tolerance: float | None) -> Arc:
-    """Make an arc of an ellipse with half axes (d, 2) between two parameters [rad], counter-clockwise."""
+def _ellipse(centre: Sequence[float], axes: np.ndarray, start: float, end: float, tolerance: float | None) -> Stroke:
+    """Draw an arc of an ellipse with half axes (d, 2) between two parameters [rad], counter-clockwise."""
     sweep = (end - start) % (2.0 * math.pi)
     sweep = sweep if sweep > WHOLE_TURN else 2.0 * math.pi
-    return Arc(0, chords_of(sweep, float(np.linalg.norm(axes, 2)), tolerance), centre, axes, start, sweep)
+    n = chords_of(sweep, float(np.linalg.norm(axes, 2)), tolerance)
+    return _along(Arc(0, n, np.array(centre), axes, start, sweep))
 
 
-def _on(arc: Arc) -> np.ndarray:
-    """(n, d) array: the ends of its chords."""
-    return arc.at(np.linspace(0.0, 1.0, arc.chords + 1))
+def _along(arc: Arc) -> Stroke:
+    """Draw an arc."""
+    return Stroke(points=arc.at(np.linspace(0.0, 1.0, arc.chords + 1)), curves=(arc,))
 
 
-def _with_bulges(
-    corners: list[tuple[float, float, float]], closed: bool, tolerance: float | None
-) -> tuple[np.ndarray, list[Arc]]:
-    """(n, 2) array: points of a polyline, a closed one ends where it starts; and its arcs."""
+def _with_bulges(corners: list[tuple[float, float, float]], closed: bool, tolerance: float | None) -> Stroke:
+    """Draw a polyline, (n, 2) points; a closed one ends where it starts."""
     from ezdxf.math import bulge_to_arc
 
     points, arcs = [np.array(corner[:2]) for corner in corners[:1]], list[Arc]()
@@ -542,9 +472,9 @@ def _with_bulges(
             sweep = (end - start) % (2 * math.pi)
             begin, turned = (start, sweep) if bulge > 0 else (end, -sweep)
             arcs.append(_arc(len(points) - 1, centre, radius, begin, turned, tolerance))
-            points += [*_on(arcs[-1])[1:-1]]
+            points += [*_along(arcs[-1]).points[1:-1]]
         points.append(np.array([u, v]))
-    return np.array(points).reshape(-1, 2), arcs
+    return Stroke(points=np.array(points).reshape(-1, 2), curves=tuple(arcs))
 
 
 def _looks(entity: Any) -> tuple[str, ...]:
@@ -578,44 +508,33 @@ def _is_chain(entity: Any, line_type: str) -> bool:
     return is_chain([length for length in lengths if length >= 0.0])
 
 
-def _hatch_rings(entity: Any, tolerance: float | None) -> list[tuple[np.ndarray, float, tuple[Arc, ...]]]:
-    """(n, 3) arrays: boundaries of a hatch, how far their chords are off its curves, and their arcs."""
-    rings = []
+def _hatch_rings(entity: Any, tolerance: float | None) -> list[Stroke]:
+    """Boundaries of a hatch, (n, 3) points."""
+    loops = list[Stroke]()
     for boundary in entity.paths:
         if hasattr(boundary, "vertices"):
-            loops = [_Loop(*_with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance))]
+            loops.append(_with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance))
         else:
-            loops = _loops_of([_edge(edge, tolerance) for edge in boundary.edges])
-        level = float(entity.dxf.elevation.z) if entity.dxf.hasattr("elevation") else 0.0
-        for loop in loops:
-            points, off, arcs = _in_world(entity, loop.points, loop.arcs, level)
-            rings.append((points, max(off, loop.off), arcs))
-    return rings
+            loops += _loops_of([_edge(edge, tolerance) for edge in boundary.edges])
+    return [_in_world(entity, loop, _level(entity)) for loop in loops]
 
 
-@dataclass(frozen=True)
-class _Loop:
-    """Points (n, 2) of edges of a hatch that follow each other, their arcs, and how far chords are off other curves."""
-
-    points: np.ndarray
-    arcs: list[Arc]
-    off: float = 0.0
-
-    def backwards(self) -> _Loop:
-        """Turn round."""
-        return replace(
-            self, points=self.points[::-1], arcs=[arc.backwards(len(self.points)) for arc in self.arcs[::-1]]
-        )
-
-    def then(self, other: _Loop, near: float) -> _Loop:
-        """Put edges behind it, which begin at its end or after a gap."""
-        meets = math.dist(self.points[-1], other.points[0]) <= near
-        n = len(self.points) - meets
-        arcs = [*self.arcs, *(replace(arc, first=arc.first + n) for arc in other.arcs)]
-        return _Loop(np.concatenate([self.points, other.points[int(meets) :]]), arcs, max(self.off, other.off))
+def _backwards(edge: Stroke) -> Stroke:
+    """Turn edges of a hatch round."""
+    arcs = (arc.backwards(len(edge.points)) for arc in edge.curves[::-1] if isinstance(arc, Arc))
+    return replace(edge, points=edge.points[::-1], curves=tuple(arcs))
 
 
-def _edge(edge: Any, tolerance: float | None) -> _Loop:
+def _then(one: Stroke, other: Stroke, near: float) -> Stroke:
+    """Put edges of a hatch behind others; they begin at their end or after a gap."""
+    meets = math.dist(one.points[-1], other.points[0]) <= near
+    n = len(one.points) - meets
+    curves = (*one.curves, *(replace(arc, first=arc.first + n) for arc in other.curves))
+    points = np.concatenate([one.points, other.points[int(meets) :]])
+    return Stroke(points=points, curves=curves, off_others=max(one.off_others, other.off_others))
+
+
+def _edge(edge: Any, tolerance: float | None) -> Stroke:
     """Read one edge of a hatch boundary, in the plane of the hatch."""
     from ezdxf.math import BSpline, fit_points_to_cad_cv
     from ezdxf.path import Path as Drawn
@@ -623,7 +542,7 @@ def _edge(edge: Any, tolerance: float | None) -> _Loop:
 
     kind = edge.EDGE_TYPE
     if kind == "LineEdge":
-        return _Loop(np.array([(*edge.start,), (*edge.end,)])[:, :2], [])
+        return Stroke(points=np.array([(*edge.start,), (*edge.end,)])[:, :2])
     if kind == "SplineEdge":
         if len(edge.control_points):
             points, weights, knots = _clamped(edge.control_points, edge.weights, edge.knot_values, edge.degree)
@@ -632,23 +551,22 @@ def _edge(edge: Any, tolerance: float | None) -> _Loop:
             given = edge.start_tangent and edge.end_tangent
             curve = fit_points_to_cad_cv(edge.fit_points, (edge.start_tangent, edge.end_tangent) if given else None)
         else:
-            return _Loop(np.zeros((0, 2)), [])
+            return Stroke(points=np.zeros((0, 2)))
         drawn = Drawn()
         add_spline(drawn, curve, reset=True)
-        flat, off = _points(drawn, tolerance)
-        return _Loop(flat[:, :2], [], off)
+        found = _flattened(drawn, tolerance)
+        return replace(found, points=found.points[:, :2])
     if kind == "ArcEdge":
         axes, start, end = edge.radius * np.eye(2), math.radians(edge.start_angle), math.radians(edge.end_angle)
     else:
         x, y = edge.major_axis.x, edge.major_axis.y
         axes, start, end = np.array([[x, -edge.ratio * y], [y, edge.ratio * x]]), edge.start_param, edge.end_param
     if not axes.any():
-        return _Loop(np.zeros((0, 2)), [])
-    arc = _ellipse(np.array([edge.center.x, edge.center.y]), axes, start, end, tolerance)
-    return _Loop(_on(arc), [arc])
+        return Stroke(points=np.zeros((0, 2)))
+    return _ellipse((edge.center.x, edge.center.y), axes, start, end, tolerance)
 
 
-def _loops_of(edges: Sequence[_Loop]) -> list[_Loop]:
+def _loops_of(edges: Sequence[Stroke]) -> list[Stroke]:
     """Put edges of a boundary together, which may turn either way; gaps are closed by lines, closed loops are whole."""
     edges = [edge for edge in edges if len(edge.points) > 1]
     if not edges:
@@ -660,111 +578,73 @@ def _loops_of(edges: Sequence[_Loop]) -> list[_Loop]:
         if math.dist(loop.points[0], loop.points[-1]) <= near:
             loops.append(edge)
             continue
-        ways = [(one, other) for one in (loop, loop.backwards()) for other in (edge, edge.backwards())]
+        ways = [(one, other) for one in (loop, _backwards(loop)) for other in (edge, _backwards(edge))]
         gaps = [math.dist(one.points[-1], other.points[0]) for one, other in ways]
         # Edges that do not meet are drawn in their sense.
         one, other = ways[int(np.argmin(gaps))] if min(gaps) <= near else ways[0]
-        loops[-1] = one.then(other, near)
+        loops[-1] = _then(one, other, near)
     return [_shut(loop, near) for loop in loops]
 
 
-def _shut(loop: _Loop, near: float) -> _Loop:
+def _shut(loop: Stroke, near: float) -> Stroke:
     """End a loop exactly where it begins."""
     ends = math.dist(loop.points[0], loop.points[-1]) <= near
     return replace(loop, points=np.concatenate([loop.points[:-1] if ends else loop.points, loop.points[:1]]))
 
 
-def _add_hatch(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
-    bounds = [bound for bound in _hatch_rings(entity, tolerance) if len(bound[0]) > 2]
-    rings = [ring[:-1] if (ring[0] == ring[-1]).all() else ring for ring, *_ in bounds]
+def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None) -> None:
+    bounds = [bound for bound in _hatch_rings(entity, tolerance) if len(bound.points) > 2]
+    rings = [ring[:-1] if (ring[0] == ring[-1]).all() else ring for ring in (bound.points for bound in bounds)]
     if not rings:
         found.skipped["HATCH without boundary"] += 1
         return
     outlined = [(k, holes) for k, holes in filled(rings) if not _drawn_already(rings[k], found)]
+    layer = str(entity.dxf.layer)
     for number, (k, inside) in enumerate(outlined):
+        stroke = replace(bounds[k], points=rings[k])
         if not inside:
-            found.add(rings[k], entity, handle if len(rings) == 1 else f"{handle}.{number}", *bounds[k][1:])
+            found.add(entity, handle if len(rings) == 1 else f"{handle}.{number}", stroke)
             continue
-        x, y = rings[inside[0]][:, :2].mean(axis=0)
-        message = (
-            f"HATCH {handle} on layer '{entity.dxf.layer}' has a hole around ({x:.6g}, {y:.6g}); "
-            "cut the block in two, or fill the hole with a block"
-        )
-        layer, name = str(entity.dxf.layer), f"hatch {handle}"
-        holes = tuple(rings[j] for j in inside)
-        found.left_out.append(LeftOut("hole", rings[k], message, layer, name, holes=holes, looks=_looks(entity)))
+        row, holes = {"name": f"hatch {handle}", "group": layer}, tuple(rings[j] for j in inside)
+        holed = stroke.as_(Outline, row=row, looks=_looks(entity), holes=holes)
+        found.holed.append((holed, f"HATCH {handle} on layer '{layer}'"))
 
 
-def _drawn_already(ring: np.ndarray, found: _Outlines) -> bool:
+def _drawn_already(ring: np.ndarray, found: _Found) -> bool:
     """Whether a hatch fills the outline just before it, as drawing programs write them."""
-    if not found.rings or len(found.rings[-1]) != len(ring):
+    if not found.outlines or len(found.outlines[-1].points) != len(ring):
         return False
-    return bool(np.abs(found.rings[-1].mean(0) - ring.mean(0)).max() <= CLOSES * float(np.ptp(ring, axis=0).max()))
+    last = found.outlines[-1].points.mean(0)
+    return bool(np.abs(last - ring.mean(0)).max() <= CLOSES * float(np.ptp(ring, axis=0).max()))
 
 
-def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> Faces:
+def _add_faces(found: _Found, reading: Reading, tolerance: float | None) -> None:
     """Let arcs share their corners, add the faces between loose lines, and cut outlines along the lines within them."""
-    unwanted, wanted = _chosen_lines(found, reading)
-    curves, n = [*found.rings, *(line.points for line in wanted)], len(found.rings)
-    curves = with_shared_corners(curves, [*found.arcs, *(line.curves for line in wanted)], tolerance)
-    found.rings = curves[:n]
-    wanted = [replace(line, points=points) for line, points in zip(wanted, curves[n:], strict=True)]
-    ignored = {i for i, layer in enumerate(found.layers) if unwanted.takes([layer], found.looks[i])}
-    faces = faces_of_lines(wanted, [ring[:, :2] for ring in found.rings], found.offs, ignored, reading.only)
-    found.left_out += faces.left_out
-    for i, pieces in sorted(faces.pieces.items(), reverse=True):
-        level = float(found.rings[i][0, 2])
-        for number, piece in enumerate(pieces):
-            found.append(piece, level, found.layers[i], f"{found.names[i]}.{number}", found.looks[i])
-        for values in found.of_outlines:
-            del values[i]
-    for number, (ring, layer, around) in enumerate(zip(faces.rings, faces.layers, faces.around, strict=True)):
-        found.append(ring, 0.0, layer, f"face {number}", ("face",), around)
-    return faces
+    unwanted, asked = found.choices(reading)
+    with_faces(
+        found,
+        found.without_lines(_wanted_lines(found, unwanted, asked)),
+        reading,
+        called=lambda name, k: f"{name}.{k}",
+        of_face=lambda layer, around, name: {
+            "row": {**_said_by(layer), "name": name},
+            "within": around,
+            "looks": ("face",),
+        },
+        ignored={i for i, one in enumerate(found.outlines) if unwanted.takes([one.row["group"]], one.looks)},
+        tolerance=tolerance,
+    )
 
 
-def _chosen_lines(found: _Outlines, reading: Reading) -> tuple[Choice, list[Line]]:
-    """Leave out loose lines that are not wanted; give what is unwanted, and the others."""
-    unwanted, asked = _choices(found, reading)
-    wanted = []
-    for line, is_wanted in zip(found.loose, _wanted_lines(found, unwanted, asked), strict=True):
-        if is_wanted:
-            wanted.append(line)
-        else:
-            name = f"line {line.handle}"
-            left = LeftOut("asked line", line.points[:, :2], "", line.layer, name, closed=False, looks=line.looks)
-            found.left_out.append(left)
-    return unwanted, wanted
-
-
-def _choices(found: _Outlines, reading: Reading) -> tuple[Choice, Choice]:
-    """Tell apart what is unwanted and what is asked for."""
-    names = set[str]().union(*_labels(found), *(labels for labels, _ in _of_lines(found)))
-    return Choice(reading.ignore, names), Choice(reading.only, names)
-
-
-def _labels(found: _Outlines) -> list[tuple[str, ...]]:
-    """Layer and names of each outline, by which it can be asked for."""
-    rows = [[str(row.get(key, "")) for key in ("name", "group", "material")] for row in found.rows]
-    return [tuple(filter(None, own)) for own in zip(found.layers, found.names, *zip(*rows, strict=True), strict=True)]
-
-
-def _wanted_lines(found: _Outlines, unwanted: Choice, asked: Choice) -> list[bool]:
+def _wanted_lines(found: _Found, unwanted: Choice, asked: Choice) -> list[bool]:
     """Which loose lines are wanted: all, unless layers or looks are asked for."""
-    layers = {*found.layers, *(line.layer for line in found.loose)}
-    looks = {look for own in (*found.looks, *(line.looks for line in found.loose)) for look in own}
+    layers = {*(one.row["group"] for one in found.outlines), *(line.layer for line in found.loose)}
+    looks = {look for one in (*found.outlines, *found.loose) for look in one.looks}
     chosen = any(asked.takes([layer]) for layer in layers) or asked.takes((), looks)
-    return [not unwanted.takes(*own) and (not chosen or asked.takes(*own)) for own in _of_lines(found)]
-
-
-def _of_lines(found: _Outlines) -> list[tuple[list[str], tuple[str, ...]]]:
-    """Layer and name of each loose line, by which it can be asked for, and its looks."""
-    return [([line.layer, f"line {line.handle}"], line.looks) for line in found.loose]
-
-
-def _size(found: _Outlines) -> float:
-    drawn = [points[:, :2] for points in (*found.rings, *(line.points for line in found.loose))]
-    return float(np.ptp(np.concatenate(drawn), axis=0).max()) if drawn else 0.0
+    return [
+        not unwanted.takes(line.labels, line.looks) and (not chosen or asked.takes(line.labels, line.looks))
+        for line in found.loose
+    ]
 
 
 def _own_data(entity: Any) -> dict[str, Any]:

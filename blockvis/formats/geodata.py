@@ -11,13 +11,13 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from blockvis.layout.block_table import rows_of, with_rows
+from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches, passed_over
 from blockvis.layout.notes import CHANGED, Note
@@ -27,7 +27,8 @@ from blockvis.system.extras import require
 from solver import mechanics
 
 from .bodies import ROLE_WORDS
-from .loose_lines import Faces, Line, faces_of_lines, joined_ends, joined_note, nothing_closed
+from .drawing import Drawing, Line, Outline, joined_ends
+from .loose_lines import nothing_closed, with_faces
 from .reading import Reading
 
 #: Attributes that name a block and its group, the first that a file has; in small letters.
@@ -62,28 +63,6 @@ class Feature:
     geometry: Any
     attributes: Mapping[str, Any]
     layer: str = ""
-
-
-@dataclass
-class _Found:
-    """Outlines and open lines found so far, (n, 3) points each, and the number of the feature of each."""
-
-    rings: list[np.ndarray] = field(default_factory=list)
-    of: list[int] = field(default_factory=list)
-    lines: list[tuple[np.ndarray, int]] = field(default_factory=list)
-    holed: list[tuple[list[np.ndarray], int]] = field(default_factory=list)
-    misses: list[float] = field(default_factory=list)
-    skipped: Counter[str] = field(default_factory=Counter)
-
-    @property
-    def every(self) -> list[np.ndarray]:
-        """(n, 3) arrays: the points of each outline and line."""
-        return [*self.rings, *(points for points, _ in self.lines), *(rings[0] for rings, _ in self.holed)]
-
-    @property
-    def of_every(self) -> list[int]:
-        """Number of the feature of each."""
-        return [*self.of, *(k for _, k in self.lines), *(k for _, k in self.holed)]
 
 
 def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
@@ -299,79 +278,42 @@ def layout_of_features(
     ValueError
         For coordinates in degrees, and where nothing is an outline.
     """
-    found = _Found(skipped=Counter(skipped or {}))
-    for k, feature in enumerate(features):
-        _add(feature.geometry, k, found)
-    every, skips = found.every, passed_over(found.skipped, "found")
+    found, rows = Drawing(skipped=Counter(skipped or {})), _rows(features)
+    roles = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)
+    for feature, row in zip(features, rows, strict=True):
+        first = len(found.outlines)
+        _add(feature.geometry, row, found)
+        if len(parts := found.outlines[first:]) > 1:
+            named = [{**row, "name": f"{row['name']} {k + 1}"} for k in range(len(parts))]
+            found.outlines[first:] = [replace(one, row=own) for one, own in zip(parts, named, strict=True)]
+    every, skips = found.strokes, passed_over(found.skipped, "found")
     if not every:
         seen = skips[0] if skips else "found: nothing"
         raise ValueError(f"'{path}' has no polygon ({seen}); draw each block as one polygon")
-    rows = _rows(features)
-    labels = [[row.get(key, "") for key in ("group", "material", "name")] for row in rows]
-    wanted = [points for points, k in zip(every, found.of_every, strict=True) if reading.wants(labels[k])]
-    turn, notes = drawing_plane(wanted or every, f"'{path}'", reading.view)
-    turn = turn[:2]
-    strange = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)
-    if strange:
-        listed_roles = ", ".join(f"'{role}'" for role in strange)
-        notes.append(Note(CHANGED, f"roles were left out ({listed_roles}): roles are {', '.join(mechanics.ROLES)}"))
-    rings = [ring @ turn.T for ring in found.rings]
-    outlines = [*rings, *(holed[0] @ turn.T for holed, _ in found.holed)]
-    far = not (unit or degrees or lengths) and (turn == np.eye(3)[:2]).all()
-    _check_degrees(outlines, path, reading, degrees, notes, far=far)
-    notes += passed_over(found.skipped)
-    kinds = _parts(rows, found.of)
-    lines, unwanted = _lines(found, rows, turn, reading)
-    faces = faces_of_lines(lines, rings, [0.0] * len(rings), only=reading.only)
-    _replace_cut(rings, kinds, faces)
-    holes = [_hole(*(ring @ turn.T for ring in holed), row=rows[k]) for holed, k in found.holed]
-    left_out = [*holes, *unwanted, *faces.left_out]
-    if not rings and all(item.kind == "open" for item in left_out):
-        raise ValueError(f"'{path}' has no polygon: {nothing_closed(faces)}; draw each block as one polygon")
-    notes += faces.notes + joined_note(found.misses, float(np.ptp(np.concatenate(every), axis=0).max()))
-    layout = Layout(
-        blocks=tuple(rings),
-        names=tuple(row["name"] for row in kinds),
-        unit=unit,
-        notes=tuple(notes),
-        left_out=tuple(left_out),
-        within=(*[()] * (len(rings) - len(faces.rings)), *faces.around),
+    wanted = [one for one in every if reading.wants(one.labels)]
+    turn, notes = drawing_plane([one.points for one in wanted or every], f"'{path}'", reading.view)
+    found.notes += notes
+    if roles:
+        listed = ", ".join(f"'{role}'" for role in roles)
+        found.notes.append(Note(CHANGED, f"roles were left out ({listed}): roles are {', '.join(mechanics.ROLES)}"))
+    found.turn(turn[:2])
+    _check_degrees(found, path, reading, degrees, far=not (unit or degrees or lengths) and (turn == np.eye(3)).all())
+    found.notes += passed_over(found.skipped)
+    with_faces(
+        found,
+        found.without_lines([reading.wants(line.labels) for line in found.loose]),
+        reading,
+        called=lambda name, k: f"{name} {k + 1}",
+        of_face=lambda layer, around, name: {"row": _row(name, layer, {}), "within": around},
+        in_place=True,
     )
-    return with_rows(layout, kinds)
+    if found.is_open:
+        closed = nothing_closed(found.left_out)
+        raise ValueError(f"'{path}' has no polygon: {closed}; draw each block as one polygon")
+    return found.layout(unit)
 
 
-def _lines(
-    found: _Found, rows: Sequence[Mapping[str, Any]], turn: np.ndarray, reading: Reading
-) -> tuple[list[Line], list[LeftOut]]:
-    """Name the open lines after the features that have them, and leave out those that are not wanted."""
-    wanted, left_out = [], []
-    for points, k in found.lines:
-        line = Line(points @ turn.T, rows[k].get("group", ""), rows[k]["name"], must_close=len(points) > 2)
-        if reading.wants([line.layer, line.handle]):
-            wanted.append(line)
-        else:
-            left_out.append(LeftOut("asked line", line.points, "", line.layer, line.handle, closed=False))
-    return wanted, left_out
-
-
-def _replace_cut(rings: list[np.ndarray], rows: list[dict[str, Any]], faces: Faces) -> None:
-    """Put the pieces of outlines that lines cut in their place, and the faces between lines at the end."""
-    for i, pieces in sorted(faces.pieces.items(), reverse=True):
-        rings[i : i + 1] = pieces
-        rows[i : i + 1] = [{**rows[i], "name": f"{rows[i]['name']} {n + 1}"} for n in range(len(pieces))]
-    rings += faces.rings
-    rows += [_row(f"face {n}", layer, {}) for n, layer in enumerate(faces.layers)]
-
-
-def _hole(outer: np.ndarray, *holes: np.ndarray, row: Mapping[str, Any]) -> LeftOut:
-    """Leave out a polygon with holes."""
-    x, y = holes[0].mean(axis=0)
-    name = row["name"]
-    message = f"'{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
-    return LeftOut("hole", outer, message, row.get("group", ""), name, holes=holes)
-
-
-def _add(geometry: Any, number: int, found: _Found) -> None:
+def _add(geometry: Any, row: dict[str, Any], found: Drawing) -> None:
     """Add the outlines and lines of a geometry."""
     import shapely
 
@@ -379,24 +321,24 @@ def _add(geometry: Any, number: int, found: _Found) -> None:
     if geometry.is_empty:
         found.skipped["empty geometries"] += 1
     elif kind == "Polygon":
-        rings = [_points(ring)[:-1] for ring in (geometry.exterior, *geometry.interiors)]
-        if len(rings) > 1:
-            found.holed.append((rings, number))
+        ring, *holes = (_points(one)[:-1] for one in (geometry.exterior, *geometry.interiors))
+        outline = Outline(points=ring, row=row, holes=tuple(holes))
+        if holes:
+            found.holed.append((outline, f"'{row['name']}'"))
         else:
-            found.rings.append(rings[0])
-            found.of.append(number)
+            found.outlines.append(outline)
     elif kind in ("LineString", "LinearRing"):
-        points = _points(geometry)
+        points, name = _points(geometry), row["name"]
         joined = joined_ends(points)
         if joined is None:
-            found.lines.append((points, number))
+            layer, must_close = row.get("group", ""), len(points) > 2
+            found.loose.append(Line(points=points, layer=layer, name=name, handle=name, must_close=must_close))
         else:
-            found.rings.append(joined[0])
-            found.of.append(number)
+            found.outlines.append(Outline(points=joined[0], row=row))
             found.misses.append(joined[1])
     elif kind in ("MultiPolygon", "MultiLineString", "GeometryCollection"):
         for part in shapely.get_parts(geometry):
-            _add(part, number, found)
+            _add(part, row, found)
     else:
         found.skipped[kind] += 1
 
@@ -410,10 +352,9 @@ def _points(line: Any) -> np.ndarray:
     return np.asarray(points)
 
 
-def _check_degrees(
-    rings: list[np.ndarray], path: Path, reading: Reading, system: str, notes: list[str], *, far: bool
-) -> None:
+def _check_degrees(found: Drawing, path: Path, reading: Reading, system: str, *, far: bool) -> None:
     """Refuse longitudes and latitudes, with the command that turns them into metres; of places, if they are far."""
+    rings = [one.points for one in (*found.outlines, *(one for one, _ in found.holed))]
     if not rings or (reading.unit is not None and not system):
         return
     median = float(np.median([math.sqrt(abs(ring_area(ring))) for ring in rings]))
@@ -430,7 +371,7 @@ def _check_degrees(
             f"{path.name}{unless}"
         )
     if system:
-        notes.append(
+        found.notes.append(
             Note(
                 CHANGED,
                 f"the file says degrees ({system}), in which its median block would be {median * 111.0:.3g} km across; "
@@ -451,15 +392,6 @@ def _rows(features: Sequence[Feature]) -> list[dict[str, Any]]:
         called = value if isinstance(value, str) and value else f"{name} {value}" if value != "" else f"block {k}"
         rows.append(_row(str(called), str(own.get(group, feature.layer)), own))
     return rows
-
-
-def _parts(rows: Sequence[dict[str, Any]], of: Sequence[int]) -> list[dict[str, Any]]:
-    """Rows of outlines; several of one feature are numbered."""
-    several, seen, found = Counter(of), Counter[int](), []
-    for k in of:
-        seen[k] += 1
-        found.append({**rows[k], "name": f"{rows[k]['name']} {seen[k]}"} if several[k] > 1 else rows[k])
-    return found
 
 
 def _first(keys: Iterable[str], rows: Sequence[Mapping[str, Any]], *, distinct: bool) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence, Set
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence, Set
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,14 +15,9 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import ring_width
 from solver.mechanics import counted
 
-from .arcs import Curve
-
-#: Lines are intersected on a grid of this fraction of the size of the drawing.
-GRID = 1e-6
-
-#: Ends of lines that miss another line by up to this fraction of the size of the drawing meet it, and so do the ends of
-#: an outline that misses itself by this fraction of its own size: what drawing by hand, or in single precision, leaves.
-MEETS = 1e-4
+from .arcs import with_shared_corners
+from .drawing import GRID, MEETS, Drawing, Line, Outline, joined_note
+from .reading import Reading
 
 #: An end moves at most by this fraction of the length of its line.
 SHORTENED = 0.05
@@ -33,50 +28,6 @@ STRIP, BETWEEN = 0.25, 0.7
 
 #: From this number and share of the faces on, strips are joints drawn as pairs of lines.
 LEAST_STRIPS, MOSTLY = 3, 1.0 / 3.0
-
-
-@dataclass(frozen=True)
-class Line:
-    """An open line of a drawing.
-
-    Attributes
-    ----------
-    points : (n, 2) or (n, 3) array
-    layer, handle : str
-    must_close : bool
-        Whether it is a polyline, and so part of an outline; a single line may also be a dimension or an axis.
-    looks : tuple of str
-        Kind of entity and colour.
-    line_type : str
-        In which it is drawn, "" where nothing says so.
-    chain : bool
-        Whether that is dashes and dots, as of axes, section planes and neighbouring parts: see :func:`is_chain`.
-    off : float
-        Largest distance of its chords from the curve for which they stand.
-    curves : tuple of Curve
-        Its parts that are curves.
-    """
-
-    points: np.ndarray
-    layer: str
-    handle: str
-    must_close: bool
-    looks: tuple[str, ...] = ()
-    off: float = 0.0
-    curves: tuple[Curve, ...] = ()
-    line_type: str = ""
-    chain: bool = False
-
-
-def is_chain(dashes: Sequence[float]) -> bool:
-    """Whether dashes are of several lengths, as in line types of axes, in which no joint is drawn.
-
-    Examples
-    --------
-    >>> is_chain([12.0, 0.0]), is_chain([6.0, 6.0])
-    (True, False)
-    """
-    return len({*dashes}) > 1
 
 
 @dataclass
@@ -105,23 +56,68 @@ class Faces:
     notes: list[str] = field(default_factory=list)
 
 
-def faces_of_lines(
+def with_faces(
+    drawing: Drawing,
     lines: Sequence[Line],
-    outlines: Sequence[np.ndarray],
-    offs: Sequence[float],
+    reading: Reading,
+    *,
+    called: Callable[[str, int], str],
+    of_face: Callable[[str, tuple[str, ...], str], dict[str, Any]],
     ignored: Set[int] = frozenset(),
-    only: Sequence[str] = (),
-) -> Faces:
+    tolerance: float | None = None,
+    in_place: bool = False,
+) -> None:
+    """Let curves share corners, add the faces between lines to a drawing, and cut its outlines along lines in them.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        In the plane; changed.
+    lines : sequence of Line
+        Those of its loose lines that are wanted.
+    reading : Reading
+    called : callable
+        Names a piece of an outline by the outline's name and its number among the pieces, from 0.
+    of_face : callable
+        Says of a face what an outline has beside its points, by the layer of most lines around it, those of all, and
+        its name.
+    ignored : set of int, optional
+        As of :func:`faces_of_lines`.
+    tolerance : float, optional
+        As of :func:`blockvis.formats.arcs.with_shared_corners`, in the unit of the drawing.
+    in_place : bool
+        Whether pieces take the place of their outline; else they come behind the others.
+    """
+    if not drawing.strokes:
+        return
+    size = float(np.ptp(np.concatenate([stroke.points for stroke in drawing.strokes]), axis=0).max())
+    drawn, n = [*drawing.outlines, *lines], len(drawing.outlines)
+    shared = with_shared_corners([one.points for one in drawn], [one.curves for one in drawn], tolerance)
+    drawing.outlines = [replace(one, points=points) for one, points in zip(drawing.outlines, shared, strict=False)]
+    lines = [replace(line, points=points) for line, points in zip(lines, shared[n:], strict=True)]
+    faces = faces_of_lines(lines, drawing.outlines, ignored, reading.only)
+    for i, pieces in sorted(faces.pieces.items(), reverse=True):
+        whole = drawing.outlines.pop(i)
+        at = i if in_place else len(drawing.outlines)
+        drawing.outlines[at:at] = [
+            replace(whole, points=ring, row={**whole.row, "name": called(whole.row.get("name", "block"), k)}, curves=())
+            for k, ring in enumerate(pieces)
+        ]
+    for k, (ring, layer, around) in enumerate(zip(faces.rings, faces.layers, faces.around, strict=True)):
+        drawing.outlines.append(Outline(points=ring, **of_face(layer, around, f"face {k}")))
+    drawing.left_out += faces.left_out
+    drawing.notes += faces.notes + joined_note(drawing.misses, size)
+
+
+def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: Set[int], only: Sequence[str]) -> Faces:
     """Find the faces between lines, and the pieces into which they cut outlines.
 
     Parameters
     ----------
     lines : sequence of Line
-    outlines : sequence of (n, 2) arrays
-        Closed outlines of the same drawing.
-    offs : sequence of float
-        Largest distance of the chords of each outline from the curve for which they stand.
-    ignored : set of int, optional
+    outlines : sequence of Outline
+        Of the same drawing, in the plane.
+    ignored : set of int
         Numbers of the outlines that will be left out: lines may end on them within another, as at openings; those that
         lines cross are as if they were not there.
     only : sequence of str
@@ -142,15 +138,15 @@ def faces_of_lines(
     axes = [line.chain and not matches([line.layer, *line.looks], only) for line in lines]
     found.left_out += [_axis(line) for line, is_axis in zip(lines, axes, strict=True) if is_axis]
     lines = [line for line, is_axis in zip(lines, axes, strict=True) if not is_axis]
-    flat = [line.points[:, :2] for line in lines]
+    flat, rings = [line.points for line in lines], [outline.points for outline in outlines]
     if not flat:
         return found
-    every = cKDTree(np.concatenate([*flat, *outlines]))
-    kept = [ring for i, ring in enumerate(outlines) if i not in ignored]
+    every = cKDTree(np.concatenate([*flat, *rings]))
+    kept = [ring for i, ring in enumerate(rings) if i not in ignored]
     size = float(np.ptp(np.concatenate([*flat, *kept]), axis=0).max())
-    usable = [i for i, ring in enumerate(outlines) if float(np.ptp(ring, axis=0).max()) > GRID * size]
-    flat += [np.concatenate([outlines[i], outlines[i][:1]]) for i in usable]
-    flat = _joined(flat, len(lines), [*(line.off for line in lines), *(offs[i] for i in usable)], size, found)
+    usable = [i for i, ring in enumerate(rings) if float(np.ptp(ring, axis=0).max()) > GRID * size]
+    flat += [np.concatenate([rings[i], rings[i][:1]]) for i in usable]
+    flat = _joined(flat, len(lines), [*(line.off for line in lines), *(outlines[i].off for i in usable)], size, found)
     segments = shapely.set_precision([shapely.LineString(points) for points in flat[: len(lines)]], GRID * size)
     outlined = dict(zip(usable, flat[len(lines) :], strict=True))
     cutting, openings = _cut_outlines(outlined, ignored, segments, every, size, found)
@@ -168,7 +164,7 @@ def _axis(line: Line) -> LeftOut:
         f"{name} on layer '{line.layer}' is drawn in {line.line_type}, dashes and dots as of an axis; if it is a "
         "joint, draw it whole or ask for its layer (only)"
     )
-    return LeftOut("axis", line.points[:, :2], message, line.layer, name, closed=False, looks=line.looks)
+    return line.left_out("axis", message, name)
 
 
 def _cut_outlines(
@@ -261,30 +257,6 @@ def _without_mortar(found: Faces, reach: float) -> list[Note]:
     return [Note(CHANGED, f"{words} {said} as blocks")]
 
 
-def joined_ends(points: np.ndarray) -> tuple[np.ndarray, float] | None:
-    """Close a line whose ends meet, or miss each other by little.
-
-    Parameters
-    ----------
-    points : (n, 2) or (n, 3) array
-
-    Returns
-    -------
-    ring : (n - 1, 2) or (n - 1, 3) array
-    miss : float
-        Distance between the ends.
-    """
-    gap = float(np.abs(points[0] - points[-1]).max())
-    return (points[:-1], gap) if len(points) > 3 and gap <= MEETS * float(np.ptp(points, axis=0).max()) else None
-
-
-def joined_note(misses: Sequence[float], size: float) -> list[str]:
-    """Say how many outlines did not quite close, where that was more than rounding; ``size`` is that of the drawing."""
-    far = [miss for miss in misses if miss > GRID * size]
-    words = f"joined: the ends of {counted(len(far), 'outline')}, up to {max(far, default=0):.3g} units apart"
-    return [Note(CHANGED, words)] if far else []
-
-
 def _crossing_notes(
     lines: Sequence[Line], segments: list[Any], borders: Sequence[set[int]], meets: float
 ) -> list[Note]:
@@ -321,9 +293,9 @@ def _faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
     )
 
 
-def nothing_closed(faces: Faces) -> str:
+def nothing_closed(left_out: Sequence[LeftOut]) -> str:
     """Say what lines there are where nothing closed is, for an error message."""
-    lines = [item for item in faces.left_out if item.kind == "open"]
+    lines = [item for item in left_out if item.kind == "open"]
     if not lines:
         return ""
     layers = Counter(item.layer for item in lines)
@@ -488,9 +460,7 @@ def _add_faces(
     shapely.prepare(loose)
     for line, segment in zip(lines, segments, strict=True):
         if shapely.covers(loose, segment):
-            said, name = _open_message(line), f"line {line.handle}"
-            left = LeftOut("open", line.points[:, :2], said, line.layer, name, closed=False, looks=line.looks)
-            found.left_out.append(left)
+            found.left_out.append(line.left_out("open", _open_message(line), f"line {line.handle}"))
     tree = shapely.STRtree(segments)
     drawn, borders = shapely.STRtree([shapely.Polygon(ring).buffer(0) for ring in outlines]), list[set[int]]()
     for face in faces.geoms:

@@ -19,18 +19,18 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from blockvis.layout.block_table import layer_of, layers_of, moved_notes, on_layer, rows_of, with_rows
-from blockvis.layout.choice import Choice
+from blockvis.layout.block_table import layer_of, layers_of, on_layer, rows_of
 from blockvis.layout.layout import Layout
-from blockvis.layout.left_out import LeftOut, passed_over
+from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
 from blockvis.layout.outlines import chords_of, filled
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import UNITS, metres_per
 from solver import mechanics
 
-from .arcs import MOST_CHORDS, Arc, Bezier, Curve, bezier_chords, with_shared_corners
-from .loose_lines import Faces, Line, faces_of_lines, is_chain, joined_ends, joined_note, nothing_closed
+from .arcs import MOST_CHORDS, Arc, Bezier, Curve, bezier_chords
+from .drawing import Drawing, Line, Outline, Stroke, is_chain, joined_ends
+from .loose_lines import nothing_closed, with_faces
 from .reading import Reading
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -82,34 +82,11 @@ class _Part(NamedTuple):
 
 
 @dataclass
-class _Outlines:
-    """Outlines found so far, in user units, y down."""
+class _Found(Drawing):
+    """What was found so far, in user units, y down."""
 
-    rings: list[np.ndarray] = field(default_factory=list)
-    rows: list[dict[str, Any]] = field(default_factory=list)
-    within: list[tuple[str, ...]] = field(default_factory=list)
-    looks: list[tuple[str, ...]] = field(default_factory=list)
-    offs: list[float] = field(default_factory=list)
-    curves: list[tuple[Curve, ...]] = field(default_factory=list)
-    loose: list[Line] = field(default_factory=list)
-    loose_within: list[tuple[str, ...]] = field(default_factory=list)
-    misses: list[float] = field(default_factory=list)
-    moved: list[tuple[dict[str, Any], dict[str, Any]]] = field(default_factory=list)
-    skipped: Counter[str] = field(default_factory=Counter)
     clipped: Counter[str] = field(default_factory=Counter)
-    notes: list[str] = field(default_factory=list)
-    left_out: list[LeftOut] = field(default_factory=list)
     sheets_missed: bool = False
-
-    @property
-    def of_outlines(self) -> tuple[list[Any], ...]:
-        """Lists with an item for each outline."""
-        return self.rings, self.rows, self.looks, self.within
-
-    def append(self, ring: np.ndarray, row: dict[str, Any], looks: tuple[str, ...], within: tuple[str, ...]) -> None:
-        """Add an outline (n, 2)."""
-        for each, item in zip(self.of_outlines, (ring, row, looks, within), strict=True):
-            each.append(item)
 
 
 @dataclass(frozen=True)
@@ -165,31 +142,23 @@ def read(path: Path, reading: Reading) -> Layout:
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
     styled = _styled(root)
-    found = _Outlines(notes=[*doubts, *styled, *_pattern_fills(root)])
+    found = _Found(notes=[*doubts, *styled, *_pattern_fills(root)])
     if stated and stated not in UNITS and reading.unit is None:
         found.notes.append(f"1 unit of the drawing is {stated}, by its width and its viewBox")
     # What sheets that are not read say may paint a shape.
     found.sheets_missed = len(styled) > 0
     _walk(root, _Context(np.eye(3), (), tolerance, path), found)
-    faces = _with_loose(found, reading, tolerance)
-    if not found.rings and all(item.kind == "open" for item in found.left_out):
-        said = (nothing_closed(faces), *passed_over(found.skipped), *_pattern_fills(root))
+    _add_faces(found, reading, tolerance)
+    if found.is_open:
+        said = (nothing_closed(found.left_out), *passed_over(found.skipped), *_pattern_fills(root))
         rest = "; ".join(words for words in said if words)
         raise Refused(
             f"'{path}' has no closed shape{f': {rest}' if rest else ''}; draw each block as a closed path or polygon",
-            Layout((), (), unit=stated, left_out=tuple(item.mapped((1.0, -1.0)) for item in found.left_out)),
+            found.layout(stated, factors=(1.0, -1.0)),
         )
-    every = np.concatenate([*found.rings, *(item.points for item in found.left_out)])
-    found.notes += faces.notes + joined_note(found.misses, float(np.ptp(every, axis=0).max()))
-    turned = tuple(ring * [1.0, -1.0] for ring in found.rings)
-    names = tuple(row.get("name", f"block {k}") for k, row in enumerate(found.rows))
-    left_out = tuple(item.mapped((1.0, -1.0)) for item in found.left_out)
     found.notes += passed_over(found.skipped)
     found.notes += passed_over(found.clipped, "read whole, not clipped")
-    notes = tuple(dict.fromkeys([*found.notes, *moved_notes(found.moved)]))
-    drawn: dict[str, Any] = {"looks": tuple(found.looks), "within": tuple(found.within)}
-    layout = Layout(blocks=turned, names=names, unit=stated, notes=notes, left_out=left_out, **drawn)
-    return with_rows(replace(layout, unit_by="layout" if own else ""), found.rows, own=True)
+    return found.layout(stated, unit_by="layout" if own else "", own=True, factors=(1.0, -1.0))
 
 
 def _root(path: Path) -> ElementTree.Element:
@@ -208,48 +177,28 @@ def _root(path: Path) -> ElementTree.Element:
     return root
 
 
-def _with_loose(found: _Outlines, reading: Reading, tolerance: float | None) -> Faces:
+def _add_faces(found: _Found, reading: Reading, tolerance: float | None) -> None:
     """Leave out what is not wanted, let curves share corners, add the faces of loose lines, cut outlines along them."""
-    wanted, ignored = _wanted_lines(found, reading)
-    drawn = [*found.rings, *(line.points for line in wanted)]
-    drawn = with_shared_corners(drawn, [*found.curves, *(line.curves for line in wanted)], tolerance)
-    found.rings = drawn[: len(found.rings)]
-    wanted = [replace(line, points=points) for line, points in zip(wanted, drawn[len(found.rings) :], strict=True)]
-    faces = faces_of_lines(wanted, found.rings, found.offs, ignored, reading.only)
-    found.left_out += faces.left_out
-    for k, pieces in sorted(faces.pieces.items(), reverse=True):
-        _, row, looks, within = (each.pop(k) for each in found.of_outlines)
-        for number, piece in enumerate(pieces):
-            found.append(piece, {**row, "name": f"{row.get('name', 'block')} {number + 1}"}, looks, within)
-    paths = {line.layer: within for line, within in zip(found.loose, found.loose_within, strict=True)}
-    for number, (ring, layer, around) in enumerate(zip(faces.rings, faces.layers, faces.around, strict=True)):
-        within = tuple(word for one in around for word in paths[one])
-        found.append(ring, _row(paths[layer], f"face {number}"), ("face",), within)
-    return faces
+    unwanted, asked = found.choices(reading)
+    chosen = any(asked.takes(one.labels, one.looks) for one in (*found.outlines, *found.loose))
 
+    def wants(one: Line | Outline) -> bool:
+        return not unwanted.takes(one.labels, one.looks) and (not chosen or asked.takes(one.labels, one.looks))
 
-def _wanted_lines(found: _Outlines, reading: Reading) -> tuple[list[Line], set[int]]:
-    """Leave out loose lines that are not wanted; give the others, and the numbers of the outlines not wanted."""
-    said = ([str(row.get(key, "")) for key in ("name", "group", "material")] for row in found.rows)
-    outlines = zip(said, found.within, found.looks, strict=True)
-    every = [((*own, *within), looks) for own, within, looks in outlines]
-    loose = zip(found.loose, found.loose_within, strict=True)
-    lines = [((*within, line.layer, line.handle), line.looks) for line, within in loose]
-    names = {label for labels, _ in (*every, *lines) for label in labels if label}
-    unwanted, asked = Choice(reading.ignore, names), Choice(reading.only, names)
-    chosen = any(asked.takes(*own) for own in (*every, *lines))
-
-    def wants(labels: tuple[str, ...], looks: tuple[str, ...]) -> bool:
-        return not unwanted.takes(labels, looks) and (not chosen or asked.takes(labels, looks))
-
-    wanted = []
-    for line, own in zip(found.loose, lines, strict=True):
-        if wants(*own):
-            wanted.append(line)
-        else:
-            left = LeftOut("asked line", line.points, "", line.layer, line.handle, closed=False, looks=line.looks)
-            found.left_out.append(left)
-    return wanted, {k for k, own in enumerate(every) if not wants(*own)}
+    paths = {line.layer: line.within for line in found.loose}
+    with_faces(
+        found,
+        found.without_lines([*map(wants, found.loose)]),
+        reading,
+        called=lambda name, k: f"{name} {k + 1}",
+        of_face=lambda layer, around, name: {
+            "row": _row(paths[layer], name),
+            "within": tuple(word for one in around for word in paths[one]),
+            "looks": ("face",),
+        },
+        ignored={k for k, one in enumerate(found.outlines) if not wants(one)},
+        tolerance=tolerance,
+    )
 
 
 def _unit(root: ElementTree.Element) -> tuple[str, list[str]]:
@@ -360,7 +309,7 @@ def _tag(element: ElementTree.Element) -> str:
     return str(element.tag).rsplit("}", 1)[-1]
 
 
-def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> None:
+def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
     if where.depth > DEEPEST:
         raise ValueError(f"'{where.path}' nests groups more than {DEEPEST} deep; ungroup it")
     tag = _tag(element)
@@ -410,49 +359,37 @@ def _called(element: ElementTree.Element) -> str:
     return f"<{_tag(element)}> '{element.get('id', 'without id')}'"
 
 
-def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, found: _Outlines) -> None:
+def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, found: _Found) -> None:
     title = next((child.text or "" for child in element if _tag(child) == "title"), "")
     name = title.strip() or element.get(f"{_INKSCAPE}label") or element.get("id") or ""
     kept = _kept(element, title, where, found)
     looks = (_tag(element), *_colour(where))
-    rings, offs, every_curve = [], [], []
+    drawn: list[Outline] = []
     for points, closed, of_part in parts:
         if len(points) < 2:
             continue
         if not np.isfinite(points).all():
             raise ValueError(f"'{where.path}': {_called(element)} has a point that is not a finite number; repair it")
-        placed = points @ where.matrix[:2, :2].T + where.matrix[:2, 2]
-        curves = tuple(curve.mapped(where.matrix[:2, :2], where.matrix[:2, 2]) for curve in of_part)
-        off = max((curve.off for curve in curves), default=0.0)
-        joined = joined_ends(placed)
-        if joined is None and not (closed and len(placed) > 2):
-            handle = name or f"<{_tag(element)}>"
-            found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks, off, curves, *where.dashes))
-            found.loose_within.append(where.layers)
-            continue
-        # A closed path may have a short last edge: it stays.
-        short = joined is None or (closed and joined[1] > 1e-6 * float(np.ptp(placed, axis=0).max()))
-        rings.append(placed if short or joined is None else joined[0])
-        offs.append(off)
-        every_curve.append(curves)
-        found.misses += [] if joined is None or closed else [joined[1]]
-    for k, inside in filled(rings):
-        called = name if len(rings) == 1 or not name else f"{name} {k + 1}"
+        stroke = Stroke(points=points, looks=looks, within=where.layers, curves=of_part)
+        stroke = stroke.mapped(where.matrix[:2, :2], where.matrix[:2, 2])
+        joined = joined_ends(stroke.points, closed)
+        if joined is None:
+            handle, must_close, (line_type, chain) = name or f"<{_tag(element)}>", len(points) > 2, where.dashes
+            named = {"layer": where.layer, "name": handle, "handle": handle, "must_close": must_close}
+            found.loose.append(stroke.as_(Line, **named, line_type=line_type, chain=chain))
+        else:
+            drawn.append(stroke.as_(Outline, points=joined[0], row={}))
+            found.misses.append(joined[1])
+    for k, inside in filled([one.points for one in drawn]):
+        called = name if len(drawn) == 1 or not name else f"{name} {k + 1}"
+        one = replace(drawn[k], row=_row(where.layers, called), holes=tuple(drawn[j].points for j in inside))
         if inside:
-            x, y = rings[inside[0]].mean(axis=0)
-            message = (
-                f"{_called(element)} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole "
-                "with a block"
-            )
-            holes = tuple(rings[j] for j in inside)
-            found.left_out.append(LeftOut("hole", rings[k], message, where.layer, called, holes=holes, looks=looks))
-            continue
-        found.append(rings[k], kept or _row(where.layers, called), looks, where.layers)
-        found.offs.append(offs[k])
-        found.curves.append(every_curve[k])
+            found.holed.append((one, _called(element)))
+        else:
+            found.outlines.append(replace(one, row=kept) if kept else one)
 
 
-def _kept(element: ElementTree.Element, title: str, where: _Context, found: _Outlines) -> dict[str, Any]:
+def _kept(element: ElementTree.Element, title: str, where: _Context, found: _Found) -> dict[str, Any]:
     """Row of the block table that our own writer put on a shape, with the layer and name that the shape has now."""
     try:
         kept = json.loads(element.get("data-blockvis", "{}"))

@@ -1,0 +1,231 @@
+"""Outlines and loose lines of a drawing, whatever its format."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Self, TypeVar
+
+import numpy as np
+
+from blockvis.layout.block_table import moved_notes, with_rows
+from blockvis.layout.choice import Choice
+from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut
+from blockvis.layout.notes import CHANGED, Note
+from solver.mechanics import counted
+
+from .arcs import Curve
+from .reading import Reading
+
+#: Lines are intersected on a grid of this fraction of the size of the drawing.
+GRID = 1e-6
+
+#: Ends of lines that miss another line by up to this fraction of the size of the drawing meet it, and so do the ends of
+#: an outline that misses itself by this fraction of its own size: what drawing by hand, or in single precision, leaves.
+MEETS = 1e-4
+
+
+S = TypeVar("S", bound="Stroke")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stroke:
+    """Something drawn.
+
+    Attributes
+    ----------
+    points : (n, 2) or (n, 3) array
+    looks : tuple of str
+        Kind of entity and colour.
+    within : tuple of str
+        Layers around it.
+    curves : tuple of Curve
+        Its parts that are curves.
+    off_others : float
+        Largest distance of its chords from curves that are none of these.
+    """
+
+    points: np.ndarray
+    looks: tuple[str, ...] = ()
+    within: tuple[str, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    off_others: float = 0.0
+
+    @property
+    def off(self) -> float:
+        """Largest distance of its chords from the curves for which they stand."""
+        return max([self.off_others, *(curve.off for curve in self.curves)])
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names by which it can be asked for."""
+        return self.within
+
+    def as_(self, kind: type[S], **more: Any) -> S:
+        """Make it a line or an outline, with what that has beside."""
+        return kind(**vars(self) | more)
+
+    def mapped(self, matrix: np.ndarray, origin: np.ndarray | None = None) -> Self:
+        """Map it linearly: ``matrix`` is (d, d) or (2, 3), ``origin`` where the origin goes."""
+        to = np.zeros(len(matrix)) if origin is None else origin
+        curves = tuple(curve.mapped(matrix, to) for curve in self.curves)
+        return replace(self, points=self.points @ matrix.T + to, curves=curves)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Line(Stroke):
+    """An open line.
+
+    Attributes
+    ----------
+    layer, name, handle : str
+        The handle is what messages call it.
+    must_close : bool
+        Whether it is a polyline, and so part of an outline; a single line may also be a dimension or an axis.
+    line_type : str
+        In which it is drawn, "" where nothing says so.
+    chain : bool
+        Whether that is dashes and dots, as of axes, section planes and neighbouring parts: see :func:`is_chain`.
+    """
+
+    layer: str
+    name: str
+    handle: str
+    must_close: bool
+    line_type: str = ""
+    chain: bool = False
+
+    @property
+    def labels(self) -> tuple[str, ...]:  # noqa: D102
+        return *self.within, self.layer, self.name
+
+    def left_out(self, kind: str, message: str = "", name: str = "") -> LeftOut:
+        """Leave it out as some kind."""
+        points = self.points[:, :2]
+        return LeftOut(kind, points, message, self.layer, name or self.name, closed=False, looks=self.looks)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Outline(Stroke):
+    """A closed outline with its row of the block table, and what lies within it as holes."""
+
+    row: dict[str, Any]
+    holes: tuple[np.ndarray, ...] = ()
+
+    @property
+    def labels(self) -> tuple[str, ...]:  # noqa: D102
+        return *self.within, *(str(self.row.get(key, "")) for key in ("name", "group", "material"))
+
+    def mapped(self, matrix: np.ndarray, origin: np.ndarray | None = None) -> Self:  # noqa: D102
+        to = 0.0 if origin is None else origin
+        return replace(super().mapped(matrix, origin), holes=tuple(ring @ matrix.T + to for ring in self.holes))
+
+    def left_out(self, called: str) -> LeftOut:
+        """Leave it out for its holes."""
+        x, y = self.holes[0].mean(axis=0)
+        message = f"{called} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
+        name, layer = self.row.get("name", ""), self.row.get("group", "")
+        return LeftOut("hole", self.points, message, layer, name, holes=self.holes, looks=self.looks)
+
+
+@dataclass
+class Drawing:
+    """What a reader finds: outlines, those with holes and what messages call them, lines that are open, and the rest.
+
+    ``misses`` are distances between ends that were joined; ``skipped`` counts by kind what is neither. ``moved`` are
+    rows that our own writer put beside outlines which lie on other layers now, with those that hold.
+    """
+
+    outlines: list[Outline] = field(default_factory=list)
+    holed: list[tuple[Outline, str]] = field(default_factory=list)
+    loose: list[Line] = field(default_factory=list)
+    misses: list[float] = field(default_factory=list)
+    skipped: Counter[str] = field(default_factory=Counter)
+    moved: list[tuple[Mapping[str, Any], Mapping[str, Any]]] = field(default_factory=list)
+    left_out: list[LeftOut] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def strokes(self) -> list[Stroke]:
+        """All that is drawn."""
+        return [*self.outlines, *self.loose, *(outline for outline, _ in self.holed)]
+
+    def turn(self, turn: np.ndarray) -> None:
+        """Take the directions in the rows of a matrix for all coordinates."""
+        self.outlines = [outline.mapped(turn) for outline in self.outlines]
+        self.holed = [(outline.mapped(turn), called) for outline, called in self.holed]
+        self.loose = [line.mapped(turn) for line in self.loose]
+
+    def choices(self, reading: Reading) -> tuple[Choice, Choice]:
+        """Tell apart what is unwanted and what is asked for."""
+        names = {label for one in (*self.outlines, *self.loose) for label in one.labels if label}
+        return Choice(reading.ignore, names), Choice(reading.only, names)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it has nothing but lines that close nothing."""
+        return not self.outlines and all(item.kind == "open" for item in self.left_out)
+
+    def layout(self, unit: str, *, unit_by: str = "", own: bool = False, factors: Sequence[float] = (1, 1)) -> Layout:
+        """Make a layout of its outlines in the plane, coordinates times factors, with their rows."""
+        rows = [one.row for one in self.outlines]
+        layout = Layout(
+            blocks=tuple(one.points * np.array(factors) for one in self.outlines),
+            names=tuple(f"block {k}" for k in range(len(rows))),
+            unit=unit,
+            unit_by=unit_by,
+            notes=tuple(dict.fromkeys([*self.notes, *moved_notes(self.moved)])),
+            left_out=tuple(item.mapped(factors) for item in self.left_out),
+            looks=tuple(one.looks for one in self.outlines),
+            within=tuple(one.within for one in self.outlines),
+        )
+        return with_rows(layout, rows, own=own) if rows else layout
+
+    def without_lines(self, wanted: Sequence[bool]) -> list[Line]:
+        """Leave out the lines that are not wanted, as asked for, and the outlines with holes; give the other lines."""
+        lines = [*zip(self.loose, wanted, strict=True)]
+        self.left_out += [outline.left_out(called) for outline, called in self.holed]
+        self.left_out += [line.left_out("asked line") for line, is_wanted in lines if not is_wanted]
+        return [line for line, is_wanted in lines if is_wanted]
+
+
+def is_chain(dashes: Sequence[float]) -> bool:
+    """Whether dashes are of several lengths, as in line types of axes, in which no joint is drawn.
+
+    Examples
+    --------
+    >>> is_chain([12.0, 0.0]), is_chain([6.0, 6.0])
+    (True, False)
+    """
+    return len({*dashes}) > 1
+
+
+def joined_ends(points: np.ndarray, closes: bool = False) -> tuple[np.ndarray, float] | None:
+    """Close a line whose ends meet, or miss each other by little.
+
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) array
+    closes : bool
+        Whether its file says that it is closed, whatever lies between its ends.
+
+    Returns
+    -------
+    ring : (m, 2) or (m, 3) array
+    miss : float
+        Distance between ends that the file leaves open.
+    """
+    gap, size = float(np.abs(points[0] - points[-1]).max()), float(np.ptp(points, axis=0).max())
+    # One that is closed may have a short last edge: it stays.
+    if len(points) > 3 and gap <= (GRID if closes else MEETS) * size:
+        return points[:-1], 0.0 if closes else gap
+    return (points, 0.0) if closes and len(points) > 2 else None
+
+
+def joined_note(misses: Sequence[float], size: float) -> list[str]:
+    """Say how many outlines did not quite close, where that was more than rounding; ``size`` is that of the drawing."""
+    far = [miss for miss in misses if miss > GRID * size]
+    words = f"joined: the ends of {counted(len(far), 'outline')}, up to {max(far, default=0):.3g} units apart"
+    return [Note(CHANGED, words)] if far else []
