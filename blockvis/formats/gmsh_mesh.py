@@ -1,4 +1,4 @@
-"""Meshes of gmsh, .msh 1, 2.2 and 4.1, ASCII and binary: one surface or volume entity is one block.
+"""Meshes of gmsh, .msh 2.2 and 4.1, ASCII and binary: one surface or volume entity is one block.
 
 This reader replaces that of meshio, which keeps one of two physical groups of an entity, one of two groups of the same
 name in different dimensions, and reserves whatever memory the file asks for. It follows the description of the format, https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format.
@@ -110,7 +110,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
 
 def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies:
     """Read the content of a .msh file; the path is named in messages."""
-    mesh, table = _content(data, path)
+    mesh, table = _sections(data, path)
     if mesh.solids:
         return _bodies(mesh, path)
     if not mesh.rings:
@@ -171,7 +171,7 @@ def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Pat
 
 def holds_flat_blocks(path: Path) -> bool:
     """Whether a .msh file has surface cells in a plane and none with a volume."""
-    mesh, _ = _content(path.read_bytes(), path)
+    mesh, _ = _sections(path.read_bytes(), path)
     return bool(mesh.rings) and not mesh.solids and is_flat(mesh.coordinates)
 
 
@@ -226,13 +226,6 @@ def _entity_names(groups: list[str], tags: np.ndarray, kind: str) -> list[str]:
     return names
 
 
-def _content(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, object]]]:
-    """Read the sections of a file of any version, and our own."""
-    if _section(data, "MeshFormat") is None and _section(data, "NOD") is not None:
-        return _sections_1(data, path), {}
-    return _sections(data, path)
-
-
 def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, object]]]:
     head = _section(data, "MeshFormat")
     words = head.split(b"\n", 1)[0].split() if head else []
@@ -241,7 +234,7 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
     version, binary, width = words[0].decode("ascii", "replace"), words[1] == b"1", words[2]
     if version not in ("2", "2.1", "2.2", "4.1"):
         raise ValueError(
-            f"'{path}' is version {version} of .msh; versions 1, 2 and 4.1 are read: "
+            f"'{path}' is version {version} of .msh; versions 2 and 4.1 are read: "
             f"gmsh '{path}' -save -format msh41 -o new.msh"
         )
     order = "<"
@@ -281,39 +274,13 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
     return mesh, table if isinstance(table, dict) else {}
 
 
-def _sections_1(data: bytes, path: Path) -> _Mesh:
-    """Read the sections of version 1, which is always ASCII and names no groups."""
-    mesh = _Mesh()
-    nodes, elements = (_section_between(data, name, end) for name, end in (("NOD", "ENDNOD"), ("ELM", "ENDELM")))
-    if elements is None or nodes is None:
-        raise ValueError(f"'{path}' has no section $ELM; mesh the surfaces (gmsh -2) and export again")
-    _nodes_22(_Numbers(nodes, "NOD", path, False, "<", "<i8"), mesh)
-    numbers = _Numbers(elements, "ELM", path, False, "<", "<i8")
-    for _ in range(numbers.line()):
-        number, kind, group, entity, n = map(int, numbers.take("int", 5))
-        if n != _width(kind, numbers):
-            raise ValueError(
-                f"'{path}': element {number} of type {kind} has {n} nodes, not {N_NODES[kind]}; export it again"
-            )
-        row = numbers.take("int", n).reshape(1, -1)
-        dimension = 2 if kind in GMSH else 3 if kind in GMSH_SOLIDS else 0
-        if group and group not in mesh.groups.setdefault((dimension, entity), []):
-            mesh.groups[dimension, entity].append(group)
-        _add(mesh, numbers, dimension, kind, row, np.array([entity]))
-    return mesh
-
-
-def _section_between(data: bytes, name: str, end: str) -> bytes | None:
+def _section(data: bytes, name: str) -> bytes | None:
     start = data.find(f"${name}".encode())
     if start < 0:
         return None
     start = data.find(b"\n", start) + 1
-    stop = data.find(f"${end}".encode(), start)
+    stop = data.find(f"$End{name}".encode(), start)
     return data[start : stop if stop >= 0 else len(data)]
-
-
-def _section(data: bytes, name: str) -> bytes | None:
-    return _section_between(data, name, f"End{name}")
 
 
 def _entities_41(numbers: _Numbers | None, mesh: _Mesh) -> None:
