@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -65,31 +65,51 @@ ECCENTRIC = 1e-3
 
 @dataclass(frozen=True)
 class Body:
-    """A closed surface of triangles: name, (n, 3) points, (m, 3) faces, edges of closed holes, object it is part of.
+    """A closed surface of triangles.
 
-    ``volume`` is that of the body with its curved faces, where the file knows it; else 0.
+    Attributes
+    ----------
+    name : str
+    points : (n, 3) array
+    faces : (m, 3) int array
+    said : dict
+        What the file says of it: values of the block table.
+    n_hole_edges : int
+        Edges of holes that were closed.
+    piece_of : str
+        Object of which it is one of several bodies.
+    volume : float
+        With its curved faces, where the file knows it; else 0.
     """
 
     name: str
     points: np.ndarray
     faces: np.ndarray
+    said: dict[str, Any] = field(default_factory=dict)
     n_hole_edges: int = 0
     piece_of: str = ""
     volume: float = 0.0
 
+    @property
+    def row(self) -> dict[str, Any]:
+        """Its row of the block table."""
+        return {"name": self.name, **self.said}
 
-def body_of_polygons(name: str, points: np.ndarray, faces: Sequence[Sequence[int]]) -> Body:
-    """Make a body of the polygons around it.
+    @property
+    def labels(self) -> list[str]:
+        """Names by which it can be asked for: its own, its group and its material."""
+        return [str(self.row.get(key, "")) for key in ("name", "group", "material")]
 
-    Parameters
-    ----------
-    name : str
-    points : (n, 3) array
-    faces : sequence of sequences of int
-        Points around each face, three or more, plane.
-    """
+    def piece(self, number: int) -> Body:
+        """One of several bodies of it, by its number from 1; points and faces are still those of all."""
+        said = {key: value for key, value in self.said.items() if key != "name"}
+        return replace(self, name=f"{self.name} {number}", said=said)
+
+
+def body_of_polygons(name: str, points: np.ndarray, faces: Sequence[Sequence[int]], said: dict[str, Any]) -> Body:
+    """Make a body of the plane polygons around it: the points around each."""
     used, triangles = np.unique(fans(faces), return_inverse=True)
-    return Body(name, points[used], triangles.reshape(-1, 3))
+    return Body(name, points[used], triangles.reshape(-1, 3), said)
 
 
 @dataclass(frozen=True)
@@ -98,22 +118,19 @@ class Bodies:
 
     Attributes
     ----------
-    bodies : tuple of Body
-    rows : tuple of dict
-        Rows of the block table, one per body.
+    bodies : sequence of Body
     unit : str
         Unit of length that the file states, "" for none.
-    notes : tuple of str
+    notes : sequence of str
     up : {"z", "y", ""}
         The coordinate that points up; "" where it differs between files.
     up_says : str
         Why, for a note.
     """
 
-    bodies: tuple[Body, ...]
-    rows: tuple[dict[str, Any], ...]
+    bodies: Sequence[Body]
     unit: str = ""
-    notes: tuple[str, ...] = field(default=())
+    notes: Sequence[str] = ()
     up: str = "z"
     up_says: str = ""
 
@@ -176,7 +193,7 @@ def layout_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
         If the bodies are not prisms side by side.
     """
     asked, view = _selected(found, path, reading), reading.view
-    bodies, rows, size = asked.bodies, asked.rows, asked.size
+    bodies, size = asked.bodies, asked.size
     axes = (2, 1, 0) if view is None else (axis_across(view),)
     seen = [_projected(axis, bodies, size) for axis in axes]
     fitting = [one for one in seen if not one.refused]
@@ -206,7 +223,7 @@ def layout_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
         unit=found.unit,
         notes=(*notes, *_accepted(bodies), *found.notes),
     )
-    layout = replace(with_rows(layout, rows), thickness=best.high - best.low)
+    layout = replace(with_rows(layout, asked.rows), thickness=best.high - best.low)
     return replace(layout, left_out=asked.left_out(found, name, reading.ignore))
 
 
@@ -320,27 +337,27 @@ def in_dimension(found: Bodies, path: Path | str, reading: Reading) -> Layout:
 
 @dataclass(frozen=True)
 class _Selection:
-    """The bodies that are asked for, with their rows, the size of the drawing, and the others: number and kind."""
+    """The bodies that are asked for, the size of the drawing, and the others: number and kind."""
 
     bodies: list[Body]
-    rows: list[dict[str, Any]]
     size: float
     dropped: dict[int, str]
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """Rows of the block table of those that are asked for."""
+        return [with_role(body.row) for body in self.bodies]
 
     def left_out(self, found: Bodies, view: str, ignore: Sequence[str]) -> tuple[LeftOut, ...]:
         """Say what is left out, by its box in a view."""
         items = []
         for k, kind in self.dropped.items():
             points = found.bodies[k].points[:, VIEWS[view]]
-            labels = _labels(found.rows[k])
-            layer = next((word for word in labels[1:] if matches([word], ignore)), labels[1])
+            name, group, material = found.bodies[k].labels
+            layer = next((word for word in (group, material) if matches([word], ignore)), group)
             box = rectangle(*points.min(axis=0), *points.max(axis=0))
-            items.append(LeftOut(kind, box, "", layer, labels[0]))
+            items.append(LeftOut(kind, box, "", layer, name))
         return tuple(items)
-
-
-def _labels(row: Mapping[str, Any]) -> list[str]:
-    return [str(row.get(key, "")) for key in ("name", "group", "material")]
 
 
 def _accepted(bodies: Sequence[Body]) -> tuple[Note, ...]:
@@ -357,7 +374,7 @@ def _selected(found: Bodies, path: Path | str, reading: Reading) -> _Selection:
     """Choose the bodies that are asked for, and check their coordinates."""
     if not found.bodies:
         raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
-    labels = [_labels(row) for row in found.rows]
+    labels = [body.labels for body in found.bodies]
     dropped = {k: "asked" for k, words in enumerate(labels) if not reading.wants(words)}
     dropped |= {k: "mortar" for k in _mortar(found, labels, reading.only) if k not in dropped}
     kept = [k for k in range(len(labels)) if k not in dropped]
@@ -371,7 +388,7 @@ def _selected(found: Bodies, path: Path | str, reading: Reading) -> _Selection:
     size = float(spread_of(every, f"'{path}'").max())
     if not 0.0 < size < LARGEST_SIZE:
         raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
-    return _Selection(bodies, [with_role(found.rows[k]) for k in kept], size, dropped)
+    return _Selection(bodies, size, dropped)
 
 
 def _mortar(found: Bodies, labels: Sequence[Sequence[str]], only: Sequence[str]) -> list[int]:

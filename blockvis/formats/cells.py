@@ -143,7 +143,7 @@ def _enclosed(
     values, owner = np.unique(data[key] if key else np.zeros(len(rings), dtype=np.int64), return_inverse=True)
     names = [f"block {value}" for value in values.tolist()] if key else ["block"]
     try:
-        closed = bodies_of_surfaces(points, rings, owner, names, path)
+        bodies, notes = bodies_of_surfaces(points, rings, owner, rows_of_cells(data, owner, names, path), path)
     except OpenSurface:
         # A drawing that is meant to be flat: the error says how far it is not.
         flattened(points, f"'{path}'")
@@ -154,17 +154,15 @@ def _enclosed(
         names = [f"block {k}" for k in range(int(owner.max()) + 1)]
         if key or len(names) < 2 or len(rings) < 4 * len(names):
             raise
-        closed = bodies_of_surfaces(points, rings, owner, names, path)
-    bodies, found = closed.bodies, rows_of_cells(data, owner, names, path)
-    rows = [{"name": body.name, **found[whose]} for body, whose in zip(bodies, closed.owners.tolist(), strict=True)]
+        bodies, notes = bodies_of_surfaces(points, rings, owner, rows_of_cells(data, owner, names, path), path)
     how = f"one per value of the cell array '{key}'" if key else "one per closed surface"
-    return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}", *closed.notes))
+    return Bodies(bodies, notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}", *notes))
 
 
 def rows_of_cells(
     data: Mapping[str, np.ndarray], owner: np.ndarray, names: Sequence[str], path: Path | str
 ) -> list[dict[str, Any]]:
-    """Read the block table from the cell arrays; names only where an array has them.
+    """Read the block table from the cell arrays.
 
     Parameters
     ----------
@@ -172,8 +170,9 @@ def rows_of_cells(
     owner : (n_cells,) int array
         Block of each cell, from 0 on.
     names : sequence of str
-        Of the blocks, for messages, as is the path.
+        Of the blocks, where no array has them.
     path : Path or str
+        Named in messages.
 
     Raises
     ------
@@ -198,7 +197,8 @@ def rows_of_cells(
                 f"'{path}': cells of the block '{names[block]}' differ in the cell array '{key}', as {listed}; give "
                 "them one value, or number the blocks in a cell array 'block_id'"
             )
-    return [_row(data, cell) for cell in np.unique(owner, return_index=True)[1].tolist()]
+    first = np.unique(owner, return_index=True)[1].tolist()
+    return [{"name": name, **_row(data, cell)} for name, cell in zip(names, first, strict=True)]
 
 
 def _row(data: Mapping[str, np.ndarray], cell: int) -> dict[str, Any]:
@@ -222,6 +222,23 @@ def _row(data: Mapping[str, np.ndarray], cell: int) -> dict[str, Any]:
         if key in data and len(data[key]) > cell and np.ndim(data[key][cell]) == 0:
             row[key] = float(data[key][cell])
     return row
+
+
+def layout_of_meshes(
+    meshes: Sequence[tuple[np.ndarray, Sequence[Sequence[int]], Mapping[str, Any]]], path: Path | str, view: str | None
+) -> Layout | Bodies:
+    """Make a layout of flat meshes, each a block: (n, 3) points, the points around each face, and a row."""
+    # Some repeat the corners of each face.
+    points, number = np.unique(np.concatenate([own for own, _, _ in meshes]), axis=0, return_inverse=True)
+    starts = np.cumsum([0, *(len(own) for own, _, _ in meshes)])
+    rings = [
+        number.ravel()[np.add(face, k)] for k, (_, faces, _) in zip(starts, meshes, strict=False) for face in faces
+    ]
+    counts = [len(faces) for _, faces, _ in meshes]
+    data = {"block_id": np.repeat(np.arange(len(meshes)), counts)}
+    for key in ("name", "group", "role", "material"):
+        data[key] = np.repeat([str(row.get(key, "")) for _, _, row in meshes], counts)
+    return layout_of_cells(points, rings, data, path, view)
 
 
 def flat_beside(bodies: Sequence[np.ndarray], flat: Sequence[np.ndarray]) -> tuple[str, ...]:
@@ -280,17 +297,16 @@ def _own_names(names: Sequence[str], label: str) -> tuple[str, ...]:
 
 def _merged_bodies(parts: Sequence[tuple[Bodies, str]]) -> Bodies:
     bodies: list[Body] = []
-    rows: list[dict[str, Any]] = []
     for part, label in parts:
-        names = _own_names(
-            [str(row.get("name", body.name)) for body, row in zip(part.bodies, part.rows, strict=True)], label
-        )
-        bodies += [replace(body, name=name) for body, name in zip(part.bodies, names, strict=True)]
+        names = _own_names([str(body.row["name"]) for body in part.bodies], label)
         group = {"group": label} if label else {}
-        rows += [{**group, **row, "name": name} for row, name in zip(part.rows, names, strict=True)]
+        bodies += [
+            replace(body, name=name, said={**group, **body.said, "name": name})
+            for body, name in zip(part.bodies, names, strict=True)
+        ]
     first, ups = parts[0][0], {part.up for part, _ in parts}
     notes = _joined_notes([part for part, _ in parts])
-    return replace(first, bodies=tuple(bodies), rows=tuple(rows), notes=notes, up=first.up if len(ups) == 1 else "")
+    return replace(first, bodies=bodies, notes=notes, up=first.up if len(ups) == 1 else "")
 
 
 def _joined_notes(parts: Sequence[Layout | Bodies]) -> tuple[str, ...]:
@@ -348,8 +364,8 @@ def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path
         if isinstance(part, Bodies):
             alone = len(part.bodies) == 1
             if alone:
-                row = {**part.rows[0], "name": file.stem}
-                part = replace(part, bodies=(replace(part.bodies[0], name=file.stem),), rows=(row,))
+                (body,) = part.bodies
+                part = replace(part, bodies=[replace(body, name=file.stem, said={**body.said, "name": file.stem})])
         else:
             alone = part.n_blocks == 1
             part = replace(part, names=(file.stem,)) if alone else part

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -55,14 +55,13 @@ def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> t
     return points[kept], faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
 
 
-def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path: Path | str) -> list[Body]:
+def closed_bodies(part: Body, size: float, path: Path | str) -> list[Body]:
     """Split a mesh of triangles into the closed bodies that it holds.
 
     Parameters
     ----------
-    name : str
-    points : (n, 3) array
-    faces : (m, 3) int array
+    part : Body
+        The mesh, with a name for messages; what the file says of it holds for each of its bodies.
     size : float
         Of the drawing, in the unit of the points.
     path : Path or str
@@ -75,7 +74,8 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
     ValueError
         For bodies that touch along an edge.
     """
-    points, every = _with_points_merged(points, faces, size)
+    name = part.name
+    points, every = _with_points_merged(part.points, part.faces, size)
     # Some files hold each face twice.
     faces = every[np.sort(np.unique(np.sort(every, axis=1), axis=0, return_index=True)[1])]
     if len(faces) == 0:
@@ -85,7 +85,7 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
     if (counts != 2).any():
         piece = _touching_bodies(points, every)
         if piece is not None:
-            return _pieces(name, points, every, piece)
+            return _pieces(part, points, every, piece)
     holes = unique[counts == 1]
     closed = _with_holes_closed(points, faces, holes) if len(holes) and counts.max() == 2 else None
     if closed is not None:
@@ -109,7 +109,7 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
     # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
     edge = inverse.ravel().reshape(-1, 3)
     piece = components(list(edge), len(unique))
-    return _pieces(name, points, _seen_from_outside(points, faces, edge, piece), piece, holes)
+    return _pieces(part, points, _seen_from_outside(points, faces, edge, piece), piece, holes)
 
 
 def _with_holes_closed(
@@ -141,17 +141,15 @@ def _with_holes_closed(
 
 
 def _pieces(
-    name: str, points: np.ndarray, faces: np.ndarray, piece: np.ndarray, holes: np.ndarray | None = None
+    part: Body, points: np.ndarray, faces: np.ndarray, piece: np.ndarray, holes: np.ndarray | None = None
 ) -> list[Body]:
     n = int(piece.max()) + 1
     bodies = []
     for k in range(n):
         own = faces[piece == k]
         n_hole_edges = 0 if holes is None else int(np.isin(holes, own).all(axis=1).sum())
-        whole = n == 1
-        bodies.append(
-            Body(name if whole else f"{name} {k + 1}", points, own, n_hole_edges, piece_of="" if whole else name)
-        )
+        body = part if n == 1 else replace(part.piece(k + 1), piece_of=part.name)
+        bodies.append(replace(body, points=points, faces=own, n_hole_edges=n_hole_edges))
     return bodies
 
 
@@ -212,34 +210,26 @@ def _volumes(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.asarray((a * np.cross(b, c)).sum(axis=1) / 6.0)
 
 
-@dataclass(frozen=True)
-class Enclosed:
-    """Closed bodies of a file, the number of the part from which each is, and notes on parts that enclose nothing."""
-
-    bodies: list[Body]
-    owners: np.ndarray
-    notes: list[Note]
-
-
 def enclosed(
-    parts: Sequence[tuple[str, np.ndarray, np.ndarray]],
-    size: float,
-    path: Path | str,
-    reading: Reading | None = None,
-    rows: Sequence[Mapping[str, Any]] = (),
-) -> Enclosed:
+    parts: Sequence[Body], size: float, path: Path | str, reading: Reading | None = None
+) -> tuple[list[Body], list[Note]]:
     """Find the closed bodies of the parts of a file; plane ones, and open ones that nobody wants, are left out.
 
     Parameters
     ----------
-    parts : sequence of (name, (n, 3) points, (m, 3) faces)
+    parts : sequence of Body
+        Meshes that may be none; see :func:`closed_bodies`.
     size : float
         Of the drawing, in the unit of the points.
     path : Path or str
         Named in messages.
     reading : Reading, optional
-    rows : sequence of mapping, optional
-        One per part, with the group and material by which it can be asked for, too.
+
+    Returns
+    -------
+    bodies : list of Body
+    notes : list of Note
+        On parts that enclose nothing.
 
     Raises
     ------
@@ -249,32 +239,26 @@ def enclosed(
         As of :func:`closed_bodies`.
     """
     bodies: list[Body] = []
-    owners: list[int] = []
     plane, unwanted = [], []
     first: OpenSurface | None = None
-    with carrying(lambda: as_drawn(Bodies(tuple(Body(*part) for part in parts), ()))):
-        for number, (name, points, faces) in enumerate(parts):
+    with carrying(lambda: as_drawn(Bodies(parts))):
+        for part in parts:
             try:
-                found = closed_bodies(name, points, faces, size, path)
+                bodies += closed_bodies(part, size, path)
             except ValueError as error:
-                row = rows[number] if rows else {}
-                words = [name, str(row.get("group", "")), str(row.get("material", ""))]
-                if reading is not None and not reading.wants(words):
-                    unwanted.append(name)
-                elif isinstance(error, OpenSurface) and _is_plane(points[np.unique(faces)], size):
-                    plane.append(name)
+                if reading is not None and not reading.wants(part.labels):
+                    unwanted.append(part.name)
+                elif isinstance(error, OpenSurface) and _is_plane(part.points[np.unique(part.faces)], size):
+                    plane.append(part.name)
                 else:
                     raise
                 first = first or (error if isinstance(error, OpenSurface) else None)
-                continue
-            bodies += found
-            owners += [number] * len(found)
         if not bodies and first is not None:
             raise first
     notes = [without_volume(plane)] if plane else []
     if unwanted:
         notes.append(Note(LEFT_OUT, f"left out: {_listed(unwanted)}, no closed body, as asked for"))
-    return Enclosed(bodies, np.array(owners, dtype=int), notes)
+    return bodies, notes
 
 
 def without_volume(names: Sequence[str], supports: Sequence[str] = ()) -> Note:
@@ -298,11 +282,11 @@ def bodies_of_surfaces(
     points: np.ndarray,
     rings: Sequence[np.ndarray],
     owner: np.ndarray,
-    names: Sequence[str],
+    rows: Sequence[dict[str, Any]],
     path: Path | str,
     reading: Reading | None = None,
-) -> Enclosed:
-    """Find the bodies that surface cells enclose, of each owner by itself.
+) -> tuple[list[Body], list[Note]]:
+    """Find the bodies that surface cells enclose, of each owner by itself; returned as by :func:`enclosed`.
 
     Parameters
     ----------
@@ -310,15 +294,15 @@ def bodies_of_surfaces(
     rings : sequence of (n,) int arrays
         Points around each cell.
     owner : (n_cells,) int array
-        0 to n_names - 1.
-    names : sequence of str
-        One per owner.
+        0 to n_rows - 1.
+    rows : sequence of dict
+        Of the block table, one per owner.
     path : Path or str
         Named in messages.
     reading : Reading, optional
     """
     parts = [
-        (name, points, fans([rings[k].tolist() for k in np.flatnonzero(owner == whose).tolist()]))
-        for whose, name in enumerate(names)
+        Body(row["name"], points, fans([rings[k].tolist() for k in np.flatnonzero(owner == whose).tolist()]), row)
+        for whose, row in enumerate(rows)
     ]
     return enclosed(parts, float(np.ptp(points, axis=0).max()), path, reading)

@@ -20,13 +20,13 @@ from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import Note
-from blockvis.layout.outlines import FLAT, spread_of
+from blockvis.layout.outlines import is_flat, spread_of
 from blockvis.layout.solids import fans
 from solver import mechanics
 from solver.mechanics import counted
 
-from .bodies import Bodies
-from .cells import layout_of_cells
+from .bodies import Bodies, Body
+from .cells import layout_of_cells, layout_of_meshes
 from .closed_surfaces import enclosed, without_volume
 from .reading import Reading
 
@@ -95,27 +95,24 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies 
 def _layout_of(meshes: list[_Mesh], path: Path, reading: Reading) -> Layout | Bodies:
     """Make outlines of meshes in a plane, and of others the bodies that they enclose."""
     every = np.concatenate([mesh.points for mesh in meshes])
-    spread = spread_of(every, f"'{path}'")
+    size = float(spread_of(every, f"'{path}'").max())
     names = [str(mesh.row["name"]) for mesh in meshes]
     if len(set(names)) < len(names):
         # COMPAS names a mesh after its class unless it is told otherwise.
         meshes = [replace(mesh, row={**mesh.row, "name": f"block {mesh.row['key']}"}) for mesh in meshes]
-    size = float(spread.max())
-    if spread.min() <= FLAT * size:
+    if is_flat(every):
         return _flat(meshes, path, reading.view)
     planes = [mesh for mesh in meshes if len(mesh.faces) == 1]
     if len(planes) < len(meshes):
         # A single face among bodies is a ground without depth.
         meshes = [mesh for mesh in meshes if len(mesh.faces) > 1]
     notes = [] if len(planes) == 0 else [_without_volume(planes)]
-    parts = [(str(mesh.row["name"]), mesh.points, fans(mesh.faces)) for mesh in meshes]
-    closed = enclosed(parts, size, path, reading)
-    bodies, notes = closed.bodies, [*notes, *closed.notes]
-    rows = [
-        {**{key: value for key, value in meshes[k].row.items() if key != "key"}, "name": body.name}
-        for body, k in zip(bodies, closed.owners.tolist(), strict=True)
+    parts = [
+        Body(str(mesh.row["name"]), mesh.points, fans(mesh.faces), {k: v for k, v in mesh.row.items() if k != "key"})
+        for mesh in meshes
     ]
-    return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'block')} of COMPAS", *notes))
+    bodies, more = enclosed(parts, size, path, reading)
+    return Bodies(bodies, notes=(f"{counted(len(bodies), 'block')} of COMPAS", *notes, *more))
 
 
 def _without_volume(planes: Sequence[_Mesh]) -> Note:
@@ -125,16 +122,10 @@ def _without_volume(planes: Sequence[_Mesh]) -> Note:
 
 def _flat(meshes: Sequence[_Mesh], path: Path, view: str | None) -> Layout | Bodies:
     """Make a layout of flat meshes: each is a block, but of a single one each face."""
-    points = np.concatenate([mesh.points for mesh in meshes])
-    starts = np.cumsum([0] + [len(mesh.points) for mesh in meshes])
-    rings = [np.array(face) + start for mesh, start in zip(meshes, starts[:-1], strict=True) for face in mesh.faces]
-    counts = [len(mesh.faces) for mesh in meshes]
-    if len(meshes) == 1:
-        return layout_of_cells(points, rings, {"block_id": np.arange(counts[0])}, path, view)
-    data = {"block_id": np.repeat(np.arange(len(meshes)), counts)}
-    for key in ("name", "group", "role", "material"):
-        data[key] = np.repeat([str(mesh.row.get(key, "")) for mesh in meshes], counts)
-    return layout_of_cells(points, rings, data, path, view)
+    if len(meshes) > 1:
+        return layout_of_meshes([(mesh.points, mesh.faces, mesh.row) for mesh in meshes], path, view)
+    rings = [np.array(face) for face in meshes[0].faces]
+    return layout_of_cells(meshes[0].points, rings, {"block_id": np.arange(len(rings))}, path, view)
 
 
 def _meshes(value: Any, context: _Context) -> Iterator[_Mesh]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from blockvis.layout.notes import Note
 from blockvis.layout.units import UNITS
 from blockvis.system.extras import require
 
-from .bodies import drawn_row
+from .bodies import Body, drawn_row
 
 #: Nodes nested deeper than this are refused: nodes may place each other.
 DEEPEST = 100
@@ -26,17 +26,23 @@ UP = {"X_UP": ([1, 2, 0], "z"), "Y_UP": ([0, 1, 2], "y"), "Z_UP": ([0, 1, 2], "z
 
 @dataclass(frozen=True)
 class Drawn:
-    """Meshes of a file: name, (n, 3) points in place and (m, 3) faces of each; unit, axis that points up, notes.
+    """What a file draws.
 
-    ``rows`` has one for each mesh, or is empty; those that we wrote have a name. ``grouped`` are meshes that may be
-    parts of stones.
+    Attributes
+    ----------
+    parts : list of Body
+        Its meshes in place; those that we wrote say their name.
+    unit, up, up_says : str
+        As of :class:`blockvis.formats.bodies.Bodies`.
+    grouped : bool
+        Whether the meshes may be parts of stones.
+    notes : list of Note
     """
 
-    parts: list[tuple[str, np.ndarray, np.ndarray]]
-    unit: str
-    up: str
-    up_says: str
-    rows: list[dict[str, Any]] = field(default_factory=list)
+    parts: list[Body]
+    unit: str = ""
+    up: str = "z"
+    up_says: str = ""
     grouped: bool = False
     notes: list[Note] = field(default_factory=list)
 
@@ -72,26 +78,26 @@ def drawn_in(path: Path) -> Drawn:
     metres = float(about.unitmeter or 1.0)
     unit = next((name for name, size in UNITS.items() if math.isclose(metres, size, rel_tol=1e-3)), "")
     factor = 1.0 if unit else metres
-    parts, paths = [], []
+    parts, paths = list[Body](), list[list[str]]()
     for names, matrix, geometry in _placed(document.scene.nodes if document.scene else [], np.eye(4), (), 0):
         points, faces = _mesh(geometry)
         points = points @ matrix[:3, :3].T + matrix[:3, 3]
         if len(faces):
             *around, name = names or [str(geometry.name or geometry.id)]
-            parts.append((name, points[:, order] * factor, faces))
+            parts.append(Body(name, points[:, order] * factor, faces))
             paths.append(around)
-    rows = rows_below([name for name, _, _ in parts], paths)
-    return Drawn(parts, unit or "m", up, "y is up, as the file says" if up == "y" else "", rows)
+    parts = said_below(parts, paths, [[]] * len(parts))
+    return Drawn(parts, unit or "m", up, "y is up, as the file says" if up == "y" else "")
 
 
-def rows_below(
-    names: Sequence[str], paths: Sequence[Sequence[str]], materials: Sequence[Sequence[str]] = ()
-) -> list[dict[str, Any]]:
-    """Rows of bodies, given the names of the nodes around each, but for those around all: these are the scene."""
+def said_below(parts: Sequence[Body], paths: Sequence[Sequence[str]], materials: Sequence[Sequence[str]]) -> list[Body]:
+    """Say of bodies what their materials and the nodes around say, but for those around all: these are the scene."""
     shared = min(map(len, paths), default=0)
     common = next((k for k in range(shared) if len({path[k] for path in paths}) > 1), shared)
-    painted = materials or [[]] * len(names)
-    return [drawn_row(*of) for of in zip(names, (path[common:] for path in paths), painted, strict=True)]
+    return [
+        replace(part, said=drawn_row(part.name, path[common:], painted))
+        for part, path, painted in zip(parts, paths, materials, strict=True)
+    ]
 
 
 def _placed(

@@ -26,7 +26,7 @@ from solver.mechanics import counted
 from .arcs import Arc
 from .bodies import Bodies
 from .drawing import Drawing, Line, Outline, Stroke, is_chain, joined_ends
-from .dxf_bodies import DrawnMesh, drawn_mesh, is_mesh, layout_of_meshes, meshes_of_faces
+from .dxf_bodies import DrawnMesh, drawn_mesh, is_mesh, layout_of_meshes, meshes_of_faces, said_by_layer
 from .loose_lines import nothing_closed, with_faces
 from .reading import Reading
 
@@ -82,7 +82,7 @@ class _Found(Drawing):
         """Row of an outline on its layer, with what our own writer put beside it."""
         layer, own = str(entity.dxf.layer), _own_data(entity)
         moved = bool(own) and _layer_name(own).lower() != layer.lower()
-        row = {**_said_by(layer), "name": name, **(on_layer(own, layer) if moved else own)}
+        row = {**said_by_layer(layer), "name": name, **(on_layer(own, layer) if moved else own)}
         self.moved += [(own, row)] if moved else []
         return row
 
@@ -160,11 +160,6 @@ def _unit(document: Any, reading: Reading) -> tuple[str, list[str]]:
     return "", [
         Note(CHANGED, f"the file states unit {code} ($INSUNITS), which is not known; give unit=... to settle it")
     ]
-
-
-def _said_by(layer: str) -> dict[str, Any]:
-    """Say what a layer says of a block on it."""
-    return {"group": layer, **({"material": layer} if layer != "0" else {})}
 
 
 def _chosen_meshes(found: _Found, reading: Reading) -> list[DrawnMesh]:
@@ -627,7 +622,7 @@ def _add_faces(found: _Found, reading: Reading, tolerance: float | None) -> None
         reading,
         called=lambda name, k: f"{name}.{k}",
         of_face=lambda layer, around, name: {
-            "row": {**_said_by(layer), "name": name},
+            "row": {**said_by_layer(layer), "name": name},
             "within": around,
             "looks": ("face",),
         },

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import FLAT, spread_of
+from blockvis.layout.outlines import is_flat, spread_of
 from blockvis.layout.solids import fans
 from solver.mechanics import counted
 
-from .bodies import Bodies
-from .cells import layout_of_cells
+from .bodies import Bodies, Body
+from .cells import layout_of_meshes as flat_layout
 from .closed_surfaces import closed_bodies, enclosed
 from .reading import Reading
 
@@ -25,13 +25,23 @@ SOLIDS = ("3DSOLID", "BODY")
 
 @dataclass(frozen=True)
 class DrawnMesh:
-    """A mesh of a drawing: (n, 3) points, the points around each face, and ``kind`` where faces of it are missing."""
+    """A mesh of a drawing: (n, 3) points, the points around each face, and its kind where faces of it are missing."""
 
     name: str
     layer: str
     points: np.ndarray
     faces: list[list[int]]
     curved: str = ""
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """Its row of the block table."""
+        return {"name": self.name, **said_by_layer(self.layer)}
+
+
+def said_by_layer(layer: str) -> dict[str, Any]:
+    """Say what a layer says of a block on it."""
+    return {"group": layer, **({"material": layer} if layer != "0" else {})}
 
 
 def is_mesh(entity: Any) -> bool:
@@ -99,7 +109,7 @@ def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]], path: Path) ->
         meshes.append(DrawnMesh(faces[0][0], layer, np.concatenate(rings), numbers))
         try:
             size = float(np.ptp(meshes[-1].points, axis=0).max())
-            closed = closed or bool(closed_bodies("", meshes[-1].points, fans(numbers), size, path))
+            closed = closed or bool(closed_bodies(Body("", meshes[-1].points, fans(numbers)), size, path))
         except ValueError:
             continue
     return meshes if closed else []
@@ -134,37 +144,10 @@ def layout_of_meshes(
             "(AutoCAD: STLOUT) or .step, or leave it out (ignore)"
         )
     every = np.concatenate([mesh.points for mesh in meshes])
-    spread = spread_of(every, f"'{path}'")
-    size = float(spread.max())
-    if spread.min() <= FLAT * size:
-        return _flat(meshes, path, reading, unit, notes)
-    closed = enclosed([(mesh.name, mesh.points, fans(mesh.faces)) for mesh in meshes], size, path, reading)
-    rows = [
-        {"name": body.name, "group": meshes[k].layer, **_material(meshes[k])}
-        for body, k in zip(closed.bodies, closed.owners.tolist(), strict=True)
-    ]
-    return Bodies(tuple(closed.bodies), tuple(rows), unit, notes=(*notes, *closed.notes))
-
-
-def _material(mesh: DrawnMesh) -> dict[str, str]:
-    return {"material": mesh.layer} if mesh.layer != "0" else {}
-
-
-def _flat(
-    meshes: Sequence[DrawnMesh], path: Path, reading: Reading, unit: str, notes: Sequence[str]
-) -> Layout | Bodies:
-    # Polyface meshes may repeat the corners of each face.
-    points, number = np.unique(np.concatenate([mesh.points for mesh in meshes]), axis=0, return_inverse=True)
-    number = number.ravel()
-    starts = np.cumsum([0] + [len(mesh.points) for mesh in meshes])
-    counts = [len(mesh.faces) for mesh in meshes]
-    rings = [number[np.add(face, start)] for mesh, start in zip(meshes, starts, strict=False) for face in mesh.faces]
-    data = {"block_id": np.repeat(np.arange(len(meshes)), counts)}
-    for key, values in (
-        ("name", [mesh.name for mesh in meshes]),
-        ("group", [mesh.layer for mesh in meshes]),
-        ("material", [_material(mesh).get("material", "") for mesh in meshes]),
-    ):
-        data[key] = np.repeat(values, counts)
-    found = layout_of_cells(points, rings, data, path, reading.view)
-    return replace(found, unit=unit, notes=(*found.notes, *notes))
+    size = float(spread_of(every, f"'{path}'").max())
+    if is_flat(every):
+        found = flat_layout([(mesh.points, mesh.faces, mesh.row) for mesh in meshes], path, reading.view)
+        return replace(found, unit=unit, notes=(*found.notes, *notes))
+    parts = [Body(mesh.name, mesh.points, fans(mesh.faces), mesh.row) for mesh in meshes]
+    bodies, more = enclosed(parts, size, path, reading)
+    return Bodies(bodies, unit, notes=(*notes, *more))

@@ -58,7 +58,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
             return _bodies_of_volumes(bodies, path, unit, per_mm)
         surfaces = gmsh_mesh.layout_of_mesh(target.read_bytes(), path, reading)
     if isinstance(surfaces, Bodies):
-        scaled = tuple(replace(body, points=per_mm * body.points) for body in surfaces.bodies)
+        scaled = [replace(body, points=per_mm * body.points) for body in surfaces.bodies]
         return replace(surfaces, bodies=scaled, unit=unit)
     left_out = tuple(item.mapped(per_mm) for item in surfaces.left_out)
     return replace(surfaces, blocks=tuple(ring * per_mm for ring in surfaces.outlines), left_out=left_out, unit=unit)
@@ -122,7 +122,7 @@ def _step_unit(path: Path) -> tuple[str, float]:
 
 
 def _bodies_of_volumes(found: list[dict[str, object]], path: Path, unit: str, per_mm: float) -> Bodies:
-    bodies, rows = [], []
+    bodies = []
     for part in found:
         if int(str(part["groups"])) > 1:
             raise ValueError(
@@ -130,9 +130,7 @@ def _bodies_of_volumes(found: list[dict[str, object]], path: Path, unit: str, pe
             )
         points, faces = np.array(part["points"], dtype=float), np.array(part["faces"], dtype=np.int64)
         drawn = per_mm**3 * float(str(part.get("volume", 0.0)))
-        bodies.append(Body(str(part["name"]), per_mm * points.reshape(-1, 3), faces.reshape(-1, 3), volume=drawn))
-        row = {"name": str(part["name"])}
-        if part["group"]:
-            row |= {"group": str(part["group"]), "material": str(part["group"])}
-        rows.append(row)
-    return Bodies(tuple(bodies), tuple(rows), unit)
+        said = {"group": str(part["group"]), "material": str(part["group"])} if part["group"] else {}
+        body = Body(str(part["name"]), per_mm * points.reshape(-1, 3), faces.reshape(-1, 3), said, volume=drawn)
+        bodies.append(body)
+    return Bodies(bodies, unit)

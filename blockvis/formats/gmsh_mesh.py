@@ -150,23 +150,22 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
 def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Path, reading: Reading) -> Bodies:
     """Find the bodies that surfaces in space enclose: those of each physical group, or else of all together."""
     named, owner = np.unique(groups, return_inverse=True)
-    names = [str(name) or "body" for name in named]
+    rows = [{"name": str(name) or "body", **(_said(str(name)) if len(named) > 1 else {})} for name in named]
     try:
-        closed = bodies_of_surfaces(mesh.coordinates, rings, owner, names, path, reading)
+        bodies, notes = bodies_of_surfaces(mesh.coordinates, rings, owner, rows, path, reading)
     except ValueError:
         try:
-            names = ["body"]
-            closed = bodies_of_surfaces(mesh.coordinates, rings, np.zeros_like(owner), names, path)
+            bodies, notes = bodies_of_surfaces(mesh.coordinates, rings, np.zeros_like(owner), [{"name": "body"}], path)
         except OpenSurface:
             # A drawing that is meant to be flat: the error says how far it is not.
             flattened(mesh.coordinates, f"'{path}'")
             raise
-    rows = []
-    for body, whose in zip(closed.bodies, closed.owners.tolist(), strict=True):
-        group = str(named[whose]) if len(names) > 1 else ""
-        rows.append({"name": body.name, **({"group": group, "material": group} if group else {})})
-    notes = (f"{counted(len(closed.bodies), 'body', 'bodies')}, one per closed surface", *closed.notes)
-    return Bodies(tuple(closed.bodies), tuple(rows), notes=notes)
+    return Bodies(bodies, notes=(f"{counted(len(bodies), 'body', 'bodies')}, one per closed surface", *notes))
+
+
+def _said(group: str) -> dict[str, str]:
+    """Say what a physical group, "" for none, says of a block."""
+    return {"group": group, "material": group} if group else {}
 
 
 def holds_flat_blocks(path: Path) -> bool:
@@ -185,11 +184,11 @@ def _bodies(mesh: _Mesh, path: Path) -> Bodies:
         volumes += [mesh.volumes[k] for k in chosen]
     tags, owner = np.unique(np.concatenate(volumes), return_inverse=True)
     groups = _group_names(mesh, 3, tags, path)
-    bodies, owners = bodies_of_cells(mesh.coordinates, cells, owner, _entity_names(groups, tags, "volume"))
-    rows = []
-    for body, whose in zip(bodies, owners.tolist(), strict=True):
-        group = {"group": groups[whose], "material": groups[whose]} if groups[whose] else {}
-        rows.append({"name": body.name, **group})
+    rows = [
+        {"name": name, **_said(group)}
+        for name, group in zip(_entity_names(groups, tags, "volume"), groups, strict=True)
+    ]
+    bodies = bodies_of_cells(mesh.coordinates, cells, owner, rows)
     notes = [
         f"{counted(len(bodies), 'body', 'bodies')}, one per meshed volume; "
         "a volume in no physical group may be missing from the file"
@@ -198,7 +197,7 @@ def _bodies(mesh: _Mesh, path: Path) -> Bodies:
         notes = [f"{len(bodies)} bodies, the pieces of {counted(len(tags), 'meshed volume')}"]
     if "" in groups:
         notes.append(f"in no physical group: {groups.count('')} of {counted(len(tags), 'volume')}")
-    return Bodies(tuple(bodies), tuple(rows), notes=tuple(notes))
+    return Bodies(bodies, notes=notes)
 
 
 def _group_names(mesh: _Mesh, dimension: int, tags: np.ndarray, path: Path) -> list[str]:

@@ -131,12 +131,9 @@ def _bodies(
     total = sum(len(nodes) for _, nodes in cells)
     values, owner = np.unique(data[key] if key else np.zeros(total, dtype=np.int64), return_inverse=True)
     numbered = [f"block {value}" for value in values.tolist()] if key else ["block"]
-    found = rows_of_cells(data, owner, numbered, path)
-    names = [row.get("name", name) for row, name in zip(found, numbered, strict=True)]
-    bodies, owners = bodies_of_cells(points, cells, owner, names)
-    rows = [{**found[whose], "name": body.name} for body, whose in zip(bodies, owners.tolist(), strict=True)]
+    bodies = bodies_of_cells(points, cells, owner, rows_of_cells(data, owner, numbered, path))
     how = f"one per value of the cell array '{key}'" if key else "one per piece that hangs together"
-    return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}",))
+    return Bodies(bodies, notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}",))
 
 
 class _Ending(io.StringIO):

@@ -314,7 +314,7 @@ def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | 
         flat = [points_of[k] for k in np.flatnonzero(faces & ~gone)]
         notes += flat_beside([points_of[k] for k in np.flatnonzero(solid)], flat)
         notes += _unread(types[~gone & ~solid & ~faces])
-        return replace(found, notes=found.notes + notes)
+        return replace(found, notes=(*found.notes, *notes))
     surface = np.flatnonzero(np.isin(types, list(VTK)) & ~gone)
     rings = []
     for cell in surface:
@@ -323,7 +323,7 @@ def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | 
     cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
     found = layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path, view)
     notes += _unread(types[~gone & ~np.isin(types, list(VTK))])
-    return replace(found, notes=found.notes + notes)
+    return replace(found, notes=(*found.notes, *notes))
 
 
 def _unread(types: np.ndarray) -> tuple[str, ...]:
@@ -369,7 +369,7 @@ def _found_in_parts(data: Any, path: Path | str, view: str | None) -> Layout | B
     chosen = solid or flat
     joined = merged([found for found, _ in chosen], [name for _, name in chosen], path)
     note = (Note(LEFT_OUT, f"left out: {', '.join(left_out)}, which draw no blocks"),) if left_out else ()
-    return replace(joined, notes=joined.notes + note)
+    return replace(joined, notes=(*joined.notes, *note))
 
 
 def _has_blocks(part: Any) -> bool:
@@ -410,19 +410,18 @@ def _bodies_of_solids(grid: Any, path: Path | str, stands: np.ndarray) -> Bodies
     faceted = types[solid] == POLYHEDRON
     if faceted.any() and not faceted.all():
         raise ValueError(f"'{path}' has polyhedra beside other cells with a volume; write all blocks as polyhedra")
-    found = _faceted_bodies if faceted.any() else _bodies_by_shape
+    find = _faceted_bodies if faceted.any() else _bodies_by_shape
+    rows = rows_of_cells(data, owner, names, path)
     try:
-        bodies, owners = found(grid, np.asarray(grid.points, dtype=float), solid, owner, names)
+        bodies = find(grid, np.asarray(grid.points, dtype=float), solid, owner, rows)
     except IndexError as error:
         raise ValueError(f"'{path}' has a damaged cell ({error}); export it again") from None
-    table = rows_of_cells(data, owner, names, path)
-    rows = [{"name": body.name, **table[whose]} for body, whose in zip(bodies, owners.tolist(), strict=True)]
-    return Bodies(tuple(bodies), tuple(rows), notes=(f"{counted(len(bodies), 'body', 'bodies')}, {note}",))
+    return Bodies(bodies, notes=(f"{counted(len(bodies), 'body', 'bodies')}, {note}",))
 
 
 def _bodies_by_shape(
-    grid: Any, points: np.ndarray, solid: np.ndarray, owner: np.ndarray, names: list[str]
-) -> tuple[list[Body], np.ndarray]:
+    grid: Any, points: np.ndarray, solid: np.ndarray, owner: np.ndarray, rows: list[dict[str, Any]]
+) -> list[Body]:
     """Find the bodies of cells whose faces follow from their type."""
     types = np.asarray(grid.celltypes)
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
@@ -435,12 +434,12 @@ def _bodies_by_shape(
         nodes = connectivity[offset[solid[chosen]][:, None] + np.arange(corners)]
         cells.append((VTK_SOLIDS[kind], nodes.astype(np.int64)))
         owners.append(owner[chosen])
-    return bodies_of_cells(points, cells, np.concatenate(owners), names)
+    return bodies_of_cells(points, cells, np.concatenate(owners), rows)
 
 
 def _faceted_bodies(
-    grid: Any, points: np.ndarray, solid: np.ndarray, owner: np.ndarray, names: list[str]
-) -> tuple[list[Body], np.ndarray]:
+    grid: Any, points: np.ndarray, solid: np.ndarray, owner: np.ndarray, rows: list[dict[str, Any]]
+) -> list[Body]:
     """Find the bodies of polyhedra, which list their faces."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
@@ -453,7 +452,7 @@ def _faceted_bodies(
     face_of, faces = lists(grid.GetPolyhedronFaceLocations())
     if not (_within(corners, len(points)) and _within(faces, len(corner_of) - 1)):
         raise IndexError("a face of a polyhedron uses a point that does not exist")
-    outside: list[dict[tuple[int, ...], list[int]]] = [{} for _ in names]
+    outside: list[dict[tuple[int, ...], list[int]]] = [{} for _ in rows]
     for cell, whose in zip(solid.tolist(), owner.tolist(), strict=True):
         for face in faces[face_of[cell] : face_of[cell + 1]].tolist():
             ring = corners[corner_of[face] : corner_of[face + 1]].tolist()
@@ -461,8 +460,8 @@ def _faceted_bodies(
             # A face that two cells of one body share is inside it.
             if outside[whose].pop(key, None) is None:
                 outside[whose][key] = ring
-    bodies = [body_of_polygons(name, points, list(mine.values())) for name, mine in zip(names, outside, strict=True)]
-    return bodies, np.arange(len(names))
+    faces_of = ([*mine.values()] for mine in outside)
+    return [body_of_polygons(row["name"], points, own, row) for row, own in zip(rows, faces_of, strict=True)]
 
 
 def _within(numbers: np.ndarray, end: int) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
-from blockvis.layout.outlines import FLAT, spread_of
+from blockvis.layout.outlines import is_flat, spread_of
 from blockvis.layout.solids import BASE_FRAME, Solid, area_vectors, fans, prism, triangles_of
 from blockvis.system.extras import MissingExtra
 from solver import mechanics
@@ -24,7 +24,7 @@ from solver.mechanics import counted
 from . import dae
 from .bodies import Bodies, Body, drawn_row
 from .cells import layout_of_cells, merged
-from .closed_surfaces import Enclosed, OpenSurface, enclosed
+from .closed_surfaces import OpenSurface, enclosed
 from .reading import Reading
 
 #: Programs that write coordinates to .glb as they are, whichever of them is up, in small letters.
@@ -48,42 +48,37 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     suffix = path.suffix.lower()
     drawn = {".dae": _dae, ".obj": _obj}.get(suffix, _scene)(path)
     size = _checked_size(drawn.parts, path)
-    if _are_flat(drawn.parts, size):
-        flat = _flat(drawn.parts, path, drawn.rows, reading.view)
+    if is_flat(np.concatenate([part.points for part in drawn.parts])):
+        flat = _flat(drawn.parts, path, reading.view)
         return replace(flat, unit=drawn.unit, notes=(*flat.notes, *drawn.notes))
-    closed, rows = _enclosed(drawn, size, path, reading)
-    bodies = closed.bodies
-    known = [
-        {"name": body.name, **(rows[k] if rows else {}), **({"name": body.name} if body.piece_of else {})}
-        for body, k in zip(bodies, closed.owners.tolist(), strict=True)
-    ]
+    bodies, notes = _enclosed(drawn, size, path, reading)
     if suffix == ".glb":
         up, up_says = _up(path, bodies, size)
     else:
         # .dae states it, and we have z up where we write a row, with a name, for each block.
-        stated = suffix == ".dae" or (len(rows) > 0 and all("name" in row for row in rows))
+        stated = suffix == ".dae" or all("name" in part.said for part in drawn.parts)
         up, up_says = drawn.up, drawn.up_says if stated else _stand_along_y(bodies, size)
-    return Bodies(tuple(bodies), tuple(known), drawn.unit, (*closed.notes, *drawn.notes), up=up, up_says=up_says)
+    return Bodies(bodies, drawn.unit, (*notes, *drawn.notes), up=up, up_says=up_says)
 
 
-def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> tuple[Enclosed, Sequence[dict[str, Any]]]:
-    """Find the closed bodies of a file, and the rows of the parts of which they are."""
+def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> tuple[list[Body], list[Note]]:
+    """Find the closed bodies of a file."""
     try:
-        return enclosed(drawn.parts, size, path, reading, drawn.rows), drawn.rows
+        return enclosed(drawn.parts, size, path, reading)
     except OpenSurface as error:
         if not drawn.grouped:
             raise
         # Groups may be those of the faces of one stone.
-        starts = np.cumsum([0, *(len(points) for _, points, _ in drawn.parts)])
-        points = np.concatenate([points for _, points, _ in drawn.parts])
-        faces = np.concatenate([part[2] + start for part, start in zip(drawn.parts, starts[:-1], strict=True)])
+        starts = np.cumsum([0, *(len(part.points) for part in drawn.parts)])
+        points = np.concatenate([part.points for part in drawn.parts])
+        faces = np.concatenate([part.faces + start for part, start in zip(drawn.parts, starts[:-1], strict=True)])
         try:
-            found = enclosed([(path.name, points, faces)], size, path, reading)
+            bodies, notes = enclosed([Body(path.name, points, faces)], size, path, reading)
         except ValueError:
             raise error from None
         groups = counted(len(drawn.parts), "name of a group", "names of groups")
         said = f"{groups}, not closed by themselves; name blocks by 'o' lines"
-        return replace(found, notes=[*found.notes, Note(LEFT_OUT, f"not read: {said}")]), ()
+        return bodies, [*notes, Note(LEFT_OUT, f"not read: {said}")]
 
 
 @dataclass
@@ -132,11 +127,11 @@ def _obj(path: Path) -> dae.Drawn:
             )
         own, triangles = np.unique(fans(one.faces), return_inverse=True)
         if len(own):
-            parts.append((name, every[own], triangles.reshape(-1, 3)))
-    rows, names = _own_rows(path), [name for name, _, _ in parts]
-    if word != "o" or _distinct(rows) != names:
-        rows = [objects[name].row(name, word) for name in names]
-    return dae.Drawn(parts, "", "z", "", rows, grouped=word != "o")
+            parts.append(Body(name, every[own], triangles.reshape(-1, 3), one.row(name, word)))
+    rows = _own_rows(path)
+    if word == "o" and _distinct(rows) == [part.name for part in parts]:
+        parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
+    return dae.Drawn(parts, grouped=word != "o")
 
 
 def _obj_text(path: Path) -> str:
@@ -179,7 +174,7 @@ def _scene(path: Path) -> dae.Drawn:
         scene = trimesh.load_scene(str(path), process=False)
         placed = _placed(scene, path)
         parts = [
-            (str(name), np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
+            Body(name, np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
             for name, mesh in placed
             if len(mesh.faces)
         ]
@@ -190,13 +185,14 @@ def _scene(path: Path) -> dae.Drawn:
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
         raise ValueError(f"'{path}' cannot be read as {suffix} ({reason}); export it again") from None
     if suffix != ".glb":
-        return dae.Drawn(parts, "", "z", "")
+        return dae.Drawn(parts)
     beside = [mesh.metadata for _, mesh in placed if len(mesh.faces)]
     rows = [one.get("blockvis") for one in beside]
-    if not all(isinstance(row, dict) for row in rows):
-        names = [name for name, _, _ in parts]
-        rows = dae.rows_below(names, [one["around"] for one in beside], [one["materials"] for one in beside])
-    return dae.Drawn(parts, "m", "y", "", rows)
+    if all(isinstance(row, dict) for row in rows):
+        parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
+    else:
+        parts = dae.said_below(parts, [one["around"] for one in beside], [one["materials"] for one in beside])
+    return dae.Drawn(parts, "m", "y")
 
 
 def _dae(path: Path) -> dae.Drawn:
@@ -211,25 +207,19 @@ def _dae(path: Path) -> dae.Drawn:
         raise ValueError(f"'{path}' cannot be read as .dae ({reason}); export it again") from None
 
 
-def _checked_size(parts: list[tuple[str, np.ndarray, np.ndarray]], path: Path) -> float:
+def _checked_size(parts: Sequence[Body], path: Path) -> float:
     """Return the size of all parts, whose points must be finite and there."""
     if not parts:
         raise ValueError(f"'{path}' has no surface cells; export the blocks as closed bodies or a flat mesh")
-    every = np.concatenate([points for _, points, _ in parts])
-    spread = spread_of(every, f"'{path}'")
-    for name, points, faces in parts:
-        outside = faces[(faces < 0) | (faces >= len(points))]
+    spread = spread_of(np.concatenate([part.points for part in parts]), f"'{path}'")
+    for part in parts:
+        outside = part.faces[(part.faces < 0) | (part.faces >= len(part.points))]
         if len(outside):
             raise ValueError(
-                f"'{path}': a face of '{name}' uses point {int(outside[0])}, but there are {len(points)}; "
+                f"'{path}': a face of '{part.name}' uses point {int(outside[0])}, but there are {len(part.points)}; "
                 "export it again"
             )
     return float(spread.max())
-
-
-def _are_flat(parts: list[tuple[str, np.ndarray, np.ndarray]], size: float) -> bool:
-    every = np.concatenate([points for _, points, _ in parts])
-    return float(np.ptp(every, axis=0).min()) <= FLAT * size
 
 
 def _description(path: Path) -> dict[str, Any]:
@@ -346,14 +336,14 @@ def _materials(node: dict[str, Any], description: dict[str, Any]) -> list[str]:
     return [str(every[one["material"]].get("name", "")) for one in mesh.get("primitives", []) if "material" in one]
 
 
-def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any, rows: list[dict[str, Any]]) -> dae.Drawn:
+def _numbered(parts: list[Body], scene: Any, rows: list[dict[str, Any]]) -> dae.Drawn:
     """Split a .ply whose faces have a ``block_id`` into one part per number, to which its row belongs."""
     raw = next(iter(scene.geometry.values())).metadata.get("_ply_raw", {}) if parts else {}
     data = raw.get("face", {}).get("data")
     names = getattr(getattr(data, "dtype", None), "names", None) or (data if isinstance(data, dict) else ())
     if "block_id" not in names:
         lost = f"not read: what blockvis wrote of {counted(len(rows), 'block')}: faces have no block_id any more"
-        return dae.Drawn(parts, "", "z", "", notes=[Note(LEFT_OUT, lost)] if rows else [])
+        return dae.Drawn(parts, notes=[Note(LEFT_OUT, lost)] if rows else [])
     # trimesh puts the triangles of polygons in another order.
     polygons = data["vertex_indices" if "vertex_indices" in names else "vertex_index"]
     polygons = polygons if isinstance(data, dict) else polygons["f1"]
@@ -362,28 +352,30 @@ def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any, rows:
     faces: list[list[list[int]]] = [[] for _ in values]
     for polygon, owner in zip(polygons, owners.tolist(), strict=True):
         faces[owner].append(polygon.tolist())
-    split = [(f"block {value}", points, fans(own)) for value, own in zip(values.tolist(), faces, strict=True)]
-    known = bool(rows) and all(value in range(len(rows)) for value in values.tolist())
-    return dae.Drawn(split, "", "z", "", [rows[int(value)] for value in values] if known else [])
+    known = all(value in range(len(rows)) for value in values.tolist())
+    said = [rows[int(value)] if known else {} for value in values]
+    numbered = zip(values.tolist(), faces, said, strict=True)
+    return dae.Drawn([Body(f"block {value}", points, fans(own), row) for value, own, row in numbered])
 
 
-def _flat(
-    parts: list[tuple[str, np.ndarray, np.ndarray]], path: Path, rows: list[dict[str, Any]], view: str | None
-) -> Layout:
+def _flat(parts: list[Body], path: Path, view: str | None) -> Layout:
     if path.suffix.lower() == ".stl":
         # Each triangle has corners of its own there, by which it would be a piece of its own.
-        same = [np.unique(points, axis=0, return_inverse=True) for _, points, _ in parts]
-        parts = [(name, own, index.ravel()[faces]) for (name, _, faces), (own, index) in zip(parts, same, strict=True)]
+        same = [np.unique(part.points, axis=0, return_inverse=True) for part in parts]
+        parts = [
+            replace(part, points=own, faces=index.ravel()[part.faces])
+            for part, (own, index) in zip(parts, same, strict=True)
+        ]
     layouts = []
-    for (_, points, faces), row in zip(parts, rows or [{}] * len(parts), strict=True):
-        found = layout_of_cells(points, list(faces), {}, path, view)
+    for part in parts:
+        found = layout_of_cells(part.points, list(part.faces), {}, path, view)
         assert isinstance(found, Layout)
-        every = [{key: word for key, word in row.items() if key != "name"}] * found.n_blocks
-        layouts.append(with_rows(found, every, own=True) if row else found)
-    layout = merged(layouts, [name for name, _, _ in parts], path)
+        every = [{key: word for key, word in part.said.items() if key != "name"}] * found.n_blocks
+        layouts.append(with_rows(found, every, own=True) if part.said else found)
+    layout = merged(layouts, [part.name for part in parts], path)
     assert isinstance(layout, Layout)
-    named = len(rows) == layout.n_blocks and all("name" in row for row in rows)
-    return with_rows(layout, rows, own=True) if named else layout
+    named = len(parts) == layout.n_blocks and all("name" in part.said for part in parts)
+    return with_rows(layout, [part.said for part in parts], own=True) if named else layout
 
 
 def _own_rows(path: Path) -> list[dict[str, Any]]:

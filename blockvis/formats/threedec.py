@@ -347,24 +347,21 @@ def _bodies(model: _Model) -> Bodies:
     every = np.concatenate([block.points for block in model.blocks])
     size = float(np.ptp(every, axis=0).max())
     bodies: list[Body] = []
-    rows: list[dict[str, Any]] = []
     for k, block in enumerate(model.blocks):
-        name = f"block {k + 1}"
-        for body in closed_bodies(name, block.points, fans(block.faces), size, model.path):
-            bodies.append(body)
-            rows.append(_row(body.name, block, model.names))
+        part = Body(f"block {k + 1}", block.points, fans(block.faces), _said(block, model.names))
+        bodies += closed_bodies(part, size, model.path)
     notes = [f"{counted(len(model.blocks), 'block')} of 3DEC; its joints, loads and steps are not read"]
     fixed = sum(block.fixed for block in model.blocks)
     notes += [f"fixed, as the file says: {fixed} of them"] if fixed else []
     notes += passed_over(model.passed, "commands that were passed over")
-    return Bodies(tuple(bodies), tuple(rows), notes=tuple(notes), up=model.up, up_says=model.up_says)
+    return Bodies(bodies, notes=notes, up=model.up, up_says=model.up_says)
 
 
-def _row(name: str, block: _Block, names: dict[str, str]) -> dict[str, Any]:
+def _said(block: _Block, names: dict[str, str]) -> dict[str, Any]:
     region = block.words.get("region", "")
     group = (block.groups[-1] if block.groups else "") or names.get(region) or (f"region {region}" if region else "")
     material = block.words.get("mat") or block.words.get("material")
-    row: dict[str, Any] = {"name": name, "group": group}
+    row: dict[str, Any] = {"group": group}
     row |= {"material": f"mat {material}"} if material else {}
     row |= {"density": block.density} if block.density is not None else {}
     return row | ({"role": mechanics.FIXED} if block.fixed else {})

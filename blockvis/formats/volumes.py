@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -46,8 +47,8 @@ def bodies_of_cells(
     points: np.ndarray,
     cells: Sequence[tuple[Faces, np.ndarray]],
     owner: np.ndarray,
-    names: Sequence[str],
-) -> tuple[list[Body], np.ndarray]:
+    rows: Sequence[dict[str, Any]],
+) -> list[Body]:
     """Find the skin of each body: the faces that belong to one of its cells only.
 
     Parameters
@@ -56,16 +57,10 @@ def bodies_of_cells(
     cells : sequence of (faces, (n, n_nodes) int array)
         Cells of one shape each: the corners of its faces, and the nodes of the cells.
     owner : (n_cells,) int array
-        Which body each cell belongs to, 0 to n_names - 1, in the order of ``cells``. Cells of one owner that do not
+        Which body each cell belongs to, 0 to n_rows - 1, in the order of ``cells``. Cells of one owner that do not
         hang together by faces are bodies of their own.
-    names : sequence of str
-        One per owner.
-
-    Returns
-    -------
-    bodies : list of Body
-    owners : (n_bodies,) int array
-        Which owner each body belongs to.
+    rows : sequence of dict
+        Of the block table, one per owner.
     """
     faces, cell_of_face, start = [], [], 0
     for shape, nodes in cells:
@@ -82,15 +77,15 @@ def bodies_of_cells(
     skin = skin[np.argsort(piece[cell[skin]], kind="stable")]
     owners = owner[np.unique(piece, return_index=True)[1]]
     sizes = np.bincount(piece[cell[skin]], minlength=len(owners))
-    several = np.bincount(owners, minlength=len(names)) > 1
-    seen = np.zeros(len(names), dtype=np.int64)
+    several = np.bincount(owners, minlength=len(rows)) > 1
+    seen = np.zeros(len(rows), dtype=np.int64)
     bodies = []
-    for rows, whose in zip(np.split(skin, np.cumsum(sizes)[:-1]), owners.tolist(), strict=True):
+    for own, whose in zip(np.split(skin, np.cumsum(sizes)[:-1]), owners.tolist(), strict=True):
         seen[whose] += 1
-        used, triangles = np.unique(_triangles(face[rows]), return_inverse=True)
-        name = f"{names[whose]} {seen[whose]}" if several[whose] else names[whose]
-        bodies.append(Body(name, points[used], triangles.reshape(-1, 3)))
-    return bodies, owners
+        used, triangles = np.unique(_triangles(face[own]), return_inverse=True)
+        body = Body(rows[whose]["name"], points[used], triangles.reshape(-1, 3), rows[whose])
+        bodies.append(body.piece(int(seen[whose])) if several[whose] else body)
+    return bodies
 
 
 def _pieces(faces: np.ndarray, cell_of_face: np.ndarray, owner: np.ndarray) -> np.ndarray:

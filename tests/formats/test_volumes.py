@@ -236,20 +236,6 @@ def test_surfaces_that_enclose_nothing_are_not_flat(tmp_path, suffix):
         read(path)
 
 
-def test_version_1_of_msh(tmp_path):
-    (tmp_path / "a.msh").write_text(
-        "$NOD\n6\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 2 0 0\n6 2 1 0\n$ENDNOD\n"
-        "$ELM\n4\n1 1 0 1 2 1 2\n2 3 7 10 4 1 2 3 4\n3 2 8 11 3 2 5 6\n4 2 8 11 3 2 6 3\n$ENDELM\n",
-        encoding="utf-8",
-    )
-    layout = read_layout(tmp_path / "a.msh")
-    assert layout.groups == ("group 7", "group 8")
-    assert read(tmp_path / "a.msh").areas.tolist() == [1.0, 1.0]
-    (tmp_path / "b.msh").write_text("$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n3\n1 2 0 1 3 1 1\n$ENDELM\n", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"is cut off: its section \$ELM announces"):
-        read(tmp_path / "b.msh")
-
-
 def test_damaged_cells_are_refused(tmp_path):
     grid = polyhedra(2)
     grid.save(tmp_path / "a.vtu", binary=False)
