@@ -17,18 +17,8 @@ BENT_FACE = 0.866
 def bend_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> tuple[float, np.ndarray]:
     """Find how far a corner is out of the plane of a face of four corners that was cut into two triangles.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-    faces : sequence of sequences of int
-        Points around each face.
-
-    Returns
-    -------
-    bend : float
-        In the unit of the points; 0 where no two triangles make such a face.
-    corner : (3,) array
-        The corner that is farthest.
+    (n, 3) points, and those around each face; gives 0 where no two triangles make such a face, else the distance in the
+    unit of the points, and the farthest corner.
     """
     triangles = [list(ring) for ring in faces if len(ring) == 3]
     of_edge = {(ring[k - 1], ring[k]): (number, ring[k - 2]) for number, ring in enumerate(triangles) for k in range(3)}
@@ -49,14 +39,7 @@ def bend_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> tuple[float, 
 
 
 def bent_note(bent: Sequence[tuple[float, float, str, np.ndarray]], n_blocks: int) -> tuple[Note, ...]:
-    """Say that bent faces were accepted, cut into triangles.
-
-    Parameters
-    ----------
-    bent : sequence of (bend, width of the block, name of the block, (3,) corner)
-        In the unit of the file.
-    n_blocks : int
-    """
+    """Say that bent faces were accepted, cut into triangles; given are bend, the block's width and name, and corner."""
     if not bent:
         return ()
     bend, width, name, corner = max(bent, key=lambda one: one[0] / one[1])
@@ -74,12 +57,8 @@ def bent_note(bent: Sequence[tuple[float, float, str, np.ndarray]], n_blocks: in
 def pieces_note(objects: Sequence[str], n_others: int) -> tuple[Note, ...]:
     """Say which objects hold several closed bodies, each of which became a block.
 
-    Parameters
-    ----------
-    objects : sequence of str
-        Of each body that is a piece of an object, the object's name.
-    n_others : int
-        Bodies that are a whole object. A file of a single object holds all blocks by intention.
+    Given are the object's name of each body that is a piece of one, and the number of the other bodies: a file of a
+    single object holds all blocks by intention.
     """
     counts = Counter(objects)
     if not counts or (len(counts) == 1 and n_others == 0):

@@ -34,17 +34,8 @@ class _Mask:
 class _Annotated:
     """What a file annotates.
 
-    Attributes
-    ----------
-    program : str
-    image : str
-        File name of the image.
-    size : (float, float) or None [pixels]
-        Width and height of the image.
-    shapes : list of (label, outlines or masks)
-        One per thing that is annotated.
-    dropped : dict from str to int
-        What is no outline, by its kind.
+    ``size`` is width and height of the image in pixels; ``shapes`` a label and outlines or masks for each thing;
+    ``dropped`` counts by its kind what is no outline.
     """
 
     program: str
@@ -78,14 +69,6 @@ def program_of(content: Any) -> str:
 
 def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     """Read the blocks of parsed annotations; None for what is none.
-
-    Parameters
-    ----------
-    content : object
-        Of the parser.
-    path : Path
-        Named in messages.
-    reading : Reading
 
     Raises
     ------

@@ -98,12 +98,7 @@ class Arc:
 class Bezier:
     """Part of an outline that is a Bézier curve, drawn by chords of equal parts of its parameter.
 
-    Attributes
-    ----------
-    first, chords : int
-        Number of the corner at which it starts, and of its chords.
-    controls : (n, d) array
-        Its control points, both ends included.
+    ``first`` is the number of the corner at which it starts, ``controls`` (n, d) are its control points with both ends.
     """
 
     first: int
@@ -181,18 +176,8 @@ def with_shared_corners(
 ) -> list[np.ndarray]:
     """Give curves a corner wherever a corner of a drawing lies on them.
 
-    Parameters
-    ----------
-    outlines : sequence of (n, 2) or (n, 3) arrays
-        Closed or open, with the chords of their curves; in space as seen along z.
-    curves : sequence of sequences of Curve
-        Those of each outline in its order.
-    tolerance : float or None
-        Largest distance of a curve from its chords, as of :func:`blockvis.layout.outlines.chords_of`.
-
-    Returns
-    -------
-    list of (n, 2) or (n, 3) arrays
+    Outlines (n, 2) or (n, 3), closed or open, have the chords of their curves; in space they are as seen along z. The
+    tolerance is as of :func:`blockvis.layout.outlines.chords_of`.
     """
     import shapely
 

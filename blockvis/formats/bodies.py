@@ -116,16 +116,8 @@ def body_of_polygons(name: str, points: np.ndarray, faces: Sequence[Sequence[int
 class Bodies:
     """Blocks of a file that draws them in space.
 
-    Attributes
-    ----------
-    bodies : sequence of Body
-    unit : str
-        Unit of length that the file states, "" for none.
-    notes : sequence of str
-    up : {"z", "y", ""}
-        The coordinate that points up; "" where it differs between files.
-    up_says : str
-        Why, for a note.
+    ``unit`` is that of length which the file states, "" for none; ``up`` the coordinate that points up, z or y, ""
+    where it differs between files, and ``up_says`` why, for a note.
     """
 
     bodies: Sequence[Body]
@@ -178,14 +170,8 @@ def _refused(message: str, found: Bodies, wrong: Body) -> Refused:
 def layout_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layout:
     """Make a layout of prismatic bodies: outlines across the axis of their extrusion, thicknesses along it.
 
-    Parameters
-    ----------
-    found : Bodies
-    path : Path or str
-        Named in messages.
-    reading : Reading
-        Without a view one is taken in which no body lies behind another, of several that in which the bodies come
-        closest to lying between the same two planes.
+    Without a view one is taken in which no body lies behind another, of several that in which the bodies come closest
+    to lying between the same two planes.
 
     Raises
     ------
@@ -235,12 +221,7 @@ def with_z_up(points: np.ndarray) -> np.ndarray:
 def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layout:
     """Make a layout in space of bodies of any shape.
 
-    Parameters
-    ----------
-    found, path
-        As of :func:`layout_of_bodies`.
-    reading : Reading
-        The last coordinate of its view is up: y of "xy", else z; without a view what the format has as up.
+    The last coordinate of a view is up: y of "xy", else z; without a view what the format has as up.
 
     Raises
     ------
@@ -410,20 +391,10 @@ def _mortar(found: Bodies, labels: Sequence[Sequence[str]], only: Sequence[str])
 
 
 def drawn_row(name: str, around: Sequence[str] = (), materials: Iterable[str] = ()) -> dict[str, Any]:
-    """Write what a file says of a body beside its name, as its row.
+    """Write what a file says of a body beside its name: ``group``, ``material`` and ``role`` where there is one.
 
-    Parameters
-    ----------
-    name : str
-    around : sequence of str
-        Layers, groups or nodes around it, the innermost last.
-    materials : iterable of str
-        Of its faces; a body of several has none.
-
-    Returns
-    -------
-    dict
-        ``group``, ``material`` and ``role`` where there is one; the innermost word says the role.
+    Around it are layers, groups or nodes, the innermost last, of which the innermost word says the role; of several
+    materials of its faces it has none.
     """
     one = {*materials}
     row = {"group": around[-1] if around else "", "material": one.pop() if len(one) == 1 else ""}

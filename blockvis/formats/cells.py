@@ -63,12 +63,9 @@ def layout_of_cells(
         Points around each cell.
     data : mapping of str to (n_cells, ...) array
         Cell arrays. ``block_id`` says which cells form one block; without it every cell is a block if one has more
-        than three corners, and triangles that share sides form one. ``name``, ``role``, ``material``, ``group``,
-        ``thickness`` and ``density`` are optional.
-    path : Path or str
-        Named in messages.
-    view : {"xy", "xz", "yz"}, optional
-        As of :func:`blockvis.layout.outlines.flattened`.
+        than three corners, and triangles that share sides form one; :data:`TABLE_ARRAYS` are optional.
+    path, view
+        Named in messages; as of :func:`blockvis.layout.outlines.flattened`.
 
     Raises
     ------
@@ -162,17 +159,9 @@ def _enclosed(
 def rows_of_cells(
     data: Mapping[str, np.ndarray], owner: np.ndarray, names: Sequence[str], path: Path | str
 ) -> list[dict[str, Any]]:
-    """Read the block table from the cell arrays.
+    """Read the block table from cell arrays, (n_cells, ...), given the number of the block of each cell.
 
-    Parameters
-    ----------
-    data : mapping of str to (n_cells, ...) array
-    owner : (n_cells,) int array
-        Block of each cell, from 0 on.
-    names : sequence of str
-        Of the blocks, where no array has them.
-    path : Path or str
-        Named in messages.
+    Names hold where no array has them.
 
     Raises
     ------
@@ -252,15 +241,7 @@ def flat_beside(bodies: Sequence[np.ndarray], flat: Sequence[np.ndarray]) -> tup
 
 
 def merged(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path | str) -> Layout | Bodies:
-    """Join the parts of a file to one; blocks without a name of their own are named after their part.
-
-    Parameters
-    ----------
-    found : sequence of Layout or Bodies
-    labels : sequence of str
-        Names of the parts, "" for none.
-    path : Path or str
-        Named in messages.
+    """Join the parts of a file to one; blocks without a name of their own are named after their part, "" for none.
 
     Raises
     ------

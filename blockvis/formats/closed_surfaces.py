@@ -56,16 +56,9 @@ def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> t
 
 
 def closed_bodies(part: Body, size: float, path: Path | str) -> list[Body]:
-    """Split a mesh of triangles into the closed bodies that it holds.
+    """Split a mesh of triangles, of which the name is for messages, into the closed bodies that it holds.
 
-    Parameters
-    ----------
-    part : Body
-        The mesh, with a name for messages; what the file says of it holds for each of its bodies.
-    size : float
-        Of the drawing, in the unit of the points.
-    path : Path or str
-        Named in messages.
+    ``size`` is that of the drawing, in the unit of the points.
 
     Raises
     ------
@@ -213,23 +206,9 @@ def _volumes(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def enclosed(
     parts: Sequence[Body], size: float, path: Path | str, reading: Reading | None = None
 ) -> tuple[list[Body], list[Note]]:
-    """Find the closed bodies of the parts of a file; plane ones, and open ones that nobody wants, are left out.
+    """Find the closed bodies of meshes; plane ones, and open ones that nobody wants, are left out, with notes.
 
-    Parameters
-    ----------
-    parts : sequence of Body
-        Meshes that may be none; see :func:`closed_bodies`.
-    size : float
-        Of the drawing, in the unit of the points.
-    path : Path or str
-        Named in messages.
-    reading : Reading, optional
-
-    Returns
-    -------
-    bodies : list of Body
-    notes : list of Note
-        On parts that enclose nothing.
+    ``size`` is that of the drawing, in the unit of the points.
 
     Raises
     ------
@@ -288,18 +267,7 @@ def bodies_of_surfaces(
 ) -> tuple[list[Body], list[Note]]:
     """Find the bodies that surface cells enclose, of each owner by itself; returned as by :func:`enclosed`.
 
-    Parameters
-    ----------
-    points : (n_points, 3) array
-    rings : sequence of (n,) int arrays
-        Points around each cell.
-    owner : (n_cells,) int array
-        0 to n_rows - 1.
-    rows : sequence of dict
-        Of the block table, one per owner.
-    path : Path or str
-        Named in messages.
-    reading : Reading, optional
+    (n_points, 3) points, those around each cell, and the number of each cell's owner, of which each has a row.
     """
     parts = [
         Body(row["name"], points, fans([rings[k].tolist() for k in np.flatnonzero(owner == whose).tolist()]), row)

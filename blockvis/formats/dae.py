@@ -26,17 +26,10 @@ UP = {"X_UP": ([1, 2, 0], "z"), "Y_UP": ([0, 1, 2], "y"), "Z_UP": ([0, 1, 2], "z
 
 @dataclass(frozen=True)
 class Drawn:
-    """What a file draws.
+    """What a file draws: its meshes in place, of which those that we wrote say their name.
 
-    Attributes
-    ----------
-    parts : list of Body
-        Its meshes in place; those that we wrote say their name.
-    unit, up, up_says : str
-        As of :class:`blockvis.formats.bodies.Bodies`.
-    grouped : bool
-        Whether the meshes may be parts of stones.
-    notes : list of Note
+    ``unit`` and what is up are as of :class:`blockvis.formats.bodies.Bodies`; ``grouped`` says whether the meshes may
+    be parts of stones.
     """
 
     parts: list[Body]

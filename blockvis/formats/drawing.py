@@ -32,19 +32,9 @@ S = TypeVar("S", bound="Stroke")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stroke:
-    """Something drawn.
+    """Something drawn: (n, 2) or (n, 3) points, with kind of entity and colour, layers around it, and its curves.
 
-    Attributes
-    ----------
-    points : (n, 2) or (n, 3) array
-    looks : tuple of str
-        Kind of entity and colour.
-    within : tuple of str
-        Layers around it.
-    curves : tuple of Curve
-        Its parts that are curves.
-    off_others : float
-        Largest distance of its chords from curves that are none of these.
+    ``off_others`` is the largest distance of its chords from curves that are none of these.
     """
 
     points: np.ndarray
@@ -203,19 +193,9 @@ def is_chain(dashes: Sequence[float]) -> bool:
 
 
 def joined_ends(points: np.ndarray, closes: bool = False) -> tuple[np.ndarray, float] | None:
-    """Close a line whose ends meet, or miss each other by little.
+    """Close a line whose ends meet, or miss each other by little, or whose file says that it is closed.
 
-    Parameters
-    ----------
-    points : (n, 2) or (n, 3) array
-    closes : bool
-        Whether its file says that it is closed, whatever lies between its ends.
-
-    Returns
-    -------
-    ring : (m, 2) or (m, 3) array
-    miss : float
-        Distance between ends that the file leaves open.
+    Gives its points as of a ring, and the distance between ends that the file leaves open; None where it is open.
     """
     gap, size = float(np.abs(points[0] - points[-1]).max()), float(np.ptp(points, axis=0).max())
     # One that is closed may have a short last edge: it stays.

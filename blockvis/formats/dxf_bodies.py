@@ -93,10 +93,7 @@ def _flat_faces(entity: Any) -> tuple[list[Any], str]:
 def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]], path: Path) -> list[DrawnMesh]:
     """Join 3DFACEs, those of a layer and of an inserted block together; none where none of these encloses a body.
 
-    Parameters
-    ----------
-    drawn : sequence of (layer, name, (n, 3) corners)
-    path : Path
+    Given are layer, name and (n, 3) corners of each.
     """
     together: dict[tuple[str, str], list[tuple[str, np.ndarray]]] = {}
     for layer, name, ring in drawn:
@@ -119,16 +116,6 @@ def layout_of_meshes(
     meshes: Sequence[DrawnMesh], path: Path, reading: Reading, unit: str, notes: Sequence[str]
 ) -> Layout | Bodies:
     """Make bodies of the meshes of a drawing, or outlines where all of them are flat.
-
-    Parameters
-    ----------
-    meshes : sequence of DrawnMesh
-    path : Path
-        Named in messages.
-    reading : Reading
-    unit : str
-        That the drawing states, "" for none.
-    notes : sequence of str
 
     Raises
     ------

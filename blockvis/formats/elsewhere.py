@@ -49,12 +49,7 @@ FAMILIES = (
 
 
 def cannot_read(suffix: str) -> str:
-    """Say in words that files of a suffix are not read, and what to do.
-
-    Parameters
-    ----------
-    suffix : str
-        With its dot, in small letters; "" for none.
+    """Say in words that files of a suffix, "" for none, are not read, and what to do.
 
     Examples
     --------

@@ -22,15 +22,7 @@ class MissingFile(FileNotFoundError, ValueError):
 def files_of(path: Path) -> list[Path]:
     """List the files that a name stands for: itself, those of a folder, or those that fit a pattern.
 
-    Parameters
-    ----------
-    path : Path
-        A file, a folder, or a name with ``*``, ``?`` or ``[...]``.
-
-    Returns
-    -------
-    list of Path
-        Numbers in names in the order of counting: stone 2 before stone 10.
+    Numbers in names are in the order of counting: stone 2 before stone 10.
 
     Raises
     ------

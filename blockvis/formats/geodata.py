@@ -258,20 +258,8 @@ def layout_of_features(
 ) -> Layout:
     """Make a layout of polygons, and of the faces between lines.
 
-    Parameters
-    ----------
-    features : sequence of Feature
-    path : Path
-        Named in messages.
-    reading : Reading
-    unit : str
-        Of the coordinates, "" where the file does not say it.
-    degrees : str
-        Name of the coordinate system if it is one of longitude and latitude.
-    lengths : bool
-        Whether the file says that it has none.
-    skipped : mapping, optional
-        Numbers of what is no outline, by its kind.
+    ``unit`` is "" where the file does not say it, ``degrees`` the name of a system of longitude and latitude;
+    ``lengths`` says whether the file says that it has no system, and ``skipped`` counts by its kind what is no outline.
 
     Raises
     ------

@@ -35,22 +35,9 @@ def _answer(say: Say, word: str, about: Any) -> bool:
 
 
 def _meshed(source: str, target: str, chords: int, memory: int) -> tuple[str, Any]:
-    """Mesh a geometry file.
+    """Mesh a geometry file with so many chords of a full circle, and so many bytes of memory.
 
-    Parameters
-    ----------
-    source, target : str
-        The file, and the mesh (.msh) to write if it has surfaces only.
-    chords : int
-        Of a full circle.
-    memory : int
-        The most bytes for the file.
-
-    Returns
-    -------
-    word : {"bodies", "mesh"}
-    about
-        Bodies of triangles, if the file has volumes.
+    Gives "bodies" and these, of triangles, if it has volumes; else "mesh", which is then in the target (.msh).
 
     Raises
     ------

@@ -56,20 +56,10 @@ RIM = 0.5
 class Labels:
     """Labels of the pixels of an image.
 
-    Attributes
-    ----------
-    numbers : (height, width) int array
-        From 1; 0 for the background.
-    names : tuple of str
-        Of the labels from 1 on; empty where each region is a stone of its own, as in a mask.
-    background : str
-        What it is, in words; "" for none.
-    moved : int
-        Pixels of no label's value, which went to the nearest label.
-    is_mask : bool
-        Whether all stones have one value.
-    is_of_lines : bool
-        Whether that is the paper of a drawing of lines, which is around stones, too.
+    ``numbers`` (height, width) are from 1, 0 for the background, which is called ``background``, "" for none. ``names``
+    of the labels from 1 on are empty where each region is a stone of its own, as in a mask, of which all stones have
+    one value. ``moved`` counts pixels of no label's value, which went to the nearest label.
+    ``is_of_lines``: the stones are the paper of a drawing of lines, and so is what is around them.
     """
 
     numbers: np.ndarray
@@ -85,13 +75,7 @@ class Photograph(ValueError):
 
 
 def labels_of(image: Image.Image, background: int | str | None = None) -> Labels:
-    """Find the labels of an image.
-
-    Parameters
-    ----------
-    image : PIL.Image.Image
-    background : int or str, optional
-        Value, or colour, of what is no stone.
+    """Find the labels of an image, of which a background may be given by its value or colour.
 
     Raises
     ------
@@ -145,19 +129,8 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
 class _Found:
     """Values that are labels, before the pixels between them go to one.
 
-    Attributes
-    ----------
-    numbers : (height, width) int array
-        The value of each pixel by its number, from 0; -1 for none.
-    values : tuple of int
-    colours : (n, 1 or 3) array
-        Of the values.
-    shown : (height, width, 1 or 3) array
-        Colour of each pixel.
-    pieces : (height, width) int array
-        In a noisy image what hangs together, from 1.
-    is_of_lines : bool
-        Whether the values are paper and lines that are too thin to be flat.
+    ``numbers`` (height, width) are those of each pixel's value, from 0, -1 for none; ``colours`` those of the values,
+    and ``shown`` those of the pixels. In a noisy image ``pieces`` number what hangs together, from 1.
     """
 
     numbers: np.ndarray
@@ -171,11 +144,7 @@ class _Found:
 def _filled(numbers: np.ndarray, found: _Found, outer: int | None, reach: float) -> tuple[np.ndarray, Any]:
     """Give the pixels between labels to the nearest one, or to the background if that is near and more alike.
 
-    Returns
-    -------
-    numbers : (height, width) int array
-    nearest : (row, column) arrays
-        The nearest pixel of a label that is no background, of each pixel.
+    Beside the numbers (height, width) it gives rows and columns of the nearest pixel that is of a stone.
     """
     from scipy import ndimage
 
@@ -332,13 +301,7 @@ def _lines_on_paper(shown: np.ndarray, flat: np.ndarray) -> _Found | None:
 def _half_covered(place: np.ndarray, label: np.ndarray, shown: np.ndarray) -> np.ndarray:
     """(n,) bool array: which values are mixed of two labels, and lie beside both, as at an antialiased border.
 
-    Parameters
-    ----------
-    place : (height, width) int array
-        The value of each pixel by its number.
-    label : (n,) bool array
-        Which two values are labels.
-    shown : (height, width, 1 or 3) array
+    ``place`` (height, width) numbers the values of pixels, of which two are labels.
     """
     from scipy import ndimage
 

@@ -64,14 +64,8 @@ SAME_SCALE = 0.01
 class Placement:
     """Where the pixels of an image lie.
 
-    Attributes
-    ----------
-    matrix : (2, 3) array
-        From column and row, (0, 0) the upper left corner of the image, and 1 to x and y.
-    unit : str
-        Of x and y, "" where the file does not say.
-    source : str
-        What says so, in words.
+    ``matrix`` (2, 3) takes column and row, (0, 0) the upper left corner of the image, and 1 to x and y, of which
+    ``unit`` is "" where the file does not say it; ``source`` says in words what says so.
     """
 
     matrix: np.ndarray
@@ -95,19 +89,9 @@ def placement_of(
     image: Path | None = None,
     tags: Mapping[int, Any] | None = None,
 ) -> Placement:
-    """Find where the pixels of an image lie.
+    """Find where the pixels of an image lie, or of the image of annotations; the path is named in messages.
 
-    Parameters
-    ----------
-    path : Path
-        The image, or the file of annotations, named in messages.
-    size : (float, float) or None [pixels]
-        Width and height, if they are known.
-    reading : Reading
-    image : Path, optional
-        The image of annotations.
-    tags : mapping, optional
-        Of a TIFF.
+    ``size`` is width and height in pixels, if they are known; ``tags`` are those of a TIFF.
 
     Raises
     ------

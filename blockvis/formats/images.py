@@ -94,16 +94,7 @@ def opened(path: Path) -> tuple[Image.Image, Mapping[int, Any]]:
 
 
 def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: Reading) -> Layout:
-    """Make a layout of the regions of labels.
-
-    Parameters
-    ----------
-    path : Path
-        Named in messages.
-    labels : Labels
-    placement : Placement
-    reading : Reading
-    """
+    """Make a layout of the regions of labels."""
     smallest, tolerance = reading.image.get("smallest"), reading.image.get("outline_tolerance")
     noisy = not labels.is_mask and not labels.names
     speck = SPECK_OF_NOISE if noisy else SPECK

@@ -32,20 +32,9 @@ LEAST_STRIPS, MOSTLY = 3, 1.0 / 3.0
 
 @dataclass
 class Faces:
-    """What lines enclose.
+    """What lines enclose: faces between them, (n, 2), the layer of most lines around each, and those of all of them.
 
-    Attributes
-    ----------
-    rings : list of (n, 2) arrays
-        Faces between lines.
-    layers : list of str
-        The layer of most of the lines around each face.
-    around : list of tuples of str
-        The layers of all of them.
-    pieces : {int: list of (n, 2) arrays}
-        The pieces into which lines cut an outline, by its number.
-    left_out : list of LeftOut
-    notes : list of str
+    ``pieces`` are those into which lines cut an outline, by its number.
     """
 
     rings: list[np.ndarray] = field(default_factory=list)

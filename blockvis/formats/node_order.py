@@ -46,16 +46,5 @@ VTK_OTHER_FACES = (6, 30, 36, 52, 53, 54, 61, 62, 63, 69, 70, 76, 77)
 
 
 def ring_of_nodes(nodes: np.ndarray, order: tuple[int, ...] | None) -> np.ndarray:
-    """Put the nodes of cells of one type in order around each cell.
-
-    Parameters
-    ----------
-    nodes : (n_nodes,) or (n_cells, n_nodes) int array
-    order : tuple of int or None
-        An entry of :data:`GMSH`, :data:`MESHIO` or :data:`VTK`.
-
-    Returns
-    -------
-    (n_corners,) or (n_cells, n_corners) int array
-    """
+    """Put the nodes (..., n_nodes) of cells of one type in order around each: an entry of a table above."""
     return nodes if order is None else nodes[..., list(order)]

@@ -32,17 +32,9 @@ LONG_EDGE = 4.0
 class Regions:
     """Regions of an image.
 
-    Attributes
-    ----------
-    numbers : (height, width) int32 array
-        The region of each pixel, counted from 1; 0 for the background.
-    labels : (n,) int array
-        Label of each region.
-    areas : (n,) int array [pixels]
-    specks : tuple of int
-        Number of specks, and of their pixels.
-    smallest : float [pixels]
-        Across what is no speck.
+    ``numbers`` (height, width) say the region of each pixel, counted from 1, 0 for the background; ``labels`` and
+    ``areas`` [pixels] are those of regions. ``specks`` are their number and that of their pixels; what is no speck is
+    at least ``smallest`` [pixels] across.
     """
 
     numbers: np.ndarray
@@ -56,14 +48,7 @@ class Regions:
 class Outlined:
     """Outlines of regions in pixels, counter-clockwise with y up: row r is at -r.
 
-    Attributes
-    ----------
-    rings : list of (n, 2) arrays
-        One per region.
-    holes : dict from int to tuple of (n, 2) arrays
-        By the region.
-    corners : int
-        Of the staircases of pixels.
+    ``holes`` are by the region; ``corners`` is the number of those of the staircases of pixels.
     """
 
     rings: list[np.ndarray]

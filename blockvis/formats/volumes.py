@@ -51,16 +51,8 @@ def bodies_of_cells(
 ) -> list[Body]:
     """Find the skin of each body: the faces that belong to one of its cells only.
 
-    Parameters
-    ----------
-    points : (n_points, 3) array
-    cells : sequence of (faces, (n, n_nodes) int array)
-        Cells of one shape each: the corners of its faces, and the nodes of the cells.
-    owner : (n_cells,) int array
-        Which body each cell belongs to, 0 to n_rows - 1, in the order of ``cells``. Cells of one owner that do not
-        hang together by faces are bodies of their own.
-    rows : sequence of dict
-        Of the block table, one per owner.
+    Cells of one shape each are the corners of its faces, and (n, n_nodes) nodes; ``owner`` is the row of each cell, in
+    their order. Cells of one owner that do not hang together by faces are bodies of their own.
     """
     faces, cell_of_face, start = [], [], 0
     for shape, nodes in cells:

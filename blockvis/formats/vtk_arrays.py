@@ -12,16 +12,10 @@ _TYPES = {f"{sign}Int{bits}": f"{'u' if sign else 'i'}{bits // 8}" for sign in (
 
 
 def largest_number(text: bytes, attributes: dict[str, str], file: dict[str, str], most: int) -> int:
-    """Find the largest absolute value in an array of whole numbers.
+    """Find the largest absolute value in an array of whole numbers, of at most so many bytes.
 
-    Parameters
-    ----------
-    text : bytes
-        Content of the array, or the file's appended data from the beginning of the array on.
-    attributes, file : dict of str to str
-        XML attributes of the array, with ``format`` "ascii", "binary" (base64) or "raw", and of the file.
-    most : int
-        Largest size of the array [bytes].
+    ``text`` is the content of the array, or the file's appended data from the beginning of the array on; attributes are
+    those of XML, of the array, with ``format`` "ascii", "binary" (base64) or "raw", and of the file.
 
     Raises
     ------
@@ -42,12 +36,7 @@ def largest_number(text: bytes, attributes: dict[str, str], file: dict[str, str]
 def announced_bytes(text: bytes, attributes: dict[str, str], file: dict[str, str]) -> int:
     """Read how many bytes the header of a binary array announces; VTK reserves as much memory.
 
-    Parameters
-    ----------
-    text : bytes
-        Beginning of the array's content.
-    attributes, file : dict of str to str
-        As of :func:`largest_number`.
+    Given are the beginning of the array's content, and attributes as of :func:`largest_number`.
     """
     order = "<" if file.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
     word = np.dtype(order + ("u8" if file.get("header_type") == "UInt64" else "u4"))
