@@ -30,6 +30,17 @@ def refuse_magnitude(value: float) -> str:
     return f"give a number of {SMALLEST:g} to {LARGEST:g}" if out else ""
 
 
+def listed(words: Sequence[str], most: int = 6) -> str:
+    """List words, and count those beyond the first few.
+
+    Examples
+    --------
+    >>> listed(["'a'", "'b'", "'c'"], 2)
+    "'a', 'b' and 1 more"
+    """
+    return ", ".join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")
+
+
 def place_text(place: Iterable[float], digits: int = 4) -> str:
     """Write a place.
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from blockvis.layout.notes import CHANGED, Note
+from blockvis.text import listed
 from solver.mechanics import counted
 
 #: Cosine of the fold between two triangles up to which they are read as one bent face: 30 degrees.
@@ -63,12 +64,11 @@ def pieces_note(objects: Sequence[str], n_others: int) -> tuple[Note, ...]:
     counts = Counter(objects)
     if not counts or (len(counts) == 1 and n_others == 0):
         return ()
-    shown = ", ".join(f"'{name}' ({counted(n, 'block')})" for name, n in list(counts.items())[:6])
-    more = f" and {len(counts) - 6} more" if len(counts) > 6 else ""
+    shown = listed([f"'{name}' ({counted(n, 'block')})" for name, n in counts.items()])
     return (
         Note(
             CHANGED,
-            f"objects of several closed bodies that do not share a face became as many blocks: {shown}{more}; join "
+            f"objects of several closed bodies that do not share a face became as many blocks: {shown}; join "
             "them in the drawing if each is one stone",
         ),
     )

@@ -20,6 +20,7 @@ from blockvis.layout.refusal import Refused
 from blockvis.layout.selection import MORTAR
 from blockvis.layout.solids import fans, volume, width_of
 from blockvis.layout.views import VIEWS, axis_across, view_along
+from blockvis.text import listed
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -347,8 +348,7 @@ def _accepted(bodies: Sequence[Body]) -> tuple[Note, ...]:
     holed = [f"'{body.name}' ({counted(body.n_hole_edges, 'edge')})" for body in bodies if body.n_hole_edges]
     if not holed:
         return pieces
-    more = f" and {len(holed) - 6} more" if len(holed) > 6 else ""
-    return (Note(CHANGED, f"small holes in the surface of {', '.join(holed[:6])}{more} were closed"), *pieces)
+    return (Note(CHANGED, f"small holes in the surface of {listed(holed)} were closed"), *pieces)
 
 
 def _selected(found: Bodies, path: Path | str, reading: Reading) -> _Selection:

@@ -15,6 +15,7 @@ from blockvis.layout.outlines import FLAT
 from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.solids import area_vectors, fans
 from blockvis.layout.surfaces import same_points, turned_faces
+from blockvis.text import listed
 from solver.mechanics import counted
 
 from .bodies import Bodies, Body, as_drawn
@@ -236,19 +237,16 @@ def enclosed(
             raise first
     notes = [without_volume(plane)] if plane else []
     if unwanted:
-        notes.append(Note(LEFT_OUT, f"left out: {_listed(unwanted)}, no closed body, as asked for"))
+        words = listed([f"'{name}'" for name in unwanted])
+        notes.append(Note(LEFT_OUT, f"left out: {words}, no closed body, as asked for"))
     return bodies, notes
 
 
 def without_volume(names: Sequence[str], supports: Sequence[str] = ()) -> Note:
     """Say that faces without volume among the bodies are left out."""
+    words = listed([f"'{name}'" + " (a support)" * (name in supports) for name in names])
     remedy = "draw a support that it stands for by [[supports]]"
-    return Note(LEFT_OUT, f"left out: {_listed(names, supports)}, a single face without volume; {remedy}")
-
-
-def _listed(names: Sequence[str], supports: Sequence[str] = ()) -> str:
-    more = f" and {len(names) - 6} more" if len(names) > 6 else ""
-    return ", ".join(f"'{name}'" + " (a support)" * (name in supports) for name in names[:6]) + more
+    return Note(LEFT_OUT, f"left out: {words}, a single face without volume; {remedy}")
 
 
 def _is_plane(points: np.ndarray, size: float) -> bool:

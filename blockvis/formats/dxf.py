@@ -89,20 +89,11 @@ class _Found(Drawing):
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a .dxf drawing; its unit is that of the header variable $INSUNITS."""
-    log = logging.getLogger("ezdxf")
-    level = log.level
-    # What ezdxf would print to the terminal is counted in a note.
-    log.setLevel(logging.CRITICAL + 1)
-    try:
-        return _read(path, reading)
-    finally:
-        log.setLevel(level)
-
-
-def _read(path: Path, reading: Reading) -> Layout | Bodies:
     import ezdxf
     from ezdxf import recover
 
+    # What ezdxf would print to the terminal is counted in a note.
+    logging.getLogger("ezdxf").setLevel(logging.CRITICAL + 1)
     try:
         content = path.read_bytes()
         if b"SECTION" not in content:

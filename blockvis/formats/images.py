@@ -15,6 +15,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
 from blockvis.layout.outlines import ring_area
+from blockvis.text import listed
 from solver.mechanics import counted
 
 from .image_labels import Labels, Photograph, labels_of
@@ -198,14 +199,13 @@ def _maybe_openings(rings: Sequence[np.ndarray], names: Sequence[str], holed: Co
         why = "regions far larger than others count as blocks"
     else:
         return []
-    listed = ", ".join(
+    largest = [
         f"'{names[k]}' around ({x:.4g}, {y:.4g}) of {areas[k] / median:.2g} times the median area"
-        for k in large[:NAMED].tolist()
+        for k in large.tolist()
         for x, y in [(rings[k].min(axis=0) + rings[k].max(axis=0)) / 2.0]
-    )
-    more = f" and {len(large) - NAMED} more" if len(large) > NAMED else ""
+    ]
     remedy = f'leave out what is an opening: ignore = ["{names[large[0]]}"]'
-    text = f"{why}; the largest: {listed}{more}; {remedy}"
+    text = f"{why}; the largest: {listed(largest, NAMED)}; {remedy}"
     return [Note(CHANGED, text) if paper in holed else text]
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import LEFT_OUT, Note
+from blockvis.text import listed
 from solver.mechanics import counted
 
 from .bodies import Bodies
@@ -206,7 +207,7 @@ def _arrays_of_sets(sets: Mapping[str, np.ndarray], total: int) -> tuple[dict[st
     # Sets of cells at a loaded or supported face are parts of blocks: beside them the largest hold every cell once.
     blocks = _dividing(by_size, total) or _dividing(by_size[::-1], total)
     if not blocks:
-        unused = f"the cell sets {_listed(by_size)} were not used: no choice of them holds every cell once"
+        unused = f"the cell sets {listed(_names(by_size))} were not used: no choice of them holds every cell once"
         return {}, (Note(LEFT_OUT, unused),)
     owner = np.zeros(total, dtype=np.int64)
     for k, (_, index) in enumerate(blocks):
@@ -219,7 +220,7 @@ def _arrays_of_sets(sets: Mapping[str, np.ndarray], total: int) -> tuple[dict[st
         elif 1 < len(within) < len(blocks):
             groups = [group or (name if k in within else "") for k, group in enumerate(groups)]
     names = [name for name, _ in blocks]
-    unused = f"the cell sets {_listed(cutting)} were not used: they cut blocks"
+    unused = f"the cell sets {listed(_names(cutting))} were not used: they cut blocks"
     notes = (Note(LEFT_OUT, unused),) if cutting else ()
     return {CELL_SET: owner, "name": np.array(names)[owner], "group": np.array(groups)[owner]}, notes
 
@@ -234,9 +235,8 @@ def _dividing(sets: Sequence[tuple[str, np.ndarray]], total: int) -> list[tuple[
     return [] if free.any() else sorted(taken, key=lambda one: int(one[1][0]))
 
 
-def _listed(sets: Sequence[tuple[str, np.ndarray]]) -> str:
-    more = f" and {len(sets) - 6} more" if len(sets) > 6 else ""
-    return ", ".join(f"'{name}'" for name, _ in sets[:6]) + more
+def _names(sets: Sequence[tuple[str, np.ndarray]]) -> list[str]:
+    return [f"'{name}'" for name, _ in sets]
 
 
 def _abaqus_cards(path: Path) -> list[tuple[str, str, str]]:

@@ -19,6 +19,7 @@ import numpy as np
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
+from blockvis.system.vtk_files import string_array, write_vtu
 from solver.mechanics import counted
 
 from .bodies import Bodies, Body, body_of_polygons, in_dimension
@@ -476,7 +477,7 @@ def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
     for key in ("name", "group", "role", "material"):
         words = [str(row.get(key, "")) for row in rows]
         if any(words):
-            _add_words(grid.GetCellData(), key, words)
+            grid.GetCellData().AddArray(string_array(key, words))
     for key in ("thickness", "density"):
         if any(key in row for row in rows):
             grid.cell_data[key] = np.array([float(row.get(key, np.nan)) for row in rows])
@@ -509,30 +510,14 @@ def _polyhedra(layout: Layout) -> pyvista.UnstructuredGrid:
     return pyvista.UnstructuredGrid(np.array(cells), types, layout.points)
 
 
-def _add_words(attributes: Any, name: str, words: list[str]) -> None:
-    """Add a string array without pyvista, which refuses letters beyond ASCII although VTK writes them."""
-    from vtkmodules.vtkCommonCore import vtkStringArray
-
-    array = vtkStringArray()
-    array.SetName(name)
-    array.SetNumberOfValues(len(words))
-    for k, word in enumerate(words):
-        array.SetValue(k, word)
-    attributes.AddArray(array)
-
-
 def write(layout: Layout, path: Path) -> None:
     """Write .vtu, .vtp or .vtk: a cell per block, polygon or polyhedron, double precision, lengths in m."""
     grid = dataset_of(layout)
     if path.suffix.lower() == ".vtp":
-        surface = _surface(grid)
-        surface.save(str(path))
+        _surface(grid).save(str(path))
+    elif path.suffix.lower() == ".vtu":
+        write_vtu(grid, path)
     else:
-        if path.suffix.lower() == ".vtu":
-            from blockvis.system.vtk_files import write_vtu
-
-            write_vtu(grid, path)
-            return
         grid.save(str(path))
 
 

@@ -36,30 +36,11 @@ DEEPEST_CALL = 8
 
 #: Commands that change blocks made before them, the first words of each.
 CHANGES = (
-    "jset",
-    "joint-set",
-    "cut",
-    "delete",
-    "del",
-    "tunnel",
-    "excavate",
-    "remove",
-    "densify",
-    "block cut",
-    "block delete",
-    "block densify",
-    "block excavate",
-    "block move",
-    "block translate",
-    "block rotate",
-    "block scale",
-    "block mirror",
-    "block transform",
-    "move",
-    "mirror",
-    "rotate",
-    "scale",
-)
+    "jset", "joint-set", "cut", "delete", "del", "tunnel", "excavate", "remove", "densify", "move", "mirror", "rotate",
+    "scale", *(f"block {word}" for word in (
+        "cut", "delete", "densify", "excavate", "move", "translate", "rotate", "scale", "mirror", "transform",
+    )),
+)  # fmt: skip
 
 #: Commands that make blocks from what is not in the file.
 IMPORTS = ("block import", "block generate")
@@ -71,13 +52,11 @@ FIXES = {"fix": True, "block fix": True, "free": False, "block free": False}
 LONG = ("block", "model", "program", "set", "fish")
 
 #: Commands that say nothing of the blocks as they are made: first words of each.
-STEERS = frozenset(
-    (
-        *("model", "program", "set", "fish", "new", "title", "heading", "config", "plot", "history", "hist", "save"),
-        *("solve", "step", "cycle", "ret", "return", "stop", "quit", "exit", "log", "pause", "print", "list"),
-        *("block history", "block list", "block export"),
-    )
-)
+STEERS = {
+    "model", "program", "set", "fish", "new", "title", "heading", "config", "plot", "history", "hist", "save", "solve",
+    "step", "cycle", "ret", "return", "stop", "quit", "exit", "log", "pause", "print", "list", "block history",
+    "block list", "block export",
+}  # fmt: skip
 
 #: Commands that begin as those of STEERS do, and bring in what is not in the file.
 BRINGS = ("model restore", "model import")

@@ -7,12 +7,12 @@ is given one of pyvista's.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints, vtkStringArray
+from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints
 from vtkmodules.vtkCommonDataModel import (
     VTK_LINE,
     VTK_POLYGON,
@@ -23,6 +23,7 @@ from vtkmodules.vtkCommonDataModel import (
 )
 
 import solver
+from blockvis.system.vtk_files import string_array
 from solver import mechanics
 
 from .joint_faces import InitialJoints, Rings, initial_joints, lengths_of
@@ -117,11 +118,11 @@ def block_grid(
     add_arrays(grid.GetCellData(), cells)
     grid.GetCellData().SetActiveScalars("block_id")
     for name, words in (("name", assembly.names), ("role_name", assembly.roles), ("material", assembly.materials)):
-        grid.GetCellData().AddArray(strings(name, words))
+        grid.GetCellData().AddArray(string_array(name, words))
     ahead = None if increment is None else next_places(assembly, increment, corners, assembly.block_of_vertex)
     give_shape(grid, assembly.vertices, shape, ahead)
-    grid.GetFieldData().AddArray(strings("role_names", mechanics.ROLES))
-    grid.GetFieldData().AddArray(strings("material_names", materials))
+    grid.GetFieldData().AddArray(string_array("role_names", mechanics.ROLES))
+    grid.GetFieldData().AddArray(string_array("material_names", materials))
     if increment is not None:
         fallen, motion = increment.fallen, block_motion(assembly, increment, falls)
         add_arrays(grid.GetCellData(), {"fallen": fallen.astype(np.int32), **motion})
@@ -197,7 +198,7 @@ def joint_grid(
     )
     names = assembly.names
     words = (f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True))
-    grid.GetCellData().AddArray(strings("joint", words))
+    grid.GetCellData().AddArray(string_array("joint", words))
     describe(grid, increment)
     state_units(grid)
     return grid
@@ -262,7 +263,7 @@ def contact_grid(
     if in_space:
         points |= {"shear": shear, "slip": _slip(assembly, increment)}
     add_arrays(grid.GetPointData(), points)
-    grid.GetFieldData().AddArray(strings("state_names", [state.name.lower() for state in mechanics.ContactState]))
+    grid.GetFieldData().AddArray(string_array("state_names", [state.name.lower() for state in mechanics.ContactState]))
     describe(grid, increment)
     state_units(grid)
     return grid
@@ -344,7 +345,7 @@ def describe(grid: vtkUnstructuredGrid, increment: solver.Increment) -> None:
         "reaction": increment.reaction,
     }
     add_arrays(grid.GetFieldData(), {name: np.array([number]) for name, number in numbers.items()})
-    grid.GetFieldData().AddArray(strings("status", [str(increment.status)]))
+    grid.GetFieldData().AddArray(string_array("status", [str(increment.status)]))
 
 
 def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
@@ -390,16 +391,7 @@ def state_units(grid: vtkUnstructuredGrid) -> None:
             if array.GetName() in UNITS:
                 array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), UNITS[array.GetName()])
                 listed.append(f"{array.GetName()} [{UNITS[array.GetName()]}]")
-    grid.GetFieldData().AddArray(strings("units", dict.fromkeys(listed)))
-
-
-def strings(name: str, words: Iterable[str]) -> vtkStringArray:
-    """Make a VTK array of strings; pyvista's own conversion refuses anything but ASCII."""
-    array = vtkStringArray()
-    array.SetName(name)
-    for word in words:
-        array.InsertNextValue(str(word))
-    return array
+    grid.GetFieldData().AddArray(string_array("units", dict.fromkeys(listed)))
 
 
 def _in_space(vectors: np.ndarray) -> np.ndarray:

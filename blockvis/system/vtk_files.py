@@ -17,6 +17,7 @@ from .atomic_files import write_atomic
 
 if TYPE_CHECKING:
     # VTK is loaded where its files are written: lists of files need none.
+    from vtkmodules.vtkCommonCore import vtkStringArray
     from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
 
 #: Arrays of polyhedra as VTK 9.4 and later write them.
@@ -69,6 +70,17 @@ def write_vtu(
         text = _FACES.sub(lambda _: _face_arrays(dataset), text, count=1)
         text = text.replace('version="2.3"', 'version="1.0"', 1)
     return write_atomic(path, text, durable=durable)
+
+
+def string_array(name: str, words: Iterable[str]) -> vtkStringArray:
+    """Make a VTK array of strings; pyvista's own conversion refuses anything but ASCII."""
+    from vtkmodules.vtkCommonCore import vtkStringArray
+
+    array = vtkStringArray()
+    array.SetName(name)
+    for word in words:
+        array.InsertNextValue(str(word))
+    return array
 
 
 def _with_bytes(dataset: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
