@@ -47,6 +47,15 @@ def block_array(data: Mapping[str, np.ndarray]) -> str | None:
     return next((name for name in numbered if name in named or (data[name] != data[name][0]).any()), None)
 
 
+def owners(data: Mapping[str, np.ndarray], n_cells: int) -> tuple[str | None, list[str], np.ndarray]:
+    """Name of the cell array that numbers the blocks, None for none, their names, and (n_cells,) numbers of these."""
+    key = block_array(data)
+    if key is None:
+        return None, ["block"], np.zeros(n_cells, dtype=np.int64)
+    values, owner = np.unique(data[key], return_inverse=True)
+    return key, [f"block {value}" for value in values.tolist()], owner
+
+
 def layout_of_cells(
     points: np.ndarray,
     rings: Sequence[np.ndarray],
@@ -77,23 +86,22 @@ def layout_of_cells(
     used = np.unique(np.concatenate(list(rings)))
     if used.min() < 0 or used.max() >= len(points):
         raise ValueError(f"'{path}': a cell uses point {int(used.max())}, but there are {len(points)}; export it again")
-    key = block_array(data)
     if not is_flat(points):
-        return _enclosed(points, rings, data, key, path)
+        return _enclosed(points, rings, data, path)
     flat, note = flattened(points, f"'{path}'", view)
+    key, names, owner = owners(data, len(rings))
     if key is not None:
-        ids, owner = np.unique(np.asarray(data[key]), return_inverse=True)
-        names, how = [f"block {value}" for value in ids.tolist()], f"one per value of the cell array '{key}'"
+        n, how = len(names), f"one per value of the cell array '{key}'"
         if key not in OF_BLOCKS:
             names, owner = _in_pieces(rings, names, owner)
-            how = f"one per connected piece of a value of the cell array '{key}'" if len(names) > len(ids) else how
+            how = f"one per connected piece of a value of the cell array '{key}'" if len(names) > n else how
         how = f"{counted(len(names), 'block')}, {how}"
     elif any(len(ring) > 3 for ring in rings):
         owner = np.arange(len(rings))
         names = [f"block {k}" for k in owner]
         how = f"{counted(len(rings), 'block')}, one per cell: no cell array 'block_id' says which cells are one block"
     else:
-        owner = _pieces(rings, np.zeros(len(rings), dtype=np.int64))
+        owner = _pieces(rings, owner)
         names = [f"block {k}" for k in range(int(owner.max()) + 1)]
         how = f"{counted(len(names), 'block')}, one per connected piece: no cell array 'block_id' says which are one"
     unusable: dict[int, LeftOut] = {}
@@ -134,11 +142,10 @@ def _in_pieces(rings: Sequence[np.ndarray], names: Sequence[str], owner: np.ndar
 
 
 def _enclosed(
-    points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray], key: str | None, path: Path | str
+    points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray], path: Path | str
 ) -> Bodies:
     """Find the bodies that surface cells in space enclose, one per value of a cell array, or one per piece."""
-    values, owner = np.unique(data[key] if key else np.zeros(len(rings), dtype=np.int64), return_inverse=True)
-    names = [f"block {value}" for value in values.tolist()] if key else ["block"]
+    key, names, owner = owners(data, len(rings))
     try:
         bodies, notes = bodies_of_surfaces(points, rings, owner, rows_of_cells(data, owner, names, path), path)
     except OpenSurface:

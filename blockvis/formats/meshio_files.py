@@ -20,7 +20,7 @@ from blockvis.text import listed
 from solver.mechanics import counted
 
 from .bodies import Bodies
-from .cells import CELL_SET, block_array, flat_beside, layout_of_cells, rows_of_cells
+from .cells import CELL_SET, flat_beside, layout_of_cells, owners, rows_of_cells
 from .node_order import MESHIO, ring_of_nodes
 from .reading import Reading
 from .volumes import MESHIO_SOLIDS, Faces, bodies_of_cells
@@ -128,10 +128,7 @@ def _starts(cells: Sequence[Any]) -> np.ndarray:
 def _bodies(
     points: np.ndarray, cells: list[tuple[Faces, np.ndarray]], data: dict[str, np.ndarray], path: Path
 ) -> Bodies:
-    key = block_array(data)
-    total = sum(len(nodes) for _, nodes in cells)
-    values, owner = np.unique(data[key] if key else np.zeros(total, dtype=np.int64), return_inverse=True)
-    numbered = [f"block {value}" for value in values.tolist()] if key else ["block"]
+    key, numbered, owner = owners(data, sum(len(nodes) for _, nodes in cells))
     bodies = bodies_of_cells(points, cells, owner, rows_of_cells(data, owner, numbered, path))
     how = f"one per value of the cell array '{key}'" if key else "one per piece that hangs together"
     return Bodies(bodies, notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}",))

@@ -23,7 +23,7 @@ from blockvis.system.vtk_files import string_array, write_vtu
 from solver.mechanics import counted
 
 from .bodies import Bodies, Body, body_of_polygons, in_dimension
-from .cells import block_array, flat_beside, layout_of_cells, merged, rows_of_cells
+from .cells import flat_beside, layout_of_cells, merged, owners, rows_of_cells
 from .node_order import VTK, VTK_LINES, VTK_OTHER_FACES, ring_of_nodes
 from .reading import Reading
 from .volumes import VTK_SOLIDS, bodies_of_cells
@@ -397,17 +397,13 @@ def _bodies_of_solids(grid: Any, path: Path | str, stands: np.ndarray) -> Bodies
     types = np.asarray(grid.celltypes)
     solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, POLYHEDRON]) & stands)
     data = {str(key): np.asarray(grid.cell_data[key])[solid] for key in grid.cell_data}
-    key = block_array(data)
-    if key is not None:
-        values, owner = np.unique(data[key], return_inverse=True)
-        names = [f"block {value}" for value in values.tolist()]
-        note = f"one per value of the cell array '{key}'"
-    elif (types[solid] == POLYHEDRON).all():
-        owner, names = np.arange(len(solid)), [f"block {k}" for k in range(len(solid))]
-        note = "one per cell: no cell array 'block_id' says which cells are one block"
-    else:
-        owner, names = np.zeros(len(solid), dtype=np.int64), ["block"]
+    key, names, owner = owners(data, len(solid))
+    note = f"one per value of the cell array '{key}'"
+    if key is None:
         note = "one per piece that hangs together: no cell array 'block_id' says which cells are one block"
+        if (types[solid] == POLYHEDRON).all():
+            owner, names = np.arange(len(solid)), [f"block {k}" for k in range(len(solid))]
+            note = "one per cell: no cell array 'block_id' says which cells are one block"
     faceted = types[solid] == POLYHEDRON
     if faceted.any() and not faceted.all():
         raise ValueError(f"'{path}' has polyhedra beside other cells with a volume; write all blocks as polyhedra")

@@ -9,8 +9,9 @@ import numpy as np
 from vtkmodules.vtkCommonDataModel import VTK_LINE, vtkUnstructuredGrid
 
 import solver
+from blockvis.system.vtk_files import string_array
 
-from .datasets import add_arrays, describe, give_shape, grid_of_cells, state_units, strings
+from .datasets import add_arrays, describe, give_shape, grid_of_cells, state_units
 from .ties import STATE_WORDS, ties_at
 
 if TYPE_CHECKING:
@@ -56,8 +57,8 @@ def tie_grid(
     add_arrays(grid.GetCellData(), cells)
     grid.GetCellData().SetActiveScalars("force")
     for name, words in (("name", [tie.name for tie in ties]), ("kind", [tie.kind for tie in ties])):
-        grid.GetCellData().AddArray(strings(name, words))
-    grid.GetFieldData().AddArray(strings("state_names", STATE_WORDS))
+        grid.GetCellData().AddArray(string_array(name, words))
+    grid.GetFieldData().AddArray(string_array("state_names", STATE_WORDS))
     describe(grid, increment)
     state_units(grid)
     return grid

@@ -349,6 +349,22 @@ def test_a_thickness_that_we_wrote_stays_when_the_drawing_is_scaled(tmp_path, su
     assert "thickness       0.5 m" in str(inspect(path, unit="mm"))
 
 
+@pytest.mark.parametrize("suffix", [".dxf", ".svg"])
+def test_pieces_of_a_stone_that_we_wrote_keep_what_we_wrote_of_it(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    write_layout(read_layout(drawn(tmp_path / "a.json", [np.array(SQUARE)], role=["fixed"], group=["pier"])), path)
+    if suffix == ".dxf":
+        document = ezdxf.readfile(path)
+        document.modelspace().add_line((0.5, 0.0), (0.5, 1.0))
+        document.saveas(path)
+    else:
+        text = path.read_text(encoding="utf-8")
+        line = '<line x1="0.5" y1="0" x2="0.5" y2="-1" stroke="black"/>'
+        path.write_text(text.replace("</svg>", f"{line}</svg>"), encoding="utf-8")
+    layout = read_layout(path)
+    assert (layout.roles, layout.groups) == (("fixed",) * 2, ("pier",) * 2)
+
+
 def test_level_outlines_are_a_plan_or_drawing_in_xy_wherever_one_of_them_lies(tmp_path):
     """A long course with a stray elevation is no upright drawing."""
 

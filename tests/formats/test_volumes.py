@@ -143,6 +143,16 @@ def test_flat_cells_without_points_are_none(tmp_path):
     assert not any("flat cell" in note for note in layout.notes)
 
 
+def test_stones_of_a_vtu_are_called_by_their_names(tmp_path):
+    points, cells, _ = bricks("hexahedron", 4)
+    grid = pv.UnstructuredGrid({pv.CellType.HEXAHEDRON: cells}, points)
+    grid.cell_data["block_id"], grid.cell_data["name"] = np.array([1, 2, 3, 1]), ["pier", "key", "quoin", "pier"]
+    grid.save(tmp_path / "a.vtu")
+    assert read_layout(tmp_path / "a.vtu").names == ("pier 1", "pier 2", "key", "quoin")
+    with pytest.raises(ValueError, match=r"'pier 1' lies behind 'quoin'"):
+        read_layout(tmp_path / "a.vtu", view="yz")
+
+
 def test_pieces_of_a_vtu_without_ids(tmp_path):
     points, cells, _ = bricks("tetra")
     pv.UnstructuredGrid({pv.CellType.TETRA: cells}, points).save(tmp_path / "a.vtu")
