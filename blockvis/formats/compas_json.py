@@ -1,8 +1,7 @@
 """Assemblies, block models and lists of meshes of COMPAS, .json, as its versions from 0.15 to 2 write them.
 
-The parts of a file that hold blocks are found by their shape, not by the name of the class, which changed with the
-versions: a mesh is whatever has vertices and faces, an assembly a graph whose nodes have blocks, a model a list of
-elements with a geometry. https://compas.dev describes the data of each class.
+What holds blocks is found by its shape, not by the name of the class, which changed: a mesh is whatever has vertices
+and faces, an assembly a graph whose nodes have blocks, a model a list of elements with a geometry (https://compas.dev).
 """
 
 from __future__ import annotations
@@ -61,14 +60,6 @@ class _Mesh:
 
 def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies | None:
     """Read the blocks of a parsed .json file; None if it holds no mesh.
-
-    Parameters
-    ----------
-    content : object
-        Of the parser.
-    path : Path
-        Named in messages.
-    reading : Reading
 
     Raises
     ------

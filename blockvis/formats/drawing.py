@@ -66,18 +66,11 @@ class Stroke:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Line(Stroke):
-    """An open line.
+    """An open line, which messages call by its handle.
 
-    Attributes
-    ----------
-    layer, name, handle : str
-        The handle is what messages call it.
-    must_close : bool
-        Whether it is a polyline, and so part of an outline; a single line may also be a dimension or an axis.
-    line_type : str
-        In which it is drawn, "" where nothing says so.
-    chain : bool
-        Whether that is dashes and dots, as of axes, section planes and neighbouring parts: see :func:`is_chain`.
+    ``must_close`` says whether it is a polyline, and so part of an outline; a single line may also be a dimension or an
+    axis. ``line_type`` is "" where nothing says it, and ``chain`` whether it is of dashes and dots, as of axes, section
+    planes and neighbouring parts: see :func:`is_chain`.
     """
 
     layer: str

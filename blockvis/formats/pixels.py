@@ -57,22 +57,12 @@ class Outlined:
 
 
 def regions_of(labels: np.ndarray, smallest: float | None = None, speck: float = SPECK) -> Regions:
-    """Find the regions that hang together along edges of pixels.
+    """Find the regions of labels (height, width), 0 for the background, that hang together along edges of pixels.
 
-    Parameters
-    ----------
-    labels : (height, width) int array
-        0 for the background.
-    smallest : float, optional [pixels]
-        Regions less than this across (root of the area) are specks.
-    speck : float
-        By default those less than this fraction of the typical region across.
-
-    Notes
-    -----
-    A speck becomes part of the neighbour with which it has most edges. A speck of the background does so within one
-    region only: between two it is a joint. The background hangs together across corners, too, as joints one pixel wide
-    do.
+    Regions less than ``smallest`` [pixels] across (root of the area) are specks, by default those less than a fraction
+    of the typical region across. A speck becomes part of the neighbour with which it has most edges; one of the
+    background does so within one region only: between two it is a joint. The background hangs together across corners,
+    too, as joints one pixel wide do.
     """
     numbers, of_region = _numbered(labels)
     areas = np.bincount(numbers.ravel(), minlength=len(of_region))
@@ -147,16 +137,8 @@ def _targets(numbers: np.ndarray, of_region: np.ndarray, small: np.ndarray) -> n
 
 
 def outlined(regions: Regions, tolerance: float = STAIRS) -> Outlined:
-    """Trace the outlines of regions.
+    """Trace the outlines of regions, without corners within a tolerance [pixels]; 0 keeps those of every pixel.
 
-    Parameters
-    ----------
-    regions : Regions
-    tolerance : float [pixels]
-        Within which corners are dropped; 0 keeps those of every pixel.
-
-    Notes
-    -----
     Lines between two regions are traced once, so that both have the same corners.
     """
     import shapely
