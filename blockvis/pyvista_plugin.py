@@ -33,7 +33,7 @@ from .layout.selection import sorted_out
 from .pictures import palette
 from .pictures.solid_scene import drawn_forward
 from .pictures.solid_view import ABOVE, AROUND, View, showing_faces
-from .results.datasets import block_dataset
+from .results.datasets import block_grid
 from .text import nearest
 
 
@@ -279,7 +279,7 @@ class BlockvisAccessor:
         As :meth:`pyvista.Plotter.show`: in a notebook a view.
         """
         assembly = self.assembly(roles, dimension=dimension)
-        blocks = block_dataset(assembly)
+        blocks = pv.UnstructuredGrid(block_grid(assembly))
         colours = palette.block_colours(assembly.materials, assembly.free)
         colours[assembly.moving] = palette.MOVING
         blocks.cell_data["colour"] = colours

@@ -48,25 +48,25 @@ def html(value: Any) -> str:
 
 def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.UnstructuredGrid:
     """Make a dataset of blocks, joints, contact points or ties of an increment, below 0 from the end of the path."""
-    from .results.datasets import block_dataset, contact_dataset, joint_dataset
+    import pyvista as pv
+
+    from .results.datasets import block_grid, contact_grid, joint_grid, tie_grid
     from .results.increments import numbered
-    from .results.mechanism_arrays import at_last_equilibrium, falling_in
+    from .results.mechanism_arrays import as_shown
+    from .results.ties import known_ties
 
-    assembly, path = response.assembly, response.path
+    assembly = response.assembly
     increment = numbered(response.increments, k)
-    if path and k < 0:
-        increment = numbered(path, k)
-    ends = bool(path) and increment is path[-1] and response.collapse is not None
-    if ends:
-        increment = at_last_equilibrium(response)
+    if response.path and k < 0:
+        increment = numbered(response.path, k)
+    increment, falls = as_shown(response, increment)
     if of == "blocks":
-        return block_dataset(assembly, increment, shape=shape, falls=falling_in(response) if ends else None)
-    if of == "members":
-        from .results.tie_grid import tie_dataset
-        from .results.ties import known_ties
-
-        return tie_dataset(known_ties(response), assembly, increment, shape=shape)
-    return (joint_dataset if of == "joints" else contact_dataset)(assembly, increment, shape=shape)
+        grid = block_grid(assembly, increment, shape=shape, falls=falls)
+    elif of == "members":
+        grid = tie_grid(known_ties(response), assembly, increment, shape=shape)
+    else:
+        grid = (joint_grid if of == "joints" else contact_grid)(assembly, increment, shape=shape)
+    return pv.UnstructuredGrid(grid)
 
 
 def fall(response: solver.Response, time: float, shape: str) -> pv.UnstructuredGrid:

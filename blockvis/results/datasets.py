@@ -1,14 +1,12 @@
-"""Assemblies and increments as VTK grids: blocks, joints and contact points.
+"""Assemblies and increments as VTK grids: blocks, joints, contact points and ties.
 
 In the plane blocks are polygons and joints lines, in space polyhedra and faces; contact points are vertices.
-A run writes them without pyvista, whose import takes longer than the files of a small structure; who asks for a dataset
-is given one of pyvista's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
@@ -29,9 +27,7 @@ from solver import mechanics
 from .joint_faces import InitialJoints, Rings, initial_joints, lengths_of
 from .joints import joint_states
 from .mechanism_arrays import block_motion, next_places, part_of_friction
-
-if TYPE_CHECKING:
-    import pyvista as pv
+from .ties import STATE_WORDS, ties_at
 
 #: Numbers of the roles in the cell array ``role``; their names are in the field array ``role_names``.
 ROLE_NUMBERS = {role: number for number, role in enumerate(mechanics.ROLES)}
@@ -48,14 +44,14 @@ UNITS = {
 }  # fmt: skip
 
 
-def block_dataset(
+def block_grid(
     assembly: solver.Assembly,
     increment: solver.Increment | None = None,
     *,
     shape: str = "moved",
     falls: np.ndarray | None = None,
-) -> pv.UnstructuredGrid:
-    """Make a dataset of the blocks of one increment, one cell per block: a polygon, or in space a polyhedron.
+) -> vtkUnstructuredGrid:
+    """Make a grid of the blocks of one increment, one cell per block: a polygon, or in space a polyhedron.
 
     Parameters
     ----------
@@ -71,7 +67,7 @@ def block_dataset(
 
     Returns
     -------
-    pyvista.UnstructuredGrid
+    vtkUnstructuredGrid
         Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
         ``fallen`` (1 for blocks that have left for good), ``falls`` (1 for those that collapse takes), ``translation``
         (n_blocks, 3) of the centroids [m] and ``rotation`` [rad], in space a vector; of the motion that follows
@@ -89,21 +85,10 @@ def block_dataset(
     >>> str(block_dataset(one).cell_data["name"][0])
     'lintel'
     """
-    return _as_dataset(block_grid(assembly, increment, shape=shape, falls=falls))
-
-
-def block_grid(
-    assembly: solver.Assembly,
-    increment: solver.Increment | None = None,
-    *,
-    shape: str = "moved",
-    falls: np.ndarray | None = None,
-) -> vtkUnstructuredGrid:
-    """Make what :func:`block_dataset` wraps."""
     pose = solver.Pose.initial(assembly) if increment is None else increment.pose
     corners = mechanics.moved_vertices(assembly, pose)
     if assembly.dimension == 2:
-        grid = grid_of_cells(corners, assembly.offsets, VTK_POLYGON)
+        grid = _grid_of_cells(corners, assembly.offsets, VTK_POLYGON)
     else:
         grid = _polyhedra(assembly.polyhedra, corners)
     materials = sorted(set(assembly.materials))
@@ -120,46 +105,15 @@ def block_grid(
     for name, words in (("name", assembly.names), ("role_name", assembly.roles), ("material", assembly.materials)):
         grid.GetCellData().AddArray(string_array(name, words))
     ahead = None if increment is None else next_places(assembly, increment, corners, assembly.block_of_vertex)
-    give_shape(grid, assembly.vertices, shape, ahead)
+    _give_shape(grid, assembly.vertices, shape, ahead)
     grid.GetFieldData().AddArray(string_array("role_names", mechanics.ROLES))
     grid.GetFieldData().AddArray(string_array("material_names", materials))
     if increment is not None:
         fallen, motion = increment.fallen, block_motion(assembly, increment, falls)
         add_arrays(grid.GetCellData(), {"fallen": fallen.astype(np.int32), **motion})
-        describe(grid, increment)
-    state_units(grid)
+        _describe(grid, increment)
+    _state_units(grid)
     return grid
-
-
-def joint_dataset(
-    assembly: solver.Assembly,
-    increment: solver.Increment,
-    *,
-    shape: str = "moved",
-    joints: InitialJoints | None = None,
-) -> pv.UnstructuredGrid:
-    """Make a dataset of the joints of one increment: a line for each, in space a face, midway between its two faces.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    increment : solver.Increment
-    shape : {"moved", "undeformed"}
-        As of :func:`block_dataset`.
-    joints : InitialJoints, optional
-        Of the assembly, where they are at hand.
-
-    Returns
-    -------
-    pyvista.UnstructuredGrid
-        Cell arrays ``opening`` and ``slip`` [m], ``normal_force`` (compression positive) and ``shear_force`` [N] on
-        ``block_a``, ``length`` of the faces in common [m], ``block_a``, ``block_b``, ``joint`` (their names) and
-        ``initial``: 1 for joints of the layout, 0 for blocks that have come to touch since, whose opening and slip are
-        0. In frames of a fall there are no forces. Point and field arrays as those of :func:`block_dataset`. In space
-        ``slip`` and ``shear_force`` are sizes, ``area`` [m²] takes the place of ``length``, ``normal`` and ``force``
-        [N] are vectors, and the point array ``gap`` [m] is the distance of the faces at each corner.
-    """
-    return _as_dataset(joint_grid(assembly, increment, shape=shape, joints=joints))
 
 
 def joint_grid(
@@ -169,7 +123,27 @@ def joint_grid(
     shape: str = "moved",
     joints: InitialJoints | None = None,
 ) -> vtkUnstructuredGrid:
-    """Make what :func:`joint_dataset` wraps."""
+    """Make a grid of the joints of one increment: a line for each, in space a face, midway between its two faces.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    increment : solver.Increment
+    shape : {"moved", "undeformed"}
+        As of :func:`block_grid`.
+    joints : InitialJoints, optional
+        Of the assembly, where they are at hand.
+
+    Returns
+    -------
+    vtkUnstructuredGrid
+        Cell arrays ``opening`` and ``slip`` [m], ``normal_force`` (compression positive) and ``shear_force`` [N] on
+        ``block_a``, ``length`` of the faces in common [m], ``block_a``, ``block_b``, ``joint`` (their names) and
+        ``initial``: 1 for joints of the layout, 0 for blocks that have come to touch since, whose opening and slip are
+        0. In frames of a fall there are no forces. Point and field arrays as those of :func:`block_grid`. In space
+        ``slip`` and ``shear_force`` are sizes, ``area`` [m²] takes the place of ``length``, ``normal`` and ``force``
+        [N] are vectors, and the point array ``gap`` [m] is the distance of the faces at each corner.
+    """
     states = joint_states(assembly, initial_joints(assembly) if joints is None else joints, increment)
     rings, in_space = states.rings, assembly.dimension == 3
     # Lines or vertices also where blocks touch at an edge or a corner.
@@ -199,42 +173,35 @@ def joint_grid(
     names = assembly.names
     words = (f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True))
     grid.GetCellData().AddArray(string_array("joint", words))
-    describe(grid, increment)
-    state_units(grid)
+    _describe(grid, increment)
+    _state_units(grid)
     return grid
 
 
-def contact_dataset(
+def contact_grid(
     assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
-) -> pv.UnstructuredGrid:
-    """Make a dataset of the contact points of one increment, one vertex cell each.
+) -> vtkUnstructuredGrid:
+    """Make a grid of the contact points of one increment, one vertex cell each.
 
     Parameters
     ----------
     assembly : solver.Assembly
     increment : solver.Increment
     shape : {"moved", "undeformed"}
-        As of :func:`block_dataset`.
+        As of :func:`block_grid`.
 
     Returns
     -------
-    pyvista.UnstructuredGrid
+    vtkUnstructuredGrid
         Point arrays ``normal`` and ``tangent`` (n_contacts, 3), ``force`` (n_contacts, 3) on ``block_a`` [N],
         ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``,
         ``utilisation``, the part of the friction that the shear force uses up, ``state``
         (number of :class:`solver.mechanics.ContactState`), with mortar ``intact``, the part of its strength that is
         left, ``carries`` (1 with a force), ``block_a`` and ``block_b``, ``displacement`` and ``reference`` as of
-        :func:`block_dataset`; its field arrays, and ``state_names``. In
+        :func:`block_grid`; its field arrays, and ``state_names``. In
         frames of a fall, which are no equilibrium, forces are 0. In space ``shear_force`` is the size of the vector
         ``shear`` [N], and ``slip`` [m] is how far block a has moved along block b there since the layout.
     """
-    return _as_dataset(contact_grid(assembly, increment, shape=shape))
-
-
-def contact_grid(
-    assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
-) -> vtkUnstructuredGrid:
-    """Make what :func:`contact_dataset` wraps."""
     contacts, states = increment.contacts, increment.states
     blocks = (contacts.block_a, contacts.block_b)
     places = Rings(contacts.points, np.arange(len(contacts) + 1))
@@ -264,18 +231,67 @@ def contact_grid(
         points |= {"shear": shear, "slip": _slip(assembly, increment)}
     add_arrays(grid.GetPointData(), points)
     grid.GetFieldData().AddArray(string_array("state_names", [state.name.lower() for state in mechanics.ContactState]))
-    describe(grid, increment)
-    state_units(grid)
+    _describe(grid, increment)
+    _state_units(grid)
     return grid
 
 
-def _as_dataset(grid: vtkUnstructuredGrid) -> pv.UnstructuredGrid:
-    import pyvista as pv
+def tie_grid(
+    ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
+) -> vtkUnstructuredGrid:
+    """Make a grid of the ties, props and bars of one increment: a line for each, from end to end.
 
-    return pv.UnstructuredGrid(grid)
+    Parameters
+    ----------
+    ties : sequence of solver.Tie
+    assembly : solver.Assembly
+    increment : solver.Increment
+    shape : {"moved", "undeformed"}
+        As of :func:`block_grid`.
+
+    Returns
+    -------
+    vtkUnstructuredGrid
+        Cell arrays ``force`` [N], tension positive, ``elongation`` [m], ``state`` (number), ``name``, ``kind``; point
+        and field arrays as those of the blocks, and ``state_names``.
+    """
+    found, d = ties_at(ties, assembly, increment), assembly.dimension
+    grid = _grid_of_cells(found.ends.reshape(-1, d), 2 * np.arange(len(ties) + 1), VTK_LINE)
+    _give_shape(grid, np.array([tie.points for tie in ties]).reshape(-1, d), shape, None)
+    cells = {
+        "force": found.forces,
+        "elongation": found.elongations,
+        "state": found.states.astype(np.int32),
+    }
+    add_arrays(grid.GetCellData(), cells)
+    grid.GetCellData().SetActiveScalars("force")
+    for name, words in (("name", [tie.name for tie in ties]), ("kind", [tie.kind for tie in ties])):
+        grid.GetCellData().AddArray(string_array(name, words))
+    grid.GetFieldData().AddArray(string_array("state_names", STATE_WORDS))
+    _describe(grid, increment)
+    _state_units(grid)
+    return grid
 
 
-def grid_of_cells(points: np.ndarray, offsets: np.ndarray, kind: int | np.ndarray) -> vtkUnstructuredGrid:
+def grids_of(
+    assembly: solver.Assembly,
+    increment: solver.Increment,
+    ties: Sequence[solver.Tie],
+    *,
+    shape: str = "moved",
+    joints: InitialJoints | None = None,
+    falls: np.ndarray | None = None,
+) -> dict[str, vtkUnstructuredGrid]:
+    """Make all grids of an increment by their kinds; that of ties where there are any."""
+    grids = {
+        "blocks": block_grid(assembly, increment, shape=shape, falls=falls),
+        "contacts": contact_grid(assembly, increment, shape=shape),
+        "joints": joint_grid(assembly, increment, shape=shape, joints=joints),
+    }
+    return grids | ({"ties": tie_grid(ties, assembly, increment, shape=shape)} if ties else {})
+
+
+def _grid_of_cells(points: np.ndarray, offsets: np.ndarray, kind: int | np.ndarray) -> vtkUnstructuredGrid:
     """Make a grid of cells of their own points, (n, d) [m]: cell i of offsets[i] to offsets[i + 1]."""
     grid = _grid_of_points(points)
     kinds = np.broadcast_to(np.asarray(kind, dtype=np.uint8), len(offsets) - 1)
@@ -330,13 +346,13 @@ def _grid_between(
     shape: str,
 ) -> vtkUnstructuredGrid:
     """Make a grid of cells whose points lie between two blocks each, (n_points,) int arrays."""
-    grid = grid_of_cells(rings.points, rings.offsets, kind)
+    grid = _grid_of_cells(rings.points, rings.offsets, kind)
     drawn = mechanics.carried_between(rings.points, *blocks, increment.pose, solver.Pose.initial(assembly))
-    give_shape(grid, drawn, shape, next_places(assembly, increment, rings.points, *blocks))
+    _give_shape(grid, drawn, shape, next_places(assembly, increment, rings.points, *blocks))
     return grid
 
 
-def describe(grid: vtkUnstructuredGrid, increment: solver.Increment) -> None:
+def _describe(grid: vtkUnstructuredGrid, increment: solver.Increment) -> None:
     """Write the numbers of an increment into the field arrays of a grid."""
     numbers = {
         "settlement": increment.parameter,
@@ -362,7 +378,7 @@ def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
         attributes.AddArray(values)
 
 
-def give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str, ahead: np.ndarray | None) -> None:
+def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str, ahead: np.ndarray | None) -> None:
     """Let the points of a moved grid stay or go where the layout has them, (n, d) [m], and say how far they move.
 
     The active vectors are what Warp By Vector takes first: of the layout the displacement, of moved shapes what lies
@@ -382,7 +398,7 @@ def give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str, ahe
     grid.GetPointData().SetActiveVectors(next(iter(arrays)))
 
 
-def state_units(grid: vtkUnstructuredGrid) -> None:
+def _state_units(grid: vtkUnstructuredGrid) -> None:
     """Write the unit of each array into its metadata and into the field array ``units``."""
     listed = []
     for attributes in (grid.GetPointData(), grid.GetCellData()):

@@ -14,7 +14,7 @@ from blockvis.system.atomic_files import make_folder, write_atomic
 
 from .increments import folder_of
 from .mechanism_arrays import falling_in
-from .npz import checked_arrays, compressed, flat, from_flat
+from .npz import packed, unpacked
 from .viewer_files import MOVED, ViewerFormat
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def write_fall(
             grid = fall_grid(response, fall, time, vtu.shape, falls if kind == "blocks" else None)
             write_vtu(grid, folder / file, strings=vtu.strings, durable=False)
         write_pvd(folder / listed, list(zip(times, files, strict=True)), last=False)
-    write_atomic(folder / FALL_POSES, compressed(flat(fall)))
+    write_atomic(folder / FALL_POSES, packed(fall))
 
 
 def fall_grid(
@@ -72,8 +72,7 @@ def fall_grid(
     falls : (n_blocks,) bool array, optional
         None for the ties.
     """
-    from .datasets import add_arrays, block_grid
-    from .tie_grid import tie_grid
+    from .datasets import add_arrays, block_grid, tie_grid
 
     state = falling_increment(response, fall, time)
     if falls is None:
@@ -120,7 +119,7 @@ def stored_fall(folder: Path) -> Fall | None:
     if not file.is_file():
         return None
     try:
-        fall = from_flat(checked_arrays(file), Fall)
+        fall, _ = unpacked(file.read_bytes(), Fall)
         n, blocks, *turns = fall.rotations.shape
         shapes = (fall.times.shape, fall.positions.shape)
         if n == 0 or shapes != ((n,), (n, blocks, 3 if turns else 2)) or not np.isfinite(fall.positions).all():
@@ -129,6 +128,6 @@ def stored_fall(folder: Path) -> Fall | None:
             raise ValueError(
                 f"forces of ties have the shape {fall.tie_forces.shape}, their lengths {fall.tie_rest.shape}"
             )
-    except (ValueError, KeyError, TypeError) as error:
+    except ValueError as error:
         raise ValueError(f"'{file}' cannot be read ({error}); remove it and draw again") from None
     return fall

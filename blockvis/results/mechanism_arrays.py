@@ -96,3 +96,13 @@ def at_last_equilibrium(response: solver.Response) -> solver.Increment:
     """
     last, begins = response.path[-1], with_mechanism(response)
     return last if begins is None or falls_from(response) is not last else begins
+
+
+def as_shown(response: solver.Response, increment: solver.Increment) -> tuple[solver.Increment, np.ndarray | None]:
+    """Give an increment as files and datasets show it, and the blocks (n_blocks,) that the collapse takes.
+
+    At the last equilibrium before a collapse the motion that follows is the mechanism; of others nothing is known.
+    """
+    if not response.path or increment is not response.path[-1] or response.collapse is None:
+        return increment, None
+    return at_last_equilibrium(response), falling_in(response)

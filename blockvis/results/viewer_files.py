@@ -13,7 +13,7 @@ import solver
 from blockvis.system.vtk_files import is_complete, write_pvd, write_vtu
 
 from .joint_faces import InitialJoints, initial_joints
-from .mechanism_arrays import at_last_equilibrium, falling_in
+from .mechanism_arrays import as_shown
 from .ties import TIES, stored_ties
 
 #: The VTU files of an increment, and those of one with ties.
@@ -27,7 +27,7 @@ class ViewerFormat:
     Attributes
     ----------
     shape : {"moved", "undeformed"}
-        Of the blocks; see :func:`blockvis.results.datasets.block_dataset`.
+        Of the blocks; see :func:`blockvis.results.datasets.block_grid`.
     strings : bool
         As of :func:`blockvis.system.vtk_files.write_vtu`.
     """
@@ -153,7 +153,7 @@ def write_end(folder: Path, response: solver.Response, vtu: ViewerFormat, joints
         Of the assembly, where they are at hand.
     """
     if response.path and response.collapse is not None:
-        last, falls = at_last_equilibrium(response), falling_in(response)
+        last, falls = as_shown(response, response.path[-1])
         write_grids(folder, len(response.path) - 1, response.assembly, last, vtu, joints, falls)
 
 
@@ -181,22 +181,13 @@ def write_grids(
     joints : InitialJoints, optional
         Of the assembly, where they are at hand.
     falls : (n_blocks,) bool array, optional
-        As of :func:`blockvis.results.datasets.block_dataset`.
+        As of :func:`blockvis.results.datasets.block_grid`.
     """
     # VTK is loaded where its files are written: another process may do that.
-    from .datasets import block_grid, contact_grid, joint_grid
+    from .datasets import grids_of
 
-    grids = [
-        ("blocks", block_grid(assembly, increment, shape=vtu.shape, falls=falls)),
-        ("contacts", contact_grid(assembly, increment, shape=vtu.shape)),
-        ("joints", joint_grid(assembly, increment, shape=vtu.shape, joints=joints)),
-    ]
     ties = stored_ties(folder)
-    if ties:
-        from .tie_grid import tie_grid
-
-        grids.append((TIE_GRID, tie_grid(ties, assembly, increment, shape=vtu.shape)))
-    for kind, grid in grids:
+    for kind, grid in grids_of(assembly, increment, ties, shape=vtu.shape, joints=joints, falls=falls).items():
         write_vtu(grid, grid_file(folder, kind, number), strings=vtu.strings, durable=False)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +15,11 @@ from vtkmodules.vtkIOHDF import vtkHDFWriter
 import solver
 from blockvis.system.atomic_files import atomic_file
 
-from .datasets import block_grid, contact_grid, joint_grid
+from .datasets import grids_of
 from .joint_faces import initial_joints
-from .mechanism_arrays import at_last_equilibrium, falling_in
-from .tie_grid import tie_grid
+from .mechanism_arrays import as_shown
 from .ties import known_ties
-from .viewer_files import GRIDS, TIE_GRID, output_times
+from .viewer_files import output_times
 
 #: Level of zlib.
 COMPRESSION = 4
@@ -84,22 +82,14 @@ class _Series(VTKPythonAlgorithmBase):
         time = about.Get(asked) if about.Has(asked) else self._times[0]
         number = int(np.abs(np.array(self._times) - time).argmin())
         together = vtkMultiBlockDataSet.GetData(about)
-        for k, (name, grid) in enumerate(zip((*GRIDS, TIE_GRID), self._grids(number), strict=False)):
+        for k, (name, grid) in enumerate(self._grids(number).items()):
             together.SetBlock(k, _without_strings(grid))
             together.GetMetaData(k).Set(vtkCompositeDataSet.NAME(), name)
         return 1
 
-    def _grids(self, number: int) -> Sequence[vtkUnstructuredGrid]:
-        response, falls = self._response, None
-        increment, assembly = response.path[number], response.assembly
-        if number == len(response.path) - 1 and response.collapse is not None:
-            increment, falls = at_last_equilibrium(response), falling_in(response)
-        return (
-            block_grid(assembly, increment, falls=falls),
-            contact_grid(assembly, increment),
-            joint_grid(assembly, increment, joints=self._joints),
-            *((tie_grid(self._ties, assembly, increment),) if self._ties else ()),
-        )
+    def _grids(self, number: int) -> dict[str, vtkUnstructuredGrid]:
+        increment, falls = as_shown(self._response, self._response.path[number])
+        return grids_of(self._response.assembly, increment, self._ties, joints=self._joints, falls=falls)
 
 
 def _without_strings(grid: vtkUnstructuredGrid) -> vtkUnstructuredGrid:

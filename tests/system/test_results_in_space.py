@@ -28,7 +28,7 @@ from blockvis.pictures.marks import marks_of
 from blockvis.pictures.solid_view import View, chosen_view
 from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import swing_of
-from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset
+from blockvis.results.datasets import block_grid, contact_grid, joint_grid
 from blockvis.results.joints import initial_joints, joint_states
 from blockvis.system.vtk_files import write_vtu
 from solver import mechanics
@@ -75,7 +75,7 @@ def same(one, other):
 def test_polyhedra_come_back_through_pyvista(tmp_path):
     response = vault_response()
     last, volumes = response.path[-1], response.assembly.shapes.volumes
-    file = write_vtu(block_dataset(response.assembly, last), tmp_path / "blocks.vtu")
+    file = write_vtu(block_grid(response.assembly, last), tmp_path / "blocks.vtu")
     back = pv.read(file)
     np.testing.assert_array_equal(back.points, mechanics.moved_vertices(response.assembly, last.pose))
     np.testing.assert_allclose(back.compute_cell_sizes()["Volume"], volumes, rtol=1e-12)
@@ -98,7 +98,7 @@ def test_results_reach_meshio_as_the_manual_says(response, tmp_path, monkeypatch
     (code,) = re.findall(r"```python\n(import meshio\nimport pyvista.*?)```", manual, re.S)
     assembly, increment = response().assembly, response().path[-1]
     monkeypatch.chdir(tmp_path)
-    write_vtu(block_dataset(assembly, increment), tmp_path / "out" / "increments" / "blocks_00000.vtu")
+    write_vtu(block_grid(assembly, increment), tmp_path / "out" / "increments" / "blocks_00000.vtu")
     read = {}
     exec(code, read)
     mesh = read["mesh"]
@@ -149,7 +149,7 @@ def test_joints_open_on_one_side_and_carry_the_weight():
 def test_contact_points_have_forces_and_slip_as_vectors():
     response = vault_response()
     assembly, last = response.assembly, response.path[-1]
-    grid = contact_dataset(assembly, last)
+    grid = pv.UnstructuredGrid(contact_grid(assembly, last))
     total = np.zeros((assembly.n_blocks, 3))
     np.add.at(total, grid.point_data["block_a"], grid.point_data["force"])
     np.subtract.at(total, grid.point_data["block_b"], grid.point_data["force"])
@@ -173,9 +173,9 @@ def test_slip_is_what_one_block_has_moved_along_another():
     )  # fmt: skip
     side = np.where(contacts.block_a == 1, 1.0, -1.0)[:, None]
     np.testing.assert_allclose(
-        contact_dataset(two, increment)["slip"] * side, np.tile([0.3, 0.1, 0.0], (4, 1)), atol=1e-12
+        pv.UnstructuredGrid(contact_grid(two, increment))["slip"] * side, np.tile([0.3, 0.1, 0.0], (4, 1)), atol=1e-12
     )
-    joint = joint_dataset(two, increment)
+    joint = pv.UnstructuredGrid(joint_grid(two, increment))
     assert joint.cell_data["slip"][0] == pytest.approx(np.hypot(0.3, 0.1))
     assert joint.cell_data["area"][0] == pytest.approx(1.0)
 
@@ -625,9 +625,9 @@ def test_paraview_reads_polyhedra_faces_and_contacts(tmp_path):
     done = subprocess.run([PVPYTHON, script, folder], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     told = json.loads(done.stdout.split("TOLD")[1])
-    for part, dataset in (("blocks", block_dataset), ("contacts", contact_dataset), ("joints", joint_dataset)):
+    for part, dataset in (("blocks", block_grid), ("contacts", contact_grid), ("joints", joint_grid)):
         for (_, cells, names), increment in zip(told[part], response.path, strict=True):
-            ours = dataset(response.assembly, increment)
+            ours = pv.UnstructuredGrid(dataset(response.assembly, increment))
             assert cells == ours.n_cells
             assert set(names["Point"]) == set(ours.point_data.keys())
             assert set(names["Cell"]) == set(ours.cell_data.keys())

@@ -117,7 +117,7 @@ def test_a_verb_that_does_not_exist_names_the_nearest(capsys):
 
 
 def test_options_of_an_accessor_are_named():
-    blocks = pyvista_plugin.block_dataset(generators.arch()).blockvis
+    blocks = pyvista_plugin.pv.UnstructuredGrid(pyvista_plugin.block_grid(generators.arch())).blockvis
     with pytest.raises(TypeError, match=r"rotation_centre is part of a solver\.Settlement: give phases"):
         blocks.settle(rotation_centre=(0, 0))
     with pytest.raises(TypeError, match=r"no option 'densty'.*did you mean 'density'"):
