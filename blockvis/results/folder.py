@@ -11,7 +11,6 @@ import os
 import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -28,7 +27,7 @@ from .given import GIVEN, write_given
 from .increments import StoredIncrements, packed_increment
 from .joints import LargestMovements
 from .mechanism_arrays import at_last_equilibrium
-from .npz import checked_arrays, compressed, flat, packed, unpacked
+from .npz import packed, unpacked
 from .record import RECORD, Record, read_json, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
 from .ties import COLUMNS as TIE_COLUMNS
@@ -157,7 +156,7 @@ class ResultsFolder:
             (self.path / name).unlink(missing_ok=True)
         remove_fall(self.path)
         self._remove_from(0)
-        write_atomic(self.path / "assembly.npz", compressed(flat(assembly)))
+        write_atomic(self.path / "assembly.npz", packed(assembly))
         write_ties(self.path, self.ties)
         write_atomic(self.path / RECORD, self.record.text())
         self._start_table()
@@ -232,7 +231,7 @@ class ResultsFolder:
         self.viewer.add(self.increments[-1])
         self._write_table()
         if increment.checkpoint is not None:
-            write_atomic(self.path / CHECKPOINT, packed(increment.checkpoint, increments=number + 1))
+            write_atomic(self.path / CHECKPOINT, packed(increment.checkpoint, compressed=False, increments=number + 1))
 
     def finish(
         self,
@@ -391,44 +390,21 @@ def stored_assembly(folder: Path) -> solver.Assembly:
     if not (folder / "assembly.npz").is_file():
         raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
     try:
-        stored = checked_arrays(folder / "assembly.npz")
-        names, roles, materials = (list(map(str, stored[key])) for key in ("names", "roles", "materials"))
-        drawn = tuple(map(str, stored["drawn_names"]))
-        if len(drawn) != len(names):
-            raise ValueError(f"{len(names)} names but {len(drawn)} drawn_names")
+        stored, _ = unpacked((folder / "assembly.npz").read_bytes(), solver.Assembly)
+        labels: dict[str, Any] = {"names": stored.names, "roles": stored.roles, "materials": stored.materials}
+        blocks = range(stored.n_blocks)
         # Checked like a layout: the file may come from anywhere.
-        if "corners" in stored:
-            assembly = solver.Assembly.from_solids(
-                _stored_solids(stored), names=names, roles=roles, density=stored["density"], materials=materials
-            )
+        if isinstance(stored.shapes, mechanics.Polyhedra):
+            surfaces = [stored.shapes.surface(block) for block in blocks]
+            assembly = solver.Assembly.from_solids(surfaces, density=stored.density, **labels)
         else:
+            outlines = [stored.outline(block) for block in blocks]
             assembly = solver.Assembly.from_outlines(
-                [stored["vertices"][first:last] for first, last in pairwise(stored["offsets"].tolist())],
-                names=names,
-                roles=roles,
-                density=stored["density"],
-                thickness=stored["thickness"],
-                materials=materials,
+                outlines, density=stored.density, thickness=stored.thickness, **labels
             )
-        return replace(assembly, drawn_names=drawn)
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+        return replace(assembly, drawn_names=stored.drawn_names)
+    except (ValueError, TypeError, IndexError) as error:
         raise ValueError(f"'{folder / 'assembly.npz'}' cannot be read ({error}); run the case again") from None
-
-
-def _stored_solids(stored: Mapping[str, np.ndarray]) -> list[tuple[np.ndarray, list[list[int]]]]:
-    """Corners and faces of each block in space, the corners of a face numbered within the block."""
-    offsets, faces = (
-        stored["offsets"].tolist(),
-        np.searchsorted(stored["block_of_face"], np.arange(len(stored["offsets"]))),
-    )
-    loops = [
-        stored["corners"][first:last] - stored["offsets"][block]
-        for (first, last), block in zip(pairwise(stored["face_offsets"].tolist()), stored["block_of_face"], strict=True)
-    ]
-    return [
-        (stored["vertices"][first:last], [loop.tolist() for loop in loops[low:high]])
-        for (first, last), (low, high) in zip(pairwise(offsets), pairwise(faces.tolist()), strict=True)
-    ]
 
 
 def add_to_summary(folder: Path, **found: Any) -> None:

@@ -7,7 +7,7 @@ from the increment's file and forgotten again, so that memory does not grow with
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -16,20 +16,11 @@ import numpy as np
 import solver
 from solver import mechanics
 
-from .npz import checked_arrays, compressed, flat, from_flat
+from .npz import packed, size_of, unpacked
 
 #: Bytes of arrays that are kept of the increments read last, and how many of them are kept whatever their size: frames
 #: of a film lie between two.
 CACHED, AT_LEAST = 8 << 20, 2
-
-#: Names in the files of fields that are called otherwise.
-_STORED_AS = {"parameter": "settlement"}
-
-#: Fields of an increment that are not in its file by themselves, and of its state one whose arrays have other names.
-_APART, _TIES = ("held", "checkpoint"), ("ties",)
-
-#: How the names of the arrays of ties begin.
-_OF_TIES = "tie_"
 
 
 @dataclass(frozen=True)
@@ -119,22 +110,28 @@ class StoredIncrements:
     def _keep(self, number: int, increment: solver.Increment) -> None:
         """Keep an increment with its arrays, and forget those used longest ago."""
         if number in self._last:
-            self._bytes -= _bytes_of(self._last.pop(number))
+            self._bytes -= size_of(self._last.pop(number).state)
         self._last[number] = increment
-        self._bytes += _bytes_of(increment)
+        self._bytes += size_of(increment.state)
         while len(self._last) > AT_LEAST and self._bytes > CACHED:
-            self._bytes -= _bytes_of(self._last.popitem(last=False)[1])
+            self._bytes -= size_of(self._last.popitem(last=False)[1].state)
 
     def _read(self, number: int) -> solver.Increment:
         try:
-            arrays = checked_arrays(self.file(number))
-            n, k, d = len(arrays["rotations"]), len(arrays["gaps"]), 3 if arrays["rotations"].ndim == 2 else 2
-            shapes = {"positions": (n, d), "velocity": (n, 3 * d - 3), "points": (k, d), "forces": (k, d)}
-            for name, shape in shapes.items():
-                if arrays[name].shape != shape:
-                    raise ValueError(f"{name} has shape {arrays[name].shape}, not {shape}")
-            return _increment_of(arrays)
-        except (ValueError, KeyError, TypeError, IndexError, FileNotFoundError) as error:
+            found, _ = unpacked(self.file(number).read_bytes(), solver.Increment)
+            state = found.state
+            (n, d), k = state.pose.positions.shape, len(state.contacts)
+            shapes = (
+                ("rotations", state.pose.rotations, (n, 2 * d - 3)),
+                ("velocity", state.velocity, (n, 3 * d - 3)),
+                ("points", state.contacts.points, (k, d)),
+                ("forces", state.forces, (k, d)),
+            )
+            for name, array, shape in shapes:
+                if array.shape != shape:
+                    raise ValueError(f"{name} has shape {array.shape}, not {shape}")
+            return found
+        except (ValueError, FileNotFoundError) as error:
             raise ValueError(f"'{self.file(number)}' cannot be read ({error}); run the case again") from None
 
 
@@ -144,35 +141,8 @@ def folder_of(increment: solver.Increment) -> Path | None:
 
 
 def packed_increment(increment: solver.Increment) -> bytes:
-    """Pack an increment into the bytes of its file."""
-    numbers = flat(increment, without=_APART)
-    numbers = {_STORED_AS.get(name, name): number for name, number in numbers.items()}
-    return compressed(_arrays_of(increment.state) | numbers)
-
-
-def _arrays_of(state: mechanics.State) -> dict[str, np.ndarray]:
-    """Name the arrays as the files do: in the plane a contact point has vertex, edge and corner, and one slip.
-
-    In space they have their own names.
-    """
-    arrays = flat(state, without=_TIES) | _tie_arrays(state.ties)
-    if state.pose.positions.shape[1] == 3:
-        return arrays
-    vertex, edge, corner = mechanics.corners_and_edges(arrays.pop("features"))
-    rotations, slip = arrays["rotations"][:, 0], arrays.pop("slip")[:, 0]
-    return arrays | {"vertex": vertex, "edge": edge, "corner": corner, "along": slip, "rotations": rotations}
-
-
-def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
-    named = {"fell_at": np.zeros(0), **arrays} | {name: arrays[stored] for name, stored in _STORED_AS.items()}
-    if "features" not in arrays:
-        named["features"] = mechanics.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
-        named["slip"], named["rotations"] = arrays["along"][:, None], arrays["rotations"][:, None]
-    ties = {name.removeprefix(_OF_TIES): array for name, array in arrays.items() if name.startswith(_OF_TIES)}
-    state = from_flat(
-        named, mechanics.State, ties=from_flat(ties, mechanics.TieForces) if ties else mechanics.TieForces()
-    )
-    return from_flat(named, solver.Increment, held=state, checkpoint=None)
+    """Pack an increment with its arrays into the bytes of its file."""
+    return packed(replace(increment, held=increment.state, checkpoint=None))
 
 
 def numbered(increments: Sequence[solver.Increment], k: int) -> solver.Increment:
@@ -185,15 +155,6 @@ def numbered(increments: Sequence[solver.Increment], k: int) -> solver.Increment
     return increments[k]
 
 
-def _tie_arrays(ties: mechanics.TieForces) -> dict[str, np.ndarray]:
-    """Name the arrays of ties; none where there are none."""
-    return {f"{_OF_TIES}{name}": array for name, array in flat(ties).items()} if len(ties.forces) else {}
-
-
 def _numbers(increment: solver.Increment) -> tuple[float, ...]:
     values = (getattr(increment, field.name) for field in fields(increment))
     return tuple(value for value in values if isinstance(value, int | float))
-
-
-def _bytes_of(increment: solver.Increment) -> int:
-    return sum(array.nbytes for array in flat(increment.state, without=_TIES).values())

@@ -8,8 +8,7 @@ import json
 import math
 import zipfile
 import zlib
-from collections.abc import Collection, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from types import UnionType
 from typing import IO, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -24,20 +23,23 @@ MOST_BYTES = 1 << 30
 _TREE = "tree"
 
 
-def packed(value: Any, **extra: int | float | str) -> bytes:
+def packed(value: Any, *, compressed: bool = True, **extra: int | float | str) -> bytes:
     """Pack a dataclass into the bytes of an .npz file.
 
     Parameters
     ----------
     value : dataclass
         Its fields hold numbers, texts, None, arrays, other dataclasses, and tuples of these.
+    compressed : bool
+        Whether the file is to be small rather than written fast.
     **extra
         Numbers and texts that go with it; :func:`unpacked` gives them back.
     """
     arrays: dict[str, np.ndarray] = {}
     tree = {"value": _plain(value, arrays), "extra": extra}
     buffer = io.BytesIO()
-    np.savez(buffer, **{_TREE: np.array(json.dumps(tree))}, **arrays)  # type: ignore[arg-type]
+    save = np.savez_compressed if compressed else np.savez
+    save(buffer, **{_TREE: np.array(json.dumps(tree))}, **arrays)  # type: ignore[arg-type]
     return buffer.getvalue()
 
 
@@ -50,78 +52,21 @@ def unpacked(data: bytes, kind: type[T]) -> tuple[T, dict[str, Any]]:
         If the bytes are no such file, or hold a value of other fields (another version wrote them).
     """
     try:
-        arrays = checked_arrays(io.BytesIO(data))
+        arrays = _checked_arrays(data)
         tree = json.loads(str(arrays.pop(_TREE)))
         return _built(tree["value"], kind, arrays), dict(tree["extra"])
     except (KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"no stored {kind.__name__}: {error}") from None
 
 
-def flat(value: Any, without: Collection[str] = ()) -> dict[str, np.ndarray]:
-    """Make arrays of the fields of a dataclass, by their names, and of the fields of dataclasses in it.
-
-    Parameters
-    ----------
-    value : dataclass
-        Its fields hold numbers, texts, tuples of texts, arrays and other dataclasses; no two have one name.
-    without : collection of str
-        Fields to leave out.
-    """
+def size_of(value: Any) -> int:
+    """Count the bytes of the arrays in a dataclass."""
     arrays: dict[str, np.ndarray] = {}
-    for field in dataclasses.fields(value):
-        if field.name in without:
-            continue
-        one = getattr(value, field.name)
-        if dataclasses.is_dataclass(one):
-            arrays |= flat(one)
-        else:
-            arrays[field.name] = np.array(one, dtype=str) if isinstance(one, tuple | str) else np.asarray(one)
-    return arrays
+    _plain(value, arrays)
+    return sum(array.nbytes for array in arrays.values())
 
 
-def from_flat(arrays: Mapping[str, np.ndarray], kind: type[T], **given: Any) -> T:
-    """Make the dataclass of the given kind whose fields :func:`flat` made arrays of.
-
-    Parameters
-    ----------
-    arrays : mapping from name to array
-    kind : type
-    **given
-        Fields that were left out.
-
-    Raises
-    ------
-    KeyError
-        If an array is missing.
-    """
-    hints = get_type_hints(kind)
-    fields = dict(given)
-    for field in dataclasses.fields(kind):  # type: ignore[arg-type]
-        if field.name in given:
-            continue
-        if field.name not in arrays and field.default_factory is not dataclasses.MISSING:
-            # Arrays that came later: files of before have none.
-            continue
-        one = hints[field.name]
-        if dataclasses.is_dataclass(one):
-            fields[field.name] = from_flat(arrays, one)  # type: ignore[arg-type]
-        elif one is np.ndarray:
-            fields[field.name] = arrays[field.name]
-        elif get_origin(one) is tuple:
-            fields[field.name] = tuple(map(str, arrays[field.name]))
-        else:
-            fields[field.name] = one(arrays[field.name].item())
-    return kind(**fields)
-
-
-def compressed(arrays: Mapping[str, np.ndarray]) -> bytes:
-    """Pack arrays into the bytes of an .npz file."""
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
-    return buffer.getvalue()
-
-
-def checked_arrays(source: str | Path | io.BytesIO) -> dict[str, np.ndarray]:
+def _checked_arrays(data: bytes) -> dict[str, np.ndarray]:
     """Read all arrays of an .npz file; refuse one with anything in it that could run.
 
     Raises
@@ -130,7 +75,7 @@ def checked_arrays(source: str | Path | io.BytesIO) -> dict[str, np.ndarray]:
         If it is no such file, or announces more than :data:`MOST_BYTES`.
     """
     try:
-        with zipfile.ZipFile(source) as archive:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
             if size > MOST_BYTES:
                 raise ValueError(f"it unpacks to {size} bytes")
@@ -141,9 +86,7 @@ def checked_arrays(source: str | Path | io.BytesIO) -> dict[str, np.ndarray]:
                     shape, _, kind = reader(entry)
                     if math.prod(shape) * kind.itemsize > MOST_BYTES:
                         raise ValueError(f"it announces an array of shape {shape}")
-        if isinstance(source, io.BytesIO):
-            source.seek(0)
-        with np.load(source, allow_pickle=False) as stored:
+        with np.load(io.BytesIO(data), allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}
     except (KeyError, TypeError, AttributeError, EOFError, SyntaxError, RuntimeError, NotImplementedError) as error:
         raise ValueError(f"it is not what a run wrote: {error}") from None
@@ -174,15 +117,17 @@ def _plain(value: Any, arrays: dict[str, np.ndarray]) -> Any:
 
 def _built(stored: Any, kind: Any, arrays: Mapping[str, np.ndarray]) -> Any:
     """Build the value of the annotated kind; raises TypeError where the kind does not fit what is stored."""
+    if kind is Any:
+        return stored
     if get_origin(kind) in (Union, UnionType):
         if stored is None:
             return None
-        kind = next(part for part in get_args(kind) if part is not type(None))
+        parts = [part for part in get_args(kind) if part is not type(None)]
+        kind = next((part for part in parts if _names(part) and _names(part) == sorted(stored)), parts[0])
     if dataclasses.is_dataclass(kind):
-        hints = get_type_hints(kind)
-        names = [field.name for field in dataclasses.fields(kind)]
-        if sorted(stored) != sorted(names):
-            raise TypeError(f"it has the fields {sorted(stored)}, not {sorted(names)}")
+        hints, names = get_type_hints(kind), _names(kind)
+        if sorted(stored) != names:
+            raise TypeError(f"it has the fields {sorted(stored)}, not {names}")
         return kind(**{name: _built(stored[name], hints[name], arrays) for name in names})  # type: ignore[operator]
     if kind is np.ndarray:
         return arrays[stored]
@@ -191,3 +136,8 @@ def _built(stored: Any, kind: Any, arrays: Mapping[str, np.ndarray]) -> Any:
         each = [kinds[0]] * len(stored) if len(kinds) == 2 and kinds[1] is Ellipsis else kinds
         return tuple(_built(item, one, arrays) for item, one in zip(stored, each, strict=True))
     return kind(stored)
+
+
+def _names(kind: Any) -> list[str]:
+    """List the fields of a kind of dataclass; none of others."""
+    return sorted(field.name for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else []

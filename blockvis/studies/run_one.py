@@ -76,7 +76,8 @@ def run_once(
         # Warnings about the layout would appear once per run; a run outside a study shows them.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found, shape = _outcome(case_of(run_values(values, order, n_seeded), Path(source)), seconds)
+            case = case_of(run_values(values, order, n_seeded), Path(source))
+            found, shape = _outcome(case, order["run"], seconds)
     except Exception as error:  # noqa: BLE001 - any error is this run's result and must not end the study
         return failed_row(order, _reason(error), time.perf_counter() - started), b""
     return _row(order, **found, seconds=time.perf_counter() - started), shape
@@ -103,7 +104,7 @@ def _reason(error: Exception) -> str:
     return f"{kind}{error}".strip() or type(error).__name__
 
 
-def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
+def _outcome(case: Case, number: int, seconds: float | None) -> tuple[dict[str, Any], bytes]:
     """Follow a case by its kind of analysis; give what the table says of it, and the shape of its mechanism."""
     # Where nothing stands at all the first frame of the fall shows the mechanism; the others are not needed.
     case = replace(case, controls=replace(case.controls, falling_frames=1))
@@ -135,7 +136,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         "sliding_joints": len(mechanism.sliding),
     }
     settlement = response.settlements[collapse_phase(response) or 0]
-    return found, _shape(assembly, falls, mechanism, settlement, known_ties(response))
+    return found, _shape(number, assembly, falls, mechanism, settlement, known_ties(response))
 
 
 def _numbers(response: solver.Response) -> dict[str, Any]:
@@ -205,13 +206,14 @@ def _joints(names: Sequence[str], pairs: Sequence[Sequence[int]]) -> str:
 
 
 def _shape(
+    number: int,
     assembly: solver.Assembly,
     falling: solver.Increment,
     mechanism: mechanics.Mechanism,
     settlement: solver.Settlement,
     ties: Sequence[solver.Tie],
 ) -> bytes:
-    """Pack the blocks as the mechanism displaces them, for a small picture.
+    """Pack the blocks as the mechanism of the run with a number displaces them, for a small picture.
 
     Of blocks in space these are the faces that are seen, as they are seen. The arrows are where supports settle, and
     which way.
@@ -235,6 +237,7 @@ def _shape(
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
+        run=number,
         vertices=vertices,
         at_rest=at_rest,
         offsets=offsets.astype(np.int32),

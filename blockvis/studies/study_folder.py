@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import shutil
@@ -17,7 +16,6 @@ import numpy as np
 
 import solver
 from blockvis.results.folder import locked
-from blockvis.results.npz import compressed
 from blockvis.system.atomic_files import atomic_file, flush, make_folder, write_atomic
 from solver.mechanics import counted
 
@@ -148,9 +146,7 @@ class StudyFolder:
         first = self._first[file]
         if first is None or row["run"] < first:
             self._first[file] = row["run"]
-            with np.load(io.BytesIO(shape)) as stored:
-                arrays = {name: stored[name] for name in stored.files}
-            write_atomic(file, compressed({**arrays, "run": np.array(row["run"])}))
+            write_atomic(file, shape)
 
     def shape_file(self, mechanism_class: str) -> Path:
         """File of the shape of a class of mechanisms."""

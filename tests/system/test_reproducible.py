@@ -5,9 +5,8 @@ import json
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
-from structures import case_from, run_command
+from structures import case_from, run_command, stored_bytes
 
 from blockvis.cli import main
 
@@ -37,8 +36,7 @@ TIMINGS = {
 
 def _without_timings(path: Path) -> bytes:
     if path.suffix == ".npz" and path.name.startswith("state"):
-        with np.load(path) as stored:
-            return b"".join(stored[name].tobytes() for name in stored.files if name != "seconds")
+        return stored_bytes(path)
     data = path.read_bytes()
     return re.sub(*TIMINGS[path.name], data) if path.name in TIMINGS else data
 

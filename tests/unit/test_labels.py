@@ -271,7 +271,7 @@ def test_tiles_of_studies_hold_supports_and_their_arrow():
     response = arch_response()
     last = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
     mechanism = mechanics.mechanism_of(response.assembly, last)
-    with np.load(io.BytesIO(_shape(response.assembly, last, mechanism, response.settlements[0], ()))) as stored:
+    with np.load(io.BytesIO(_shape(0, response.assembly, last, mechanism, response.settlements[0], ()))) as stored:
         shape = {name: stored[name] for name in stored.files}
     np.testing.assert_allclose(shape["arrows"][:, 1], [[1.0, 0.0]])
     # Coordinates of a national grid keep their digits, which single precision would round to 0.25 m.

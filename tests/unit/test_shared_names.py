@@ -114,14 +114,3 @@ def test_a_number_that_was_drawn_makes_no_piece_of_a_support(response):
     """Two supports drawn as "pier 1" and "pier 2" are no pieces of a "pier" that nobody has drawn."""
     with pytest.raises(ValueError, match=r"blocks: no block is named 'pier' \(did you mean 'pier \d'\?\)"):
         response(f'{STEP}direction = [0, -1]\nblocks = ["pier"]', ["pier 1", "mid", "pier 2", "beam", "cap", "cap"])
-
-
-def test_results_without_the_names_that_were_drawn_are_refused(response, tmp_path):
-    """Names that are numbered do not tell which blocks were drawn with one."""
-    response(SETTLES)
-    path = tmp_path / "out" / "assembly.npz"
-    with np.load(path) as stored:
-        kept = {key: stored[key] for key in stored.files if key != "drawn_names"}
-    np.savez(path, **kept)
-    with pytest.raises(ValueError, match=r"assembly.npz' cannot be read \('drawn_names'\); run the case again"):
-        blockvis.open_results(tmp_path / "out")
