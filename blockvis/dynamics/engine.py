@@ -63,8 +63,6 @@ class Engine:
         With the ground.
     loads : (n_blocks, n_dof) array [N, N·m]
         At the pose.
-    interfaces : solver.Interfaces
-    pose : solver.Pose
     velocity : (n_blocks, n_dof) array [m/s, rad/s]
         At the start.
     removed : (n_blocks,) bool array, optional
@@ -80,7 +78,6 @@ class Engine:
 
     Attributes
     ----------
-    pose : solver.Pose
     velocity : (n_blocks, n_dof) array
         In block sizes, radians and √(block size / g).
     rest : (n_ties,) array [m]

@@ -122,7 +122,6 @@ def fall_of(
 
     Parameters
     ----------
-    response : solver.Response
     progress : callable, optional
         Called with the seconds [s] of the fall that are worked out.
     watch : callable, optional
@@ -239,7 +238,6 @@ def engine_of(response: solver.Response, push: float) -> tuple[Engine, float]:
 
     Parameters
     ----------
-    response : solver.Response
     push : float [m/s]
         Speed of the fastest block of the mechanism at the start.
     """
@@ -268,8 +266,6 @@ def falling_increment(response: solver.Response, fall: Fall, time: float) -> sol
 
     Parameters
     ----------
-    response : solver.Response
-    fall : Fall
     time : float [s]
     """
     last, pose = response.path[-1], fall.at(time)

@@ -47,8 +47,6 @@ def on_ground(assembly: solver.Assembly, pose: solver.Pose, ground: float) -> tu
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    pose : solver.Pose
     ground : float [m]
         Height of its upper face.
     """

@@ -35,7 +35,6 @@ def free_spin(inertia: np.ndarray, spin: np.ndarray, time: float) -> tuple[np.nd
     Parameters
     ----------
     inertia, spin : (n, 3) arrays
-    time : float
 
     Returns
     -------

@@ -131,9 +131,6 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
     ----------
     assembly : solver.Assembly
         As drawn.
-    settings : ExplainSettings
-    source : Path
-        The case file, for messages.
 
     Raises
     ------
@@ -185,13 +182,6 @@ def _bearing(assembly: solver.Assembly, names: Sequence[str] | None = None) -> l
 
 def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> list[Candidate]:
     """List the causes that are looked at first.
-
-    Parameters
-    ----------
-    ground : Ground
-    settings : ExplainSettings
-    source : Path
-        The case file, for messages.
 
     Raises
     ------
@@ -358,7 +348,6 @@ def refined(ground: Ground, best: Sequence[Candidate], known: Sequence[Candidate
 
     Parameters
     ----------
-    ground : Ground
     best : sequence of Candidate
         The best of each cause that is worth it.
     known : sequence of Candidate

@@ -251,9 +251,6 @@ class _Search:
 
     Parameters
     ----------
-    case : Case
-    ground : Ground
-    observations : Observations
     runs : dict
         Followed earlier, by what they depend on; new ones are added.
     """

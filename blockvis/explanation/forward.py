@@ -123,7 +123,6 @@ def reach_of(observations: Observations, limit: float | None) -> tuple[float, fl
 
     Parameters
     ----------
-    observations : Observations
     limit : float, optional [m]
         Largest displacement of a support, where the case gives it.
     """
@@ -168,11 +167,9 @@ def ordered(
 
     Parameters
     ----------
-    case : Case
     assembly : solver.Assembly
         Every support fixed.
     motions : mapping of str to (n_dof,) tuple
-    variant : Variant
     reach : (float, float) [m]
         Largest displacement of a support, and opening of a joint at which the run may stop.
     """
@@ -281,8 +278,6 @@ def all_followed(
 
     Parameters
     ----------
-    orders : sequence of Order
-    processes : concurrent.futures.Executor, optional
     progress : RunsProgress, optional
         Counts them.
 

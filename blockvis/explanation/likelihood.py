@@ -69,9 +69,6 @@ class Comparison:
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    observations : Observations
-    trust : Trust
     farthest : float [m]
         How far a support goes that is looked at.
     """
@@ -254,8 +251,6 @@ class Trial:
 
     Attributes
     ----------
-    candidate : Candidate
-    variant : Variant
     run : Run
         Of the candidate itself, or of its twin.
     twin : Twin
@@ -332,11 +327,6 @@ def tried(
 
     Parameters
     ----------
-    comparison : Comparison
-    candidate : Candidate
-    variant : Variant
-    run : Run
-    twin : Twin
     shared : Candidate
         Whose run it is.
     unit : str

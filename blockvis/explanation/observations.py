@@ -83,7 +83,6 @@ class Observations:
     displacements : (m, d) array [m]
     point_uncertainties : (m,) array [m]
         Of each coordinate.
-    source : str
     """
 
     places: np.ndarray

@@ -74,7 +74,6 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
 
     Parameters
     ----------
-    found : Explanation
     path : path
         Ending in .png, .svg or .pdf.
     """
@@ -171,9 +170,6 @@ class _Canvas:
 
     Attributes
     ----------
-    panel : matplotlib.axes.Axes
-    assembly : solver.Assembly
-    frame : Frame
     view : View, optional
         Of blocks in space.
     """
@@ -267,7 +263,6 @@ class _Sights:
 
     Attributes
     ----------
-    rings : Rings
     pieces : (n_points, PIECES, 3) array [m], optional
         Places along the edges, of joints in space.
     seen : (n_points, PIECES) bool array, optional

@@ -23,7 +23,6 @@ def on_faces(points: np.ndarray, joints: InitialJoints) -> tuple[np.ndarray, np.
     Parameters
     ----------
     points : (n, d) array [m]
-    joints : InitialJoints
 
     Returns
     -------

@@ -54,7 +54,6 @@ class Cause:
         The likeliest candidate and friction.
     at : int
         Number of the likeliest amount.
-    trials : tuple of Trial
     weights : tuple of float
         Of the trials within the cause.
     """
@@ -225,7 +224,6 @@ def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measure
 
     Parameters
     ----------
-    comparison : Comparison
     causes : sequence of Cause
         In the order of their probability. The width is to decide among those that the observations cannot tell apart,
         whatever it would tell about the others; where the first is told apart, between that and the next ones.

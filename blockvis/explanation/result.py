@@ -21,11 +21,8 @@ class Explanation:
 
     Attributes
     ----------
-    case : Case
     assembly : solver.Assembly
         As it was analysed: every support fixed, the ground cut where troughs were looked at.
-    observations : Observations
-    comparison : Comparison
     causes : tuple of Cause
         The most probable first; empty where no candidate makes any of the cracks, or stands at any amount.
     unexplained : tuple of int
@@ -38,7 +35,6 @@ class Explanation:
         The joint that would tell the first causes apart best.
     runs : dict
         Of the candidates: ``explain(..., runs=...)`` takes them instead of following them again.
-    notes : tuple of str
     words : str
         What came out, for people.
     """

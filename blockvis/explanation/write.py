@@ -56,7 +56,6 @@ def explanation_html(found: Explanation, picture: bytes) -> str:
 
     Parameters
     ----------
-    found : Explanation
     picture : bytes
         Its picture, a PNG.
     """

@@ -88,7 +88,6 @@ def in_phase(response: solver.Response, phase: int) -> str:
 
     Parameters
     ----------
-    response : solver.Response
     phase : int
         Number of the settlement, from 0.
     """

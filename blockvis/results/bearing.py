@@ -22,7 +22,6 @@ class Bearing:
 
     Attributes
     ----------
-    name : str
     force : float [N]
         Normal to its face.
     pressures : (float, float) [Pa]

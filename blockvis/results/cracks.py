@@ -137,10 +137,6 @@ def cracks_of(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    pose : solver.Pose
-    joints : InitialJoints, optional
-        Of the assembly, where they are known already.
     fallen : (n_blocks,) bool array, optional
         Blocks that have left for good, whose joints are no cracks.
     """
@@ -168,7 +164,6 @@ def slid_joints(assembly: solver.Assembly, moved: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    assembly : solver.Assembly
     moved : (n_joints, 2) array [m]
         As of :func:`opening_and_slip`.
     """

@@ -55,7 +55,6 @@ def block_grid(
 
     Parameters
     ----------
-    assembly : solver.Assembly
     increment : solver.Increment, optional
         The blocks as laid out by default.
     shape : {"moved", "undeformed"}
@@ -127,12 +126,8 @@ def joint_grid(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    increment : solver.Increment
     shape : {"moved", "undeformed"}
         As of :func:`block_grid`.
-    joints : InitialJoints, optional
-        Of the assembly, where they are at hand.
 
     Returns
     -------
@@ -185,8 +180,6 @@ def contact_grid(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    increment : solver.Increment
     shape : {"moved", "undeformed"}
         As of :func:`block_grid`.
 
@@ -243,9 +236,6 @@ def tie_grid(
 
     Parameters
     ----------
-    ties : sequence of solver.Tie
-    assembly : solver.Assembly
-    increment : solver.Increment
     shape : {"moved", "undeformed"}
         As of :func:`block_grid`.
 
@@ -365,13 +355,7 @@ def _describe(grid: vtkUnstructuredGrid, increment: solver.Increment) -> None:
 
 
 def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
-    """Add arrays to the point, cell or field data of a VTK grid.
-
-    Parameters
-    ----------
-    attributes : vtkFieldData
-    arrays : mapping from name to array
-    """
+    """Add arrays to the point, cell or field data of a VTK grid."""
     for name, array in arrays.items():
         values = numpy_to_vtk(np.ascontiguousarray(array), deep=True)
         values.SetName(name)

@@ -37,13 +37,8 @@ def write_fall(
 
     Parameters
     ----------
-    fall : Fall
     response : solver.Response
         Of which it is the fall.
-    folder : Path
-        Of the results.
-    vtu : ViewerFormat
-        As of the folder.
     """
     from blockvis.system.vtk_files import write_pvd, write_vtu
 
@@ -65,8 +60,6 @@ def fall_grid(
 
     Parameters
     ----------
-    response : solver.Response
-    fall : Fall
     time : float [s]
     shape : {"moved", "undeformed"}
     falls : (n_blocks,) bool array, optional

@@ -102,8 +102,6 @@ class ResultsFolder:
 
     Parameters
     ----------
-    path : str or Path
-    assembly : solver.Assembly
     record : Record, optional
         What the run is made from.
     overwrite : bool
@@ -170,13 +168,8 @@ class ResultsFolder:
 
         Parameters
         ----------
-        path : str or Path
-        parameter : solver.mechanics.Quantity
-            As of the folder.
         kind : type
             Of the checkpoint.
-        vtu : ViewerFormat
-            As of the folder.
 
         Returns
         -------
@@ -245,7 +238,6 @@ class ResultsFolder:
 
         Parameters
         ----------
-        response : solver.Response
         seconds : float
             Solver time.
         own : mapping, optional
@@ -412,7 +404,6 @@ def add_to_summary(folder: Path, **found: Any) -> None:
 
     Parameters
     ----------
-    folder : Path
     **found
         By the names of the keys.
     """

@@ -29,7 +29,6 @@ class StateInFile:
 
     Attributes
     ----------
-    files : StoredIncrements
     number : int
         Of the increment.
     numbers : tuple of float

@@ -48,9 +48,6 @@ def carried_faces(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    joints : InitialJoints
-    pose : solver.Pose
     fallen : (n_blocks,) bool array, optional
         Blocks that have fallen or were taken away by then: their joints are no more, and have neither gap nor slip.
     """
@@ -241,7 +238,6 @@ class LargestMovements:
 
     Parameters
     ----------
-    assembly : solver.Assembly
     parameter : solver.mechanics.Quantity
         What the increments run over.
     """

@@ -21,8 +21,6 @@ def block_motion(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    increment : solver.Increment
     falls : (n_blocks,) bool array, optional
         Blocks that the collapse takes; by default those that have fallen, in frames of a fall those that move.
     """
@@ -46,8 +44,6 @@ def next_places(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    increment : solver.Increment
     points : (n_points, d) array [m]
     *blocks : (n_points,) int arrays
         The block each point moves with, or the two between which it stays midway.

@@ -28,7 +28,6 @@ class Record:
         Text of the case file; empty where the run came from Python.
     case_file, layout_file : str
         Absolute paths; empty where there is none.
-    case_sha256, layout_sha256 : str
     versions : dict
         Of Python and of the packages, and the platform.
     """

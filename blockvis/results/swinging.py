@@ -15,8 +15,6 @@ def corner_speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarr
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    pose : solver.Pose
     motion : (n_blocks, n_dof) array
     """
     block = assembly.block_of_vertex
@@ -35,8 +33,6 @@ def swing_factors(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    increment : solver.Increment
     reach : float
         In extents of the free blocks.
     shares : (n,) array
@@ -53,7 +49,6 @@ def swung_increment(increment: solver.Increment, motion: np.ndarray) -> solver.I
 
     Parameters
     ----------
-    increment : solver.Increment
     motion : (n_blocks, n_dof) array
     """
     contacts, pose = increment.contacts, mechanics.swung(increment.pose, motion)

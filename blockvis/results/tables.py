@@ -49,7 +49,6 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
 
     Parameters
     ----------
-    response : solver.Response
     seconds : float
         Solver time.
     record : Record
@@ -163,9 +162,6 @@ def row_of_increment(
 
     Parameters
     ----------
-    number : int
-    increment : solver.Increment
-    assembly : solver.Assembly
     parameter : solver.mechanics.Quantity
         What the increments run over.
     """

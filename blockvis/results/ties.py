@@ -114,7 +114,6 @@ class TieCourse:
 
     Attributes
     ----------
-    name, kind : str
     largest_force : float [N]
         Tension positive.
     largest_force_at : float [m or rad]
@@ -239,7 +238,6 @@ def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, s
 
     Parameters
     ----------
-    course : TieCourse
     response : solver.Response
         Which says in what unit and in how many phases the supports move.
     """

@@ -28,8 +28,6 @@ class ViewerFormat:
     ----------
     shape : {"moved", "undeformed"}
         Of the blocks; see :func:`blockvis.results.datasets.block_grid`.
-    strings : bool
-        As of :func:`blockvis.system.vtk_files.write_vtu`.
     """
 
     shape: str = "moved"
@@ -55,13 +53,8 @@ class ViewerFiles:
 
     Parameters
     ----------
-    folder : Path
-    assembly : solver.Assembly
-    vtu : ViewerFormat
     increments : sequence of solver.Increment
         Whose files are there already.
-    joints : InitialJoints, optional
-        Of the assembly, where they are at hand.
     """
 
     def __init__(
@@ -97,13 +90,6 @@ def write_lists(folder: Path, increments: Sequence[solver.Increment], *, durable
     """Write the lists of the VTU files to the last equilibrium, for which the parameter is the time.
 
     Where nothing is in equilibrium, they name all there is.
-
-    Parameters
-    ----------
-    folder : Path
-    increments : sequence of solver.Increment
-    durable : bool
-        As of :func:`blockvis.system.atomic_files.atomic_file`.
     """
     path = [increment for increment in increments if increment.status == solver.Status.EQUILIBRIUM]
     times = output_times(path or increments)
@@ -116,15 +102,6 @@ def restore_grids(
     folder: Path, assembly: solver.Assembly, increments: Sequence[solver.Increment], vtu: ViewerFormat
 ) -> int:
     """Make the VTU files again that a power cut has left empty, or half there.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the results.
-    assembly, increments
-        Of the results.
-    vtu : ViewerFormat
-        As of the folder.
 
     Returns
     -------
@@ -140,18 +117,7 @@ def restore_grids(
 
 
 def write_end(folder: Path, response: solver.Response, vtu: ViewerFormat, joints: InitialJoints | None = None) -> None:
-    """Write the VTU files of the last equilibrium again, when the collapse that follows it is known.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the results.
-    response : solver.Response
-    vtu : ViewerFormat
-        As of the folder.
-    joints : InitialJoints, optional
-        Of the assembly, where they are at hand.
-    """
+    """Write the VTU files of the last equilibrium again, when the collapse that follows it is known."""
     if response.path and response.collapse is not None:
         last, falls = as_shown(response, response.path[-1])
         write_grids(folder, len(response.path) - 1, response.assembly, last, vtu, joints, falls)
@@ -170,16 +136,8 @@ def write_grids(
 
     Parameters
     ----------
-    folder : Path
-        Of the results.
     number : int
         Of the increment.
-    assembly : solver.Assembly
-    increment : solver.Increment
-    vtu : ViewerFormat
-        As of the folder.
-    joints : InitialJoints, optional
-        Of the assembly, where they are at hand.
     falls : (n_blocks,) bool array, optional
         As of :func:`blockvis.results.datasets.block_grid`.
     """

@@ -30,7 +30,6 @@ def write_vtkhdf(response: solver.Response, path: Path) -> Path:
 
     Parameters
     ----------
-    response : solver.Response
     path : Path
         Ending in .vtkhdf.
 

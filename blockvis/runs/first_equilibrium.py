@@ -36,7 +36,6 @@ class FirstEquilibrium:
     ----------
     stands : bool or None
         None where it was not tried.
-    says : str
     falling : tuple of int
         Blocks that fall.
     """
@@ -51,7 +50,6 @@ def first_equilibrium(case: Case, assembly: solver.Assembly) -> FirstEquilibrium
 
     Parameters
     ----------
-    case : Case
     assembly : solver.Assembly
         That was built of it.
 

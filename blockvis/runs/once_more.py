@@ -45,7 +45,6 @@ class Traced:
         Of centroids.
     collapse : float, optional [m or rad]
         Parameter at collapse; 0 of what does not stand as drawn.
-    stop : str
     collapse_phase : int
         Number of the phase of the collapse, from 0.
     """

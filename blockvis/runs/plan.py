@@ -32,8 +32,6 @@ def planned(
 
     Parameters
     ----------
-    case : Case
-    assembly : solver.Assembly
     resume : optional
         Where it goes on from: the checkpoint of an increment, of the type that its kind of analysis has.
     found : sequence of solver.Increment

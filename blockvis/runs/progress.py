@@ -27,13 +27,7 @@ BEAT = 1.0
 
 
 class _Line:
-    """One line on stderr that is written again and again; where it is no terminal, lines now and then.
-
-    Parameters
-    ----------
-    stream : text stream, optional
-        stderr by default.
-    """
+    """One line on stderr that is written again and again; where it is no terminal, lines now and then."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = sys.stderr if stream is None else stream
@@ -62,13 +56,7 @@ class _Line:
 
 
 class DrawingProgress:
-    """A bar that counts the seconds of the fall as it is worked out, then the frames of the film.
-
-    Parameters
-    ----------
-    stream : text stream, optional
-        stderr by default.
-    """
+    """A bar that counts the seconds of the fall as it is worked out, then the frames of the film."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._line = _Line(stream)
@@ -95,8 +83,6 @@ class Progress:
     ----------
     course : Course
         What the increments run over.
-    stream : text stream, optional
-        stderr by default.
     assembly : solver.Assembly, optional
         Whose blocks move.
     count : int
@@ -191,8 +177,6 @@ class RunsProgress:
     ----------
     shown : bool
         Whether anything is written.
-    stream : text stream, optional
-        stderr by default.
     """
 
     def __init__(self, *, shown: bool = True, stream: TextIO | None = None) -> None:
@@ -240,8 +224,6 @@ class StudyProgress:
         Of these, finished earlier.
     shown : bool, optional
         By default, where somebody watches.
-    stream : text stream, optional
-        stderr by default.
     """
 
     def __init__(self, total: int, before: int = 0, *, shown: bool | None = None, stream: TextIO | None = None) -> None:

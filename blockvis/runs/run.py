@@ -53,7 +53,6 @@ class Run:
     ----------
     response : solver.Response
         Whose increments read their arrays from the folder when they are asked for.
-    folder : Path
     summary : dict
         What summary.json holds.
     missing : tuple of str

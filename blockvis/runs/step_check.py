@@ -147,7 +147,6 @@ class StepChecking:
 
         Parameters
         ----------
-        folder : str or Path
         response : solver.Response
             Of the case.
         patience : float, optional [s]
@@ -255,7 +254,6 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
 
     Parameters
     ----------
-    response : solver.Response
     other : Traced
         Of the same case.
     """

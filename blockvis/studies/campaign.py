@@ -209,7 +209,6 @@ def existing_cluster(address: str, file: str) -> Iterator[Client]:
 
     Parameters
     ----------
-    address : str
     file : str
         Layout file that every worker must see; empty for none.
     """
@@ -258,10 +257,8 @@ def carry_out(records: StudyFolder, todo: Sequence[int], client: Client, progres
 
     Parameters
     ----------
-    records : StudyFolder
     todo : sequence of int
         Runs to be made.
-    client : distributed.Client
     progress : bool
         Whether a progress bar is shown.
     """

@@ -78,8 +78,6 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
 
     Parameters
     ----------
-    study : Study
-    table : pandas.DataFrame
     path : path
         Of a PNG, SVG or PDF.
     """
@@ -332,10 +330,8 @@ def runs_counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str
 
     Parameters
     ----------
-    curve : Fragility
     table : pandas.DataFrame
         The rows that the curve is made of.
-    factor : float
     unit : str
         Of the settlements.
     """

@@ -88,8 +88,6 @@ def failed_row(order: Mapping[str, Any], message: str, seconds: float = 0.0) -> 
 
     Parameters
     ----------
-    order : mapping
-    message : str
     seconds : float [s]
     """
     return _row(order, status=FAILED, message=message, seconds=seconds)

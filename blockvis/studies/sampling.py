@@ -52,7 +52,6 @@ def designed(method: str, runs: int, levels: Sequence[int], repeats: int, seed: 
         Number of values of each parameter in a grid.
     repeats : int
         Runs per point of a grid.
-    seed : int
     scattered : bool
         Whether there are imperfections.
 

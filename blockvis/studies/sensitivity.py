@@ -29,7 +29,6 @@ class Swing:
 
     Attributes
     ----------
-    name : str
     low_value, high_value : float or str
         Mean of the parameter in the compared runs, or the value itself if it has few.
     low, high : float [m or rad]
@@ -76,7 +75,6 @@ def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
 
     Parameters
     ----------
-    study : Study
     table : pandas.DataFrame
         Its table.
 
@@ -124,7 +122,6 @@ def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, flo
 
     Parameters
     ----------
-    study : Study
     table : pandas.DataFrame
         Its table.
 

@@ -54,7 +54,6 @@ class Parameter:
         Its column in the table; by default the path.
     also : tuple of str
         Further paths of the same value.
-    distribution : Distribution or None
     values : tuple
         The values to choose from, if there is no distribution.
     weights : (n_values,) array
@@ -104,13 +103,10 @@ class Study:
         The base case as parsed TOML, with the imperfections of the study behind its own.
     n_seeded : int
         Number of the last of these imperfections, those of the study, which get a new seed in every run.
-    parameters : tuple of Parameter
-    method : str
     runs : int
         Number of runs in the study file: of a "saltelli" design the size of its two independent samples.
     repeats : int
         Runs per point of a grid, with different imperfections.
-    seed : int
     seconds : float or None
         Longest time of one run [s].
     keep : tuple of int

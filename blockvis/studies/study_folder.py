@@ -54,8 +54,6 @@ class StudyFolder:
 
     Parameters
     ----------
-    folder : str or Path
-    study : Study
     force : bool
         Whether rows of another study are deleted.
 

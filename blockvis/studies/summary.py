@@ -65,7 +65,6 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
 
     Parameters
     ----------
-    study : Study
     table : pandas.DataFrame
         Its table.
     """

@@ -43,8 +43,6 @@ def write_vtu(
         Whether arrays of strings are written as such, which meshio does not read; otherwise each is a field array of
         bytes, its strings in UTF-8 with a line feed after each, and polyhedra are in the order of their numbers of
         corners: meshio gives their data to others otherwise.
-    durable : bool
-        As of :func:`blockvis.system.atomic_files.atomic_file`.
 
     Notes
     -----
@@ -183,11 +181,8 @@ def write_pvd(
 
     Parameters
     ----------
-    path : path
     entries : iterable of (time, file)
         Files as given, relative to the folder of ``path``.
-    last, durable : bool
-        As of :func:`blockvis.system.atomic_files.atomic_file`.
     """
     lines = [
         '<?xml version="1.0"?>',

@@ -48,7 +48,6 @@ class Worker:
 
     Parameters
     ----------
-    module : str
     errors : bool
         Whether its standard error is kept for :class:`WorkerEnded`; it is that of this process by default.
 
