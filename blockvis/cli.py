@@ -31,7 +31,7 @@ from .text import nearest, resume_command
 if TYPE_CHECKING:
     from .cases.contents import Case
     from .layout.inspect import Inspection
-    from .runs.outputs import Output
+    from .runs.outputs import Drawing
     from .runs.run import Run
     from .runs.step_check import StepChecking
 
@@ -73,14 +73,14 @@ SHELLS = {
 }
 
 
-def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Drawing] | None = None) -> int:
     """Run the command line and return its exit code.
 
     Parameters
     ----------
     arguments : sequence of str, optional
         Those of the process by default.
-    outputs : sequence of Output, optional
+    outputs : sequence of Drawing, optional
         What runs make beside their numbers, in place of what the arguments say; a new case is drawn without them only.
     """
     warnings.showwarning = _notes_without_repeats()
@@ -550,13 +550,10 @@ def _compare(options: argparse.Namespace) -> int:
 
     folder = Path(options.output or f"{Path(options.one).name}-{Path(options.other).name}")
     film = None if options.animation == "none" else options.animation
-    progress = DrawingProgress()
-    try:
+    with DrawingProgress() as progress:
         written = compare(
             options.one, options.other, folder, film=film, overwrite=options.force, progress=progress.frame
         )
-    finally:
-        progress.done()
     print(f"compared in {folder}/: {', '.join(written)}")
     return 0
 
@@ -1039,12 +1036,9 @@ def _render(options: argparse.Namespace) -> int:
         draw_cracks(response, -1, folder / "cracks.png", **seen_from)
         drawn.append("cracks.png")
     if options.animation != "none":
-        progress = DrawingProgress()
-        try:
-            look |= seen_from | {"poster": folder / "poster.png"}
+        look |= seen_from | {"poster": folder / "poster.png"}
+        with DrawingProgress() as progress:
             animate(response, folder / options.animation, size=size, fall=fall, progress=progress.frame, **look)
-        finally:
-            progress.done()
         drawn += [options.animation, "poster.png"]
     print(f"drawn in {folder}/: {', '.join(drawn)}")
     return 0

@@ -53,29 +53,10 @@ class Clock:
             yield increment
 
 
-class Output:
-    """What a run makes beside its numbers; it is told of the run by these methods, in this order."""
+class Drawing:
+    """What a run makes beside its numbers: fall, pictures, report and film, which a process of its own draws.
 
-    def begin(self, case: Case) -> None:
-        """Prepare, before the assembly of the case is built."""
-
-    def follow(self, results: ResultsFolder) -> None:
-        """Take note of the results folder, before the first increment is added to it."""
-
-    def finish(self, case: Case, response: solver.Response, folder: Path, clock: Clock) -> tuple[str, ...]:
-        """Make what there is to make of a run that came to its end; returns what could not be made, and why."""
-        return ()
-
-    def close(self) -> None:
-        """End what is still at work, whatever has ended the run."""
-
-    def is_written(self, case: Case, folder: Path) -> bool:
-        """Whether all of it is in the folder of a finished run."""
-        return True
-
-
-class Drawing(Output):
-    """The fall, pictures, report and film of a run; a film is drawn by a process of its own.
+    It is told of the run by :meth:`begin`, :meth:`follow`, :meth:`finish` and :meth:`close`, in this order.
 
     Parameters
     ----------
@@ -96,7 +77,7 @@ class Drawing(Output):
         return case.animation if self._film and self._pictures else None
 
     def begin(self, case: Case) -> None:
-        """Read the photograph under the pictures, and start the process that draws the film, if there is one."""
+        """Before the assembly is built, read the photograph under the pictures and start the process of the film."""
         self._underlay = _underlay(case) if self._pictures else None
         if self._animation(case) is not None:
             from blockvis.pictures.film_process import FilmProcess
@@ -104,7 +85,7 @@ class Drawing(Output):
             self._process = FilmProcess()
 
     def follow(self, results: ResultsFolder) -> None:
-        """Have the files for viewers written by the process."""
+        """Have the files for viewers written by the process, before the first increment is added."""
         if self._process is not None:
             self._process.follow(results.path, results.assembly, results.vtu, len(results.increments))
             results.viewer = self._process
@@ -132,16 +113,15 @@ class Drawing(Output):
         return underlay
 
     def close(self) -> None:
-        """End the process, drawn or not."""
+        """End the process, whatever has ended the run."""
         if self._process is not None:
             self._process.close()
 
     def finish(self, case: Case, response: solver.Response, folder: Path, clock: Clock) -> tuple[str, ...]:
-        """Write the fall, the pictures, the report and the film of a results folder."""
+        """Write fall, pictures, report and film of a results folder; returns what could not be made, and why."""
         if not response.increments:
             return ()
         underlay = self._shown_underlay(case, response) if self._pictures else None
-        progress = DrawingProgress()
         stored = stored_fall(folder)
         animation, apart = self._animation(case), self._process
         eye = seen_from(case, response) if self._pictures else {}
@@ -160,8 +140,7 @@ class Drawing(Output):
 
                     draw_cracks(response, -1, folder / "cracks.png", **eye)
         with clock.counting("fall"):
-            fall = _fall(response, apart, progress) if stored is None else stored
-            progress.done()
+            fall = _fall(response, apart) if stored is None else stored
             if fall is not None and stored is None:
                 write_fall(fall, response, folder, viewer_format(case))
         if not self._pictures:
@@ -170,19 +149,16 @@ class Drawing(Output):
             write_report_of(response, folder, fall)
         problem = ""
         if apart is not None:
-            problem = _awaited(apart, progress, clock)
+            problem = _awaited(apart, clock)
         if response.path and (apart is None or problem):
             with clock.counting("curve"):
                 draw_curves(response, folder, ["curve.png"])
         if animation is not None and apart is None:
-            with clock.counting("film"):
+            with clock.counting("film"), DrawingProgress() as progress:
                 from blockvis.pictures.render import animate
 
-                try:
-                    look: dict[str, Any] = {"underlay": underlay, "poster": folder / "poster.png", **eye}
-                    animate(response, folder / animation, fall=fall, progress=progress.frame, **look)
-                finally:
-                    progress.done()
+                look: dict[str, Any] = {"underlay": underlay, "poster": folder / "poster.png", **eye}
+                animate(response, folder / animation, fall=fall, progress=progress.frame, **look)
         return (problem,) if problem else ()
 
 
@@ -239,29 +215,28 @@ def seen_from(case: Case, response: solver.Response) -> dict[str, Any]:
     return asked
 
 
-def _awaited(film: FilmProcess, progress: DrawingProgress, clock: Clock) -> str:
+def _awaited(film: FilmProcess, clock: Clock) -> str:
     """Wait for the process that draws curve and film; returns why it has ended without them, or nothing."""
     from blockvis.pictures.film_process import FilmFailed
 
     try:
-        with clock.counting("film"):
+        with clock.counting("film"), DrawingProgress() as progress:
             film.wait(progress.frame)
     except FilmFailed as error:
         return str(error)
-    finally:
-        progress.done()
     return ""
 
 
-def _fall(response: solver.Response, film: FilmProcess | None, progress: DrawingProgress) -> Fall | None:
+def _fall(response: solver.Response, film: FilmProcess | None) -> Fall | None:
     """Find the fall of a response: that of the process that draws the film, or worked out here."""
-    if film is not None:
-        from blockvis.pictures.film_process import FilmFailed
+    with DrawingProgress() as progress:
+        if film is not None:
+            from blockvis.pictures.film_process import FilmFailed
 
-        # What became of the process is told where the film is waited for.
-        with suppress(FilmFailed):
-            return _told(response, film.fall(progress.fall))
-    return _told(response, fall_of(response, progress.fall))
+            # What became of the process is told where the film is waited for.
+            with suppress(FilmFailed):
+                return _told(response, film.fall(progress.fall))
+        return _told(response, fall_of(response, progress.fall))
 
 
 def _told(response: solver.Response, fall: Fall | None) -> Fall | None:

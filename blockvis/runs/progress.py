@@ -71,7 +71,11 @@ class DrawingProgress:
         if self._line.due or (self._line.watched and done == total):
             self._line.write(f"frame {done} of {total}", done / max(total, 1))
 
-    def done(self) -> None:
+    def __enter__(self) -> DrawingProgress:
+        """Draw."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
         """Clear the bar."""
         self._line.clear()
 
@@ -110,11 +114,15 @@ class Progress:
                     what = f"increment {self.count + 1}" if state is None else f"{self.doing(state)}, in one step"
                     self._line.write(f"{what} for {still:.0f} s")
 
+    def _driver(self, phase: int) -> mechanics.Control | None:
+        drivers = self.course.drivers
+        return drivers[min(phase, len(drivers) - 1)] if drivers else None
+
     def doing(self, state: mechanics.PathState) -> str:
         """Say in words where an increment is: its parameter, the next step, and what moves."""
-        if not self.course.drivers:
+        driver = self._driver(state.phase)
+        if driver is None:
             return f"increment {self.count + 1}"
-        driver = self.course.drivers[min(state.phase, len(self.course.drivers) - 1)]
         words = (
             f"{self.course.parameter.name} {state.place.s:.6g} of at most {driver.limit:g} {driver.unit}, increment "
             f"{self.count + 1} in steps of {state.step:.2g}"
@@ -134,11 +142,10 @@ class Progress:
     def step(self, state: mechanics.PathState) -> None:
         """Show where an increment is that takes long."""
         self._state, self._at = state, time.perf_counter()
-        if not self._line.due or not self.course.drivers:
-            return
-        driver = self.course.drivers[min(state.phase, len(self.course.drivers) - 1)]
-        with self._writing:
-            self._line.write(self.doing(state), min(state.place.s / driver.limit, 1.0))
+        driver = self._driver(state.phase)
+        if self._line.due and driver is not None:
+            with self._writing:
+                self._line.write(self.doing(state), min(state.place.s / driver.limit, 1.0))
 
     def increment(self, increment: solver.Increment) -> None:
         """Show an increment."""
@@ -146,22 +153,16 @@ class Progress:
         self._state, self._at = None, time.perf_counter()
         if not self._line.due:
             return
-        parameter, measured, drivers = self.course.parameter, self.course.measured, self.course.drivers
+        measured, driver, part, where = self.course.measured, self._driver(increment.phase), None, ""
         what = f"{measured.name} {increment.measured:.5g} {measured.unit}".rstrip()
         if increment.status == solver.Status.FALLING:
             what = "falls"
-        if not drivers:
-            with self._writing:
-                self._line.write(f"{what}, {counted(self.count, 'increment')}")
-            return
-        driver = drivers[min(increment.phase, len(drivers) - 1)]
-        part = min(increment.parameter / driver.limit, 1.0)
+        if driver is not None:
+            part = min(increment.parameter / driver.limit, 1.0)
+            name = self.course.parameter.name
+            where = f"{name} {increment.parameter:.4g} of at most {driver.limit:g} {driver.unit}, "
         with self._writing:
-            self._line.write(
-                f"{parameter.name} {increment.parameter:.4g} of at most {driver.limit:g} {driver.unit}, {what}, "
-                f"{counted(self.count, 'increment')}",
-                part,
-            )
+            self._line.write(f"{where}{what}, {counted(self.count, 'increment')}", part)
 
     def done(self) -> None:
         """Clear the bar."""

@@ -25,7 +25,7 @@ from blockvis.system.atomic_files import PARTIAL
 from blockvis.text import resume_command
 from solver import mechanics
 
-from .outputs import Clock, Drawing, Output, viewer_format
+from .outputs import Clock, Drawing, viewer_format
 from .plan import planned
 from .progress import Progress
 from .reopen import open_results
@@ -87,7 +87,7 @@ def run_case(
     overwrite: bool = False,
     film: bool = True,
     pictures: bool = True,
-    outputs: Sequence[Output] | None = None,
+    outputs: Sequence[Drawing] | None = None,
     increment_seconds: float | None = None,
 ) -> Run:
     """Solve a case and write everything: VTU, PVD, CSV, summary, pictures.
@@ -101,7 +101,7 @@ def run_case(
         Whether results that are there already may be replaced.
     film, pictures : bool
         Draw the film of the case; draw anything at all, the report included.
-    outputs : sequence of Output, optional
+    outputs : sequence of Drawing, optional
         What is made beside the numbers, in place of what ``film`` and ``pictures`` say.
     increment_seconds : float, optional [s]
         What an increment may take, in place of what the case says.
@@ -149,7 +149,7 @@ def run_case(
 def resume_run(
     folder: str | Path,
     *,
-    outputs: Sequence[Output] | None = None,
+    outputs: Sequence[Drawing] | None = None,
     increment_seconds: float | None = None,
 ) -> Run:
     """Go on with a run that was stopped, from its results folder alone, to the result it would have had.
@@ -158,7 +158,7 @@ def resume_run(
     ----------
     folder : str or Path
         That a run has written, whatever ended it.
-    outputs : sequence of Output, optional
+    outputs : sequence of Drawing, optional
         As in :func:`run_case`.
     increment_seconds : float, optional [s]
         What an increment may take; by default what it takes, whatever the case says.
@@ -208,7 +208,7 @@ def _finished(folder: Path) -> dict[str, Any] | None:
 
 
 def _made(
-    outputs: Sequence[Output], case: Case, response: solver.Response, folder: Path, clock: Clock
+    outputs: Sequence[Drawing], case: Case, response: solver.Response, folder: Path, clock: Clock
 ) -> tuple[str, ...]:
     """Make what is wanted beside the numbers."""
     return tuple(missing for output in outputs for missing in output.finish(case, response, folder, clock))
@@ -226,7 +226,7 @@ def _resumable(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _begun(case: Case, outputs: Sequence[Output]) -> Iterator[None]:
+def _begun(case: Case, outputs: Sequence[Drawing]) -> Iterator[None]:
     """Have the outputs of a case begin, and end with it."""
     try:
         for output in outputs:
@@ -241,7 +241,7 @@ def _followed(
     case: Case,
     results: ResultsFolder,
     run: AnalysisRun,
-    outputs: Sequence[Output],
+    outputs: Sequence[Drawing],
     clock: Clock,
     increment_seconds: float | None,
 ) -> Run:
@@ -262,7 +262,7 @@ def _follow(
     case: Case,
     results: ResultsFolder,
     run: AnalysisRun,
-    outputs: Sequence[Output],
+    outputs: Sequence[Drawing],
     clock: Clock,
     increment_seconds: float | None,
 ) -> Run:
