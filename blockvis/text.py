@@ -209,16 +209,9 @@ def by_similarity(word: str, known: Iterable[str]) -> list[str]:
 
 
 def files_like(path: Path, pattern: str = "*", *, or_any: bool = False) -> list[str]:
-    """Find up to three names similar to that of a missing file, among the files of its folder that fit a pattern.
+    """Find up to three names similar to that of a missing file, among those of its folder that fit a pattern of glob.
 
-    Parameters
-    ----------
-    path : Path
-        Of the missing file.
-    pattern : str
-        As of ``Path.glob``.
-    or_any : bool
-        Whether less similar names, or any, are returned if none is similar.
+    ``or_any`` returns less similar names, or any, if none is similar.
     """
     beside = sorted(entry.name for entry in path.parent.glob(pattern)) if path.parent.is_dir() else []
     near = difflib.get_close_matches(path.name, beside, n=3, cutoff=0.4 if or_any else 0.6)

@@ -72,10 +72,7 @@ def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.Unstru
 def fall(response: solver.Response, time: float, shape: str) -> pv.UnstructuredGrid:
     """Make a dataset of the blocks at a time [s] of the fall, before it as at the last equilibrium.
 
-    Raises
-    ------
-    ValueError
-        Where nothing falls.
+    Raises ``ValueError`` where nothing falls.
     """
     import pyvista as pv
 

@@ -233,13 +233,8 @@ def _followed(
 def engine_of(response: solver.Response, push: float) -> tuple[Engine, float]:
     """Put the last equilibrium of a response above a ground, and give the height of that [m].
 
-    The supports are where no equilibrium is any more: at the last one a push would leave blocks on the last of their
-    bearing.
-
-    Parameters
-    ----------
-    push : float [m/s]
-        Speed of the fastest block of the mechanism at the start.
+    The push is the speed [m/s] of the fastest block of the mechanism at the start. The supports are where no
+    equilibrium is any more: at the last one a push would leave blocks on the last of their bearing.
     """
     assert response.collapse is not None
     last, end = response.path[-1].pose, response.increments[-1]
@@ -262,12 +257,7 @@ def engine_of(response: solver.Response, push: float) -> tuple[Engine, float]:
 
 
 def falling_increment(response: solver.Response, fall: Fall, time: float) -> solver.Increment:
-    """Make what pictures, pages and files show of a fall at a time: blocks and ties alone, no joints and no forces.
-
-    Parameters
-    ----------
-    time : float [s]
-    """
+    """Make what pictures, pages and files show of a fall at a time [s]: blocks and ties, no joints and no forces."""
     last, pose = response.path[-1], fall.at(time)
     nothing = np.zeros((0, last.forces.shape[1]))
     return replace(last, status=solver.Status.FALLING, checkpoint=None).with_arrays(

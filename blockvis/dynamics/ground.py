@@ -43,13 +43,7 @@ def ground_below(assembly: solver.Assembly, pose: solver.Pose, removed: np.ndarr
 
 
 def on_ground(assembly: solver.Assembly, pose: solver.Pose, ground: float) -> tuple[solver.Assembly, solver.Pose]:
-    """Add a slab as wide as anything can get, as the last block.
-
-    Parameters
-    ----------
-    ground : float [m]
-        Height of its upper face.
-    """
+    """Add a slab as wide as anything can get, its upper face at the height of the ground [m], as the last block."""
     corners, d = mechanics.moved_vertices(assembly, pose), assembly.dimension
     middle, size = corners.mean(axis=0), 4.0 * float(np.ptp(corners, axis=0).max())
     low = np.append(middle[:-1] - size, ground - 0.5 * assembly.block_size)

@@ -125,17 +125,9 @@ class Ground:
 
 
 def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path) -> Ground:
-    """Cut the supports of an assembly for troughs, where these are candidates.
+    """Cut the supports of an assembly, as drawn, for troughs, where these are candidates.
 
-    Parameters
-    ----------
-    assembly : solver.Assembly
-        As drawn.
-
-    Raises
-    ------
-    ValueError
-        For an assembly without supports, and troughs under one that stands on less than two places.
+    Raises ``ValueError`` for one without supports, and for troughs under one that stands on less than two places.
     """
     supports = np.flatnonzero(~assembly.free).tolist()
     if not supports:
@@ -183,10 +175,7 @@ def _bearing(assembly: solver.Assembly, names: Sequence[str] | None = None) -> l
 def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> list[Candidate]:
     """List the causes that are looked at first.
 
-    Raises
-    ------
-    ValueError
-        For a support of [explain] that there is not, and where no cause is left.
+    Raises ``ValueError`` for a support of [explain] that there is not, and where no cause is left.
     """
     names = list(ground.pieces)
     for group in settings.supports:
@@ -344,14 +333,9 @@ def _by_profile(ground: Ground, profile: Profile) -> Motions:
 
 
 def refined(ground: Ground, best: Sequence[Candidate], known: Sequence[Candidate]) -> list[Candidate]:
-    """List candidates around the best ones: movements between two directions, and troughs beside the best trough.
+    """List candidates around the best of causes that are worth it, but for those that are known.
 
-    Parameters
-    ----------
-    best : sequence of Candidate
-        The best of each cause that is worth it.
-    known : sequence of Candidate
-        Looked at already.
+    They are movements between two directions, and troughs beside the best trough.
     """
     found: list[Candidate] = []
     troughs = [one for one in known if one.is_trough]
@@ -416,10 +400,7 @@ class Twin:
 def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list[Twin]:
     """Find candidates that differ by a translation of the whole structure, which opens no crack.
 
-    Returns
-    -------
-    list of Twin
-        One per candidate; of itself where it has its own run.
+    Each has a twin: itself where it has its own run.
     """
     bearing = _bearing(assembly)
     size, d = float(np.ptp(assembly.vertices, axis=0).max()), assembly.dimension

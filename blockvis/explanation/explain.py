@@ -157,13 +157,7 @@ def explain(
 
 
 def _notes_of_frame(comparison: Comparison) -> list[str]:
-    """Say where displacements tell of supports against each other alone.
-
-    Raises
-    ------
-    ValueError
-        Where they tell of nothing.
-    """
+    """Say where displacements tell of supports against each other alone; raises ``ValueError`` where of nothing."""
     common, given = comparison.common, comparison.observations
     if common is None:
         return []

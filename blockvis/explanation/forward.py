@@ -119,13 +119,7 @@ class Run:
 
 
 def reach_of(observations: Observations, limit: float | None) -> tuple[float, float]:
-    """Say how far runs go: the largest displacement of a support, and the opening at which they may stop [m].
-
-    Parameters
-    ----------
-    limit : float, optional [m]
-        Largest displacement of a support, where the case gives it.
-    """
+    """Say how far runs go: the largest displacement of a support, if limited, and the opening to stop at [m]."""
 
     def rounded(length: float) -> float:
         # Runs that go a little farther serve other observations of the same structure, too.
@@ -163,16 +157,7 @@ def ordered(
     variant: Variant,
     reach: tuple[float, float],
 ) -> Order:
-    """State the run of a candidate.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-        Every support fixed.
-    motions : mapping of str to (n_dof,) tuple
-    reach : (float, float) [m]
-        Largest displacement of a support, and opening of a joint at which the run may stop.
-    """
+    """State the run of a candidate, by its motions of supports that are all fixed, as far as :func:`reach_of` says."""
     roles = assembly.roles.astype("<U6").copy()
     roles[[assembly.index(name) for name in motions]] = mechanics.MOVING
     moving = assembly.with_roles(roles)
@@ -227,16 +212,10 @@ def followed(order: Order) -> Run:
 
 @contextmanager
 def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterator[Executor | None]:
-    """Start or find the processes of the runs; None where this process makes them.
+    """Start or find the processes of about so many runs; None where this process makes them.
 
-    Parameters
-    ----------
-    runs : int
-        About so many there will be.
-    workers : int, optional
-        Processes of this machine; one per core where the runs are many.
-    scheduler : str, optional
-        Address of a Dask scheduler that exists.
+    ``workers`` are processes of this machine, one per core where the runs are many; ``scheduler`` is the address of a
+    Dask scheduler that exists.
     """
     if workers is not None and workers < 1:
         raise ValueError(f"workers is {workers}; give at least 1")
@@ -274,18 +253,7 @@ def _ignore_interrupts() -> None:
 def all_followed(
     orders: Sequence[Order], processes: Executor | None, progress: RunsProgress | None = None
 ) -> list[Run]:
-    """Carry out runs, in other processes or here.
-
-    Parameters
-    ----------
-    progress : RunsProgress, optional
-        Counts them.
-
-    Raises
-    ------
-    ValueError
-        Where processes cannot be started, or are ended by the system.
-    """
+    """Carry out runs, in other processes or here; raises ``ValueError`` where these cannot be started, or are ended."""
     count: Callable[[], None] = (lambda: None) if progress is None else progress.finished
     found = []
     if processes is None:

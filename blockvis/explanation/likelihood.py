@@ -158,16 +158,9 @@ class Comparison:
     def log_likelihood(self, widths: np.ndarray, displacements: np.ndarray) -> np.ndarray:
         """(n,) array: logarithm of the probability density of the observations.
 
-        Parameters
-        ----------
-        widths : (n, n_pairs) array [m]
-        displacements : (n, n_points, d) array [m]
-
-        Notes
-        -----
-        Each observation is normally distributed about what the model shows, with the variances of the measurement and
-        of the model added, or, with the probability of an outlier, evenly over twice the largest observed width, or as
-        far both ways as supports may have gone.
+        Widths are (n, n_pairs), displacements (n, n_points, d) [m]. Each observation is normally distributed about what
+        the model shows, with the variances of the measurement and of the model added, or, with the probability of an
+        outlier, evenly over twice the largest observed width, or as far both ways as supports may have gone.
         Observations beyond :data:`INDEPENDENT` sharpen nothing: all of them weigh less.
         """
         given = self.observations
@@ -202,14 +195,9 @@ class Comparison:
         return np.array(best, dtype=int).reshape(-1, len(widths)).T
 
     def made(self, widths: np.ndarray, displacements: np.ndarray) -> np.ndarray:
-        """(n,) bool array: whether any of the cracks, or displacements, that were observed is made at all.
+        """(n,) bool array: whether any crack (n, n_widths), or displacement (n, n_points, d), observed is made at all.
 
         Else a movement that moves nothing would be the likeliest cause of what no movement makes, at any amount.
-
-        Parameters
-        ----------
-        widths : (n, n_widths) array [m]
-        displacements : (n, n_points, d) array [m]
         """
         given = self.observations
         opened = given.widths > 0.0
@@ -220,13 +208,7 @@ class Comparison:
         return np.asarray(makes | (along > MADE * (observed**2).sum(axis=1)).any(axis=1))
 
     def misfits(self, widths: np.ndarray, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Differences from the observed widths and points, in standard deviations: (n, n_widths), (n, n_points).
-
-        Parameters
-        ----------
-        widths : (n, n_widths) array [m]
-        displacements : (n, n_points, d) array [m]
-        """
+        """Differences of widths (n, n_widths) and points (n, n_points, d) from the observed, in standard deviations."""
         sigma, spread = self.deviations
         over = (displacements - self.observations.displacements) / spread
         return (widths - self.observations.widths) / sigma, np.linalg.norm(over, axis=-1)
@@ -323,17 +305,7 @@ def tried(
     unit: str,
     largest: float,
 ) -> Trial:
-    """Compare a run with the observations, at every amount.
-
-    Parameters
-    ----------
-    shared : Candidate
-        Whose run it is.
-    unit : str
-        Of the amount.
-    largest : float [m or rad]
-        Largest amount of the candidate that is looked at.
-    """
+    """Compare the run of the candidate ``shared`` with the observations, at every amount up to a largest [m or rad]."""
     amounts = largest * np.geomspace(LEAST_AMOUNT, 1.0, AMOUNTS)
     if len(run.amounts) < 2:
         widths = np.zeros((AMOUNTS, len(comparison.observations.widths)))

@@ -392,16 +392,9 @@ def _between(
 
 
 def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> tuple[np.ndarray, bool, bool, str]:
-    """Find where a width was measured: somewhere in the joint between two blocks, or at its coordinates.
+    """Find the place (d,) [m] of a width: somewhere in the joint between two blocks, or at its coordinates.
 
-    Returns
-    -------
-    place : (d,) array [m]
-    named : bool
-        Whether the joint is known.
-    whole : bool
-        Whether the place along the joint is not.
-    label : str
+    Whether the joint is known, whether the place along it is not, and a label go with it.
     """
     axes = "xyz"[: assembly.dimension]
     if cells.text("joint"):

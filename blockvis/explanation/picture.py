@@ -70,13 +70,7 @@ MOST_LABELS = 24
 
 @plain_text
 def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
-    """Draw what was observed, and what the two most probable causes make.
-
-    Parameters
-    ----------
-    path : path
-        Ending in .png, .svg or .pdf.
-    """
+    """Draw what was observed, and what the two most probable causes make, as .png, .svg or .pdf."""
     assembly, causes = found.assembly, found.causes[:2]
     drawn = solver.Pose.initial(assembly)
     poses = [pose_of(assembly, cause.best.moved(cause.at)) for cause in causes]
@@ -274,13 +268,10 @@ class _Sights:
     seen: np.ndarray | None = None
 
     def of(self, places: np.ndarray, joints: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-        """Find what is seen of joints (n,) int, nearest to places (n, d) [m] on them first.
+        """Find what is seen of joints (n,) int, and whether anything is, (n,) bool.
 
-        Returns
-        -------
-        places : list of (m, d) arrays [m]
-            On edges of each joint; the one given where nothing of it is seen.
-        seen : (n,) bool array
+        The nearest to places (n, d) [m] on them come first. They are (m, d) [m], on edges of each joint; the one given
+        where nothing of it is seen.
         """
         found, seen = list(np.array(places)[:, None]), np.ones(len(places), dtype=bool)
         if self.pieces is None or self.seen is None:

@@ -197,10 +197,7 @@ def alike(causes: Sequence[Cause]) -> list[Cause]:
 def unexplained(comparison: Comparison, causes: Sequence[Cause], trials: Sequence[Trial]) -> tuple[np.ndarray, ...]:
     """Find what the best cause does not make, and what no candidate makes at any amount.
 
-    Returns
-    -------
-    by_best, by_none : (n_widths,) bool arrays
-    points_by_best, points_by_none : (n_points,) bool arrays
+    Of widths, (n_widths,) bool arrays, then of points, (n_points,).
     """
     widths = comparison.observations.widths
     best, at = causes[0].best, causes[0].at
@@ -222,11 +219,8 @@ def unexplained(comparison: Comparison, causes: Sequence[Cause], trials: Sequenc
 def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measurement | None:
     """Find the joint whose width tells most about which cause it is; None where no other than those measured does.
 
-    Parameters
-    ----------
-    causes : sequence of Cause
-        In the order of their probability. The width is to decide among those that the observations cannot tell apart,
-        whatever it would tell about the others; where the first is told apart, between that and the next ones.
+    It is to decide among the causes, the most probable first, that the observations cannot tell apart, whatever it
+    would tell about the others; where the first is told apart, between that and the next ones.
     """
     if len(causes) < 2:
         return None
@@ -258,12 +252,7 @@ def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measure
 def _information(mean: np.ndarray, sigma: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """(n_joints,) array: what a width is expected to tell about which of the causes it is, in nats.
 
-    Parameters
-    ----------
-    mean, sigma : (n_causes, n_joints) arrays [m]
-        Of the width, normally distributed under each cause.
-    weights : (n_causes,) array
-        Probabilities of the causes, with sum 1.
+    It is normally distributed under each cause, (n_causes, n_joints) [m]; weights (n_causes,) have the sum 1.
     """
     nodes, shares = np.polynomial.hermite_e.hermegauss(SAMPLES)
     told = np.zeros(mean.shape[1])

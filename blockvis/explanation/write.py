@@ -52,13 +52,7 @@ def write_explanation(found: Explanation, folder: Path) -> None:
 
 
 def explanation_html(found: Explanation, picture: bytes) -> str:
-    """Make the page as HTML text; it needs no network and makes no request.
-
-    Parameters
-    ----------
-    picture : bytes
-        Its picture, a PNG.
-    """
+    """Make the page as HTML text, with its picture as a PNG; it needs no network and makes no request."""
     room = files("blockvis")
     name = found.case.source.stem
     try:

@@ -68,29 +68,15 @@ def about(response: solver.Response) -> About:
 
 
 def least_reaction(first: solver.Increment) -> float:
-    """Find the reaction [N or N·m] that a first movement of the supports has to overcome.
+    """Find the reaction [N or N·m] that a first movement of the supports has to overcome, before anything has moved.
 
-    Parameters
-    ----------
-    first : solver.Increment
-        Of a settlement, before anything has moved.
-
-    Returns
-    -------
-    float
-        The least that equilibrium allows there; the reaction at rest where equilibrium sets no bound.
+    It is the least that equilibrium allows there; the reaction at rest where equilibrium sets no bound.
     """
     return float(first.least if math.isfinite(first.least) else first.reaction)
 
 
 def in_phase(response: solver.Response, phase: int) -> str:
-    """Say in which of several settlements a place is, which counts from its beginning; empty where there is but one.
-
-    Parameters
-    ----------
-    phase : int
-        Number of the settlement, from 0.
-    """
+    """Say in which of several settlements, by its number from 0, a place is; empty where there is but one."""
     return f" in phase {phase + 1}" if len(response.settlements) > 1 else ""
 
 
@@ -129,13 +115,7 @@ def certified(response: solver.Response) -> tuple[solver.Increment, ...]:
 
 
 def collapse_mechanism(response: solver.Response) -> mechanics.Mechanism | None:
-    """Find the collapse mechanism: what words, tables, curves, pictures and pages count.
-
-    Returns
-    -------
-    solver.mechanics.Mechanism or None
-        None where nothing collapses.
-    """
+    """Find the collapse mechanism, which words, tables, curves, pictures and pages count; None where there is none."""
     begins = with_mechanism(response)
     return None if begins is None else mechanics.mechanism_of(response.assembly, begins)
 

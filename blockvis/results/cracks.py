@@ -130,15 +130,10 @@ def cracks_of(
     joints: InitialJoints | None = None,
     fallen: np.ndarray | None = None,
 ) -> list[Crack]:
-    """Trace the cracks of a layout at a pose, the widest first.
+    """Trace the cracks of a layout at a pose, the widest first; joints of fallen blocks (n_blocks,) are none.
 
     In the plane joints that have parted or slid are followed as far as they stay near a straight line; where cracks
     fork, the one along which less has parted begins anew, and where one turns, another begins.
-
-    Parameters
-    ----------
-    fallen : (n_blocks,) bool array, optional
-        Blocks that have left for good, whose joints are no cracks.
     """
     joints = initial_joints(assembly) if joints is None else joints
     moved = opening_and_slip(assembly, joints, pose, fallen)
@@ -158,14 +153,9 @@ def cracks_of(
 
 
 def slid_joints(assembly: solver.Assembly, moved: np.ndarray) -> np.ndarray:
-    """(n,) int array: joints that have slid by far and are not open, the farthest first.
+    """(n,) int array: joints that by their opening and slip (n_joints, 2) [m] have slid by far and are not open.
 
-    They are a step in what a survey draws, whether a stepped crack runs through them or none.
-
-    Parameters
-    ----------
-    moved : (n_joints, 2) array [m]
-        As of :func:`opening_and_slip`.
+    The farthest come first. They are a step in what a survey draws, whether a stepped crack runs through them or none.
     """
     opening, slip = np.maximum(moved[:, 0], 0.0), np.abs(moved[:, 1])
     least = max(SMALLEST_OPENING * assembly.block_size, SLID * float(opening.max(initial=0.0)))

@@ -33,13 +33,7 @@ def write_fall(
     folder: Path,
     vtu: ViewerFormat = MOVED,
 ) -> None:
-    """Write the VTU files of a fall, the list of them, and its poses.
-
-    Parameters
-    ----------
-    response : solver.Response
-        Of which it is the fall.
-    """
+    """Write the VTU files of the fall of a response, the list of them, and its poses."""
     from blockvis.system.vtk_files import write_pvd, write_vtu
 
     make_folder(folder / "fall")
@@ -56,15 +50,7 @@ def write_fall(
 def fall_grid(
     response: solver.Response, fall: Fall, time: float, shape: str, falls: np.ndarray | None
 ) -> vtkUnstructuredGrid:
-    """Make a grid of the blocks, of which the collapse takes ``falls`` (n_blocks,), or of the ties at a time [s].
-
-    Parameters
-    ----------
-    time : float [s]
-    shape : {"moved", "undeformed"}
-    falls : (n_blocks,) bool array, optional
-        None for the ties.
-    """
+    """Make a grid of the blocks, of which ``falls`` (n_blocks,) are taken, at a time [s]; without it of the ties."""
     from .datasets import add_arrays, block_grid, tie_grid
 
     state = falling_increment(response, fall, time)
@@ -101,13 +87,7 @@ def remove_fall(folder: Path) -> None:
 
 
 def stored_fall(folder: Path) -> Fall | None:
-    """Read the fall of a results folder; None where there is none.
-
-    Raises
-    ------
-    ValueError
-        If its file is damaged; names it.
-    """
+    """Read the fall of a results folder, None where there is none; raises ``ValueError`` where its file is damaged."""
     file = folder / FALL_POSES
     if not file.is_file():
         return None

@@ -164,23 +164,9 @@ class ResultsFolder:
     def reopened(
         cls, path: str | Path, parameter: mechanics.Quantity, kind: type[C], vtu: ViewerFormat = MOVED
     ) -> tuple[ResultsFolder, C | None]:
-        """Reopen the folder of a run that was stopped, as it was after its last checkpoint.
+        """Reopen the folder of a run that was stopped, as it was after its last checkpoint, and give that, of a kind.
 
-        Parameters
-        ----------
-        kind : type
-            Of the checkpoint.
-
-        Returns
-        -------
-        results : ResultsFolder
-        checkpoint : of type ``kind``, optional
-            None where the run had written none.
-
-        Raises
-        ------
-        ValueError
-            If the folder holds no run.
+        Raises ``ValueError`` where the folder holds no run.
         """
         results = cls.__new__(cls)
         results.path, results.parameter, results.vtu = Path(path), parameter, vtu
@@ -234,17 +220,7 @@ class ResultsFolder:
         own: Mapping[str, Any] | None = None,
         tables: Mapping[str, str] | None = None,
     ) -> dict[str, Any]:
-        """Write and return the summary.
-
-        Parameters
-        ----------
-        seconds : float
-            Solver time.
-        own : mapping, optional
-            What the kind of analysis adds to the summary.
-        tables : mapping from file name to text, optional
-            Tables of the kind of analysis.
-        """
+        """Write the tables of the kind of analysis, by their files, and the summary with what it adds; returns that."""
         self._refuse_gone()
         self.tell(response)
         if not self.viewer.finish():
@@ -373,12 +349,7 @@ def _lock(handle: int) -> None:
 
 
 def stored_assembly(folder: Path) -> solver.Assembly:
-    """Read the assembly of a results folder.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Read the assembly of a results folder; raises ``ValueError`` where there is none, or its file is damaged."""
     if not (folder / "assembly.npz").is_file():
         raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
     try:
@@ -400,31 +371,16 @@ def stored_assembly(folder: Path) -> solver.Assembly:
 
 
 def add_to_summary(folder: Path, **found: Any) -> None:
-    """Add to summary.json what becomes known after it is written.
-
-    Parameters
-    ----------
-    **found
-        By the names of the keys.
-    """
+    """Add to summary.json, by the names of the keys, what becomes known after it is written."""
     file = folder / "summary.json"
     write_atomic(file, json.dumps({**read_json(file), **found}, indent=2, ensure_ascii=False) + "\n")
 
 
 def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
-    """Read the response of a results folder, without what its kind of analysis adds, and its summary.
+    """Read the response of a results folder, without what its kind of analysis adds, and its summary, empty if stopped.
 
-    Returns
-    -------
-    solver.Response
-        Its increments read their arrays from the folder when they are asked for; loads and interfaces are defaults.
-    dict
-        Empty where the run was stopped.
-
-    Raises
-    ------
-    ValueError
-        If the folder holds no results.
+    Increments read their arrays from the folder when they are asked for; loads and interfaces are defaults. Raises
+    ``ValueError`` where the folder holds no results.
     """
     assembly = stored_assembly(folder)
     files = StoredIncrements(folder)

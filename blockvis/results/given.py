@@ -39,10 +39,7 @@ def write_given(folder: Path, response: solver.Response) -> None:
 def with_given(folder: Path, response: solver.Response) -> solver.Response:
     """Give a response the laws, loads and changes of its folder, with a warning of what is not there.
 
-    Raises
-    ------
-    ValueError
-        For a file that no run has written.
+    Raises ``ValueError`` for a file that no run has written.
     """
     file = folder / GIVEN
     if not file.is_file():

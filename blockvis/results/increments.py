@@ -40,13 +40,7 @@ class StateInFile:
     numbers: tuple[float, ...]
 
     def read(self) -> mechanics.State:
-        """Read the state.
-
-        Raises
-        ------
-        ValueError
-            If the file is missing, damaged or no longer that of the increment; names it.
-        """
+        """Read the state; raises ``ValueError`` where the file is missing, damaged or of another increment."""
         found = self.files.read(self.number)
         if not np.array_equal(_numbers(found), self.numbers, equal_nan=True):
             file = self.files.file(self.number)
@@ -83,23 +77,11 @@ class StoredIncrements:
         return replace(increment, held=StateInFile(self, number, _numbers(increment)), checkpoint=None)
 
     def opened(self, number: int) -> solver.Increment:
-        """Open an increment; its file is read once, whole, so that damage is found at once.
-
-        Raises
-        ------
-        ValueError
-            If the file is missing or damaged; names it.
-        """
+        """Open an increment; its file is read once, whole: raises ``ValueError`` where it is missing or damaged."""
         return self.without_arrays(number, self._read(number))
 
     def read(self, number: int) -> solver.Increment:
-        """Read an increment with its arrays, from its file or from memory.
-
-        Raises
-        ------
-        ValueError
-            If the file is missing or damaged; names it.
-        """
+        """Read an increment with its arrays, from its file, as :meth:`opened` does, or from memory."""
         if number in self._last:
             self._last.move_to_end(number)
         else:

@@ -132,8 +132,6 @@ def lengths_of(ends: np.ndarray) -> np.ndarray:
 def initial_joints(assembly: solver.Assembly) -> InitialJoints:
     """Find the faces that touch in the layout; where they part later there is a crack.
 
-    Notes
-    -----
     In space the contact points of two faces are the corners of the polygon they have in common, so the polygon is their
     convex hull. Blocks that are not convex may have several.
     """

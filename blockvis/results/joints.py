@@ -46,10 +46,7 @@ def carried_faces(
 ) -> Faces:
     """Carry the faces of joints to a pose.
 
-    Parameters
-    ----------
-    fallen : (n_blocks,) bool array, optional
-        Blocks that have fallen or were taken away by then: their joints are no more, and have neither gap nor slip.
+    Joints of blocks (n_blocks,) that have fallen or were taken away by then are no more: neither gap nor slip.
     """
     initial, rings = solver.Pose.initial(assembly), joints.rings
     on_a, on_b = (

@@ -19,10 +19,7 @@ def block_motion(
 ) -> dict[str, np.ndarray]:
     """Make the cell arrays of blocks that describe the motion that follows.
 
-    Parameters
-    ----------
-    falls : (n_blocks,) bool array, optional
-        Blocks that the collapse takes; by default those that have fallen, in frames of a fall those that move.
+    The collapse takes blocks (n_blocks,); by default those that have fallen, in frames of a fall those that move.
     """
     parts, d = mechanics.rigid_parts(assembly, increment), assembly.dimension
     if falls is None:
@@ -42,11 +39,7 @@ def next_places(
 ) -> np.ndarray:
     """(n_points, d) array [m]: a step of points along the motion that follows, to first order, out of scale.
 
-    Parameters
-    ----------
-    points : (n_points, d) array [m]
-    *blocks : (n_points,) int arrays
-        The block each point moves with, or the two between which it stays midway.
+    Each moves with a block, (n_points,) int, or stays midway between two.
     """
     factor = swing_factor(assembly, increment, AHEAD)
     each = [mechanics.point_velocities(points, block, increment.pose, increment.velocity) for block in blocks]
@@ -54,27 +47,14 @@ def next_places(
 
 
 def part_of_friction(forces: np.ndarray, friction: np.ndarray) -> np.ndarray:
-    """(n_contacts,) array: shear force over what friction allows; 0 where it allows none.
-
-    Parameters
-    ----------
-    forces : (n_contacts, d) array [N]
-        Normal and shear.
-    friction : (n_contacts,) array
-    """
+    """(n_contacts,) array: shear of forces (n_contacts, d) over what friction allows; 0 where it allows none."""
     allowed = friction * forces[:, 0]
     shear = np.linalg.norm(forces[:, 1:], axis=1)
     return np.divide(shear, allowed, out=np.zeros(len(forces)), where=allowed > 0.0)
 
 
 def falling_in(response: solver.Response) -> np.ndarray:
-    """(n_blocks,) bool array: blocks that have fallen by the last equilibrium, or that the collapse takes.
-
-    Parameters
-    ----------
-    response : solver.Response
-        With an increment in equilibrium.
-    """
+    """(n_blocks,) bool array: blocks that have fallen by the last equilibrium, or that the collapse takes."""
     last, begins = response.path[-1], with_mechanism(response)
     falls = last.fallen & ~last.removed
     if begins is not None and response.collapse is not None and response.collapse.lost == "equilibrium":
@@ -83,13 +63,7 @@ def falling_in(response: solver.Response) -> np.ndarray:
 
 
 def at_last_equilibrium(response: solver.Response) -> solver.Increment:
-    """Give the last increment in equilibrium, where the collapse mechanism begins there with that as its motion.
-
-    Parameters
-    ----------
-    response : solver.Response
-        With an increment in equilibrium.
-    """
+    """Give the last increment in equilibrium, where the collapse mechanism begins there with that as its motion."""
     last, begins = response.path[-1], with_mechanism(response)
     return last if begins is None or falls_from(response) is not last else begins
 

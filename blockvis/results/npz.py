@@ -46,10 +46,7 @@ def packed(value: Any, *, compressed: bool = True, **extra: int | float | str) -
 def unpacked(data: bytes, kind: type[T]) -> tuple[T, dict[str, Any]]:
     """Unpack the bytes that :func:`packed` made of a dataclass of the given kind, and the extra values.
 
-    Raises
-    ------
-    ValueError
-        If the bytes are no such file, or hold a value of other fields (another version wrote them).
+    Raises ``ValueError`` where they are no such file, or hold a value of other fields (another version wrote them).
     """
     try:
         arrays = _checked_arrays(data)
@@ -67,13 +64,7 @@ def size_of(value: Any) -> int:
 
 
 def _checked_arrays(data: bytes) -> dict[str, np.ndarray]:
-    """Read all arrays of an .npz file; refuse one with anything in it that could run.
-
-    Raises
-    ------
-    ValueError
-        If it is no such file, or announces more than :data:`MOST_BYTES`.
-    """
+    """Read all arrays of an .npz file; refuse what could run, and more than :data:`MOST_BYTES`."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             size = sum(entry.file_size for entry in archive.infolist())

@@ -56,12 +56,7 @@ class Places:
         self._edges = drawn.area > FILLED * shapely.box(*self._box).area
 
     def name(self, point: np.ndarray) -> str:
-        """Say where a point is.
-
-        Parameters
-        ----------
-        point : (2,) array [m]
-        """
+        """Say where a point (2,) [m] is."""
         place = shapely.Point(point)
         left, _, right, top = self._box
         edges = [(float(top - point[1]), "the top")]

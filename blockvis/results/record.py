@@ -53,13 +53,7 @@ class Record:
         }
 
     def changes(self, sum_of_layout: Callable[[Path], str]) -> list[str]:
-        """Say which files and versions have changed since the run began.
-
-        Parameters
-        ----------
-        sum_of_layout : callable
-            Checksum of a layout by its path, which may stand for several files.
-        """
+        """Say which files and versions have changed since the run began; a layout may be of several files."""
         notes = []
         for what, file, checksum, sum_of in (
             ("case", self.case_file, self.case_sha256, checksum_of),
@@ -85,10 +79,7 @@ class Record:
 def read_record(folder: Path) -> Record:
     """Read the record of a results folder.
 
-    Raises
-    ------
-    ValueError
-        If the folder has none: it holds no run, or one that was stopped before it began.
+    Raises ``ValueError`` where it has none: it holds no run, or one that was stopped before it began.
     """
     path = folder / RECORD
     if not path.is_file():

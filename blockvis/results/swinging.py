@@ -11,12 +11,7 @@ from solver import mechanics
 
 
 def corner_speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
-    """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports.
-
-    Parameters
-    ----------
-    motion : (n_blocks, n_dof) array
-    """
+    """(n_blocks,) array: speed of the fastest corner of each block in a motion (n_blocks, n_dof), zero for supports."""
     block = assembly.block_of_vertex
     velocity = mechanics.point_velocities(mechanics.moved_vertices(assembly, pose), block, pose, motion)
     speeds = np.zeros(assembly.n_blocks)
@@ -35,12 +30,7 @@ def swing_factor(assembly: solver.Assembly, increment: solver.Increment, reach: 
 
 
 def swung_increment(increment: solver.Increment, motion: np.ndarray) -> solver.Increment:
-    """Give a frame of pseudo-motion: the blocks of a state after a motion, with its contact points carried along.
-
-    Parameters
-    ----------
-    motion : (n_blocks, n_dof) array
-    """
+    """Give the blocks of a state after a motion (n_blocks, n_dof), with its contact points carried along."""
     contacts, pose = increment.contacts, mechanics.swung(increment.pose, motion)
     points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
     moved = increment.with_arrays(pose=pose, contacts=replace(contacts, points=points))

@@ -45,17 +45,7 @@ LIMIT_TABLES = ("envelope.csv", "capacity.csv")
 
 
 def summary_of(response: solver.Response, *, seconds: float, record: Record, own: Mapping[str, Any]) -> dict[str, Any]:
-    """Make the summary that summary.json holds; every length in m, force in N, angle in rad.
-
-    Parameters
-    ----------
-    seconds : float
-        Solver time.
-    record : Record
-        What the run was made from.
-    own : mapping
-        What the kind of analysis adds.
-    """
+    """Make the summary that summary.json holds, with what the kind of analysis adds; in m, N, rad, solver seconds."""
     path, collapse, phase = response.path, response.collapse, collapse_phase(response)
     in_phase = phase if phase is not None else path[-1].phase if path else 0
     worst = mechanics.worst_of(i.certificate for i in path)
@@ -158,13 +148,7 @@ def own_columns(parameter: mechanics.Quantity) -> tuple[str, ...]:
 def row_of_increment(
     number: int, increment: solver.Increment, assembly: solver.Assembly, parameter: mechanics.Quantity
 ) -> Sequence[Any]:
-    """Make the row of response.csv for an increment, in the order of :data:`COLUMNS`.
-
-    Parameters
-    ----------
-    parameter : solver.mechanics.Quantity
-        What the increments run over.
-    """
+    """Make the row of response.csv for an increment over a parameter, in the order of :data:`COLUMNS`."""
     certificate = increment.certificate
     value = repr(float(increment.parameter))
     settlement = value if parameter.is_path else repr(0.0)

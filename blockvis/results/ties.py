@@ -53,10 +53,7 @@ def write_ties(folder: Path, ties: Sequence[solver.Tie]) -> None:
 def stored_ties(folder: Path, increments: Sequence[solver.Increment] = ()) -> tuple[solver.Tie, ...]:
     """Read the ties of a results folder, and of its ``increments``; none where it has none.
 
-    Raises
-    ------
-    ValueError
-        For a file that no run has written, and where increments have other ties than the file.
+    Raises ``ValueError`` for a file that no run has written, and where increments have other ties than the file.
     """
     file, ties = folder / TIES, tuple[solver.Tie, ...]()
     try:
@@ -234,13 +231,7 @@ def tie_force_curves(response: solver.Response) -> TieForceCurves | None:
 
 
 def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, str]:
-    """Say what a tie is, its largest force and where, and what became of it.
-
-    Parameters
-    ----------
-    response : solver.Response
-        Which says in what unit and in how many phases the supports move.
-    """
+    """Say what a tie of a response is, its largest force and where, and what became of it."""
 
     def place(at: float, phase: int) -> str:
         return f"{at:.4g} {unit_in(response, phase - 1)}{in_phase(response, phase - 1)}"

@@ -70,13 +70,7 @@ class ViewerFiles:
         self._listed = list(increments)
 
     def add(self, increment: solver.Increment) -> None:
-        """Write the files of the next increment, then the lists that name them.
-
-        Parameters
-        ----------
-        increment : solver.Increment
-            Kept: its arrays had better be in a file.
-        """
+        """Write the files of the next increment, which is kept without arrays, then the lists that name them."""
         write_grids(self.folder, len(self._listed), self.assembly, increment, self.vtu, self.joints)
         self._listed.append(increment)
         write_lists(self.folder, self._listed)
@@ -101,13 +95,7 @@ def write_lists(folder: Path, increments: Sequence[solver.Increment], *, durable
 def restore_grids(
     folder: Path, assembly: solver.Assembly, increments: Sequence[solver.Increment], vtu: ViewerFormat
 ) -> int:
-    """Make the VTU files again that a power cut has left empty, or half there.
-
-    Returns
-    -------
-    int
-        How many increments had lost some.
-    """
+    """Make the VTU files again that a power cut has left empty, or half there; counts increments that had lost some."""
     lost = 0
     for number, increment in enumerate(increments):
         if not all(is_complete(grid_file(folder, kind, number)) for kind in grids_in(folder)):
@@ -132,15 +120,7 @@ def write_grids(
     joints: InitialJoints | None = None,
     falls: np.ndarray | None = None,
 ) -> None:
-    """Write the VTU files of an increment.
-
-    Parameters
-    ----------
-    number : int
-        Of the increment.
-    falls : (n_blocks,) bool array, optional
-        As of :func:`blockvis.results.datasets.block_grid`.
-    """
+    """Write the VTU files of an increment by its number; ``falls`` as of :func:`~.datasets.block_grid`."""
     # VTK is loaded where its files are written: another process may do that.
     from .datasets import grids_of
 
@@ -162,11 +142,8 @@ def grid_file(folder: Path, kind: str, number: int) -> Path:
 def output_times(increments: Sequence[solver.Increment]) -> list[float]:
     """Strictly increasing times, one per increment, for readers that sort or merge by time.
 
-    Returns
-    -------
-    list of float [m or rad]
-        The parameter in equilibrium, phases one after another. Frames of the fall share one parameter: their times
-        grow by a hundredth of it each.
+    They are the parameter in equilibrium [m or rad], phases one after another. Frames of the fall share one parameter:
+    their times grow by a hundredth of it each.
     """
     times: list[float] = []
     before, phase, last = 0.0, 0, 0.0

@@ -46,17 +46,9 @@ class FirstEquilibrium:
 
 
 def first_equilibrium(case: Case, assembly: solver.Assembly) -> FirstEquilibrium:
-    """Find the first equilibrium of a case, or say which blocks fall and why.
+    """Find the first equilibrium of a case, of which an assembly was built, or say which blocks fall and why.
 
-    Parameters
-    ----------
-    assembly : solver.Assembly
-        That was built of it.
-
-    Raises
-    ------
-    ValueError
-        For input that cannot be analysed.
+    Raises ``ValueError`` for input that cannot be analysed.
     """
     most = MOST_BLOCKS[assembly.dimension]
     if assembly.n_blocks > most:

@@ -85,13 +85,7 @@ class OnceMore:
         self._worker.say("follow", (case, folder))
 
     def found(self, seconds: float) -> Traced | None:
-        """Wait so long for the path; None where it came to nothing.
-
-        Raises
-        ------
-        TimeoutError
-            Where it takes longer; short waits let Windows see Ctrl-C.
-        """
+        """Wait so long for the path, then raise ``TimeoutError``; None where it came to nothing."""
         try:
             path: Traced | None = self._worker.hear("path", seconds=seconds)[1]
         except WorkerEnded:

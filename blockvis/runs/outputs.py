@@ -193,12 +193,9 @@ def _underlay(case: Case) -> Underlay | None:
 
 
 def seen_from(case: Case, response: solver.Response) -> dict[str, Any]:
-    """Say from where the pictures of a case are drawn; they are drawn all the same where that makes no sense.
+    """Say from where the pictures of a case are drawn, as :func:`blockvis.draw_still` takes view and section.
 
-    Returns
-    -------
-    dict
-        View and section as :func:`blockvis.draw_still` takes them.
+    They are drawn all the same where that makes no sense.
     """
     from blockvis.pictures.solid_view import plane_of
 

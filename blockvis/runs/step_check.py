@@ -145,18 +145,7 @@ class StepChecking:
     ) -> StepCheck | None:
         """Wait for the other path and compare, as :func:`check_steps`; None where there is nothing to compare with.
 
-        Parameters
-        ----------
-        response : solver.Response
-            Of the case.
-        patience : float, optional [s]
-            How long to wait at most.
-        waiting : callable, optional
-            Called once where it takes long.
-
-        Raises
-        ------
-        TimeoutError
+        ``waiting`` is called once where it takes long. Raises ``TimeoutError`` after so much patience [s].
         """
         began, reported = time.monotonic(), False
         while True:
@@ -176,13 +165,7 @@ class StepChecking:
 
 
 def stored_case(folder: Path) -> Case:
-    """Read the case of a results folder.
-
-    Raises
-    ------
-    ValueError
-        For a run without one.
-    """
+    """Read the case of a results folder; raises ``ValueError`` for a run without one."""
     case = case_of(folder)
     if case is None:
         raise ValueError(f"'{folder}' was written from Python, without a case file; run it again from there")
@@ -250,13 +233,7 @@ def _written(folder: Path, check: StepCheck) -> StepCheck:
 
 
 def compared(response: solver.Response, other: Traced) -> StepCheck:
-    """Compare a run with another of shorter steps.
-
-    Parameters
-    ----------
-    other : Traced
-        Of the same case.
-    """
+    """Compare a run with another of the same case in shorter steps."""
     ours = traced(response)
     mine, theirs = ours.same_places(other)
     stepped = (ours.phases[mine] > 0) | (ours.parameters[mine] != 0.0)

@@ -26,10 +26,7 @@ SAME_SHAPE = 0.01
 def underlay_of(case: Case) -> Underlay | None:
     """Read the photograph under the pictures of a case; None if it names none.
 
-    Raises
-    ------
-    ValueError
-        For a photograph that is missing, and one of which nothing says where it lies.
+    Raises ``ValueError`` for one that is missing, and one of which nothing says where it lies.
     """
     if case.underlay is None:
         return None

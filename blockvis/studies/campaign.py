@@ -205,13 +205,7 @@ def _ignore_interrupts() -> Any:
 
 @contextmanager
 def existing_cluster(address: str, file: str) -> Iterator[Client]:
-    """Find a cluster by the address of its scheduler, and check that its workers can do the runs.
-
-    Parameters
-    ----------
-    file : str
-        Layout file that every worker must see; empty for none.
-    """
+    """Find a cluster by the address of its scheduler, and check that its workers can do the runs and see a layout."""
     from distributed import Client
 
     try:
@@ -253,15 +247,7 @@ def _probe(file: str) -> tuple[str, bool]:
 
 
 def carry_out(records: StudyFolder, todo: Sequence[int], client: Client, progress: bool) -> None:
-    """Make the runs and record each row on the disk before the next is taken.
-
-    Parameters
-    ----------
-    todo : sequence of int
-        Runs to be made.
-    progress : bool
-        Whether a progress bar is shown.
-    """
+    """Make the runs and record each row on the disk before the next is taken."""
     bar = StudyProgress(records.study.n_runs, records.study.n_runs - len(todo), shown=None if progress else False)
     suspects: list[int] = []
     written = time.monotonic()

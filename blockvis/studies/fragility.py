@@ -56,18 +56,9 @@ class Fragility:
 
 
 def observations(table: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Last settlement of each run with a result, and whether the run collapsed there.
+    """Last settlement [m or rad] of each run of a table with a result, and whether it collapsed there, (n,) arrays.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Of a study.
-
-    Returns
-    -------
-    settlement : (n,) array [m or rad]
-        Settlement at collapse, 0 without an initial equilibrium; of a run that did not collapse, its last settlement.
-    collapsed : (n,) bool array
+    It is that at collapse, 0 without an initial equilibrium; of a run that did not collapse, its last one.
     """
     known = table[~table["status"].isin(NO_RESULT)]
     collapsed = ~known["status"].isin(STOOD).to_numpy(dtype=bool)

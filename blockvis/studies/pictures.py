@@ -51,13 +51,7 @@ HEADING: dict[str, Any] = {"fontsize": 0.95 * TEXT, "loc": "left", "color": "#4a
 
 
 def draw_study(records: StudyFolder, table: pd.DataFrame) -> list[Path]:
-    """Draw the pictures of a study that its table has data for.
-
-    Returns
-    -------
-    list of Path
-        The files.
-    """
+    """Draw the pictures of a study that its table has data for; gives the files."""
     study, folder = records.study, records.folder
     drawn = []
     if (~table["status"].isin(NO_RESULT)).any():
@@ -74,13 +68,7 @@ def draw_study(records: StudyFolder, table: pd.DataFrame) -> list[Path]:
 
 @plain_text
 def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draw the probability of collapse against the settlement, with its confidence band.
-
-    Parameters
-    ----------
-    path : path
-        Of a PNG, SVG or PDF.
-    """
+    """Draw the probability of collapse against the settlement, with its confidence band, as PNG, SVG or PDF."""
     rows = independent_rows(study, table)
     curve = fragility_of(rows)
     factor, unit = _length(table)
@@ -326,15 +314,7 @@ def _axis_end(curve: Fragility) -> float:
 
 
 def runs_counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:
-    """Count the runs by how they ended: the title of the fragility curve.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        The rows that the curve is made of.
-    unit : str
-        Of the settlements.
-    """
+    """Count the runs, rows that the curve is made of, by how they ended: the title of the fragility curve."""
     status = table["status"]
     collapsed = status == str(solver.Status.COLLAPSED)
     local = int((collapsed & (table["falling_share"] < LOCAL)).sum())

@@ -84,12 +84,7 @@ def run_once(
 
 
 def failed_row(order: Mapping[str, Any], message: str, seconds: float = 0.0) -> dict[str, Any]:
-    """Make the row of a run without result.
-
-    Parameters
-    ----------
-    seconds : float [s]
-    """
+    """Make the row of a run without result, after so many seconds."""
     return _row(order, status=FAILED, message=message, seconds=seconds)
 
 
@@ -171,10 +166,7 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
 def mechanism_class(mechanism: mechanics.Mechanism) -> str:
     """Name the class of a mechanism by its hinges and sliding joints, or by their numbers if there are many.
 
-    Returns
-    -------
-    str
-        The same for the same joints, whatever the displacements of the blocks.
+    It is the same for the same joints, whatever the displacements of the blocks.
     """
     n, hinges, sliding = len(mechanism.motions), mechanism.hinges, mechanism.sliding
     parts = f"{n} part{'' if n == 1 else 's'}"
@@ -250,13 +242,7 @@ def _shape(
 def _seen_faces(assembly: solver.Assembly, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the faces that are turned to the eye: supports first, then those at the back.
 
-    Returns
-    -------
-    corners : (n_corners,) int array
-        Vertices around them, face after face.
-    offsets : (n_faces + 1,) int array
-        Where each begins.
-    block : (n_faces,) int array
+    Gives the vertices around them, face after face, where each face begins, (n_faces + 1,), and its block.
     """
     solids = assembly.polyhedra
     faces, rings = solids.faces(vertices), np.split(solids.corners, solids.face_offsets[1:-1])

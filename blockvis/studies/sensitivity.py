@@ -71,17 +71,9 @@ def stood_as_far(table: pd.DataFrame) -> np.ndarray:
 
 
 def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
-    """Compute the swing of every parameter.
+    """Compute the swing of every parameter, by the table of a study, the largest first.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Its table.
-
-    Returns
-    -------
-    list of Swing
-        The largest first; empty where no run collapsed, whose outcomes are no more than how far they were followed.
+    There is none where no run collapsed: outcomes are no more than how far runs were followed.
     """
     y = outcome(table)
     table, y = table[np.isfinite(y)], y[np.isfinite(y)]

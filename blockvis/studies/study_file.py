@@ -173,16 +173,9 @@ class Study:
 
 
 def run_values(values: Mapping[str, Any], order: Mapping[str, Any], n_seeded: int) -> dict[str, Any]:
-    """Put the values and seeds of a run into the base case.
+    """Put the values and the seed of a run, as of :meth:`Study.order`, into the base case as parsed TOML.
 
-    Parameters
-    ----------
-    values : mapping
-        The base case as parsed TOML.
-    order : mapping
-        Of :meth:`Study.order`.
-    n_seeded : int
-        Number of the last imperfections, those of the study, which get the run's seed.
+    The seed is of the last ``n_seeded`` imperfections, those of the study.
     """
     case = copy.deepcopy(dict(values))
     for path, value in order["paths"].items():

@@ -113,13 +113,7 @@ class StudyFolder:
         return [run for run in range(self.study.n_runs) if run not in done]
 
     def add(self, finished: Sequence[tuple[dict[str, Any], bytes]]) -> None:
-        """Record finished runs, and the shape of a mechanism if no earlier run has one of its class.
-
-        Parameters
-        ----------
-        finished : sequence of (dict, bytes)
-            Rows and shapes of :func:`blockvis.studies.run_one.run_once`.
-        """
+        """Record finished runs by their rows, and the shape of a mechanism if no earlier run has one of its class."""
         # In memory before on the disk: an interruption between the two would leave a row out of the table that is kept.
         self.rows |= {row["run"]: row for row, _ in finished}
         for row, shape in finished:

@@ -61,13 +61,7 @@ def curve_name(study: Study) -> str:
 
 
 def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
-    """Summarise a study, for its summary.json; lengths in m, angles in rad.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Its table.
-    """
+    """Summarise a study by its table, for its summary.json; lengths in m, angles in rad."""
     curve = fragility_of(independent_rows(study, table))
     units = [u for u in table["unit"].unique().tolist() if u]
     failed = table[table["status"].isin(NO_RESULT)]

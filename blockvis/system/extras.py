@@ -21,30 +21,14 @@ class MissingExtra(ImportError):
 
 
 def install_command(extra: str) -> str:
-    """Name the command that adds an extra to an installed blockvis.
-
-    Parameters
-    ----------
-    extra : str
-        A key of :data:`EXTRAS`.
-    """
+    """Name the command that adds an extra, a key of :data:`EXTRAS`, to an installed blockvis."""
     return f"pip install 'blockvis[{extra}]'"
 
 
 def require(extra: str, needed_by: str) -> None:
-    """Check that the packages of an extra are installed, without importing them.
+    """Check that the packages of an extra are installed, without importing them, and raise ``MissingExtra`` if not.
 
-    Parameters
-    ----------
-    extra : str
-        A key of :data:`EXTRAS`.
-    needed_by : str
-        Subject of the message, in the plural.
-
-    Raises
-    ------
-    MissingExtra
-        If a package is not installed.
+    ``needed_by`` is the subject of the message, in the plural.
     """
     missing = [PACKAGES.get(name, name) for name in EXTRAS[extra] if not is_installed(name)]
     if missing:
@@ -55,13 +39,7 @@ def require(extra: str, needed_by: str) -> None:
 
 
 def is_installed(name: str) -> bool:
-    """Whether a package is installed, without importing it.
-
-    Parameters
-    ----------
-    name : str
-        As it is imported.
-    """
+    """Whether a package, as it is imported, is installed, without importing it."""
     try:
         return find_spec(name) is not None
     except ImportError:

@@ -177,13 +177,7 @@ def write_pvd(
     last: bool = True,
     durable: bool = True,
 ) -> Path:
-    """Write the list of files of a time series (PVD), whole or not at all.
-
-    Parameters
-    ----------
-    entries : iterable of (time, file)
-        Files as given, relative to the folder of ``path``.
-    """
+    """Write the list of files of a time series (PVD), relative to its folder, whole or not at all."""
     lines = [
         '<?xml version="1.0"?>',
         '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',

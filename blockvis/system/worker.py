@@ -79,16 +79,9 @@ class Worker:
                 self._process.stdin.flush()
 
     def hear(self, *words: str, seconds: float | None = None) -> tuple[str, Any]:
-        """Wait for one of these words; others are of no interest.
+        """Wait for one of these words; others are of no interest. What the worker has raised is raised here.
 
-        Raises
-        ------
-        WorkerEnded
-            If it ends before.
-        TimeoutError
-            If it takes longer than so many seconds.
-        Exception
-            That the worker has raised.
+        Raises ``WorkerEnded`` where it ends before, and ``TimeoutError`` where it takes longer than so many seconds.
         """
         until = None if seconds is None else time.monotonic() + seconds
         while True:
