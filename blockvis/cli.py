@@ -577,10 +577,11 @@ def _explain(options: argparse.Namespace) -> int:
 
 
 def _sweep(options: argparse.Namespace) -> int:
+    from .results.record import read_json
     from .studies.campaign import study as carried_out
     from .studies.study_file import read_study
     from .studies.study_folder import finished_runs
-    from .studies.summary import in_words, stored_summary
+    from .studies.summary import in_words
 
     study = read_study(options.study)
     folder = Path(options.output or f"{study.source.stem}-study")
@@ -600,7 +601,7 @@ def _sweep(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return INTERRUPTED
-    print(in_words(stored_summary(folder)))
+    print(in_words(read_json(folder / "summary.json")))
     print(f"table and pictures in {folder}/")
     return 0
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import base64
 import html
-import json
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
+from blockvis.results.record import versions, write_json
 from blockvis.system.atomic_files import make_folder, write_atomic
 from solver.mechanics import counted
 
@@ -46,7 +45,7 @@ MOST_CAUSES, MOST_OBSERVATIONS = 12, 200
 def write_explanation(found: Explanation, folder: Path) -> None:
     """Write the page, its numbers and its picture."""
     make_folder(folder)
-    write_atomic(folder / "explain.json", json.dumps(values_of(found), indent=2, ensure_ascii=False) + "\n")
+    write_json(folder / "explain.json", values_of(found))
     picture = draw_explanation(found, folder / "explain.png")
     write_atomic(folder / "explain.html", explanation_html(found, picture.read_bytes()))
 
@@ -55,14 +54,10 @@ def explanation_html(found: Explanation, picture: bytes) -> str:
     """Make the page as HTML text, with its picture as a PNG; it needs no network and makes no request."""
     room = files("blockvis")
     name = found.case.source.stem
-    try:
-        ours = f"blockvis {version('blockvis')}"
-    except PackageNotFoundError:
-        ours = "blockvis"
     problems = [*unexplained_texts(found), *found.notes]
     return Template((room / "explanation" / "explain.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(f"{name} · likely causes of its cracks"),
-        about=html.escape(" · ".join((str(found.case.source), found.observations.source, ours))),
+        about=html.escape(f"{found.case.source} · {found.observations.source} · blockvis {versions()['blockvis']}"),
         style=(room / "report" / "player.css").read_text(encoding="utf-8"),
         verdict=html.escape(verdict(found)),
         picture=base64.b64encode(picture).decode("ascii"),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,7 +17,7 @@ from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import collapse_phase, governing_limit, in_phase, unit_in
 from blockvis.results.swinging import swing_factor, swung_increment
-from blockvis.results.tables import finite
+from blockvis.results.tables import csv_text, finite
 from blockvis.text import force_text
 from solver import mechanics
 
@@ -230,20 +228,19 @@ class LimitLoadKind(AnalysisKind):
         over_settlement = response.parameter.is_path
         if not over_settlement and len(response.limits) < 2:
             return {}
-        rows = io.StringIO()
-        table = csv.writer(rows, lineterminator="\n")
         first = ["phase", "settlement"] if over_settlement else ["position"]
         known = any(limit.staying_open is not None for limit in response.limits)
         last = ["staying_open"] if known and not over_settlement else []
-        table.writerow([*first, "load_multiplier", "static", "kinematic", "status", "flow", "mechanism", *last])
+        header = [*first, "load_multiplier", "static", "kinematic", "status", "flow", "mechanism", *last]
+        rows = []
         for limit, state in response.limit_states:
             place = [repr(float(state.parameter))]
             numbers = [repr(float(v)) for v in (limit.multiplier, *limit.bounds)]
             words = str(mechanics.mechanism_of(response.assembly, state)) if limit.mechanism.any() else ""
             where = [str(state.phase), *place] if over_settlement else place
             own = [repr(math.nan if limit.staying_open is None else float(limit.staying_open)) for _ in last]
-            table.writerow([*where, *numbers, str(limit.status), limit.flow, words, *own])
-        return {"capacity.csv" if over_settlement else "envelope.csv": rows.getvalue()}
+            rows.append([*where, *numbers, str(limit.status), limit.flow, words, *own])
+        return {"capacity.csv" if over_settlement else "envelope.csv": csv_text(header, rows)}
 
     def headline(self, response: solver.Response) -> str:
         """Count the limit loads."""

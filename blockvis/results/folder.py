@@ -6,7 +6,6 @@ import csv
 import errno
 import importlib
 import io
-import json
 import os
 import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -28,7 +27,7 @@ from .increments import StoredIncrements, packed_increment
 from .joints import LargestMovements
 from .mechanism_arrays import at_last_equilibrium
 from .npz import packed, unpacked
-from .record import RECORD, Record, read_json, read_record, versions
+from .record import RECORD, Record, read_json, read_record, versions, write_json
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
 from .ties import COLUMNS as TIE_COLUMNS
 from .ties import TIES, TieCourses, stored_ties, tie_courses, tie_rows, write_ties
@@ -156,7 +155,7 @@ class ResultsFolder:
         self._remove_from(0)
         write_atomic(self.path / "assembly.npz", packed(assembly))
         write_ties(self.path, self.ties)
-        write_atomic(self.path / RECORD, self.record.text())
+        write_json(self.path / RECORD, asdict(self.record))
         self._start_table()
         self.viewer = self.own_viewer()
 
@@ -249,7 +248,7 @@ class ResultsFolder:
             courses = self._courses.courses if response.parameter.is_path else tie_courses(response)
             listed["ties"] = [asdict(course) for course in courses]
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
-        write_atomic(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
+        write_json(self.path / "summary.json", summary)
         self._release()
         return summary
 
@@ -373,7 +372,7 @@ def stored_assembly(folder: Path) -> solver.Assembly:
 def add_to_summary(folder: Path, **found: Any) -> None:
     """Add to summary.json, by the names of the keys, what becomes known after it is written."""
     file = folder / "summary.json"
-    write_atomic(file, json.dumps({**read_json(file), **found}, indent=2, ensure_ascii=False) + "\n")
+    write_json(file, {**read_json(file), **found})
 
 
 def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,6 +11,7 @@ import solver
 from solver import mechanics
 
 from .joint_faces import InitialJoints, Rings, faces_of, grouped_by_face, initial_joints, lines
+from .tables import csv_text
 
 #: Opening and slip, in block sizes, up to which a joint has not moved: equilibria are that exact.
 CLOSED = 1e-6
@@ -273,11 +272,8 @@ class LargestMovements:
             measured = (largest[0], at[0], largest[1], at[1], *(phase if phases else ()))
             rows.append((f"{names[a]} | {names[b]}", *place, sizes[here].sum(), *measured))
         rows.sort(key=lambda row: (-row[d + 2], -row[d + 4]))
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
         opening, slip = (f"{self.parameter.name} at largest {what}{unit}" for what in ("opening", "slip"))
         head = ("joint", *(f"{axis} [m]" for axis in "xyz"[:d]), "length [m]" if d == 2 else "area [m²]")
         within = ("phase at largest opening", "phase at largest slip") if phases else ()
-        table.writerow((*head, "largest opening [m]", opening, "largest slip [m]", slip, *within))
-        table.writerows((name, *(f"{number + 0.0:.6g}" for number in numbers)) for name, *numbers in rows)
-        return text.getvalue()
+        header = (*head, "largest opening [m]", opening, "largest slip [m]", slip, *within)
+        return csv_text(header, ((name, *(f"{number + 0.0:.6g}" for number in numbers)) for name, *numbers in rows))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import solver
 
 from .folder import RANGE
 from .record import damaged
+from .tables import csv_text
 
 #: Columns of range.csv.
 COLUMNS = ("phase", "settlement", "reaction_low", "reaction_high", "runs")
@@ -49,12 +49,8 @@ class ReactionRange:
 
     def table(self) -> str:
         """Text of range.csv."""
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(COLUMNS)
         numbers = (self.phases, self.settlements, self.low, self.high, self.runs)
-        table.writerows(zip(*(values.tolist() for values in numbers), strict=True))
-        return text.getvalue()
+        return csv_text(COLUMNS, zip(*(values.tolist() for values in numbers), strict=True))
 
     def along(self, response: solver.Response) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(n,) arrays: parameter with the phases one after another, low and high, of the phases of a response."""

@@ -6,10 +6,12 @@ import hashlib
 import json
 import platform
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from blockvis.system.atomic_files import write_atomic
 
 #: Name of the file in the results folder.
 RECORD = "run.json"
@@ -38,10 +40,6 @@ class Record:
     layout_file: str = ""
     layout_sha256: str = ""
     versions: dict[str, str] = field(default_factory=dict)
-
-    def text(self) -> str:
-        """Write the record as JSON."""
-        return json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n"
 
     def inputs(self) -> dict[str, str | None]:
         """Names and checksums of the files that were read, for summary.json."""
@@ -103,6 +101,11 @@ def read_json(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise damaged(path, error) from None
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a file of JSON of a run."""
+    write_atomic(path, json.dumps(value, indent=2, ensure_ascii=False) + "\n")
 
 
 def damaged(path: Path, why: object) -> ValueError:

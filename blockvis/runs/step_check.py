@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -15,8 +14,7 @@ import solver
 from blockvis.cases.contents import Case
 from blockvis.results.about import unit_in
 from blockvis.results.folder import STEP_CHECK, add_to_summary
-from blockvis.results.record import read_json
-from blockvis.system.atomic_files import write_atomic
+from blockvis.results.record import read_json, write_json
 from solver import mechanics
 
 from .once_more import LINEAR_PROGRAM, OnceMore, Traced, followed, takes_steps, traced
@@ -227,7 +225,7 @@ def _two_digits(value: float) -> str:
 
 def _written(folder: Path, check: StepCheck) -> StepCheck:
     numbers = {**vars(check), **{name: None for name in UNKNOWN if np.isnan(getattr(check, name))}}
-    write_atomic(folder / STEP_CHECK, json.dumps(numbers, indent=2) + "\n")
+    write_json(folder / STEP_CHECK, numbers)
     add_to_summary(folder, step_error=check.step_error)
     return check
 

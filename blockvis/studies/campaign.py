@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import glob
-import json
 import logging
 import multiprocessing
 import queue
@@ -17,6 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from blockvis.results.record import read_json
 from blockvis.runs.progress import StudyProgress
 from blockvis.system.extras import require
 from blockvis.system.processes import cores
@@ -137,7 +137,7 @@ def _keep(records: StudyFolder, run: int) -> None:
 
     folder = records.folder / "results" / f"run_{run:06d}"
     summary = folder / "summary.json"
-    if summary.is_file() and not has_failed(json.loads(summary.read_text(encoding="utf-8"))):
+    if summary.is_file() and not has_failed(read_json(summary)):
         return
     values = records.study.values_of(run)
     source = records.study.case_source

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -109,12 +107,6 @@ def _reasons(messages: list[str]) -> dict[str, int]:
     kinds = [re.sub(r"\d[\d.e+-]*", "#", message) for message in messages]
     first = dict(zip(reversed(kinds), reversed(messages), strict=True))
     return {first[kind]: number for kind, number in Counter(kinds).most_common(MOST_REASONS)}
-
-
-def stored_summary(folder: str | Path) -> dict[str, Any]:
-    """Read summary.json in the folder of a study."""
-    found: dict[str, Any] = json.loads((Path(folder) / "summary.json").read_text(encoding="utf-8"))
-    return found
 
 
 def in_words(summary: dict[str, Any]) -> str:
