@@ -156,14 +156,9 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
     return Ground(cut, pieces, troughs=True, notes=tuple(str(warning.message) for warning in caught))
 
 
-def _touching(assembly: solver.Assembly) -> mechanics.Contacts:
-    """Find the contact points of the layout."""
-    return mechanics.find_contacts(assembly, assembly.vertices, TOUCHING * assembly.block_size)
-
-
 def _bearing(assembly: solver.Assembly, names: Sequence[str] | None = None) -> list[int]:
     """Find the supports, of these names or all, on which free blocks stand, with a face, not a corner alone."""
-    contacts = _touching(assembly)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, TOUCHING * assembly.block_size)
     found = []
     for block in np.flatnonzero(~assembly.free).tolist() if names is None else map(assembly.index, names):
         points = contacts.points[(contacts.block_a == block) | (contacts.block_b == block)]
@@ -177,28 +172,12 @@ def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> li
 
     Raises ``ValueError`` for a support of [explain] that there is not, and where no cause is left.
     """
-    names = list(ground.pieces)
-    for group in settings.supports:
-        for name in group:
-            if name not in names:
-                kind = "a free block" if name in ground.assembly.names else "no block"
-                raise ValueError(
-                    f"{source}: [explain] supports: '{name}' is {kind}{nearest(name, names)}; supports are "
-                    f"{', '.join(names[:12])}"
-                )
     found: list[Candidate] = []
     directions = _directions(ground, settings, source)
-    # A support is called as it was drawn, too, and its pieces with it.
-    drawn = {one: ground.assembly.drawn_names[ground.assembly.index(ground.pieces[one][0])] for one in names}
-    asked = [
-        tuple(dict.fromkeys(one for name in group for one in names if name in (one, drawn[one])))
-        for group in settings.supports
-    ]
-    for group in asked or _groups(ground):
+    for group in _asked(ground, settings, source) or _groups(ground):
         pieces = [piece for name in group for piece in ground.pieces[name]]
-        if not _bearing(ground.assembly, pieces):
-            continue
-        found += _movements(ground, group, pieces, directions)
+        if _bearing(ground.assembly, pieces):
+            found += _movements(ground, group, pieces, directions)
     if ground.troughs:
         found += _troughs(ground, settings)
     if not found:
@@ -207,6 +186,23 @@ def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> li
             + (", or [explain] trough = true" if ground.assembly.dimension == 2 else "")
         )
     return found
+
+
+def _asked(ground: Ground, settings: ExplainSettings, source: Path) -> list[tuple[str, ...]]:
+    """List the groups of supports that the case names, each as it was drawn or by the name it got."""
+    names = list(ground.pieces)
+    drawn = {one: ground.assembly.drawn_names[ground.assembly.index(ground.pieces[one][0])] for one in names}
+    for name in (name for group in settings.supports for name in group):
+        if name not in names:
+            kind = "a free block" if name in ground.assembly.names else "no block"
+            raise ValueError(
+                f"{source}: [explain] supports: '{name}' is {kind}{nearest(name, names)}; supports are "
+                f"{', '.join(names[:12])}"
+            )
+    return [
+        tuple(dict.fromkeys(one for name in group for one in names if name in (one, drawn[one])))
+        for group in settings.supports
+    ]
 
 
 def _directions(ground: Ground, settings: ExplainSettings, source: Path) -> tuple[str, ...]:

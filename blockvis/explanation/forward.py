@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -250,21 +250,13 @@ def _ignore_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def all_followed(
-    orders: Sequence[Order], processes: Executor | None, progress: RunsProgress | None = None
-) -> list[Run]:
+def all_followed(orders: Sequence[Order], processes: Executor | None, progress: RunsProgress) -> list[Run]:
     """Carry out runs, in other processes or here; raises ``ValueError`` where these cannot be started, or are ended."""
-    count: Callable[[], None] = (lambda: None) if progress is None else progress.finished
     found = []
-    if processes is None:
-        for order in orders:
-            found.append(followed(order))
-            count()
-        return found
     try:
-        for future in [processes.submit(followed, order) for order in orders]:
-            found.append(future.result())
-            count()
+        for run in map(followed, orders) if processes is None else processes.map(followed, orders):
+            found.append(run)
+            progress.finished()
     except BrokenExecutor as error:
         raise ValueError(
             f"the processes of the runs have ended ({error}), perhaps for want of memory; ask for fewer with "

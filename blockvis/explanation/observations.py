@@ -255,11 +255,16 @@ def _of_rows(
     given: list[_Cells] = []
     for number, row in rows:
         given.append(cells := _Cells(row, columns, f"{where}, {counted} {number}"))
-        width = cells.number("width")
+        width = cells.length("width")
         if width is not None:
             place, named, whole, label = _place(cells, assembly, joints)
-            _check_width(width, cells, assembly)
-            uncertainty = cells.number("uncertainty")
+            if width > WIDEST * assembly.block_size:
+                raise cells.error(
+                    "width",
+                    f"is {width:g} m, more than a block is wide ({assembly.block_size:.3g} m); is it in mm? name the "
+                    "column width [mm]",
+                )
+            uncertainty = cells.length("uncertainty")
             usual = max(WIDTH_UNCERTAINTY * width, LEAST_UNCERTAINTY)
             widths.append((place, named, whole, width, usual if uncertainty is None else uncertainty, label))
         moved = _displacement(cells, assembly)
@@ -271,10 +276,10 @@ def _of_rows(
         raise ValueError(f"{where}: has no observation; give a row for each crack or displaced point")
     found = _observations(widths, points, where, assembly.dimension)
     for cells in given:
-        if (cells.number("uncertainty") or 0.0) > LEAST_CERTAIN * found.largest:
+        if (cells.length("uncertainty") or 0.0) > LEAST_CERTAIN * found.largest:
             raise cells.error(
                 "uncertainty",
-                f"is {cells.number('uncertainty'):g} m, and the largest width or displacement {found.largest:.3g} m: "
+                f"is {cells.length('uncertainty'):g} m, and the largest width or displacement {found.largest:.3g} m: "
                 "that leaves nothing certain; is it in mm? name the column uncertainty [mm]",
             )
     _note_middles(found, joints)
@@ -331,8 +336,8 @@ def _number(text: str) -> float | str:
         return text
 
 
-class _Row(Table):
-    """The cells of a row that are filled, as numbers and texts in the units of the table."""
+class _Cells(Table):
+    """The cells of a row that are filled, checked by the table of columns."""
 
     def __init__(self, row: Mapping[str, Any], columns: Mapping[str, _Column], where: str) -> None:
         self.columns = columns
@@ -341,38 +346,21 @@ class _Row(Table):
         texts = {key: str(value).strip() for key, value in given.items() if value is not None and value == value}
         cells = {key: _number(text) if key in LENGTHS else text for key, text in texts.items() if text}
         super().__init__(cells, where, Path())
+        self.checked = OBSERVATION.read(self)
 
     def error(self, key: str, problem: str) -> ValueError:
         """Make an error that names the file, the line and the column."""
         name = self.columns[key].name if key in self.columns else key
         return ValueError(f"{self.where}: {name} {problem}")
 
-
-class _Cells:
-    """What a row says, checked by the table of columns."""
-
-    def __init__(self, row: Mapping[str, Any], columns: Mapping[str, _Column], where: str) -> None:
-        cells = _Row(row, columns, where)
-        self.columns, self.error = columns, cells.error
-        self.values = OBSERVATION.read(cells)
-
-    def text(self, key: str) -> str:
+    def word(self, key: str) -> str:
         """Text of a cell; empty where there is none."""
-        return self.values[key] or ""
+        return self.checked[key] or ""
 
-    def number(self, key: str) -> float | None:
+    def length(self, key: str) -> float | None:
         """Length [m] in a cell; None where it is empty."""
-        value: float | None = self.values[key]
+        value: float | None = self.checked[key]
         return None if value is None else value * self.columns[key].factor
-
-
-def _check_width(width: float, cells: _Cells, assembly: solver.Assembly) -> None:
-    if width > WIDEST * assembly.block_size:
-        raise cells.error(
-            "width",
-            f"is {width:g} m, more than a block is wide ({assembly.block_size:.3g} m); is it in mm? name the column "
-            "width [mm]",
-        )
 
 
 def _between(
@@ -397,18 +385,18 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
     Whether the joint is known, whether the place along it is not, and a label go with it.
     """
     axes = "xyz"[: assembly.dimension]
-    if cells.text("joint"):
-        names = [name.strip() for name in re.split(r"\s*\|\s*", cells.text("joint"))]
+    if cells.word("joint"):
+        names = [name.strip() for name in re.split(r"\s*\|\s*", cells.word("joint"))]
         if len(names) != 2:
-            raise cells.error("joint", f"is '{cells.text('joint')}'; name two blocks as \"A | B\"")
+            raise cells.error("joint", f"is '{cells.word('joint')}'; name two blocks as \"A | B\"")
         keys = ["joint", "joint"]
     else:
-        names, keys = [cells.text("block_a"), cells.text("block_b")], ["block_a", "block_b"]
+        names, keys = [cells.word("block_a"), cells.word("block_b")], ["block_a", "block_b"]
     if names[0] or names[1]:
         between = _between(names, keys, cells, assembly, joints)
         label = f"{names[0]} | {names[1]}"
-        if all(cells.number(axis) is not None for axis in axes):
-            place = np.array([cells.number(axis) for axis in axes], dtype=float)
+        if all(cells.length(axis) is not None for axis in axes):
+            place = np.array([cells.length(axis) for axis in axes], dtype=float)
             away, weights = on_faces(place[None], joints)
             joint = int(np.argmin(np.where(between, away[0], np.inf)))
             _check_place(place, float(away[0, joint]), f"'{label}'", cells, assembly)
@@ -416,10 +404,10 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
             return nearest_place, True, False, f"{label} at {place_text(place)}"
         sizes = joints.sizes[between]
         return sizes @ joints.rings.middles()[between] / sizes.sum(), True, True, label
-    missing = next((axis for axis in axes if cells.number(axis) is None), None)
+    missing = next((axis for axis in axes if cells.length(axis) is None), None)
     if missing is not None:
         raise cells.error(missing, "is missing; give the place of the crack, or the joint")
-    place = np.array([cells.number(axis) for axis in axes], dtype=float)
+    place = np.array([cells.length(axis) for axis in axes], dtype=float)
     _check_place(place, float(on_faces(place[None], joints)[0].min(initial=np.inf)), "any joint", cells, assembly)
     return place, False, False, place_text(place)
 
@@ -453,11 +441,11 @@ def _blocks(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> li
 def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray, str, np.ndarray, float] | None:
     """Read the displacement of a point."""
     axes = "xyz"[: assembly.dimension]
-    there = [cells.number(f"displaced_{axis}") for axis in axes]
-    moved = [cells.number(f"d{axis}") for axis in axes]
+    there = [cells.length(f"displaced_{axis}") for axis in axes]
+    moved = [cells.length(f"d{axis}") for axis in axes]
     if all(value is None for value in (*moved, *there)):
         return None
-    place, name = [cells.number(axis) for axis in axes], cells.text("block")
+    place, name = [cells.length(axis) for axis in axes], cells.word("block")
     if not name and None in place:
         raise cells.error("block", f"is missing; give the block, or {_listed(axes)}, of the displaced point")
     blocks = _blocks(name, "block", cells, assembly) if name else list(range(assembly.n_blocks))
@@ -485,7 +473,7 @@ def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray,
             f"puts '{assembly.names[block]}' {far:.3g} m from where it is drawn, in a structure of "
             f"{extent:.3g} m; is it in mm? name the column so, as in: dx [mm]",
         )
-    uncertainty = cells.number("uncertainty")
+    uncertainty = cells.length("uncertainty")
     return point, assembly.names[block], displaced, POINT_UNCERTAINTY if uncertainty is None else uncertainty
 
 
@@ -505,13 +493,12 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
     for block, drawn in partner.items():
         pose.positions[block], pose.rotations[block] = _moved(assembly, block, np.asarray(layout.outlines[drawn]))
     _check_moved(pose.positions - assembly.centroids, sorted(partner), assembly, path)
-    lost = [name for i, name in enumerate(assembly.names) if i not in partner and assembly.free[i]]
+    lost = [f"'{name}'" for i, name in enumerate(assembly.names) if i not in partner and assembly.free[i]]
     if lost:
-        shown = ", ".join(f"'{name}'" for name in lost[:6]) + (" ..." if len(lost) > 6 else "")
         missing = counted(
             len(lost), "block of the case is not in it and says", "blocks of the case are not in it and say"
         )
-        warnings.warn(f"{path}: {missing} nothing ({shown})", stacklevel=4)
+        warnings.warn(f"{path}: {missing} nothing ({_first(lost)})", stacklevel=4)
     joints = initial_joints(assembly)
     opening = opening_and_slip(assembly, joints, pose)[:, 0]
     # Joints that are closed but for the rounding of the drawing's numbers would be told and drawn as cracks.
@@ -548,11 +535,12 @@ def _check_moved(moved: np.ndarray, known: list[int], assembly: solver.Assembly,
             f"{path}: its blocks, supports too, lie about {place_text(shift, 3)} m beside those of the case, and what "
             "all have in common opens no joint; move it: a support that stands still lies where the case draws it"
         )
-    lost = [block for block in known if far[block] > FARTHEST_POINT * float(np.ptp(assembly.vertices, axis=0).max())]
+    most = FARTHEST_POINT * float(np.ptp(assembly.vertices, axis=0).max())
+    lost = [f"'{assembly.names[k]}' {far[k]:.3g} m" for k in known if far[k] > most]
     if lost:
-        shown = ", ".join(f"'{assembly.names[k]}' {far[k]:.3g} m" for k in lost[:6]) + (" ..." if len(lost) > 6 else "")
         raise ValueError(
-            f"{path}: puts {shown} from where the case draws it; check names that are swapped, the origin and the unit"
+            f"{path}: puts {_first(lost)} from where the case draws it; check names that are swapped, the origin and "
+            "the unit"
         )
     # Blocks that still stand have moved by the shortest ways to where they lie; those with swapped names have not.
     places = assembly.centroids[known]
@@ -560,8 +548,11 @@ def _check_moved(moved: np.ndarray, known: list[int], assembly: solver.Assembly,
     names = [assembly.names[k] for k in known]
     swapped = [f"'{names[k]}' where '{names[own]}' lies" for k, own in enumerate(owners.tolist()) if k != own]
     if swapped:
-        shown = ", ".join(swapped[:6]) + (" ..." if len(swapped) > 6 else "")
-        raise ValueError(f"{path}: puts {shown} in the case; check names that are swapped")
+        raise ValueError(f"{path}: puts {_first(swapped)} in the case; check names that are swapped")
+
+
+def _first(words: Sequence[str]) -> str:
+    return ", ".join(words[:6]) + (" ..." if len(words) > 6 else "")
 
 
 def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: solver.Assembly) -> dict[int, int]:
@@ -584,7 +575,7 @@ def _moved(assembly: solver.Assembly, block: int, ring: np.ndarray) -> tuple[np.
     own = assembly.outline(block)
     polygon = shapely.Polygon(ring)
     centre = np.array(polygon.centroid.coords[0])
-    ring = ring if shapely.Polygon(ring).exterior.is_ccw else ring[::-1]
+    ring = ring if polygon.exterior.is_ccw else ring[::-1]
     if len(ring) != len(own):
         return centre, 0.0
     arms, best = own - assembly.centroids[block], (np.inf, 0.0)
