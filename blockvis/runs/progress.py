@@ -6,7 +6,6 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
-from typing import TextIO
 
 import numpy as np
 
@@ -29,8 +28,8 @@ BEAT = 1.0
 class _Line:
     """One line on stderr that is written again and again; where it is no terminal, lines now and then."""
 
-    def __init__(self, stream: TextIO | None = None) -> None:
-        self.stream = sys.stderr if stream is None else stream
+    def __init__(self) -> None:
+        self.stream = sys.stderr
         self.watched = self.stream.isatty()
         self.started = time.perf_counter()
         self.last = -1.0 if self.watched else self.started
@@ -58,8 +57,8 @@ class _Line:
 class DrawingProgress:
     """A bar that counts the seconds of the fall as it is worked out, then the frames of the film."""
 
-    def __init__(self, stream: TextIO | None = None) -> None:
-        self._line = _Line(stream)
+    def __init__(self) -> None:
+        self._line = _Line()
 
     def fall(self, time: float) -> None:
         """Show how far the fall is worked out [s]."""
@@ -87,16 +86,14 @@ class Progress:
     ----------
     course : Course
         What the increments run over.
-    assembly : solver.Assembly, optional
+    assembly : solver.Assembly
         Whose blocks move.
     count : int
         Increments found before.
     """
 
-    def __init__(
-        self, course: Course, stream: TextIO | None = None, assembly: solver.Assembly | None = None, count: int = 0
-    ) -> None:
-        self.course, self.count, self.assembly, self._line = course, count, assembly, _Line(stream)
+    def __init__(self, course: Course, assembly: solver.Assembly, count: int = 0) -> None:
+        self.course, self.count, self.assembly, self._line = course, count, assembly, _Line()
         self._state: mechanics.PathState | None = None
         self._at = time.perf_counter()
         self._ended, self._writing = threading.Event(), threading.Lock()
@@ -133,7 +130,7 @@ class Progress:
 
     def _moving(self, velocity: np.ndarray | None) -> str:
         """Count the free blocks that move at least a hundredth as fast as the fastest, and name that."""
-        if velocity is None or self.assembly is None:
+        if velocity is None:
             return ""
         speeds = mechanics.motion_size(velocity, self.assembly.block_size)
         moving = int((self.assembly.free & (speeds > 0.01 * speeds.max(initial=0.0))).sum())
@@ -180,10 +177,10 @@ class RunsProgress:
         Whether anything is written.
     """
 
-    def __init__(self, *, shown: bool = True, stream: TextIO | None = None) -> None:
+    def __init__(self, *, shown: bool) -> None:
         self.names: list[str] = []
         self.count = 0
-        self._line, self._ended = _Line(stream), threading.Event()
+        self._line, self._ended = _Line(), threading.Event()
         self._thread = threading.Thread(target=self._keep_telling, daemon=True) if shown else None
 
     def __enter__(self) -> RunsProgress:
@@ -215,22 +212,12 @@ class RunsProgress:
 
 
 class StudyProgress:
-    """A bar that counts the runs of a study; in a terminal or a notebook.
+    """A bar that counts the runs of a study, some of which were finished before, in a terminal or a notebook."""
 
-    Parameters
-    ----------
-    total : int
-        Runs of the study.
-    before : int
-        Of these, finished earlier.
-    shown : bool, optional
-        By default, where somebody watches.
-    """
-
-    def __init__(self, total: int, before: int = 0, *, shown: bool | None = None, stream: TextIO | None = None) -> None:
-        self.total, self.before, self.count, self.failed, self._line = total, before, 0, 0, _Line(stream)
+    def __init__(self, total: int, before: int, *, shown: bool) -> None:
+        self.total, self.before, self.count, self.failed, self._line = total, before, 0, 0, _Line()
         self._line.watched |= "ipykernel" in sys.modules
-        self.shown = self._line.watched and shown is not False
+        self.shown = self._line.watched and shown
 
     def finished(self, *, failed: bool = False) -> None:
         """Count a run."""

@@ -248,7 +248,7 @@ def _probe(file: str) -> tuple[str, bool]:
 
 def carry_out(records: StudyFolder, todo: Sequence[int], client: Client, progress: bool) -> None:
     """Make the runs and record each row on the disk before the next is taken."""
-    bar = StudyProgress(records.study.n_runs, records.study.n_runs - len(todo), shown=None if progress else False)
+    bar = StudyProgress(records.study.n_runs, records.study.n_runs - len(todo), shown=progress)
     suspects: list[int] = []
     written = time.monotonic()
     try:

@@ -170,14 +170,15 @@ class Terminal(io.StringIO):
 def test_a_bar_on_a_terminal_lines_elsewhere(monkeypatch):
     watched, piped = Terminal(), io.StringIO()
     for stream in (watched, piped):
-        with DrawingProgress(stream) as bar:
+        monkeypatch.setattr("sys.stderr", stream)
+        with DrawingProgress() as bar:
             for k in range(8):
                 bar.frame(k + 1, 8)
     assert "[########################] frame 8 of 8" in watched.getvalue()
     assert watched.getvalue().endswith("\r\x1b[K")
     assert piped.getvalue() == ""
     monkeypatch.setattr(progress, "LINES", 0.0)
-    with DrawingProgress(piped) as bar:
+    with DrawingProgress() as bar:
         bar.frame(3, 8)
         bar.frame(4, 8)
     assert [line.rpartition(",")[0] for line in piped.getvalue().splitlines()] == [

@@ -192,7 +192,8 @@ def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_pat
     nothing = np.zeros((0, 2))
     state = mechanics.State(None, None, nothing, nothing, nothing, nothing, nothing)
     standing = solver.Increment(0.05, 7.0, 0, 7.0, 7.0, certificate, solver.Status.EQUILIBRIUM, 1, 0.1, state)
-    Progress(course, stream).increment(standing)
+    monkeypatch.setattr("sys.stderr", stream)
+    Progress(course, None).increment(standing)
     assert f"] {line}" in stream.getvalue()
 
 
@@ -208,7 +209,8 @@ def test_a_single_step_that_takes_long_is_told_too(tmp_path, monkeypatch):
                 told.set()
             return super().write(words)
 
-    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), Stream(), count=3)
+    monkeypatch.setattr("sys.stderr", Stream())
+    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), None, count=3)
     bar.watch()
     assert told.wait(timeout=60)
     bar.done()
@@ -220,7 +222,8 @@ def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monke
     stream, seen = Terminal(), []
     outlines = [[[-1, -1], [1, -1], [1, 0], [-1, 0]], [[-0.2, 0], [0.2, 0], [0.2, 1], [-0.2, 1]]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
-    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), stream, assembly)
+    monkeypatch.setattr("sys.stderr", stream)
+    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), assembly)
     steps = mechanics.settlement_increments(
         assembly,
         [solver.Settlement(direction=(0, -1), increment=0.1, limit=0.1)],
