@@ -519,19 +519,8 @@ def _completion(options: argparse.Namespace) -> int:
     # Choices here, not in the parser: a name that does not exist gets a better message than argparse has.
     choices: dict[str, Any] = {"name": _layout_names()}
     files = {
-        "case",
-        "drawing",
-        "output",
-        "resume",
-        "file",
-        "source",
-        "target",
-        "results",
-        "study",
-        "picture",
-        "observed",
-        "one",
-        "other",
+        *("case", "drawing", "output", "resume", "file", "source", "target"),
+        *("results", "study", "picture", "observed", "one", "other"),
     }
     for action in parser._actions:
         for verb in (action.choices or {}).values() if isinstance(action.choices, dict) else ():

@@ -53,7 +53,7 @@ class Fall:
     times : (n,) array [s]
         Since the last equilibrium.
     positions : (n, n_blocks, d) array [m]
-    rotations : (n, n_blocks) array, in space (n, n_blocks, 3) [rad]
+    rotations : (n, n_blocks, n_rot) array [rad]
     ground : float [m]
         Height of the ground line.
     tie_forces : (n, n_ties) array [N]
@@ -75,8 +75,7 @@ class Fall:
 
     def pose(self, number: int) -> solver.Pose:
         """Return one of the poses."""
-        turns = self.rotations[number]
-        return solver.Pose(self.positions[number], turns.reshape(len(turns), -1))
+        return solver.Pose(self.positions[number], self.rotations[number])
 
     def at(self, time: float) -> solver.Pose:
         """Return the pose at a time [s], in between those kept."""
@@ -219,11 +218,10 @@ def _followed(
         if calm >= RESTING * RATE:
             break
     n = response.assembly.n_blocks
-    rotations = np.stack([pose.rotations[:n] for pose in poses])
     return Fall(
         np.arange(len(poses)) / RATE,
         np.stack([pose.positions[:n] for pose in poses]),
-        rotations[:, :, 0] if rotations.shape[2] == 1 else rotations,
+        np.stack([pose.rotations[:n] for pose in poses]),
         ground,
         np.stack([forces for forces, _ in tied]),
         np.stack([rest for _, rest in tied]),

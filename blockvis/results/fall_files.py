@@ -93,9 +93,9 @@ def stored_fall(folder: Path) -> Fall | None:
         return None
     try:
         fall, _ = unpacked(file.read_bytes(), Fall)
-        n, blocks, *turns = fall.rotations.shape
+        n, blocks, n_rot = fall.rotations.shape
         shapes = (fall.times.shape, fall.positions.shape)
-        if n == 0 or shapes != ((n,), (n, blocks, 3 if turns else 2)) or not np.isfinite(fall.positions).all():
+        if n == 0 or shapes != ((n,), (n, blocks, 2 if n_rot == 1 else 3)) or not np.isfinite(fall.positions).all():
             raise ValueError(f"positions have the shape {fall.positions.shape}, rotations {fall.rotations.shape}")
         if fall.tie_forces.shape != fall.tie_rest.shape or len(fall.tie_rest) not in (0, n):
             raise ValueError(

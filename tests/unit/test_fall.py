@@ -101,7 +101,7 @@ def test_a_stone_that_turns_and_wedges_in_a_gap_has_fallen():
     """Its centroid sinks by less than a quarter of it."""
     fall = fall_of(pulled_apart([(0, 0, 1, 1), (-1, -6, 0.3, 0), (0.7, -6, 1.4, 0)], 0.1))
     assert np.linalg.norm(fall.positions[-1, 0] - fall.positions[0, 0]) < 0.25
-    assert abs(fall.rotations[-1, 0]) == pytest.approx(np.pi / 4.0, abs=0.05)
+    assert abs(fall.rotations[-1, 0, 0]) == pytest.approx(np.pi / 4.0, abs=0.05)
 
 
 def test_what_collapses_onto_the_ground_at_once_is_said_to_rest():
@@ -292,7 +292,7 @@ def test_a_damaged_fall_is_named(tmp_path):
 
 
 def test_poses_between_those_kept():
-    fall = Fall(np.array([0.0, 0.1]), np.array([[[0.0, 0.0]], [[1.0, 2.0]]]), np.array([[0.0], [0.4]]), 0.0)
+    fall = Fall(np.array([0.0, 0.1]), np.array([[[0.0, 0.0]], [[1.0, 2.0]]]), np.array([[[0.0]], [[0.4]]]), 0.0)
     pose = fall.at(0.025)
     np.testing.assert_allclose((*pose.positions[0], pose.rotations[0, 0]), (0.25, 0.5, 0.1))
     np.testing.assert_array_equal(fall.at(7.0).positions, [[1.0, 2.0]])
@@ -393,7 +393,7 @@ def test_bent_blocks_fall_in_one_piece():
         collapse=replace(base.collapse, mechanism=np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])),
     )  # fmt: skip
     fall = fall_of(response)
-    assert fall.rotations[-1, 0] < -0.5
+    assert fall.rotations[-1, 0, 0] < -0.5
     end = outlines(assembly, fall.pose(len(fall) - 1))
     assert shapely.bounds(end[0])[1] == pytest.approx(fall.ground, abs=0.01)
 
