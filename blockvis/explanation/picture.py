@@ -74,25 +74,15 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     assembly, causes = found.assembly, found.causes[:2]
     drawn = solver.Pose.initial(assembly)
     poses = [pose_of(assembly, cause.best.moved(cause.at)) for cause in causes]
-    free = assembly.free
-    largest = [float(np.linalg.norm(pose.positions - assembly.centroids, axis=1).max()) for pose in poses]
-    extent = float(np.ptp(assembly.vertices[free[assembly.block_of_vertex]], axis=0).max())
     # Each cause by its own: what one makes by going far, another may make by going a little.
-    factors = [max(1.0, rounded_length(SHOWN * extent / most)) if most > 0.0 else 1.0 for most in largest]
+    factors = [_magnification(assembly, pose) for pose in poses]
     shown = [magnified(assembly, pose, factor) for pose, factor in zip(poses, factors, strict=True)]
     view = None if assembly.dimension == 2 else _view_of(found)
     if view is None:
         frame = framed(assembly, [drawn, *shown], whole=WHOLE)
     else:
         frame = framed(assembly, [drawn, *shown], margin=0.05, supports=0.3, axes=view.axes[:2], whole=WHOLE)
-    count = 1 + len(causes)
-    aspect = float(frame.size[0] / frame.size[1])
-    rows, columns = (count, 1) if aspect > WIDE else (1, count)
-    width = PANEL * (2.0 if aspect > WIDE else 1.0)
-    height = min(width / aspect, 1.4 * PANEL) + HEAD
-    figure = Figure(figsize=(width * columns, height * rows), layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06))
-    FigureCanvasAgg(figure)
-    axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False).ravel())
+    figure, axes = _panels(1 + len(causes), float(frame.size[0] / frame.size[1]))
     canvases = [_Canvas(panel, assembly, frame, view) for panel in axes]
     labels = [_observed(canvases[0], found)]
     for number, (canvas, cause, pose, there, factor) in enumerate(
@@ -113,6 +103,23 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     with atomic_file(path) as partial:
         figure.savefig(partial, dpi=DPI, facecolor="white")
     return path
+
+
+def _magnification(assembly: solver.Assembly, pose: solver.Pose) -> float:
+    """Find a round factor with which the largest displacement is seen."""
+    most = float(np.linalg.norm(pose.positions - assembly.centroids, axis=1).max())
+    extent = float(np.ptp(assembly.vertices[assembly.free[assembly.block_of_vertex]], axis=0).max())
+    return max(1.0, rounded_length(SHOWN * extent / most)) if most > 0.0 else 1.0
+
+
+def _panels(count: int, aspect: float) -> tuple[Figure, np.ndarray]:
+    """Make a figure with panels beside each other, or below each other where what they show is wide for its height."""
+    rows, columns = (count, 1) if aspect > WIDE else (1, count)
+    width = PANEL * (2.0 if aspect > WIDE else 1.0)
+    height = min(width / aspect, 1.4 * PANEL) + HEAD
+    figure = Figure(figsize=(width * columns, height * rows), layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06))
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(rows, columns, squeeze=False).ravel()
 
 
 def _view_of(found: Explanation) -> View:

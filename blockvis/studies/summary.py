@@ -111,7 +111,6 @@ def _reasons(messages: list[str]) -> dict[str, int]:
 
 def in_words(summary: dict[str, Any]) -> str:
     """Write the summary as text."""
-    unit = summary["unit"]
     lines = [
         f"{summary['n_finished']} of {summary['n_runs']} runs: "
         + ", ".join(f"{n} {status}" for status, n in summary["status"].items())
@@ -122,41 +121,59 @@ def in_words(summary: dict[str, Any]) -> str:
         number = summary["n_local"]
         words = "is a local loss" if number == 1 else "are local losses"
         lines.append(f"{number} of the collapses {words}: a few blocks fall, the structure stands")
-    if summary["line"]:
-        ends = [
-            f"{_value(value)}: {f'{at:.4g} {unit}' if at is not None else f'none ({status})'}"
-            for value, at, status in summary["line"][:MOST_VALUES]
-        ]
-        if len(summary["line"]) > MOST_VALUES:
-            ends.append(f"{len(summary['line']) - MOST_VALUES} more in table.csv")
-        lines.append(f"collapse by {summary['parameter']}, {'; '.join(ends)}")
-    elif summary["n_collapsed"] or summary["n_never_stood"]:
+    lines += _line_lines(summary) if summary["line"] else [*_curve_lines(summary), *_swing_lines(summary)]
+    return "\n".join([*lines, *_index_lines(summary), *_mechanism_lines(summary["mechanism_classes"])])
+
+
+def _line_lines(summary: dict[str, Any]) -> list[str]:
+    unit = summary["unit"]
+    ends = [
+        f"{_value(value)}: {f'{at:.4g} {unit}' if at is not None else f'none ({status})'}"
+        for value, at, status in summary["line"][:MOST_VALUES]
+    ]
+    if len(summary["line"]) > MOST_VALUES:
+        ends.append(f"{len(summary['line']) - MOST_VALUES} more in table.csv")
+    return [f"collapse by {summary['parameter']}, {'; '.join(ends)}"]
+
+
+def _curve_lines(summary: dict[str, Any]) -> list[str]:
+    unit = summary["unit"]
+    if summary["n_collapsed"] or summary["n_never_stood"]:
         quantiles = [
             f"{100 * float(p):g} % at {value:.4g} {unit}" if value is not None else f"{100 * float(p):g} % not reached"
             for p, value in summary["quantiles"].items()
         ]
-        lines.append(f"{summary['curve']}: {', '.join(quantiles)}")
-    elif summary["n_stood"]:
-        farther = (
-            "what each parameter does to a collapse is not known: let settlement.limit be larger; last reactions and "
-            "largest openings are in table.csv"
-        )
-        lines.append(f"no run collapsed up to {summary['furthest_settlement']:.4g} {unit}; {farther}")
-    for swing in () if summary["line"] else summary["swings"]:
+        return [f"{summary['curve']}: {', '.join(quantiles)}"]
+    if not summary["n_stood"]:
+        return []
+    farther = (
+        "what each parameter does to a collapse is not known: let settlement.limit be larger; last reactions and "
+        "largest openings are in table.csv"
+    )
+    return [f"no run collapsed up to {summary['furthest_settlement']:.4g} {unit}; {farther}"]
+
+
+def _swing_lines(summary: dict[str, Any]) -> list[str]:
+    lines, unit = [], summary["unit"]
+    for swing in summary["swings"]:
         (low_at, high_at), (low, high) = swing["at"], swing["mean"]
         index = summary["first_order_indices"].get(swing["parameter"])
         share = f", {100 * index[0]:.0f} ± {100 * index[1]:.0f} % of the variance" if index else ""
-        # A study of an earlier version has not stored which means are bounds.
-        least = ["at least " * bool(bound) for bound in swing.get("at_least", (False, False))]
+        least = ["at least " * bool(bound) for bound in swing["at_least"]]
         lines.append(
             f"{swing['parameter']}: {least[0]}{low:.4g} {unit} on average at {_value(low_at)}, {least[1]}{high:.4g} "
             f"{unit} at {_value(high_at)}{share}"
         )
+    return lines
+
+
+def _index_lines(summary: dict[str, Any]) -> list[str]:
     listed = {swing["parameter"] for swing in summary["swings"]}
-    for name, (share, error) in summary["first_order_indices"].items():
-        if name not in listed:
-            lines.append(f"{name}: {100 * share:.0f} ± {100 * error:.0f} % of the variance")
-    return "\n".join([*lines, *_mechanism_lines(summary["mechanism_classes"])])
+    return [
+        f"{name}: {100 * share:.0f} ± {100 * error:.0f} % of the variance"
+        for name, (share, error) in summary["first_order_indices"].items()
+        if name not in listed
+    ]
 
 
 def _mechanism_lines(classes: dict[str, int]) -> list[str]:
