@@ -252,9 +252,7 @@ def _parser() -> argparse.ArgumentParser:
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
     info.add_argument("file", metavar="FILE", help="or a folder or a pattern of files, one per stone")
-    info.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
-    _add_view(info)
-    _add_choice(info)
+    _add_reading(info)
     info.add_argument("--picture", metavar="PNG", help="draw what was found, or why it is refused")
     info.set_defaults(verb=_info)
     convert = verbs.add_parser(
@@ -269,9 +267,7 @@ def _parser() -> argparse.ArgumentParser:
         help="of the format that its suffix says, as .json, .dxf or .obj (a wrong one lists all); of results .vtkhdf "
         "for the path in time, .glb for an animation, else the blocks at the end",
     )
-    convert.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
-    _add_view(convert)
-    _add_choice(convert)
+    _add_reading(convert)
     convert.add_argument(
         "--joint-thickness", default="0", metavar="M", help='close mortar joints up to this, or "auto"'
     )
@@ -346,16 +342,6 @@ def _version() -> str:
         return "(not installed)"
 
 
-def _add_view(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument(
-        "--dimension",
-        choices=("2", "3", "auto"),
-        default="auto",
-        help="read blocks in the plane or in space (default: in space where bodies are not prisms side by side)",
-    )
-    verb.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
-
-
 def _add_render(verbs: Any) -> None:
     render = verbs.add_parser("render", help="draw again from a results folder, without solving")
     render.add_argument("results", metavar="OUT")
@@ -388,7 +374,17 @@ def _add_sight(verb: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_choice(verb: argparse.ArgumentParser) -> None:
+def _add_reading(verb: argparse.ArgumentParser, *, in_space: bool = True) -> None:
+    """Add the options that say how a layout file is read, and what of it."""
+    verb.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    if in_space:
+        verb.add_argument(
+            "--dimension",
+            choices=("2", "3", "auto"),
+            default="auto",
+            help="read blocks in the plane or in space (default: in space where bodies are not prisms side by side)",
+        )
+    verb.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
     for flag, what in (("--ignore", "leave out"), ("--only", "read nothing but")):
         verb.add_argument(
             flag,
@@ -404,14 +400,10 @@ def _add_choice(verb: argparse.ArgumentParser) -> None:
         metavar=("X0", "Y0", "X1", "Y1"),
         help="read what lies within this rectangle of the plane, in m, as info prints coordinates",
     )
-    _add_image(verb)
-
-
-def _add_image(verb: argparse.ArgumentParser) -> None:
-    what = "of an image, or of that of annotations"
+    of_image = "of an image, or of that of annotations"
     for flag in ("--width", "--height"):
-        verb.add_argument(flag, type=float, metavar="M", help=f"{flag[2:]} {what}, in m")
-    verb.add_argument("--pixel", type=float, metavar="M", help=f"size of a pixel {what}, in m, instead")
+        verb.add_argument(flag, type=float, metavar="M", help=f"{flag[2:]} {of_image}, in m")
+    verb.add_argument("--pixel", type=float, metavar="M", help=f"size of a pixel {of_image}, in m, instead")
     verb.add_argument("--background", metavar="VALUE", help='value, or colour such as "white", of what is no stone')
     verb.add_argument("--smallest", type=float, metavar="M", help="less of an image than this across is a speck")
 
@@ -427,9 +419,7 @@ def _add_bond(verbs: Any) -> None:
         "parameters", nargs="*", metavar="key=value", help="walls, openings, bond, brick, joint, heads ..., as in TOML"
     )
     bond.add_argument("-o", "--output", required=True, metavar="OUT")
-    bond.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
-    bond.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
-    _add_choice(bond)
+    _add_reading(bond, in_space=False)
     bond.add_argument("--force", action="store_true", help="replace OUT if it is there already")
     bond.set_defaults(verb=_bond)
 
@@ -488,9 +478,7 @@ def _add_new(verbs: Any) -> None:
     new = verbs.add_parser("new", help="a case file for a drawing, with a comment on every key")
     new.add_argument("drawing", metavar="DRAWING", help="or a folder or a pattern of files, one per stone")
     new.add_argument("-o", "--output", metavar="CASE.toml", help="(default: <drawing>.toml)")
-    new.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
-    _add_view(new)
-    _add_choice(new)
+    _add_reading(new)
     new.add_argument("--force", action="store_true", help="replace CASE.toml if it is there already")
     new.set_defaults(verb=_new)
 
