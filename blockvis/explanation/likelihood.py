@@ -9,13 +9,14 @@ import numpy as np
 from scipy.special import logsumexp
 
 import solver
+from blockvis.cases.block_at import distances_to
 from blockvis.results.joints import InitialJoints, carried_faces, initial_joints
 from solver import mechanics
 
 from .candidates import Candidate, Twin
 from .forward import Run, Variant, pose_of
 from .observations import Observations
-from .places import corners_of, nearest_block, on_faces
+from .places import corners_of, on_faces
 
 #: Amounts at which the likelihood is worked out, each larger than the one before by the same factor: from this fraction
 #: of the largest on.
@@ -103,7 +104,7 @@ class Comparison:
         names = {name: i for i, name in enumerate(assembly.names)}
         self.blocks = np.array(
             [
-                names[name] if name in names else nearest_block(assembly, point)
+                names[name] if name in names else int(np.argmin(distances_to(assembly, point)))
                 for name, point in zip(given.blocks, given.points, strict=True)
             ],
             dtype=int,

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-import solver
-from blockvis.cases.block_at import distances_to
 from blockvis.results.joint_faces import InitialJoints
 
 
@@ -33,7 +31,9 @@ def on_faces(points: np.ndarray, joints: InitialJoints) -> tuple[np.ndarray, np.
         two plane faces, has there the mean of its values at the corners with these weights.
     """
     if joints.rings.points.shape[1] == 2:
-        return _on_lines(points, joints.ends)
+        lines, places = shapely.linestrings(joints.ends), shapely.points(points)[:, None]
+        along = shapely.line_locate_point(lines, places, normalized=True)
+        return shapely.distance(lines, places), np.stack([1.0 - along, along], axis=2)
     corners = corners_of(joints)
     away, weights = np.zeros((len(points), len(joints))), np.zeros((len(points), *corners.shape))
     for joint, (first, stop) in enumerate(zip(joints.rings.offsets[:-1], joints.rings.offsets[1:], strict=True)):
@@ -47,16 +47,3 @@ def on_faces(points: np.ndarray, joints: InitialJoints) -> tuple[np.ndarray, np.
         known, there = (np.column_stack([np.ones(len(some)), some]) for some in (flat, near))
         weights[:, joint, : stop - first] = there @ np.linalg.pinv(known)
     return away, weights
-
-
-def _on_lines(points: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    start, line = ends[:, 0], ends[:, 1] - ends[:, 0]
-    squared = np.maximum((line**2).sum(axis=1), 1e-300)
-    along = np.clip(((points[:, None] - start) * line).sum(axis=2) / squared, 0.0, 1.0)
-    apart = points[:, None] - (start + along[..., None] * line)
-    return np.hypot(apart[..., 0], apart[..., 1]), np.stack([1.0 - along, along], axis=2)
-
-
-def nearest_block(assembly: solver.Assembly, point: np.ndarray) -> int:
-    """Find the block in which a point lies, or the nearest."""
-    return int(np.argmin(distances_to(assembly, point)))

@@ -12,6 +12,7 @@ import shapely
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 import solver
 from blockvis.pictures import palette
@@ -340,9 +341,7 @@ def _length(table: pd.DataFrame) -> tuple[float, str]:
     return (1e3, "mm") if unit == "m" and largest < 1.0 else (1.0, unit)
 
 
-def _mark(colour: str, mark: str, label: str, *, hollow: bool = False):  # type: ignore[no-untyped-def]
-    from matplotlib.lines import Line2D
-
+def _mark(colour: str, mark: str, label: str, *, hollow: bool = False) -> Line2D:
     face = "none" if hollow else colour
     return Line2D([], [], linestyle="", marker=mark, color=colour, markerfacecolor=face, label=label)
 
