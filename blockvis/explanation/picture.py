@@ -211,7 +211,7 @@ class _Canvas:
         self.panel.add_collection(
             PolyCollection(list(filled), facecolors=[colour], edgecolors=[colour], linewidths=0.8, zorder=3)
         )
-        return _Sights(joints)
+        return _Sights(self, joints)
 
     def compass(self) -> None:
         """Show where the right and the back are, in a corner of the panel."""
@@ -255,7 +255,7 @@ class _Canvas:
         scene.close()
         extent = (shown.low[0], shown.high[0], shown.low[1], shown.high[1])
         self.panel.imshow(np.asarray(picture), extent=extent, zorder=2)
-        return _Sights(joints, pieces, seen)
+        return _Sights(self, joints, pieces, seen)
 
 
 @dataclass(frozen=True)
@@ -270,6 +270,7 @@ class _Sights:
         Those that nothing hides.
     """
 
+    canvas: _Canvas
     rings: Rings
     pieces: np.ndarray | None = None
     seen: np.ndarray | None = None
@@ -277,19 +278,18 @@ class _Sights:
     def of(self, places: np.ndarray, joints: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
         """Find what is seen of joints (n,) int, and whether anything is, (n,) bool.
 
-        The nearest to places (n, d) [m] on them come first. They are (m, d) [m], on edges of each joint; the one given
-        where nothing of it is seen.
+        The nearest to places (n, d) [m] on them come first. They are (m, 2) of the panel, on edges of each joint; the
+        one given where nothing of it is seen.
         """
         found, seen = list(np.array(places)[:, None]), np.ones(len(places), dtype=bool)
-        if self.pieces is None or self.seen is None:
-            return found, seen
-        for k, joint in enumerate(joints.tolist()):
-            here = slice(*self.rings.offsets[joint : joint + 2])
-            edges = self.pieces[here][self.seen[here]]
-            seen[k] = len(edges) > 0
-            if len(edges):
-                found[k] = edges[np.linalg.norm(edges - places[k], axis=1).argsort(kind="stable")]
-        return found, seen
+        if self.pieces is not None and self.seen is not None:
+            for k, joint in enumerate(joints.tolist()):
+                here = slice(*self.rings.offsets[joint : joint + 2])
+                edges = self.pieces[here][self.seen[here]]
+                seen[k] = len(edges) > 0
+                if len(edges):
+                    found[k] = edges[np.linalg.norm(edges - places[k], axis=1).argsort(kind="stable")]
+        return [self.canvas.placed(each) for each in found], seen
 
 
 def _observed(canvas: _Canvas, found: Explanation) -> list[_Label]:
@@ -305,8 +305,7 @@ def _observed(canvas: _Canvas, found: Explanation) -> list[_Label]:
         thick += [1.5 + 4.0 * width / max(given.largest, 1e-300)] * len(around)
     sights = canvas.blocks(solver.Pose.initial(assembly), lines, thick, [], rings)
     canvas.compass()
-    at, seen = sights.of(given.places, found.comparison.own)
-    spots = [canvas.placed(each) for each in at]
+    spots, seen = sights.of(given.places, found.comparison.own)
     places, closed = np.array([each[0] for each in spots]).reshape(-1, 2), ~opened & seen
     panel.plot(*places[closed].T, "o", ms=4.5, mfc="white", mec=palette.hexadecimal(palette.FAINT), zorder=4)
     labels = _labels(panel, spots, given.widths, found, seen, sizes=given.widths)
@@ -355,20 +354,18 @@ def _computed(
     if len(given.widths):
         pairs = cause.best.pairs[cause.at]
         corners = between.points[compared.corners[compared.joint[pairs]]]
-        at, seen = sights.of((corners * compared.weights[pairs][..., None]).sum(axis=1), compared.joint[pairs])
-        spots = [canvas.placed(each) for each in at]
+        spots, seen = sights.of((corners * compared.weights[pairs][..., None]).sum(axis=1), compared.joint[pairs])
         labels = _labels(panel, spots, cause.best.widths[cause.at], found, seen, sizes=given.widths)
         np.maximum.at(labelled, compared.joint[pairs], cause.best.widths[cause.at])
     # Where nothing was observed at the end that gapes, the width at the other is not that of the crack.
     wider = np.flatnonzero(opening > GAPES * labelled)
     widest = compared.corners[wider, openings[0, compared.corners[wider]].argmax(axis=1)]
-    at, seen = sights.of(between.points[widest], wider)
-    spots = [canvas.placed(each) for each in at]
+    spots, seen = sights.of(between.points[widest], wider)
     labels += _labels(panel, spots, opening[wider], found, seen, sizes=opening[wider])
     measurement = found.next_measurement
     if measurement is not None:
-        at, _ = sights.of(between.middles()[[measurement.joint]], np.array([measurement.joint]))
-        x, y = canvas.placed(at[0])[0]
+        spots, _ = sights.of(between.middles()[[measurement.joint]], np.array([measurement.joint]))
+        x, y = spots[0][0]
         panel.plot(x, y, "D", ms=8, mfc="white", mec=palette.hexadecimal(palette.FORCE), mew=1.8, zorder=7)
         here = panel.annotate(
             f"measure here: {width_text(float(opening[measurement.joint]))}",
