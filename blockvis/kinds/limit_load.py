@@ -244,8 +244,7 @@ class LimitLoadKind(AnalysisKind):
 
     def headline(self, response: solver.Response) -> str:
         """Count the limit loads."""
-        number = len(response.limits)
-        return f"{number} limit load{'' if number == 1 else 's'}"
+        return mechanics.counted(len(response.limits), "limit load")
 
     def covers_message(self, response: solver.Response) -> bool:
         """Whether there is a limit load, which :meth:`lines` describe."""

@@ -24,7 +24,7 @@ from blockvis.pictures.marks import evenly
 from blockvis.pictures.render import draw_mechanism, draw_still
 from blockvis.pictures.underlay import Underlay
 from blockvis.results.about import about
-from blockvis.results.cracks import Crack, cracks_of, narrower_text
+from blockvis.results.cracks import Crack, cracks_of
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text, width_text
@@ -158,7 +158,7 @@ def _crack_table(cracks: Sequence[Crack]) -> tuple[Sequence[str], list[tuple[str
         size = f"{crack.size:.3g} {'m' if plane else 'm²'}"
         rows.append((str(number), width_text(crack.width), crack.widest, size, f"{crack.inclination:.0f}°", *ends))
     if len(cracks) > MOST_CRACKS:
-        rows.append(("", "", f"and {narrower_text(len(cracks) - MOST_CRACKS)}", "", "", "", ""))
+        rows.append(("", "", f"and {counted(len(cracks) - MOST_CRACKS, 'narrower one')}", "", "", "", ""))
     return head, rows, (7.0, 17.0, 40.0, 16.0, 16.0, 39.0, 39.0)
 
 

@@ -130,13 +130,13 @@ def mechanism_text(response: solver.Response) -> str:
 
 def counts_text(mechanism: mechanics.Mechanism) -> str:
     """Count the moving parts, hinges, sliding and crushing joints of a mechanism."""
-    counted = (
+    parts = (
         (len(mechanism.motions), "moving part"),
         (len(mechanism.hinges), "hinge"),
         (len(mechanism.sliding), "sliding joint"),
         (len(mechanism.crushing), "crushing joint"),
     )
-    return ", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in counted if n)
+    return ", ".join(mechanics.counted(n, word) for n, word in parts if n)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from scipy.spatial import ConvexHull
 
 import solver
 from blockvis.text import width_text
+from solver.mechanics import counted
 
 from .joint_faces import InitialJoints, initial_joints
 from .joints import Faces, carried_faces, opening_and_slip
@@ -186,13 +187,8 @@ def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
             words += f": {first} to {last}" if first != last else f": at {first}"
         rows.append((f"crack {number}", words))
     if len(cracks) > most:
-        rows.append(("and", narrower_text(len(cracks) - most)))
+        rows.append(("and", counted(len(cracks) - most, "narrower one")))
     return rows
-
-
-def narrower_text(number: int) -> str:
-    """Count the cracks that a table leaves out."""
-    return f"{number} narrower one{'' if number == 1 else 's'}"
 
 
 def _groups(meeting: np.ndarray, members: np.ndarray) -> list[np.ndarray]:

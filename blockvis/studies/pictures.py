@@ -228,7 +228,7 @@ def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path)
         _draw_shape(axes, shape, low, high)
         median = factor * float(table.loc[table["mechanism_class"] == one, "collapse_displacement"].median())
         number, part = classes[one], 100 * classes[one] / sum(classes.values())
-        runs = f"{number} run{'' if number == 1 else 's'}" + (f", {part:.3g} %" if is_sample(records.study) else "")
+        runs = counted(number, "run") + (f", {part:.3g} %" if is_sample(records.study) else "")
         share = float(table.loc[table["mechanism_class"] == one, "falling_share"].median())
         title = f"{place + 1}: {runs}; median {median:.3g} {unit}"
         if not np.isnan(share):

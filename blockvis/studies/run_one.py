@@ -168,11 +168,11 @@ def mechanism_class(mechanism: mechanics.Mechanism) -> str:
 
     It is the same for the same joints, whatever the displacements of the blocks.
     """
-    n, hinges, sliding = len(mechanism.motions), mechanism.hinges, mechanism.sliding
-    parts = f"{n} part{'' if n == 1 else 's'}"
+    hinges, sliding = mechanism.hinges, mechanism.sliding
+    parts = mechanics.counted(len(mechanism.motions), "part")
     if len(hinges) + len(sliding) > NAMED_JOINTS:
-        counted = ((len(hinges), "hinge"), (len(sliding), "sliding joint"))
-        return ", ".join([parts, *(f"{k} {what}{'' if k == 1 else 's'}" for k, what in counted if k)])
+        joints = ((len(hinges), "hinge"), (len(sliding), "sliding joint"))
+        return ", ".join([parts, *(mechanics.counted(k, what) for k, what in joints if k)])
     words = [parts] if len(hinges) + len(sliding) == 0 else []
     words += [
         f"{what} {_joints(mechanism.names, pairs.tolist())}"

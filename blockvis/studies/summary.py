@@ -116,7 +116,7 @@ def in_words(summary: dict[str, Any]) -> str:
         + ", ".join(f"{n} {status}" for status, n in summary["status"].items())
     ]
     for reason, n in summary["reasons"].items():
-        lines.append(f"without result, {n} time{'' if n == 1 else 's'}: {reason}")
+        lines.append(f"without result, {counted(n, 'time')}: {reason}")
     if summary["n_local"]:
         number = summary["n_local"]
         words = "is a local loss" if number == 1 else "are local losses"
@@ -178,7 +178,7 @@ def _index_lines(summary: dict[str, Any]) -> list[str]:
 
 def _mechanism_lines(classes: dict[str, int]) -> list[str]:
     lines = [
-        f"mechanism {number}, {count} time{'' if count == 1 else 's'}: {name}"
+        f"mechanism {number}, {counted(count, 'time')}: {name}"
         for number, (name, count) in enumerate(list(classes.items())[:MOST_MECHANISMS], 1)
     ]
     more = len(classes) - MOST_MECHANISMS
