@@ -53,7 +53,6 @@ def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.Unstru
     from .results.datasets import block_grid, contact_grid, joint_grid, tie_grid
     from .results.increments import numbered
     from .results.mechanism_arrays import as_shown
-    from .results.ties import known_ties
 
     assembly = response.assembly
     increment = numbered(response.increments, k)
@@ -63,7 +62,7 @@ def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.Unstru
     if of == "blocks":
         grid = block_grid(assembly, increment, shape=shape, falls=falls)
     elif of == "members":
-        grid = tie_grid(known_ties(response), assembly, increment, shape=shape)
+        grid = tie_grid(response.ties, assembly, increment, shape=shape)
     else:
         grid = (joint_grid if of == "joints" else contact_grid)(assembly, increment, shape=shape)
     return pv.UnstructuredGrid(grid)

@@ -162,7 +162,7 @@ class Engine:
         return np.where(self.free, energies, 0.0) * self.mass * solver.GRAVITY * self.length
 
     def advance(self, seconds: float) -> None:
-        """Follow the blocks for so many seconds; raises ``NotSolved`` where the shortest step cannot be."""
+        """Follow the blocks for so many seconds; raises ``NotSolved`` where the shortest step cannot be solved."""
         left = seconds / self.unit
         while left > 1e-9:
             fastest = float(self.speeds[self.free].max()) + 0.5 * LONGEST_STEP

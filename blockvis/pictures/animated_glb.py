@@ -16,7 +16,6 @@ from blockvis.dynamics.fall import Fall
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import layout_of
 from blockvis.layout.solids import BASE_FRAME, prism, triangles_of
-from blockvis.results.ties import known_ties
 from blockvis.system.atomic_files import write_atomic
 from solver import mechanics
 
@@ -64,7 +63,7 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     """
     if not response.increments:
         raise ValueError(f"there is no motion to write to '{path}': {response.message or response.stop}")
-    ties = known_ties(response)
+    ties = response.ties
     times, poses, tied, stands = _played(response, fall)
     moves = [_as_gltf(pose, response.assembly.dimension) for pose in poses]
     places, turns = np.array([place for place, _ in moves]), np.array([turn for _, turn in moves])

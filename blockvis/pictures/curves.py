@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw
 import solver
 from blockvis.results.about import about, collapse_mechanism, collapse_phase, counts_text, in_phase
 from blockvis.results.reaction_range import ReactionRange
-from blockvis.results.ties import TieForceCurves, known_ties, tie_force_curves
+from blockvis.results.ties import TieForceCurves, tie_force_curves
 from blockvis.system.atomic_files import atomic_file
 from solver import mechanics
 
@@ -264,7 +264,7 @@ def _mark_phases(axes: Axes, response: solver.Response, letters: int) -> float:
         changes = [change for change in response.changes if change.phase == path[k].phase]
         words += [f"'{name}' taken away" for change in changes for name in change.ties]
         words += ["dead load changed"] * any(change.dead is not None for change in changes)
-        words += [f"'{tie.name}' installed" for tie in known_ties(response) if tie.phase == path[k].phase + 1]
+        words += [f"'{tie.name}' installed" for tie in response.ties if tie.phase == path[k].phase + 1]
         axes.axvline(total[k - 1], color=grey, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1)
         axes.annotate(
             str(path[k].phase + 1), (total[k - 1], 1.0), (0, 2), ("data", "axes fraction"), ha="center", **style

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import solver
-from blockvis.results.ties import known_ties, ties_at
+from blockvis.results.ties import ties_at
 from blockvis.text import force_text
 from solver import mechanics
 
@@ -97,7 +97,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
 
 def _of_ties(response: solver.Response, increment: solver.Increment) -> np.ndarray:
     """(n_blocks, n_dof) array [N, N·m]: what ties, props and bars do to the blocks."""
-    ties, assembly = known_ties(response), response.assembly
+    ties, assembly = response.ties, response.assembly
     forces = ties_at(ties, assembly, increment).forces
     lengths = np.where(forces == 0.0, np.nan, 1.0)
     members = mechanics.member_contacts(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.results.ties import STATE_WORDS, known_ties
+from blockvis.results.ties import STATE_WORDS
 from blockvis.text import force_text
 from solver import mechanics
 
@@ -93,7 +93,7 @@ class DrawnTies:
     """
 
     def __init__(self, response: solver.Response, cut: np.ndarray | None = None) -> None:
-        self._assembly, self._ties, self._cut = response.assembly, known_ties(response), cut
+        self._assembly, self._ties, self._cut = response.assembly, response.ties, cut
         self._props = np.array([tie.kind == mechanics.PROP for tie in self._ties], dtype=bool)
         self._grounded = np.array([[b is None for b in tie.blocks] for tie in self._ties], dtype=bool).reshape(-1, 2)
         self.seen: set[tuple[int, str]] = set()

@@ -15,7 +15,6 @@ from blockvis.text import force_text
 from solver import mechanics
 
 from .about import in_phase, unit_in
-from .increments import folder_of
 from .npz import packed, unpacked
 from .tables import own_columns
 
@@ -69,14 +68,6 @@ def stored_ties(folder: Path, increments: Sequence[solver.Increment] = ()) -> tu
     return ties
 
 
-def known_ties(response: solver.Response) -> tuple[solver.Tie, ...]:
-    """Find the ties of a response: those it knows, or those of the folder that its increments are read from."""
-    if response.ties or not response.increments:
-        return response.ties
-    folder = folder_of(response.increments[0])
-    return () if folder is None else stored_ties(folder)
-
-
 def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment) -> mechanics.TieForces:
     """Give what ties do at an increment; where that is not known, where their ends are."""
     found = increment.ties
@@ -90,12 +81,7 @@ def ties_at(ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: so
 def tie_rows(
     ties: Sequence[solver.Tie], number: int, increment: solver.Increment, parameter: mechanics.Quantity
 ) -> list[tuple[Any, ...]]:
-    """Make the rows of ties.csv for an increment by its number, in the order of :data:`COLUMNS`, its parameter last.
-
-    There are none outside of equilibrium.
-    """
-    if increment.status != solver.Status.EQUILIBRIUM:
-        return []
+    """Make the rows of ties.csv for an increment by its number, in the order of :data:`COLUMNS`, its parameter last."""
     found, value = increment.ties, repr(float(increment.parameter))
     place = number, increment.phase, value if parameter.is_path else repr(0.0)
     own = [value for _ in own_columns(parameter)]
@@ -185,7 +171,7 @@ class TieCourses:
 
 def tie_courses(response: solver.Response) -> tuple[TieCourse, ...]:
     """Work out what each tie of a response does along its path, gone through once, or at the state that governs."""
-    courses, governing = TieCourses(known_ties(response)), response.governing
+    courses, governing = TieCourses(response.ties), response.governing
     if not response.parameter.is_path and governing is not None:
         courses.add(governing)
         return courses.courses
@@ -215,7 +201,7 @@ class TieForceCurves:
 
 def tie_force_curves(response: solver.Response) -> TieForceCurves | None:
     """Collect the forces of ties along a path; None where none carries."""
-    ties, path = known_ties(response), response.path
+    ties, path = response.ties, response.path
     if not ties or len(path) < 2:
         return None
     found = [increment.ties for increment in path]

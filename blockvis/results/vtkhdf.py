@@ -18,7 +18,6 @@ from blockvis.system.atomic_files import atomic_file
 from .datasets import grids_of
 from .joint_faces import initial_joints
 from .mechanism_arrays import as_shown
-from .ties import known_ties
 from .viewer_files import output_times
 
 #: Level of zlib.
@@ -66,7 +65,7 @@ class _Series(VTKPythonAlgorithmBase):
     def __init__(self, response: solver.Response) -> None:
         super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkMultiBlockDataSet")
         self._response, self._joints = response, initial_joints(response.assembly)
-        self._times, self._ties = output_times(response.path), known_ties(response)
+        self._times, self._ties = output_times(response.path), response.ties
 
     def RequestInformation(self, _request: Any, _inputs: Any, outputs: Any) -> int:
         """Say which times there are."""

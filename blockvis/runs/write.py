@@ -9,7 +9,6 @@ from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.paraview import write_paraview_macro
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.increments import folder_of
-from blockvis.results.ties import known_ties
 
 
 def write(response: solver.Response, folder: str | Path, *, overwrite: bool = False) -> Path:
@@ -31,8 +30,9 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
     sources = {folder_of(increment) for increment in response.increments} - {None}
     if any(source is not None and source.resolve() == Path(folder).resolve() for source in sources):
         raise ValueError(f"the response is read from '{folder}' itself; write it to another folder")
-    ties = known_ties(response)
-    results = ResultsFolder(folder, response.assembly, overwrite=overwrite, parameter=response.parameter, ties=ties)
+    results = ResultsFolder(
+        folder, response.assembly, overwrite=overwrite, parameter=response.parameter, ties=response.ties
+    )
     for increment in response.increments:
         results.add(increment)
     finish(results, response)

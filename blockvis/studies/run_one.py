@@ -23,7 +23,6 @@ from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import collapse_phase, least_reaction, loss_in
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.results.swinging import swing_factor
-from blockvis.results.ties import known_ties
 from blockvis.runs.plan import planned
 from solver import mechanics
 
@@ -129,7 +128,7 @@ def _outcome(case: Case, number: int, seconds: float | None) -> tuple[dict[str, 
         "sliding_joints": len(mechanism.sliding),
     }
     settlement = response.settlements[collapse_phase(response) or 0]
-    return found, _shape(number, assembly, falls, mechanism, settlement, known_ties(response))
+    return found, _shape(number, assembly, falls, mechanism, settlement, response.ties)
 
 
 def _numbers(response: solver.Response) -> dict[str, Any]:
