@@ -293,4 +293,4 @@ def _cracks_at(side: Side, at: float) -> tuple[list[Crack], dict[frozenset[str],
     for a, b, width in zip(joints.block_a.tolist(), joints.block_b.tolist(), opening.tolist(), strict=True):
         pair = frozenset((assembly.names[a], assembly.names[b]))
         found[pair] = max(width, found.get(pair, 0.0))
-    return cracks_of(assembly, state.pose, joints, state.fallen), found
+    return cracks_of(assembly, state.pose, state.fallen), found

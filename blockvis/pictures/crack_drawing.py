@@ -65,7 +65,7 @@ def draw_cracks(
     increments = response.path or response.increments
     increment = numbered(increments, number)
     joints = initial_joints(assembly)
-    cracks = cracks_of(assembly, increment.pose, joints, increment.fallen)
+    cracks = cracks_of(assembly, increment.pose, increment.fallen)
     shown, hidden = cracks, 0
     sheet = Sheet(size)
     if assembly.dimension == 2:

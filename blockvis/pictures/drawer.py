@@ -663,7 +663,7 @@ class Drawer:
         """Write the forces of ties, and the widths of the widest crack lines, beside them, where there is room."""
         points, words, colours = self.ties.labels(increment, shown)
         if widths:
-            cracks = main_cracks(cracks_of(self.assembly, increment.pose, self.joints, increment.fallen))
+            cracks = main_cracks(cracks_of(self.assembly, increment.pose, increment.fallen))
             faces = carried_faces(self.assembly, self.joints, shown)
             widest = [int(crack.joints[0]) for crack in cracks]
             ends = end_openings(self.assembly, self.joints, increment.pose)[widest].argmax(axis=1)

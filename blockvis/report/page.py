@@ -228,7 +228,7 @@ def _cracks(response: solver.Response) -> str:
     if not response.path:
         return ""
     last = response.path[-1]
-    rows = crack_rows(cracks_of(response.assembly, last.pose, fallen=last.fallen), LISTED_CRACKS)
+    rows = crack_rows(cracks_of(response.assembly, last.pose, last.fallen), LISTED_CRACKS)
     return f'<h2>Cracks at the last equilibrium</h2><table id="crack-lines">{html_rows(rows)}</table>' if rows else ""
 
 

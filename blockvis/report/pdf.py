@@ -104,7 +104,7 @@ def write_pdf(
             paper.heading("Curve", 12.0, PICTURE)
             paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), 140.0)
             paper.tabulate("States", *_states(response))
-            cracks = cracks_of(response.assembly, last.pose, fallen=last.fallen)
+            cracks = cracks_of(response.assembly, last.pose, last.fallen)
             if cracks:
                 paper.heading("Cracks", 12.0, PICTURE)
                 paper.picture(draw_cracks(response, -1, Path(folder) / "cracks.png", **eye))

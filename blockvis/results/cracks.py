@@ -125,18 +125,13 @@ class Crack:
         }
 
 
-def cracks_of(
-    assembly: solver.Assembly,
-    pose: solver.Pose,
-    joints: InitialJoints | None = None,
-    fallen: np.ndarray | None = None,
-) -> list[Crack]:
+def cracks_of(assembly: solver.Assembly, pose: solver.Pose, fallen: np.ndarray | None = None) -> list[Crack]:
     """Trace the cracks of a layout at a pose, the widest first; joints of fallen blocks (n_blocks,) are none.
 
     In the plane joints that have parted or slid are followed as far as they stay near a straight line; where cracks
     fork, the one along which less has parted begins anew, and where one turns, another begins.
     """
-    joints = initial_joints(assembly) if joints is None else joints
+    joints = initial_joints(assembly)
     moved = opening_and_slip(assembly, joints, pose, fallen)
     least = SMALLEST_OPENING * assembly.block_size
     # A stepped crack runs through bed joints that slide but stay shut.

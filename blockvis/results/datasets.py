@@ -24,7 +24,7 @@ import solver
 from blockvis.system.vtk_files import string_array
 from solver import mechanics
 
-from .joint_faces import InitialJoints, Rings, initial_joints, lengths_of
+from .joint_faces import Rings, initial_joints, lengths_of
 from .joints import joint_states
 from .mechanism_arrays import block_motion, next_places, part_of_friction
 from .ties import STATE_WORDS, ties_at
@@ -115,13 +115,7 @@ def block_grid(
     return grid
 
 
-def joint_grid(
-    assembly: solver.Assembly,
-    increment: solver.Increment,
-    *,
-    shape: str = "moved",
-    joints: InitialJoints | None = None,
-) -> vtkUnstructuredGrid:
+def joint_grid(assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved") -> vtkUnstructuredGrid:
     """Make a grid of the joints of one increment: a line for each, in space a face, midway between its two faces.
 
     Parameters
@@ -139,7 +133,7 @@ def joint_grid(
         ``slip`` and ``shear_force`` are sizes, ``area`` [m²] takes the place of ``length``, ``normal`` and ``force``
         [N] are vectors, and the point array ``gap`` [m] is the distance of the faces at each corner.
     """
-    states = joint_states(assembly, initial_joints(assembly) if joints is None else joints, increment)
+    states = joint_states(assembly, initial_joints(assembly), increment)
     rings, in_space = states.rings, assembly.dimension == 3
     # Lines or vertices also where blocks touch at an edge or a corner.
     kinds = np.array([VTK_VERTEX, VTK_LINE, VTK_POLYGON], dtype=np.uint8)
@@ -269,14 +263,13 @@ def grids_of(
     ties: Sequence[solver.Tie],
     *,
     shape: str = "moved",
-    joints: InitialJoints | None = None,
     falls: np.ndarray | None = None,
 ) -> dict[str, vtkUnstructuredGrid]:
     """Make all grids of an increment by their kinds; that of ties where there are any."""
     grids = {
         "blocks": block_grid(assembly, increment, shape=shape, falls=falls),
         "contacts": contact_grid(assembly, increment, shape=shape),
-        "joints": joint_grid(assembly, increment, shape=shape, joints=joints),
+        "joints": joint_grid(assembly, increment, shape=shape),
     }
     return grids | ({"ties": tie_grid(ties, assembly, increment, shape=shape)} if ties else {})
 

@@ -27,12 +27,7 @@ FALL_LIST, TIE_LIST, FALL_POSES = "fall.pvd", "fall_ties.pvd", "fall.npz"
 _known: dict[int, Fall | None] = {}
 
 
-def write_fall(
-    fall: Fall,
-    response: solver.Response,
-    folder: Path,
-    vtu: ViewerFormat = MOVED,
-) -> None:
+def write_fall(fall: Fall, response: solver.Response, folder: Path, vtu: ViewerFormat = MOVED) -> None:
     """Write the VTU files of the fall of a response, the list of them, and its poses."""
     from blockvis.system.vtk_files import write_pvd, write_vtu
 

@@ -226,7 +226,7 @@ class ResultsFolder:
             restore_grids(self.path, self.assembly, self.increments, self.vtu)
         if response.path and response.collapse is not None:
             # What follows the last equilibrium is known by now, and with it the states of its joints.
-            write_end(self.path, response, self.vtu, self._movements.joints)
+            write_end(self.path, response, self.vtu)
             self._rows.seek(self._last_row)
             self._rows.truncate()
             last = at_last_equilibrium(response)
@@ -242,7 +242,7 @@ class ResultsFolder:
         cracks = []
         if response.path:
             end = response.path[-1]
-            cracks = cracks_of(self.assembly, end.pose, self._movements.joints, end.fallen)
+            cracks = cracks_of(self.assembly, end.pose, end.fallen)
         listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         if self.ties:
             courses = self._courses.courses if response.parameter.is_path else tie_courses(response)
@@ -259,7 +259,7 @@ class ResultsFolder:
 
     def own_viewer(self) -> ViewerWriter:
         """Make what writes the files for viewers in this process."""
-        return ViewerFiles(self.path, self.assembly, self.vtu, self.increments, self._movements.joints)
+        return ViewerFiles(self.path, self.assembly, self.vtu, self.increments)
 
     def _start_table(self) -> None:
         self._rows = io.StringIO()

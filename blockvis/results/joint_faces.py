@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import shapely
@@ -129,8 +130,19 @@ def lengths_of(ends: np.ndarray) -> np.ndarray:
     return np.asarray(np.hypot(*(ends[:, 1] - ends[:, 0]).T))
 
 
+#: Joints by their assembly, as long as it lives: who needs them asks again and again.
+_known: WeakKeyDictionary[solver.Assembly, InitialJoints] = WeakKeyDictionary()
+
+
 def initial_joints(assembly: solver.Assembly) -> InitialJoints:
-    """Find the faces that touch in the layout; where they part later there is a crack.
+    """Find the faces that touch in the layout, once; where they part later there is a crack."""
+    if assembly not in _known:
+        _known[assembly] = _touching_faces(assembly)
+    return _known[assembly]
+
+
+def _touching_faces(assembly: solver.Assembly) -> InitialJoints:
+    """Find the faces that touch in the layout.
 
     In space the contact points of two faces are the corners of the polygon they have in common, so the polygon is their
     convex hull. Blocks that are not convex may have several.

@@ -12,7 +12,6 @@ import numpy as np
 import solver
 from blockvis.system.vtk_files import is_complete, write_pvd, write_vtu
 
-from .joint_faces import InitialJoints, initial_joints
 from .mechanism_arrays import as_shown
 from .ties import TIES, stored_ties
 
@@ -58,20 +57,14 @@ class ViewerFiles:
     """
 
     def __init__(
-        self,
-        folder: Path,
-        assembly: solver.Assembly,
-        vtu: ViewerFormat,
-        increments: Sequence[solver.Increment] = (),
-        joints: InitialJoints | None = None,
+        self, folder: Path, assembly: solver.Assembly, vtu: ViewerFormat, increments: Sequence[solver.Increment]
     ) -> None:
         self.folder, self.assembly, self.vtu = folder, assembly, vtu
-        self.joints = initial_joints(assembly) if joints is None else joints
         self._listed = list(increments)
 
     def add(self, increment: solver.Increment) -> None:
         """Write the files of the next increment, which is kept without arrays, then the lists that name them."""
-        write_grids(self.folder, len(self._listed), self.assembly, increment, self.vtu, self.joints)
+        write_grids(self.folder, len(self._listed), self.assembly, increment, self.vtu)
         self._listed.append(increment)
         write_lists(self.folder, self._listed)
 
@@ -104,11 +97,11 @@ def restore_grids(
     return lost
 
 
-def write_end(folder: Path, response: solver.Response, vtu: ViewerFormat, joints: InitialJoints | None = None) -> None:
+def write_end(folder: Path, response: solver.Response, vtu: ViewerFormat) -> None:
     """Write the VTU files of the last equilibrium again, when the collapse that follows it is known."""
     if response.path and response.collapse is not None:
         last, falls = as_shown(response, response.path[-1])
-        write_grids(folder, len(response.path) - 1, response.assembly, last, vtu, joints, falls)
+        write_grids(folder, len(response.path) - 1, response.assembly, last, vtu, falls)
 
 
 def write_grids(
@@ -117,7 +110,6 @@ def write_grids(
     assembly: solver.Assembly,
     increment: solver.Increment,
     vtu: ViewerFormat,
-    joints: InitialJoints | None = None,
     falls: np.ndarray | None = None,
 ) -> None:
     """Write the VTU files of an increment by its number; ``falls`` as of :func:`~.datasets.block_grid`."""
@@ -125,7 +117,7 @@ def write_grids(
     from .datasets import grids_of
 
     ties = stored_ties(folder)
-    for kind, grid in grids_of(assembly, increment, ties, shape=vtu.shape, joints=joints, falls=falls).items():
+    for kind, grid in grids_of(assembly, increment, ties, shape=vtu.shape, falls=falls).items():
         write_vtu(grid, grid_file(folder, kind, number), strings=vtu.strings, durable=False)
 
 

@@ -16,7 +16,6 @@ import solver
 from blockvis.system.atomic_files import atomic_file
 
 from .datasets import grids_of
-from .joint_faces import initial_joints
 from .mechanism_arrays import as_shown
 from .viewer_files import output_times
 
@@ -64,8 +63,7 @@ class _Series(VTKPythonAlgorithmBase):
 
     def __init__(self, response: solver.Response) -> None:
         super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkMultiBlockDataSet")
-        self._response, self._joints = response, initial_joints(response.assembly)
-        self._times, self._ties = output_times(response.path), response.ties
+        self._response, self._times = response, output_times(response.path)
 
     def RequestInformation(self, _request: Any, _inputs: Any, outputs: Any) -> int:
         """Say which times there are."""
@@ -87,7 +85,7 @@ class _Series(VTKPythonAlgorithmBase):
 
     def _grids(self, number: int) -> dict[str, vtkUnstructuredGrid]:
         increment, falls = as_shown(self._response, self._response.path[number])
-        return grids_of(self._response.assembly, increment, self._ties, joints=self._joints, falls=falls)
+        return grids_of(self._response.assembly, increment, self._response.ties, falls=falls)
 
 
 def _without_strings(grid: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
