@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -201,9 +201,7 @@ def stored_check(folder: Path) -> StepCheck | None:
     if not (folder / STEP_CHECK).is_file():
         return None
     numbers = read_json(folder / STEP_CHECK)
-    known = {field.name: numbers[field.name] for field in fields(StepCheck) if field.name in numbers}
-    unknown = {name: np.nan for name in UNKNOWN if known[name] is None}
-    return StepCheck(**{**known, **unknown})
+    return StepCheck(**numbers | {name: np.nan for name in UNKNOWN if numbers[name] is None})
 
 
 def _finer(case: Case) -> Case:

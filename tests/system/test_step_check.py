@@ -175,7 +175,7 @@ def test_where_one_run_collapses_and_the_other_does_not_both_ends_are_named():
 
 
 def test_a_check_is_read_as_it_was_written(tmp_path):
-    numbers = {**vars(CHECK), "collapse": None, "way": "steps"}
+    numbers = {**vars(CHECK), "collapse": None}
     (tmp_path / "step_check.json").write_text(json.dumps(numbers), encoding="utf-8")
     assert str(stored_check(tmp_path)) == str(CHECK)
 
