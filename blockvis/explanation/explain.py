@@ -42,6 +42,7 @@ from .likelihood import EXPLAINED, Comparison, Trial, Trust, tried
 from .observations import Observations, read_observations
 from .ranking import Cause, next_measurement, ranked, unexplained
 from .result import Explanation
+from .words import in_words
 from .write import FILES, write_explanation
 
 #: Range of the coefficient of friction, as fractions of that of the case, where the case gives none.
@@ -149,6 +150,7 @@ def explain(
         runs=search.used,
         notes=tuple(notes),
     )
+    found = replace(found, words=in_words(found))
     if folder is not None:
         write_explanation(found, Path(folder))
     return found

@@ -13,7 +13,6 @@ from .forward import Run
 from .likelihood import Comparison
 from .observations import Observations
 from .ranking import Cause, Measurement, alike
-from .words import in_words
 
 
 @dataclass(frozen=True)
@@ -36,6 +35,8 @@ class Explanation:
         The joint that would tell the first causes apart best.
     runs : dict
         Of the candidates: ``explain(..., runs=...)`` takes them instead of following them again.
+    words : str
+        What came out, for people.
     """
 
     case: Case
@@ -50,6 +51,7 @@ class Explanation:
     next_measurement: Measurement | None
     runs: dict[Any, Run] = field(repr=False, default_factory=dict)
     notes: tuple[str, ...] = ()
+    words: str = ""
 
     @property
     def stands(self) -> bool:
@@ -63,8 +65,8 @@ class Explanation:
 
     def __str__(self) -> str:
         """Say in words what came out."""
-        return in_words(self)
+        return self.words
 
     def _repr_html_(self) -> str:
         """Show the words in a notebook."""
-        return f"<pre>{html.escape(str(self))}</pre>"
+        return f"<pre>{html.escape(self.words)}</pre>"
