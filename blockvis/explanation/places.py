@@ -31,9 +31,7 @@ def on_faces(points: np.ndarray, joints: InitialJoints) -> tuple[np.ndarray, np.
         two plane faces, has there the mean of its values at the corners with these weights.
     """
     if joints.rings.points.shape[1] == 2:
-        lines, places = shapely.linestrings(joints.ends), shapely.points(points)[:, None]
-        along = shapely.line_locate_point(lines, places, normalized=True)
-        return shapely.distance(lines, places), np.stack([1.0 - along, along], axis=2)
+        return _on_lines(points, joints.ends)
     corners = corners_of(joints)
     away, weights = np.zeros((len(points), len(joints))), np.zeros((len(points), *corners.shape))
     for joint, (first, stop) in enumerate(zip(joints.rings.offsets[:-1], joints.rings.offsets[1:], strict=True)):
@@ -47,3 +45,11 @@ def on_faces(points: np.ndarray, joints: InitialJoints) -> tuple[np.ndarray, np.
         known, there = (np.column_stack([np.ones(len(some)), some]) for some in (flat, near))
         weights[:, joint, : stop - first] = there @ np.linalg.pinv(known)
     return away, weights
+
+
+def _on_lines(points: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    start, line = ends[:, 0], ends[:, 1] - ends[:, 0]
+    squared = np.maximum((line**2).sum(axis=1), 1e-300)
+    along = np.clip(((points[:, None] - start) * line).sum(axis=2) / squared, 0.0, 1.0)
+    apart = points[:, None] - (start + along[..., None] * line)
+    return np.hypot(apart[..., 0], apart[..., 1]), np.stack([1.0 - along, along], axis=2)

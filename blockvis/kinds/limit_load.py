@@ -16,7 +16,7 @@ from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import collapse_phase, governing_limit, in_phase, unit_in
-from blockvis.results.swinging import swing_factor, swung_increment
+from blockvis.results.swinging import swing_factors, swung_increment
 from blockvis.results.tables import csv_text, finite
 from blockvis.text import force_text
 from solver import mechanics
@@ -598,7 +598,7 @@ def _limit_ending(limit: solver.LimitLoad) -> mechanics.Ending:
 
 def _swinging(assembly: solver.Assembly, state: solver.Increment) -> Iterator[solver.Increment]:
     """Pseudo-motion: the mechanism of a limit state, followed to first order, out of scale."""
-    factors = np.linspace(0.0, 1.0, SWINGING_FRAMES + 1)[1:] * swing_factor(assembly, state, SWING)
+    factors = swing_factors(assembly, state, SWING, np.linspace(0.0, 1.0, SWINGING_FRAMES + 1)[1:])
     if factors.any():
         # What the state has to tell it tells itself.
         state = replace(state, notes=())

@@ -8,7 +8,7 @@ import solver
 from blockvis.dynamics.fall import falls_from, with_mechanism
 from solver import mechanics
 
-from .swinging import swing_factor
+from .swinging import swing_factors
 
 #: How far the fastest corner goes by the point array ``mechanism``, in extents of the free blocks: to be seen at once.
 AHEAD = 0.1
@@ -41,7 +41,7 @@ def next_places(
 
     Each moves with a block, (n_points,) int, or stays midway between two.
     """
-    factor = swing_factor(assembly, increment, AHEAD)
+    factor = swing_factors(assembly, increment, AHEAD, np.ones(1))[0]
     each = [mechanics.point_velocities(points, block, increment.pose, increment.velocity) for block in blocks]
     return np.asarray(factor * sum(each[1:], each[0]) / len(each))
 

@@ -19,14 +19,18 @@ def corner_speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarr
     return np.where(assembly.free, speeds, 0.0)
 
 
-def swing_factor(assembly: solver.Assembly, increment: solver.Increment, reach: float) -> float:
-    """Factor on the motion that follows with which the fastest corner goes a reach, in extents of the free blocks.
+def swing_factors(
+    assembly: solver.Assembly, increment: solver.Increment, reach: float, shares: np.ndarray
+) -> np.ndarray:
+    """(n,) array: factors on the motion that follows with which the fastest corner goes shares (n,) of a reach.
 
-    Zero where nothing moves.
+    The reach is in extents of the free blocks. Zero where nothing moves.
     """
     fastest = float(corner_speeds(assembly, increment.pose, increment.velocity).max(initial=0.0))
+    if fastest == 0.0:
+        return np.zeros(len(shares))
     corners = mechanics.moved_vertices(assembly, increment.pose)[assembly.free[assembly.block_of_vertex]]
-    return reach * float(np.ptp(corners, axis=0).max()) / fastest if fastest > 0.0 else 0.0
+    return np.asarray(shares * (reach * float(np.ptp(corners, axis=0).max())) / fastest)
 
 
 def swung_increment(increment: solver.Increment, motion: np.ndarray) -> solver.Increment:

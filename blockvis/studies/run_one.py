@@ -22,7 +22,7 @@ from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import collapse_phase, least_reaction, loss_in
 from blockvis.results.joints import initial_joints, opening_and_slip
-from blockvis.results.swinging import swing_factor
+from blockvis.results.swinging import swing_factors
 from blockvis.runs.plan import planned
 from solver import mechanics
 
@@ -210,7 +210,8 @@ def _shape(
     free = assembly.free[assembly.block_of_vertex]
     at_rest = mechanics.moved_vertices(assembly, falling.pose)
     size = float(np.ptp(at_rest[free], axis=0).max())
-    moved = mechanics.swung(falling.pose, falling.velocity * swing_factor(assembly, falling, SWING))
+    (factor,) = swing_factors(assembly, falling, SWING, np.ones(1))
+    moved = mechanics.swung(falling.pose, falling.velocity * factor)
     vertices, tied = mechanics.moved_vertices(assembly, moved), mechanics.tie_ends(ties, assembly, moved)
     if assembly.dimension == 2:
         low, high = at_rest[free].min(axis=0) - 0.15 * size, at_rest[free].max(axis=0) + 0.15 * size

@@ -37,7 +37,7 @@ from blockvis.pictures.swing import swing_of
 from blockvis.report.page import summary_rows
 from blockvis.results.cracks import crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
-from blockvis.results.swinging import corner_speeds, swing_factor, swung_increment
+from blockvis.results.swinging import corner_speeds, swing_factors, swung_increment
 from blockvis.text import rounded_length, width_text
 from solver import mechanics
 
@@ -304,14 +304,14 @@ def test_a_mechanism_that_rises_swings_as_far_as_it_is_to(response_of):
     np.testing.assert_allclose(corner_speeds(assembly, last.pose, up), np.where(assembly.free, 3.0, 0.0))
     free = assembly.free[assembly.block_of_vertex]
     extent = np.ptp(mechanics.moved_vertices(assembly, last.pose)[free], axis=0).max()
-    for share in (0.5, 1.0):
-        frame = swung_increment(state, share * swing_factor(assembly, state, 0.1) * state.velocity)
+    for share, factor in zip((0.5, 1.0), swing_factors(assembly, state, 0.1, np.array([0.5, 1.0])), strict=True):
+        frame = swung_increment(state, factor * state.velocity)
         rise = (frame.pose.positions - last.pose.positions)[assembly.free]
         np.testing.assert_allclose(rise[:, -1], 0.1 * share * extent)
         np.testing.assert_allclose(rise[:, :-1], 0.0, atol=1e-12)
         assert frame.status == solver.Status.FALLING
     at_rest = mechanics.with_motion(last, np.zeros_like(up))
-    assert swing_factor(assembly, at_rest, 0.1) == 0.0
+    assert swing_factors(assembly, at_rest, 0.1, np.ones(1)).tolist() == [0.0]
 
 
 def moved(assembly, **motions):
