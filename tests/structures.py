@@ -14,8 +14,9 @@ from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
+import imageio_ffmpeg
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageSequence
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
@@ -85,6 +86,16 @@ def turn_by(rotation) -> np.ndarray:
 def pixels(path) -> np.ndarray:
     """(height, width, 3) array of the colours of a picture."""
     return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+def film_frames(path) -> list[np.ndarray]:
+    """(height, width, 3) uint8 array of each frame of a film."""
+    if Path(path).suffix == ".mp4":
+        reader = imageio_ffmpeg.read_frames(str(path))
+        width, height = next(reader)["size"]
+        return [np.frombuffer(frame, np.uint8).reshape(height, width, 3) for frame in reader]
+    with Image.open(path) as film:
+        return [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(film)]
 
 
 def alike(colours, wanted, tolerance: int = 12) -> np.ndarray:

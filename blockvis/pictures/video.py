@@ -7,50 +7,29 @@ import importlib
 import os
 import shutil
 from collections.abc import Iterable
-from contextlib import closing
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from subprocess import PIPE, Popen
+from tempfile import TemporaryFile
 
-import numpy as np
 from PIL import Image
 
 from blockvis.results.folder import VIDEO_SUFFIXES
 from blockvis.system.atomic_files import atomic_file, make_folder, partial_of
 
-#: What imageio's writer is given for each format. Quality of x264 is 0 lossless, 51 worst: line drawings show ringing
-#: from about 22 on. A gif has a palette per frame: one of the first frame lacks the colours of cracks that open later.
-#: One thread keeps up with what draws, costs less in all, and the film is the same bytes on any number of cores.
-_ENCODERS: dict[str, dict[str, Any]] = {
-    ".mp4": {
-        "codec": "libx264",
-        "pixelformat": "yuv420p",
-        "output_params": [
-            "-crf",
-            "19",
-            "-preset",
-            "veryfast",
-            "-threads",
-            "1",
-            "-movflags",
-            "+faststart",
-            "-f",
-            "mp4",
-        ],
-    },
-    ".gif": {
-        "codec": "gif",
-        "pixelformat": "pal8",
-        "output_params": [
-            "-vf",
-            "split[a][b];[a]palettegen=stats_mode=single[palette];[b][palette]paletteuse=new=1:dither=none",
-            *("-loop", "0", "-f", "gif"),
-        ],
-    },
-    ".webp": {
-        "codec": "libwebp_anim",
-        "pixelformat": "bgra",
-        "output_params": ["-quality", "85", "-compression_level", "2", "-loop", "0", "-f", "webp"],
-    },
+#: Codec, format of pixels and options of ffmpeg for each format. Quality of x264 is 0 lossless, 51 worst: line drawings
+#: show ringing from about 22 on. A gif has a palette per frame: one of the first frame lacks the colours of cracks that
+#: open later. One thread keeps up with what draws, costs less in all, and the film is the same bytes on any number of
+#: cores.
+_ENCODERS = {
+    ".mp4": ("libx264", "yuv420p", "-crf 19 -preset veryfast -threads 1 -movflags +faststart -f mp4"),
+    ".gif": (
+        "gif",
+        "pal8",
+        "-vf split[a][b];[a]palettegen=stats_mode=single[palette];[b][palette]paletteuse=new=1:dither=none "
+        "-loop 0 -f gif",
+    ),
+    ".webp": ("libwebp_anim", "bgra", "-quality 85 -compression_level 2 -loop 0 -f webp"),
 }
 
 #: Frames per second of a gif at most: browsers play one of shorter frames at ten per second.
@@ -100,12 +79,9 @@ def write_film(
         raise ValueError(f"an animation of {size[0]} × {size[1]} pixels cannot be encoded; both must be even")
     _open_for_writing(path)
     with atomic_file(path) as partial:
-        try:
-            _encode(frames, partial, fps)
-        except OSError as error:
-            raise _not_written(path, error) from None
-        if partial.is_file() and not _reaches_its_end(partial):
-            raise _not_written(path, None)
+        failed = _encode(frames, partial, size, fps, suffix)
+        if failed is not None:
+            raise _not_written(path, failed)
     return path
 
 
@@ -140,52 +116,38 @@ def _is_frame(path: Path) -> bool:
     return path.name.startswith("frame_") and path.suffix == ".png"
 
 
-def find_encoder() -> None:
-    """Load what writes films and find its program, for who has nothing else to do yet."""
-    importlib.import_module("imageio.v2")
-    importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
+def find_encoder() -> str:
+    """Find the program that encodes films, as who has nothing else to do yet may do early."""
+    return str(importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe())
 
 
-def _encode(frames: Iterable[Image.Image], path: Path, fps: float) -> None:
-    import imageio.v2 as imageio
-
-    writer = imageio.get_writer(
-        str(path.absolute()),
-        # imageio writes a gif or webp by a writer that holds all frames in memory; its writer of videos holds one.
-        format=".mp4",
-        mode="I",
-        fps=fps,
-        macro_block_size=2,
-        ffmpeg_log_level="error",
-        **_ENCODERS[path.suffix.lower()],
-    )
-    with closing(writer):
-        for frame in frames:
-            writer.append_data(np.asarray(frame))
-
-
-def _reaches_its_end(path: Path) -> bool:
-    """Whether a film ends where its format says it does: imageio gets no error of an encoder that stops at the end."""
-    size = path.stat().st_size
-    with path.open("rb") as film:
-        if path.suffix.lower() == ".gif":
-            film.seek(max(size - 1, 0))
-            return film.read() == b";"
-        if path.suffix.lower() == ".webp":
-            return int.from_bytes(film.read(8)[4:], "little") + 8 == size
-        # The boxes of an mp4, of which "moov" says where the frames are.
-        at, boxes = 0, set()
-        while at < size:
-            film.seek(at)
-            length, name = int.from_bytes(film.read(4), "big"), film.read(4)
-            at += int.from_bytes(film.read(8), "big") if length == 1 else max(length, 8)
-            boxes.add(name)
-    return at == size and b"moov" in boxes
+def _encode(frames: Iterable[Image.Image], path: Path, size: tuple[int, int], fps: float, suffix: str) -> str | None:
+    """Encode frames by ffmpeg; returns what it said where it stopped before its end."""
+    codec, pixels, options = _ENCODERS[suffix]
+    given = f"-f rawvideo -pix_fmt rgb24 -s {size[0]}x{size[1]} -r {Fraction(fps).limit_denominator()} -i -"
+    written = f"-an -vcodec {codec} -pix_fmt {pixels} -v error {options}"
+    command = [find_encoder(), "-y", *given.split(), *written.split(), str(path.absolute())]
+    with TemporaryFile() as said:
+        encoder = Popen(command, stdin=PIPE, stderr=said)
+        assert encoder.stdin is not None
+        try:
+            with encoder.stdin as entry:
+                for frame in frames:
+                    entry.write(frame.tobytes())
+        except BaseException as error:
+            encoder.kill()
+            # Why the encoder takes no more, it says itself.
+            if not isinstance(error, BrokenPipeError):
+                raise
+        finally:
+            encoder.wait()
+        said.seek(0)
+        return said.read().decode(errors="replace") if encoder.returncode else None
 
 
-def _not_written(path: Path, error: OSError | None) -> OSError:
-    """Make the error for a film that could not be written; the encoder itself only says that it stopped."""
+def _not_written(path: Path, said: str) -> OSError:
+    """Make the error for a film that could not be written, from what the encoder said."""
     if shutil.disk_usage(path.parent).free < FULL_DISK:
         return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-    reason = str(error).strip().partition("\n")[0] if error else "the encoder stopped before its end"
+    reason = said.strip().partition("\n")[0] or "the encoder stopped before its end"
     return OSError(f"'{path}' could not be written: {reason}")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, box, case_from, moved_and_turned, pixels
+from structures import arch_response, box, case_from, film_frames, moved_and_turned, pixels
 
 import blockvis
 import solver
@@ -185,13 +185,9 @@ def test_what_the_cases_differ_in_is_told(tmp_path):
 
 @pytest.mark.slow
 def test_the_film_goes_in_step(arch_results, other, tmp_path):
-    import imageio.v2 as imageio
-
     out = tmp_path / "both"
     assert main(["compare", str(arch_results), str(other), "-o", str(out)]) == 0
-    with imageio.get_reader(out / "compare.mp4") as film:
-        assert film.get_meta_data()["fps"] == 25
-        frames = [np.asarray(frame).astype(int) for frame in film]
+    frames = [frame.astype(int) for frame in film_frames(out / "compare.mp4")]
     # The sinking arch stops at less than half of the way of the other, which moves to its end.
     half = frames[0].shape[1] // 2
     change = [np.abs(frames[k] - frames[k + 1]).max(axis=(0, 2)) for k in (20, 100)]

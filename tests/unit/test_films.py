@@ -7,12 +7,22 @@ from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
-import imageio.v2 as imageio
 import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from structures import alike, arch_response, box, brick, case_from, dropped_brick, pixels, posed, rectangle
+from structures import (
+    alike,
+    arch_response,
+    box,
+    brick,
+    case_from,
+    dropped_brick,
+    film_frames,
+    pixels,
+    posed,
+    rectangle,
+)
 
 import blockvis
 import solver
@@ -261,8 +271,7 @@ def frames(seen=None):
 @pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
 def test_a_film_holds_its_frames_in_order(tmp_path, suffix):
     path = write_film(frames(), tmp_path / f"film{suffix}", size=SMALL, fps=10.0)
-    with imageio.get_reader(path) as film:
-        found = [np.asarray(frame)[..., :3] for frame in film]
+    found = film_frames(path)
     assert len(found) == len(COLOURS)
     for frame, colour in zip(found, COLOURS, strict=True):
         assert frame.shape == (SMALL[1], SMALL[0], 3)
@@ -287,21 +296,28 @@ def test_frames_are_forgotten_when_they_are_written(tmp_path, suffix):
 
 @pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
 def test_a_film_without_its_end_is_not_kept(tmp_path, monkeypatch, suffix):
-    """An encoder that the system ends, or that finds the disk full at the end, does not say so to imageio."""
-    encode = video._encode
+    """Of an encoder that the system ends, or that finds the disk full at the end."""
 
-    def cut_off(given, path, fps):
-        encode(given, path, fps)
-        path.write_bytes(path.read_bytes()[:-5])
+    class Ended(subprocess.Popen):
+        def wait(self, *given, **named):
+            self.kill()
+            return super().wait(*given, **named)
 
     (tmp_path / f"film{suffix}").write_bytes(b"the film before")
-    monkeypatch.setattr(video, "_encode", cut_off)
+    monkeypatch.setattr(video, "Popen", Ended)
     with pytest.raises(OSError, match=r"could not be written: the encoder stopped before its end"):
         write_film(frames(), tmp_path / f"film{suffix}", size=SMALL, fps=10.0)
     monkeypatch.setattr(video, "FULL_DISK", float("inf"))
     with pytest.raises(OSError, match=r"No space left on device"):
         write_film(frames(), tmp_path / f"film{suffix}", size=SMALL, fps=10.0)
     assert [p.read_bytes() for p in tmp_path.iterdir()] == [b"the film before"]
+
+
+def test_what_the_encoder_says_is_told(tmp_path, monkeypatch):
+    monkeypatch.setitem(video._ENCODERS, ".mp4", ("no codec", "yuv420p", "-f mp4"))
+    with pytest.raises(OSError, match=r"film\.mp4' could not be written: .*codec"):
+        write_film(frames(), tmp_path / "film.mp4", size=SMALL, fps=10.0)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)

@@ -25,7 +25,6 @@ HEAVY = {
     "vtkmodules",
     "pyvista",
     "matplotlib",
-    "imageio",
     "imageio_ffmpeg",
     "PIL",
     "meshio",
