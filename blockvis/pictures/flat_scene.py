@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 import numpy as np
-from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 from PIL import Image
@@ -19,6 +18,7 @@ from .backfill import FillBodies
 from .frame import Frame
 from .hatching import hatch_lines
 from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes, part_outlines
+from .painting import painted
 from .scene import Scene
 from .swing import MOST_PARTS, Swing
 from .ties import Strands
@@ -32,9 +32,6 @@ ORDER = (
     "hinge", "hinge top", "crushing", "crushing top",
     "motion rim", "motion top", "live rim", "live top", "arrow rim", "arrow top",
 )  # fmt: skip
-
-#: A picture is drawn in bands of at most so many pixels, so that its size does not decide how much memory that takes.
-BAND = 2_000_000
 
 #: Thickness of arrows by their layer, and the least width of a line [pixels].
 WEIGHTS = {"arrow": 1.0, "motion": 0.6, "live": 0.55}
@@ -80,11 +77,9 @@ class FlatScene(Scene):
         self._photograph = (
             None if underlay is None else CarriedPhotograph(underlay, assembly, self.frame.low, self.pixel, size)
         )
-        self._under: np.ndarray | None = None
         self._gone = np.zeros(assembly.n_blocks, dtype=bool)
         self._layers: dict[str, _Layer] = {}
         self._fills: list[_Layer] = []
-        self._renderer: RendererAgg | None = None
         self._outlines = _rings(np.diff(assembly.offsets))
         self._paint(block_fill)
         self._layers["outline"] = _Layer(outline, *self._outlines, width=self._outline_width())
@@ -246,43 +241,16 @@ class FlatScene(Scene):
 
     def image(self) -> Image.Image:
         """Draw the picture."""
-        width, height = self.size
-        self._under = None if self._photograph is None else self._photograph.picture(self._shown, self._gone)
-        rows = max(1, min(height, BAND // width))
-        if rows == height:
-            return self._band(0, height)
-        picture = Image.new("RGB", self.size, palette.PAPER)
-        for top in range(0, height, rows):
-            picture.paste(self._band(top, min(rows, height - top)), (0, top))
-        return picture
+        if self._photograph is None:
+            under = Image.new("RGB", self.size, palette.PAPER)
+        else:
+            under = self._photograph.picture(self._shown, self._gone)
+        return painted(under, self._paths(), Affine2D().translate(*-self.frame.low).scale(1.0 / self.pixel))
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: pixel (column, row) of points (n, 2) [m]."""
         place = (np.asarray(points) - self.frame.low) / self.pixel
         return np.column_stack([place[:, 0], self.size[1] - place[:, 1]])
-
-    def _band(self, top: int, rows: int) -> Image.Image:
-        if self._renderer is None or self._renderer.height != rows:
-            self._renderer = RendererAgg(self.size[0], rows, 72.0)
-        renderer = self._renderer
-        pixels = renderer.buffer_rgba()
-        np.asarray(pixels).view(np.uint32)[...] = np.array([*palette.PAPER, 255], np.uint8).view(np.uint32)
-        if self._under is not None:
-            np.asarray(pixels)[..., :3] = self._under[top : top + rows]
-        below = self.size[1] - top - rows
-        place = Affine2D().translate(*-self.frame.low).scale(1.0 / self.pixel).translate(0.0, -below)
-        for colour, width, cover, path in self._paths():
-            pen = renderer.new_gc()
-            pen.set_alpha(cover)
-            pen.set_snap(False)
-            pen.set_linewidth(width)
-            pen.set_joinstyle("miter")
-            pen.set_capstyle("butt")
-            rgb = tuple(c / 255.0 for c in colour)
-            pen.set_foreground(rgb)
-            renderer.draw_path(pen, path, place, None if width else rgb)
-        # Nothing is transparent: the fourth byte of a pixel says nothing.
-        return Image.frombytes("RGB", (self.size[0], rows), pixels, "raw", "RGBX")
 
     def _paths(self) -> Iterator[tuple[Colour, float, float, Path]]:
         """Colour, width of the line (0 where it is filled), opacity and outlines, back to front.

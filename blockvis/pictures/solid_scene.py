@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
 import pyvista as pv
-from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 from PIL import Image
@@ -24,6 +24,7 @@ from . import palette
 from .backfill import FillBodies
 from .frame import Frame, framed, room_in
 from .marks import Marks, arrow_shapes
+from .painting import painted
 from .scene import Scene
 from .solid_view import ABOVE, AROUND, View, showing_faces
 from .surface import IN_PLANE, section_of, sharp_edges, triangles_of
@@ -387,19 +388,21 @@ class SolidScene(Scene):
         picture = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
         if self._over > 1:
             picture = picture.reduce(self._over)
-        return _painted(
-            _fading(picture, round(EDGE * min(picture.size))),
-            [shape for arrows in self._overlays.values() for shape in self._shapes(arrows)],
-        )
+        shapes = [shape for arrows in self._overlays.values() for shape in self._shapes(arrows)]
+        upright = Affine2D().scale(1.0, -1.0).translate(0.0, picture.size[1])
+        return painted(_fading(picture, round(EDGE * min(picture.size))), shapes, upright)
 
-    def _shapes(self, arrows: _Arrows) -> list[tuple[tuple[int, int, int], np.ndarray]]:
-        """Polygons, (k, 2) pixels each, of arrows in the last picture, with their colours."""
+    def _shapes(self, arrows: _Arrows) -> Iterator[tuple[tuple[int, int, int], float, float, Path]]:
+        """Yield arrows in the last picture [pixels] with a white rim, as :func:`painted` takes them."""
         tails, tips = arrows.tails, arrows.tips
         if arrows.within is not None and len(tails):
             seen = self._hidden_by(tails) < arrows.within
             # One that is hidden still says where a single support goes.
             tails, tips = (tails[seen], tips[seen]) if seen.any() else (tails, tips)
-        return _rimmed_arrows(self.at_pixel(tails), self.at_pixel(tips), self.size[1] / 130.0, arrows.colour)
+        thick = self.size[1] / 130.0
+        for grown, colour in ((0.35 * thick, palette.PAPER), (0.0, arrows.colour)):
+            for polygon in chain(*arrow_shapes(self.at_pixel(tails), self.at_pixel(tips), thick, grown)):
+                yield colour, 0.0, 1.0, Path(polygon)
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: pixel (column, row) of points (n, 3) [m]."""
@@ -564,16 +567,6 @@ def _quiet() -> Iterator[None]:
         vtkLogger.SetStderrVerbosity(before)
 
 
-def _rimmed_arrows(
-    tails: np.ndarray, tips: np.ndarray, thick: float, colour: tuple[int, int, int]
-) -> list[tuple[tuple[int, int, int], np.ndarray]]:
-    """Polygons of arrows from tails (n, 2) to tips (n, 2) [pixels] with a white rim, back to front."""
-    shapes: list[tuple[tuple[int, int, int], np.ndarray]] = []
-    for grown, paint in ((0.35 * thick, palette.PAPER), (0.0, colour)):
-        shapes += [(paint, polygon) for kind in arrow_shapes(tails, tips, thick, grown) for polygon in kind]
-    return shapes
-
-
 def _fading(picture: Image.Image, wide: int) -> Image.Image:
     """Let what is cut off at the edges of a picture fade over a strip so many pixels ``wide``."""
     pixels = np.array(picture)
@@ -581,19 +574,3 @@ def _fading(picture: Image.Image, wide: int) -> Image.Image:
     for strip in (pixels[:wide], pixels[::-1][:wide], pixels.swapaxes(0, 1)[:wide], pixels.swapaxes(0, 1)[::-1][:wide]):
         strip[...] = np.rint(left * strip + (1.0 - left) * np.array(palette.PAPER))
     return Image.fromarray(pixels)
-
-
-def _painted(picture: Image.Image, shapes: list[tuple[tuple[int, int, int], np.ndarray]]) -> Image.Image:
-    """Paint polygons, (k, 2) pixels each, over a picture, with exact edges."""
-    if not shapes:
-        return picture
-    renderer = RendererAgg(*picture.size, 72.0)
-    pixels = np.asarray(renderer.buffer_rgba())
-    pixels[...] = np.asarray(picture.convert("RGBA"))
-    upright = Affine2D().scale(1.0, -1.0).translate(0.0, picture.size[1])
-    for colour, polygon in shapes:
-        pen = renderer.new_gc()
-        pen.set_linewidth(0.0)
-        pen.set_snap(False)
-        renderer.draw_path(pen, Path(polygon), upright, tuple(c / 255.0 for c in colour))
-    return Image.fromarray(pixels[..., :3].copy())

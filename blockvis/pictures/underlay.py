@@ -85,8 +85,8 @@ class CarriedPhotograph:
         self._turn = np.diag([pixel, -pixel])
         self._corner = np.array([low[0], low[1] + pixel * size[1]])
 
-    def picture(self, pose: solver.Pose, gone: np.ndarray) -> np.ndarray:
-        """(height, width, 3) uint8 array: the photograph where its blocks are in a pose, but (n_blocks,) bool ones."""
+    def picture(self, pose: solver.Pose, gone: np.ndarray) -> Image.Image:
+        """Draw the photograph where its blocks are in a pose, but (n_blocks,) bool ones."""
         assembly, picture = self._assembly, self._around.copy()
         moved = mechanics.moved_vertices(assembly, pose)
         far = np.linalg.norm(moved - assembly.vertices, axis=1)
@@ -99,7 +99,7 @@ class CarriedPhotograph:
         picture.paste(self._own, (0, 0), standing)
         for block in np.flatnonzero(moves & ~gone):
             self._paste(picture, rings[block], int(block), pose)
-        return np.asarray(picture)
+        return picture
 
     def _paste(self, picture: Image.Image, ring: np.ndarray, block: int, pose: solver.Pose) -> None:
         """Paste what a block carries, whose corners (n, 2) are now at these pixels."""

@@ -15,7 +15,7 @@ from structures import BENT, alike, arch_response, box, parted, partly_unbounded
 
 import solver
 from blockvis import animate, draw_mechanism, draw_still, generators
-from blockvis.pictures import flat_scene, palette
+from blockvis.pictures import palette
 from blockvis.pictures.curves import CurvePanel
 from blockvis.pictures.drawer import Drawer, Look, magnified
 from blockvis.pictures.film import film_of
@@ -443,16 +443,6 @@ print(next(int(line.split()[1]) / 1024 for line in open("/proc/self/status") if 
     assert float(told.stdout) < 400.0
     with Image.open(tmp_path / "large.png") as picture:
         assert picture.size == (5000, 3500)
-
-
-def test_bands_of_a_picture_fit_together(monkeypatch):
-    response = arch_response()
-    drawer = Drawer(response, Look(), SMALL, response.path)
-    whole = np.asarray(drawer.picture(response.path[-1])).astype(int)
-    monkeypatch.setattr(flat_scene, "BAND", 640 * 7)
-    bands = np.asarray(drawer.picture(response.path[-1])).astype(int)
-    # Where a line is cut off at the edge of a band, its smoothing may differ by a shade.
-    assert np.abs(whole - bands).max() <= 16
 
 
 def test_the_dot_moves_along_the_curve_beside_the_blocks():
