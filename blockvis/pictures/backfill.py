@@ -9,6 +9,8 @@ import shapely
 
 import solver
 
+from .hatching import hatched
+
 #: Distance of hatch lines, in extents of the fill.
 SPACING = 0.02
 
@@ -56,17 +58,8 @@ class FillBodies:
 
     def hatch(self) -> np.ndarray:
         """(m, 2, 2) array [m]: in the plane, lines that fall to the right across the fill."""
-        areas = shapely.polygons(self.columns)
-        whole = shapely.union_all(areas, grid_size=SAME_BODY * self._extent)
-        if whole.is_empty:
-            return np.zeros((0, 2, 2))
-        x0, y0, x1, y1 = whole.bounds
-        step = SPACING * np.sqrt(2.0) * self._extent
-        levels = np.arange(np.ceil((x0 + y0) / step), np.floor((x1 + y1) / step) + 1) * step
-        ends = np.stack([np.stack([levels - y, np.full(len(levels), y)], axis=1) for y in (y0, y1)], axis=1)
-        parts = shapely.get_parts(shapely.intersection(shapely.linestrings(ends), whole))
-        parts = parts[(shapely.get_type_id(parts) == 1) & (shapely.get_num_points(parts) == 2)]
-        return np.asarray(shapely.get_coordinates(parts)).reshape(-1, 2, 2)
+        whole = shapely.union_all(shapely.polygons(self.columns), grid_size=SAME_BODY * self._extent)
+        return hatched(whole, SPACING * self._extent, -1.0)
 
     def rims(self) -> np.ndarray:
         """(m, 2, d) array [m]: edges of the bodies, in the surface and in space up to it from the extrados."""

@@ -1,4 +1,4 @@
-"""What fills the outlines of supports: hatch lines."""
+"""Hatch lines, which fill supports and bodies of fill."""
 
 from __future__ import annotations
 
@@ -8,45 +8,39 @@ import shapely
 import solver
 
 
+def hatched(area: shapely.Geometry, spacing: float, rise: float) -> np.ndarray:
+    """(n, 2, 2) array [m]: lines across an area, ``spacing`` [m] apart, that rise to the right by 1 or fall by -1.
+
+    They lie at multiples of the spacing from the origin, the same in all areas.
+    """
+    if area.is_empty:
+        return np.zeros((0, 2, 2))
+    x0, y0, x1, y1 = area.bounds
+    low, high = sorted((rise * y0, rise * y1))
+    step = spacing * np.sqrt(2.0)
+    levels = np.arange(np.ceil((x0 - high) / step), np.floor((x1 - low) / step) + 1) * step
+    ends = np.stack([np.column_stack([levels + rise * y, np.full(len(levels), y)]) for y in (y0, y1)], axis=1)
+    parts = shapely.get_parts(shapely.intersection(shapely.linestrings(ends), area))
+    parts = parts[(shapely.get_type_id(parts) == 1) & (shapely.get_num_points(parts) == 2)]
+    return np.asarray(shapely.get_coordinates(parts)).reshape(-1, 2, 2)
+
+
 def hatch_lines(
     assembly: solver.Assembly, supports: np.ndarray, low: np.ndarray, high: np.ndarray, spacing: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Hatch the supports.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    supports : (n_supports,) int array
-    low, high : (2,) arrays [m]
-        Corners of the box beyond which nothing is hatched.
-    spacing : float [m]
-        Between two lines.
+    """Hatch supports (n_supports,) as laid out, inside a box between two corners (2,) [m].
 
     Returns
     -------
     ends : (2 n, 2) array [m]
-        Both ends of each line, as laid out.
+        Both ends of each line.
     blocks : (2 n,) int array
         The support of each end.
     """
     box = shapely.box(*low, *high)
-    points, blocks = [np.zeros((0, 2))], [np.zeros(0, dtype=int)]
-    for block in supports:
-        area = shapely.intersection(shapely.Polygon(assembly.outline(int(block))), box)
-        if area.is_empty:
-            continue
-        x0, y0, x1, y1 = area.bounds
-        # Lines x - y = constant at multiples of the spacing, the same over all supports.
-        step = spacing * np.sqrt(2.0)
-        levels = np.arange(np.ceil((x0 - y1) / step), np.floor((x1 - y0) / step) + 1) * step
-        if len(levels) == 0:
-            continue
-        reach = np.array([[y0, y1]])
-        ends = np.stack([levels[:, None] + reach, np.broadcast_to(reach, (len(levels), 2))], axis=2)
-        parts = shapely.get_parts(shapely.intersection(shapely.linestrings(ends), area))
-        parts = parts[shapely.get_type_id(parts) == 1]
-        parts = parts[shapely.get_num_points(parts) == 2]
-        coordinates = shapely.get_coordinates(parts)
-        points.append(coordinates)
-        blocks.append(np.full(len(coordinates), block))
-    return np.concatenate(points), np.concatenate(blocks)
+    found = [
+        hatched(shapely.intersection(shapely.Polygon(assembly.outline(block)), box), spacing, 1.0)
+        for block in supports.tolist()
+    ]
+    ends = np.concatenate([np.zeros((0, 2, 2)), *found]).reshape(-1, 2)
+    return ends, np.repeat(supports, [2 * len(lines) for lines in found])
