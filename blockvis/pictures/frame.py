@@ -70,17 +70,6 @@ class ColourBar:
     exceeded: bool = False
 
 
-@dataclass(frozen=True)
-class _Shared:
-    """What many pictures of a film have in common; of a :meth:`Sheet.composed` picture."""
-
-    keys: tuple[Key, ...]
-    places: tuple[Key, ...]
-    pixel: float
-    detail: str
-    badge: str
-
-
 class Sheet:
     """Where the picture of the blocks goes, and the words around it.
 
@@ -107,7 +96,7 @@ class Sheet:
         if min(self.inside_size) < 1:
             raise ValueError(f"size is {width} × {height} pixels, which leave the blocks none; give more")
         self.beside = (width - beside_width, self.header, width, height - self.footer)
-        self._shared: dict[_Shared, Image.Image] = {}
+        self._page, self._page_of = Image.new("RGB", size), tuple[object, ...]()
 
     @property
     def inside_size(self) -> tuple[int, int]:
@@ -146,29 +135,29 @@ class Sheet:
         beside : PIL.Image.Image, optional
             The picture to the right, as large as :attr:`beside`.
         """
-        shared = _Shared(tuple(keys), tuple(keys if places is None else places), pixel, detail, badge)
-        page = self._sheet(shared).copy()
+        shared = tuple(keys), tuple(keys if places is None else places), pixel, detail, badge
+        if shared != self._page_of:
+            # One at a time: joints open and slide now and then, and a page at any size is memory.
+            self._page, self._page_of = self._around(*shared), shared
+        page = self._page.copy()
         page.paste(picture, self.inside[:2])
         if beside is not None:
             page.paste(beside, self.beside[:2])
         self._title(ImageDraw.Draw(page), title, badge)
         return page
 
-    def _sheet(self, shared: _Shared) -> Image.Image:
+    def _around(self, keys: Sequence[Key], places: Sequence[Key], pixel: float, detail: str, badge: str) -> Image.Image:
         """Draw what many pictures of a film share: scale bar, legend, colour bar, all of the caption but its title."""
-        if shared not in self._shared:
-            page = Image.new("RGB", self.size, palette.PAPER)
-            draw = ImageDraw.Draw(page)
-            end = self._scale_bar(draw, shared.pixel)
-            self._legend(draw, shared.keys, shared.places, end + 2 * self.pad)
-            if self.colour_bar is not None:
-                self._colour_bar(page, draw, self.colour_bar)
-            self._detail(draw, shared.detail)
-            if shared.badge:
-                self._badge(draw, shared.badge)
-            # One at a time: joints open and slide now and then, and a page at any size is memory.
-            self._shared = {shared: page}
-        return self._shared[shared]
+        page = Image.new("RGB", self.size, palette.PAPER)
+        draw = ImageDraw.Draw(page)
+        end = self._scale_bar(draw, pixel)
+        self._legend(draw, keys, places, end + 2 * self.pad)
+        if self.colour_bar is not None:
+            self._colour_bar(page, draw, self.colour_bar)
+        self._detail(draw, detail)
+        if badge:
+            self._badge(draw, badge)
+        return page
 
     def _title(self, draw: ImageDraw.ImageDraw, title: str, badge: str) -> None:
         room = (self._badge_box(badge)[0] if badge else self.size[0]) - 2 * self.pad
@@ -457,17 +446,6 @@ class Frame:
         return Frame(centre - half, centre + half)
 
 
-class _Box:
-    """Bounds of all points so far, in d dimensions."""
-
-    def __init__(self, d: int) -> None:
-        self.low, self.high = np.full(d, np.inf), np.full(d, -np.inf)
-
-    def hold(self, points: np.ndarray) -> None:
-        self.low = np.minimum(self.low, points.min(axis=0, initial=np.inf))
-        self.high = np.maximum(self.high, points.max(axis=0, initial=-np.inf))
-
-
 def framed(
     assembly: solver.Assembly,
     poses: Iterable[solver.Pose],
@@ -496,24 +474,24 @@ def framed(
     cut : (2, 3) array, optional
         A point [m] of a plane and its normal towards what is kept: what is left out takes no room.
     """
-    d = assembly.dimension if axes is None else len(axes)
-    inner, outer = _Box(d), _Box(d)
+    inner, outer = list[np.ndarray](), list[np.ndarray]()
     for pose in poses:
         corners, owner = mechanics.moved_vertices(assembly, pose), assembly.block_of_vertex
         if cut is not None:
             corners, owner = _left_by(cut, assembly, corners)
         corners = corners if axes is None else corners @ axes.T
-        free = assembly.free[owner]
-        inner.hold(corners[free])
-        outer.hold(corners[~free])
+        for bounds, of in ((inner, assembly.free[owner]), (outer, ~assembly.free[owner])):
+            if of.any():
+                bounds += [corners[of].min(axis=0), corners[of].max(axis=0)]
     # Where no free block is to be seen, or no support.
-    inner, outer = (box if np.isfinite(box.low).all() else other for box, other in ((inner, outer), (outer, inner)))
-    low, high = inner.low, inner.high
+    (low, high), (outer_low, outer_high) = (
+        (np.min(bounds, axis=0), np.max(bounds, axis=0)) for bounds in (inner or outer, outer or inner)
+    )
     size = float((high - low).max())
-    all_of_it = float((np.maximum(high, outer.high) - np.minimum(low, outer.low)).max())
+    all_of_it = float((np.maximum(high, outer_high) - np.minimum(low, outer_low)).max())
     beyond = np.inf if all_of_it <= whole * size else supports * size
-    low = np.minimum(low, np.maximum(outer.low, low - beyond))
-    high = np.maximum(high, np.minimum(outer.high, high + beyond))
+    low = np.minimum(low, np.maximum(outer_low, low - beyond))
+    high = np.maximum(high, np.minimum(outer_high, high + beyond))
     return Frame(low - margin * size, high + margin * size)
 
 
