@@ -16,11 +16,10 @@ from blockvis.results.joints import carried_faces, opening_and_slip
 from blockvis.text import width_text
 
 from . import palette
-from .drawer import MARGIN, WHOLE, alike
-from .frame import Key, Sheet, framed, write_labels, write_words
-from .paired_scenes import WORDS
+from .drawer import MARGIN, WHOLE
+from .frame import Frame, Key, Sheet, framed, write_labels
+from .paired_scenes import PairedScenes
 from .sight_lines import SightLines
-from .solid_scene import SolidScene
 from .solid_view import AROUND, View, hiding_supports, plane_of, views_of
 from .swing import swing_of
 
@@ -69,10 +68,8 @@ class CracksInSpace:
         cut: Cut | None = None,
     ) -> None:
         assembly, swing = response.assembly, swing_of(response)
-        self._roles = palette.role_colours(assembly, bool(response.settlements))
         motion = swing.displaced.positions - swing.increment.pose.positions
         self._views = views_of(response, motion, joints, sight, cut)
-        self._sheet = sheet
         edges = _Edges.of(assembly, joints, increment)
         opened = edges.chosen(edges.openings > SMALLEST_OPENING * assembly.block_size)
         if cut is None and (sight is None or sight.azimuth is None):
@@ -88,8 +85,18 @@ class CracksInSpace:
         self._seen_joints = np.zeros(0, dtype=int)
         limits = class_limits(float(self._opened.openings.max(initial=0.0)))
         colours = [palette.rgb(colour) for colour in palette.crack_colours(len(limits) + 1)]
-        self._scenes = self._drawn(assembly, limits, colours, plane, increment.fallen)
-        self.pixel = self._scenes[0].pixel
+        roles = palette.role_colours(assembly, bool(response.settlements))
+        initial = solver.Pose.initial(assembly)
+        frames = [framed(assembly, [initial], MARGIN, 0.3, view.axes[:2], WHOLE, plane) for view in self._views]
+        frame = Frame(*(np.concatenate([getattr(one, end) for one in frames]) for end in ("low", "high")))
+        self._pair = PairedScenes(
+            assembly, self._views, frame, sheet, roles, fine=True, cut=plane, outline=palette.PALE_OUTLINE
+        )
+        self._pair.hide(increment.fallen)
+        every = np.ones(assembly.n_blocks, dtype=bool)
+        self._pair.pose(initial, palette.pale(roles, every, palette.SURVEY))
+        self._draw(limits, colours)
+        self.pixel, self._text = self._pair.pixel, sheet.text
         texts = [width_text(limit) for limit in limits]
         words = [*(f"to {text}" for text in texts), f"above {texts[-1]}" if texts else "open joint"]
         self.keys = [Key("line", text, colour) for text, colour in zip(words, colours, strict=True)]
@@ -106,39 +113,12 @@ class CracksInSpace:
         """Choose the cracks of which the views of the last image show nothing."""
         return [crack for crack in cracks if not np.isin(crack.joints, self._seen_joints).any()]
 
-    def _drawn(
-        self,
-        assembly: solver.Assembly,
-        limits: Sequence[float],
-        colours: Sequence[tuple[int, int, int]],
-        plane: np.ndarray | None,
-        gone: np.ndarray,
-    ) -> list[SolidScene]:
-        width, height = self._sheet.inside_size
-        below = round(WORDS * self._sheet.text) if len(self._views) > 1 else 0
-        size = width // len(self._views), height - below
-        fill = palette.pale(self._roles, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
-        frames = [
-            framed(assembly, [solver.Pose.initial(assembly)], MARGIN, 0.3, view.axes[:2], WHOLE, plane)
-            for view in self._views
-        ]
-        which = np.searchsorted(limits, self._opened.openings)
-        scenes = []
-        for view, frame in zip(self._views, alike(frames), strict=True):
-            outlined = hiding_supports(assembly, view)
-            scene = SolidScene(
-                assembly, view, frame, size, self._roles, fine=True, cut=plane, outlined=outlined,
-                outline=palette.PALE_OUTLINE,
-            )  # fmt: skip
-            scene.hide(gone)
-            scene.pose(solver.Pose.initial(assembly), fill)
-            for k, colour in enumerate(colours):
-                part = k / max(len(colours) - 1, 1)
-                thick = height * (THIN + part * (THICK - THIN))
-                scene.lines(f"crack/{k}", self._opened.ends[which == k], colour, thick, forward=2.0 + k)
-            scene.lines("sliding", self._slid.ends, palette.SLIDING, height * (THIN + THICK) / 2.0, forward=1.5)
-            scenes.append(scene)
-        return scenes
+    def _draw(self, limits: Sequence[float], colours: Sequence[tuple[int, int, int]]) -> None:
+        height, which = self._pair.size[1], np.searchsorted(limits, self._opened.openings)
+        for k, colour in enumerate(colours):
+            thick = height * (THIN + k / max(len(colours) - 1, 1) * (THICK - THIN))
+            self._pair.lines(f"crack/{k}", self._opened.ends[which == k], colour, thick, 2.0 + k)
+        self._pair.lines("sliding", self._slid.ends, palette.SLIDING, height * (THIN + THICK) / 2.0, 1.5)
 
     def image(self, cracks: Sequence[Crack], numbers: Sequence[int]) -> Image.Image:
         """Draw the views, with number and largest width of each crack in the view that shows its widest place.
@@ -151,17 +131,12 @@ class CracksInSpace:
         numbers : sequence of int
             As the report counts them.
         """
-        text = self._sheet.text
-        page, left = Image.new("RGB", self._sheet.inside_size, palette.PAPER), 0
+        page, left = self._pair.image(), 0
         opened, slid = self._opened, self._slid
         found: dict[int, tuple[float, np.ndarray]] = {}
         slipped: tuple[float, np.ndarray] = 0.0, np.zeros(2)
         dots, seen_joints = [], []
-        for scene, words in zip(self._scenes, ("from above", "from below"), strict=False):
-            page.paste(scene.image(), (left, 0))
-            if len(self._scenes) > 1:
-                place = left + scene.size[0] / 2.0, page.height - 0.7 * text
-                write_words(page, place, words, text)
+        for scene in self._pair.scenes:
             offset, thin = np.array([left, 0]), THIN * scene.size[1]
             seen, pixels = ~scene.hides(opened.middles, thin), scene.at_pixel(opened.middles) + offset
             for crack, number in zip(cracks, numbers, strict=True):
@@ -176,7 +151,7 @@ class CracksInSpace:
             dots += [pixels[seen], along[slides]]
             seen_joints.append(opened.joints[seen])
             left += scene.size[0]
-            scene.close()
+        self._pair.close()
         self._seen_joints = np.concatenate(seen_joints)
         labelled = [(crack, n) for crack, n in zip(cracks, numbers, strict=True) if n in found]
         labels = [f"{n}: {width_text(crack.width)}" for crack, n in labelled]
@@ -186,7 +161,7 @@ class CracksInSpace:
             places.append(slipped[1])
             colours.append(palette.SLIDING)
         if labels:
-            write_labels(page, np.array(places), labels, text, np.concatenate(dots), colours)
+            write_labels(page, np.array(places), labels, self._text, np.concatenate(dots), colours)
         return page
 
 

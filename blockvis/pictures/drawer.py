@@ -132,8 +132,8 @@ class _Series:
         Displacement of any free block.
     widest : float [m]
         Opening of any crack in equilibrium.
-    cracks, sliding, hinges, crushing, lost, pulls : bool
-        Whether there are any anywhere; of blocks that are lost, of joints that pull.
+    marks : set of str
+        What there is anywhere of "cracks", "sliding", "hinges", "crushing", "lost" blocks, and joints with "pulls".
     largest_force : float [N]
     forces : list of arrays [N]
         Sizes, of the increments sampled.
@@ -142,12 +142,7 @@ class _Series:
     sampled: frozenset[int]
     largest: float = 0.0
     widest: float = 0.0
-    cracks: bool = False
-    sliding: bool = False
-    hinges: bool = False
-    crushing: bool = False
-    lost: bool = False
-    pulls: bool = False
+    marks: set[str] = field(default_factory=set)
     largest_force: float = 0.0
     forces: list[np.ndarray] = field(default_factory=list)
 
@@ -291,34 +286,15 @@ class Drawer:
                 scene.show_ground(self.fall.ground)
             return scene
         # VTK takes seconds to import, and pictures in the plane need none.
-        from .paired_scenes import WORDS, PairedScenes
-        from .solid_scene import SolidScene
+        from .paired_scenes import PairedScenes
 
-        width, height = self.sheet.inside_size
-        several = len(self._views) > 1
-        frames = alike([Frame(frame.low[k : k + 2], frame.high[k : k + 2]) for k in range(0, len(frame.low), 2)])
-        scenes = [
-            SolidScene(
-                self.assembly,
-                view,
-                seen,
-                (width // len(self._views), height - round(WORDS * self.sheet.text) * several),
-                self.fill,
-                opacity=1.0 if self.look.forces == "none" else GLASS,
-                fine=self._still,
-                cut=self._plane,
-                outlined=hiding_supports(self.assembly, view),
-                hidden_hinges=not several,
-            )
-            for view, seen in zip(self._views, frames, strict=True)
-        ]
-        for solid in scenes:
-            # From below it would hide everything.
-            if self.fall is not None and solid.view.above >= 0.0:
-                solid.show_ground(self.fall.ground)
-        if not several:
-            return scenes[0]
-        return PairedScenes(scenes, ("from above", "from below"), self.sheet.text)
+        opacity = 1.0 if self.look.forces == "none" else GLASS
+        pair = PairedScenes(
+            self.assembly, self._views, frame, self.sheet, self.fill, opacity=opacity, fine=self._still, cut=self._plane
+        )
+        if self.fall is not None:
+            pair.show_ground(self.fall.ground)
+        return pair if len(self._views) > 1 else pair.scenes[0]
 
     def hold(self, drawers: Sequence[Drawer]) -> None:
         """Draw in one frame that holds those of several, this among them, with arrows of supports as long."""
@@ -357,20 +333,21 @@ class Drawer:
         for number, increment in enumerate(self.increments):
             seen.largest = max(seen.largest, largest_displacement(self.assembly, increment))
             self.ties.survey(increment)
-            seen.lost |= bool((increment.fallen & ~increment.removed).any())
+            if (increment.fallen & ~increment.removed).any():
+                seen.marks.add("lost")
             if look.joints:
                 found = marks_of(self.assembly, self.joints, self._shown(increment), increment.pose)
                 if increment.status != solver.Status.FALLING:
                     seen.widest = max(seen.widest, float(found.openings.max(initial=0.0)))
-                seen.cracks |= len(found.cracks) > 0
-                seen.sliding |= len(found.sliding) > 0
-                seen.hinges |= len(found.hinges) > 0
-                seen.crushing |= len(found.crushing) > 0
+                seen.marks |= {
+                    kind for kind in ("cracks", "sliding", "hinges", "crushing") if len(getattr(found, kind))
+                }
             if look.forces != "none" and matters(increment, self.response):
                 sizes = np.linalg.norm(joint_forces(increment, look.forces)[1], axis=1)
                 largest = float(sizes.max(initial=0.0))
                 seen.largest_force = max(seen.largest_force, largest)
-                seen.pulls |= bool((increment.forces[:, 0] < -SMALLEST_RESULTANT * largest).any())
+                if (increment.forces[:, 0] < -SMALLEST_RESULTANT * largest).any():
+                    seen.marks.add("pulls")
                 if number in seen.sampled:
                     seen.forces.append(sizes)
             yield magnified(self.assembly, increment.pose, look.magnification)
@@ -526,7 +503,7 @@ class Drawer:
                 keys.append(
                     Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",))
                 )
-            if self._loses and (self._seen.lost or self._drawn_at is not None):
+            if self._loses and ("lost" in self._seen.marks or self._drawn_at is not None):
                 first = self.assembly.index(self.response.losses[0].blocks[0])
                 colour = palette.rgb(palette.pale(self.fill[[first]], np.ones(1, dtype=bool))[0])
                 keys.append(Key("area", LOST, colour))
@@ -544,7 +521,7 @@ class Drawer:
 
     def _keys_of_joints(self) -> list[Key]:
         seen, keys = self._seen, []
-        if seen.cracks:
+        if "cracks" in seen.marks:
             # Where a mechanism swings alone, nothing is open in equilibrium.
             widest = "" if self._flat or seen.widest == 0.0 else f", up to {width_text(seen.widest)}"
             kind = "area" if self._flat else "line"
@@ -553,12 +530,16 @@ class Drawer:
             told = "are shown at true scale only" if self.look.joints and not self.many else "not shown"
             return [*keys, Key("", f"hinges, sliding joints and forces {told}", palette.FAINT)]
         marked = [
-            *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),
-            *([Key("dot" if self._flat else "line", "hinge", palette.HINGE, layers=("hinge",))] if seen.hinges else []),
+            *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if "sliding" in seen.marks else []),
+            *(
+                [Key("dot" if self._flat else "line", "hinge", palette.HINGE, layers=("hinge",))]
+                if "hinges" in seen.marks
+                else []
+            ),
         ]
-        if seen.hinges and len(self._views) == 1 and not self.many:
+        if "hinges" in seen.marks and len(self._views) == 1 and not self.many:
             marked.append(Key("dash", "hidden hinge", palette.HINGE))
-        if seen.crushing:
+        if "crushing" in seen.marks:
             keys.append(Key("dot", "crushing", palette.CRUSHING, layers=("crushing top",)))
         if not self.many:
             return keys + marked
@@ -571,7 +552,7 @@ class Drawer:
             return [Key("", "forces not shown", palette.FAINT)]
         if self.force_scale == 0.0:
             return []
-        joint = "force of a joint" if self._seen.pulls else "compression"
+        joint = "force of a joint" if "pulls" in self._seen.marks else "compression"
         text = joint if self.look.forces == "thrust" else "contact force"
         if not self._flat:
             # Lengths in space are foreshortened: no bar is their scale.
@@ -782,13 +763,6 @@ def without_removed(increment: solver.Increment, fell_at: np.ndarray) -> solver.
         friction=increment.friction[kept],
         crushing=crushing[kept] if len(crushing) else crushing,
     )
-
-
-def alike(frames: list[Frame]) -> list[Frame]:
-    """Grow frames about their middles to the size of the largest, so that all have one scale."""
-    half = np.max([frame.size for frame in frames], axis=0) / 2.0
-    middles = [(frame.low + frame.high) / 2.0 for frame in frames]
-    return [Frame(middle - half, middle + half) for middle in middles]
 
 
 def largest_displacement(assembly: solver.Assembly, increment: solver.Increment) -> float:

@@ -1,4 +1,4 @@
-"""Several views of the same blocks in space, side by side, as one scene."""
+"""One or several views of the same blocks in space, side by side, as one scene."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from PIL import Image
 import solver
 
 from . import palette
-from .frame import write_words
+from .frame import Frame, Sheet, write_words
 from .scene import Scene
 from .solid_scene import SolidScene
+from .solid_view import View, hiding_supports
 from .swing import Swing
 
-#: Height of the words below each view, in heights of the text.
-WORDS = 1.6
+#: What stands below each of several views, and how high, in heights of the text.
+WORDS, HEIGHT = ("from above", "from below"), 1.6
 
 
 def _on_each(name: str) -> Callable[..., None]:
     """Make a method that each of the scenes has."""
 
     def call(self: PairedScenes, *given: Any) -> None:
-        for scene in self._scenes:
+        for scene in self.scenes:
             getattr(scene, name)(*given)
 
     return call
@@ -35,43 +36,79 @@ class PairedScenes(Scene):
 
     Parameters
     ----------
-    scenes : sequence of SolidScene
-    words : sequence of str
-        What each shows.
-    text : int
-        Height of the words in pixels.
+    assembly : solver.Assembly
+    views : sequence of View
+    frame : Frame
+        What is shown, in the axes of each view in turn.
+    sheet : Sheet
+        On which they find their place.
+    block_fill, opacity, fine, cut, outline
+        As of :class:`SolidScene`.
     """
 
-    def __init__(self, scenes: Sequence[SolidScene], words: Sequence[str], text: int) -> None:
-        self._scenes, self._words, self._text = tuple(scenes), tuple(words), text
-        first = self._scenes[0]
-        self.size = (sum(scene.size[0] for scene in self._scenes), first.size[1] + round(WORDS * text))
-        self.frame, self.pixel = first.frame, first.pixel
+    def __init__(
+        self,
+        assembly: solver.Assembly,
+        views: Sequence[View],
+        frame: Frame,
+        sheet: Sheet,
+        block_fill: np.ndarray,
+        **look: Any,
+    ) -> None:
+        (width, height), self._text = sheet.inside_size, sheet.text
+        self._several = len(views) > 1
+        size = width // len(views), height - round(HEIGHT * self._text) * self._several
+        half = frame.size.reshape(-1, 2).max(axis=0) / 2.0
+        self.scenes = [
+            SolidScene(
+                assembly,
+                view,
+                Frame(middle - half, middle + half),
+                size,
+                block_fill,
+                outlined=hiding_supports(assembly, view),
+                hidden_hinges=not self._several,
+                **look,
+            )
+            for view, middle in zip(views, ((frame.low + frame.high) / 2.0).reshape(-1, 2), strict=True)
+        ]
+        self.size = (size[0] * len(views), height)
+        self.frame, self.pixel = self.scenes[0].frame, self.scenes[0].pixel
 
-    pose, hide, backfill, cracks, sliding, hinges, crushing, forces, ties, arrows, clear = map(
+    pose, hide, backfill, cracks, sliding, hinges, crushing, forces, ties, arrows, clear, lines, close = map(
         _on_each,
-        ("pose", "hide", "backfill", "cracks", "sliding", "hinges", "crushing", "forces", "ties", "arrows", "clear"),
+        (
+            *("pose", "hide", "backfill", "cracks", "sliding", "hinges", "crushing", "forces", "ties", "arrows"),
+            *("clear", "lines", "close"),
+        ),
     )
+
+    def show_ground(self, height: float) -> None:
+        """Draw the ground of a fall; from below it would hide everything."""
+        for scene in self.scenes:
+            if scene.view.above >= 0.0:
+                scene.show_ground(height)
 
     def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:
         """Draw how a mechanism moves."""
-        for scene in self._scenes:
+        for scene in self.scenes:
             scene.show_motion(swing, tails, tips)
         return swing.displaced
 
     def holds(self, *layers: str) -> bool:
         """Whether anything is drawn in one of the layers."""
-        return self._scenes[0].holds(*layers)
+        return self.scenes[0].holds(*layers)
 
     def image(self) -> Image.Image:
-        """Draw the views beside each other, each with its words."""
+        """Draw the views beside each other, each of several with its words."""
         page, left = Image.new("RGB", self.size, palette.PAPER), 0
-        for scene, words in zip(self._scenes, self._words, strict=True):
+        for scene, words in zip(self.scenes, WORDS, strict=False):
             page.paste(scene.image(), (left, 0))
-            write_words(page, (left + scene.size[0] / 2.0, self.size[1] - 0.7 * self._text), words, self._text)
+            if self._several:
+                write_words(page, (left + scene.size[0] / 2.0, self.size[1] - 0.7 * self._text), words, self._text)
             left += scene.size[0]
         return page
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: pixel (column, row) of points (n, 3) [m] in the first view."""
-        return self._scenes[0].at_pixel(points)
+        return self.scenes[0].at_pixel(points)

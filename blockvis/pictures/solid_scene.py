@@ -204,13 +204,9 @@ class SolidScene(Scene):
         self.lines("backfill", bodies.rims(), palette.FILL_RIM, max(2.0 * self._thin, 1.2))
 
     def show_ground(self, height: float) -> None:
-        """Draw the ground of a fall, with the shadows of the blocks under a light from above.
+        """Draw the ground of a fall, ``height`` [m], with the shadows of the blocks under a light from above.
 
         It has no end but fades, and supports below the structure reach down to it: they are ground as well.
-
-        Parameters
-        ----------
-        height : float [m]
         """
         # Where the middle of the picture looks at; a level view has it nowhere.
         eye, radius = self.view.axes[2], GROUND * float(self.frame.size.max())
@@ -219,28 +215,12 @@ class SolidScene(Scene):
         plane = pv.Disc(center=(*middle[:2], height), inner=0.0, outer=radius, normal=(0, 0, 1), r_res=48, c_res=96)
         away = np.linalg.norm(plane.points[:, :2] - middle[:2], axis=1) / radius
         left = np.clip((1.0 - away) / (1.0 - FADES), 0.0, 1.0)[:, None] ** 2
-        plane.point_data["colour"] = np.rint(
-            left * np.array(palette.GROUND) + (1.0 - left) * np.array(palette.PAPER)
-        ).astype(np.uint8)
-        corners = np.array(self.assembly.vertices)
+        self._add("earth", plane, np.rint(left * palette.GROUND + (1.0 - left) * palette.PAPER), forward=-10.0 / 3.0)
         shadow = self._surface.copy()
         shadow.clear_data()
-        shadow.points = corners * (1.0, 1.0, 0.0) + (0.0, 0.0, height)
-        shadow.point_data["colour"] = np.tile(np.array(palette.SHADOW, dtype=np.uint8), (len(corners), 1))
+        shadow.points = self.assembly.vertices * (1.0, 1.0, 0.0) + (0.0, 0.0, height)
+        self._add("earth/shadow", shadow, palette.SHADOW, forward=-5.0 / 3.0)
         self._shadow, self._floor, self._feet = shadow, height, _feet(self.assembly)
-        for mesh, forward in ((plane, -2.0), (shadow, -1.0)):
-            actor = self._plotter.add_mesh(
-                mesh,
-                scalars="colour",
-                rgb=True,
-                lighting=False,
-                reset_camera=False,
-                render=False,
-                show_scalar_bar=False,
-            )
-            mapper = actor.GetMapper()
-            mapper.SetResolveCoincidentTopologyToPolygonOffset()
-            mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, -forward * 10.0)
 
     def lines(
         self,
@@ -248,7 +228,6 @@ class SolidScene(Scene):
         ends: np.ndarray,
         colour: tuple[int, int, int] | np.ndarray,
         width: float,
-        *,
         forward: float = 2.0,
     ) -> None:
         """Draw lines, ends (n, 2, 3) [m], ``width`` pixels wide, in one layer, instead of those before.
@@ -474,8 +453,8 @@ class SolidScene(Scene):
             mesh, **look, line_width=self._over * width, lighting=False, reset_camera=False, render=False,
         )  # fmt: skip
         drawn_forward(actor, forward)
-        # The cut faces lie in the plane, and their edges.
-        if not layer.startswith("section"):
+        # The cut faces lie in the plane, and their edges; the ground goes on.
+        if not layer.startswith(("section", "earth")):
             self._clip(actor)
         self._layers[layer] = actor
 
