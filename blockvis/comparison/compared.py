@@ -44,16 +44,13 @@ class Side:
     ----------
     label : str
         What tables and pictures call it.
-    folder : Path
     response : solver.Response
         With an increment in equilibrium at least.
-    fall : Fall, optional
     case : dict
         Values of its case by key, as "material.friction_coefficient"; empty where it was written from Python.
     """
 
     label: str
-    folder: Path
     response: solver.Response
     fall: Fall | None
     case: dict[str, Any]
@@ -89,22 +86,6 @@ class Side:
         before = max(int(np.searchsorted(self.response.parameters, at)) - 1, 0)
         on_line = np.isclose(left_rest(self.response, before), path[before].measured, atol=0.0)
         return state if on_line else replace(state, measured=np.nan)
-
-
-@dataclass(frozen=True)
-class ComparedJoint:
-    """The same joint in two runs.
-
-    Attributes
-    ----------
-    place : str
-        Its two blocks.
-    openings : (float, float) [m]
-        To the µm; nan where the run has no such joint, or a block of it has fallen.
-    """
-
-    place: str
-    openings: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -184,20 +165,24 @@ class Comparison:
             return False
         return bool(np.abs(one.vertices - other.vertices).max() <= SAME * one.block_size)
 
-    def cracks(self, at: float) -> list[ComparedJoint]:
+    def cracks(self, at: float) -> list[tuple[str, np.ndarray]]:
         """Compare the joints at which the crack lines of either run are widest, the widest first.
 
         Parameters
         ----------
         at : float [m or rad]
             Over all phases.
+
+        Returns
+        -------
+        list of (str, (2,) array [m])
+            The two blocks of each joint, and its opening in both runs, to the µm; nan where the run has no such joint,
+            or a block of it has fallen.
         """
         (lines, one), (more_lines, other) = (_cracks_at(side, at) for side in self.sides)
-        joints = [
-            ComparedJoint(crack.widest, (one.get(pair, np.nan), other.get(pair, np.nan)))
-            for pair, crack in {frozenset(line.widest.split(" | ")): line for line in [*more_lines, *lines]}.items()
-        ]
-        return sorted(joints, key=lambda joint: -np.nanmax(joint.openings))[:MOST_CRACKS]
+        crack_at = {frozenset(line.widest.split(" | ")): line.widest for line in [*more_lines, *lines]}
+        joints = [(crack_at[pair], np.array([of.get(pair, np.nan) for of in (one, other)])) for pair in crack_at]
+        return sorted(joints, key=lambda joint: -np.nanmax(joint[1]))[:MOST_CRACKS]
 
 
 def compared(one: str | Path, other: str | Path) -> Comparison:
@@ -234,7 +219,7 @@ def _opened(folder: Path, label: str) -> Side:
             "are movements along a direction, or all are rotations"
         )
     text = case_text(folder)
-    return Side(label, folder, response, stored_fall(folder), dict(_flat(tomllib.loads(text))) if text else {})
+    return Side(label, response, stored_fall(folder), dict(_flat(tomllib.loads(text))) if text else {})
 
 
 def _labels(one: Path, other: Path) -> tuple[str, str]:
@@ -287,8 +272,7 @@ def _cracks_at(side: Side, at: float) -> tuple[list[Crack], dict[frozenset[str],
     state, assembly = side.state(at), side.response.assembly
     joints = initial_joints(assembly)
     opening = np.maximum(np.round(opening_and_slip(assembly, joints, state.pose)[:, 0], 6), 0.0)
-    if state.fallen is not None:
-        opening[state.fallen[joints.block_a] | state.fallen[joints.block_b]] = np.nan
+    opening[state.fallen[joints.block_a] | state.fallen[joints.block_b]] = np.nan
     found: dict[frozenset[str], float] = {}
     for a, b, width in zip(joints.block_a.tolist(), joints.block_b.tolist(), opening.tolist(), strict=True):
         pair = frozenset((assembly.names[a], assembly.names[b]))

@@ -84,8 +84,6 @@ class Pair:
 
     Parameters
     ----------
-    comparison : Comparison
-    look : Look
     falls : bool
         Whether the falls are drawn, which the frame then holds.
     """

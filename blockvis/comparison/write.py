@@ -85,7 +85,6 @@ def comparison_html(found: Comparison, curves: bytes, stations: bytes, film: str
 
     Parameters
     ----------
-    found : Comparison
     curves, stations : bytes
         The pictures, in PNG.
     film : str, optional
@@ -94,8 +93,8 @@ def comparison_html(found: Comparison, curves: bytes, stations: bytes, film: str
     report = files("blockvis") / "report"
     heads = ("", *(side.label for side in found.sides))
     cracks = [
-        (joint.place, *("–" if math.isnan(opening) else width_text(opening) for opening in joint.openings))
-        for joint in found.cracks(found.common_end)
+        (place, *("–" if math.isnan(opening) else width_text(opening) for opening in openings.tolist()))
+        for place, openings in found.cracks(found.common_end)
     ]
     where = found.place_text(found.common_end) if found.is_path else "the limit load"
     keys, unknown = found.changed_keys(), " and ".join(side.label for side in found.sides if not side.case)

@@ -43,7 +43,6 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
 
     Parameters
     ----------
-    response : solver.Response
     path : Path
         Ending in .glb.
     fall : Fall, optional

@@ -99,8 +99,6 @@ def fill_bodies(response: solver.Response, shown: solver.Pose, gone: np.ndarray 
 
     Parameters
     ----------
-    response : solver.Response
-    shown : solver.Pose
     gone : (n_blocks,) bool array, optional
         Blocks that have left, with the fill over them.
     """

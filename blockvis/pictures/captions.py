@@ -71,7 +71,6 @@ def in_one_unit(response: solver.Response, phase: int | None = None) -> solver.R
 
     Parameters
     ----------
-    response : solver.Response
     phase : int, optional
         The last with an increment by default.
     """
@@ -111,7 +110,6 @@ def parameter_text(value: float, response: solver.Response) -> str:
     Parameters
     ----------
     value : float [m or rad]
-    response : solver.Response
     """
     factor, unit = parameter_unit(response)
     power = int(np.floor(np.log10(factor * _largest_parameter(response) or 1.0)))
@@ -156,7 +154,6 @@ def shown_range(values: np.ndarray, response: solver.Response) -> tuple[float, f
     ----------
     values : (n,) array
         Of the path, in the unit of the axis; nan where they are not finite.
-    response : solver.Response
     """
     known = values[np.isfinite(values)]
     low, high = min(0.0, float(known.min(initial=0.0))), max(0.0, float(known.max(initial=0.0)))
@@ -256,8 +253,6 @@ def caption_of(response: solver.Response, increment: solver.Increment, magnifica
 
     Parameters
     ----------
-    response : solver.Response
-    increment : solver.Increment
     magnification : float
         Of the displacements.
     """

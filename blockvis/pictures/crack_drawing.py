@@ -47,10 +47,8 @@ def draw_cracks(
 
     Parameters
     ----------
-    response : solver.Response
     number : int
         Of the increment; -1 is the last equilibrium.
-    path : path
     size : (int, int)
         Width and height in pixels.
     view, section

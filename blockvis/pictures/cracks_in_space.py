@@ -38,10 +38,6 @@ class CracksInSpace:
 
     Parameters
     ----------
-    response : solver.Response
-    increment : solver.Increment
-    joints : InitialJoints
-    sheet : Sheet
     cracks : sequence of Crack
         As of :func:`blockvis.results.cracks.cracks_of`: the main ones of them are to be seen.
     sight, cut
@@ -221,10 +217,8 @@ def _showing(
 
     Parameters
     ----------
-    assembly : solver.Assembly
     views : tuple of View
         Those of the other pictures.
-    opened : _Edges
     cracks : sequence of Crack
         That are to be seen.
     gone : (n_blocks,) bool array

@@ -111,7 +111,6 @@ class CurvePanel:
 
     Parameters
     ----------
-    response : solver.Response
     size : (int, int)
         Width and height in pixels.
     text : int

@@ -152,8 +152,6 @@ class Drawer:
 
     Parameters
     ----------
-    response : solver.Response
-    look : Look
     size : (int, int)
         Width and height of the pictures in pixels.
     increments : tuple of solver.Increment
@@ -369,7 +367,6 @@ class Drawer:
 
         Parameters
         ----------
-        increment : solver.Increment
         title, note, badge : str
             First and second line of the caption, and the warning, instead of those of the increment.
         blocks_only : bool

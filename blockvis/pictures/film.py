@@ -32,7 +32,6 @@ def film_of(
 
     Parameters
     ----------
-    drawer : Drawer
     fps : float
         Frames per second.
     seconds : float [s]
@@ -86,7 +85,6 @@ def state_at(response: solver.Response, at: float) -> solver.Increment:
 
     Parameters
     ----------
-    response : solver.Response
     at : float [m or rad]
     """
     return _state_at(response.path, response.parameters, at)

@@ -49,9 +49,6 @@ class FilmProcess:
 
         Parameters
         ----------
-        folder : Path
-        assembly : solver.Assembly
-        vtu : blockvis.results.viewer_files.ViewerFormat
         count : int
             Increments whose files are there already.
         """
@@ -90,9 +87,6 @@ class FilmProcess:
 
         Parameters
         ----------
-        response : solver.Response
-        path : Path
-        fall : Fall, optional
         falls : bool
             Whether the process works out the fall; :meth:`fall` waits for it.
         underlay : Underlay, optional

@@ -48,7 +48,6 @@ class FlatScene(Scene):
 
     Parameters
     ----------
-    assembly : solver.Assembly
     frame : Frame
         What is shown, the same in all frames.
     size : (int, int)
@@ -95,7 +94,6 @@ class FlatScene(Scene):
 
         Parameters
         ----------
-        shown : solver.Pose
         block_fill : (n_blocks, 3) uint8 array, optional
             New colours.
         """

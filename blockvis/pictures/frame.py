@@ -40,7 +40,6 @@ class Key:
     ----------
     kind : {"area", "line", "dash", "dot", "bar", ""}
         What stands before the text; nothing before a note.
-    text : str
     colour : (int, int, int)
     length : float
         Pixels, of a bar drawn to scale.
@@ -77,7 +76,6 @@ class Sheet:
     ----------
     size : (int, int)
         Width and height in pixels.
-    colour_bar : ColourBar, optional
     beside_width : int
         Pixels of a picture to the right of the blocks, as high as theirs.
     """
@@ -325,7 +323,6 @@ class Label:
     place : (float, float) [pixel]
     box : (float, float, float, float) [pixel]
         Left, top, width and height.
-    words : str
     colour : (int, int, int)
         Of its rim.
     """
@@ -459,7 +456,6 @@ def framed(
 
     Parameters
     ----------
-    assembly : solver.Assembly
     poses : iterable of solver.Pose
         As drawn, magnified if they are; gone through once.
     margin : float

@@ -37,7 +37,6 @@ def draw_inspection(
 
     Parameters
     ----------
-    inspection : Inspection
     path : str or Path
         .png, .svg or .pdf.
     ground : Layout, optional
@@ -53,7 +52,6 @@ def draw_refusal(refused: Refused, path: str | Path) -> Path | None:
 
     Parameters
     ----------
-    refused : blockvis.layout.refusal.Refused
     path : str or Path
         As of :func:`draw_inspection`.
 

@@ -46,7 +46,6 @@ class Kind:
 
     Attributes
     ----------
-    label : str
     colour : (int, int, int)
     blocks : tuple of int
     hatch : str
@@ -67,7 +66,6 @@ class Contents:
     ----------
     layout : Layout
         All that is drawn.
-    title : str
     findings : tuple of str
         Lines below it.
     kinds : tuple of Kind
@@ -77,7 +75,6 @@ class Contents:
         Blocks that are named beside them.
     rings : (n, d) array [m]
         Places to look at, and what they are.
-    rings_are : str
     ends : (n, 2) array [m]
         Ends of open lines.
     edges : (n, 2, 3) array [m]
@@ -113,7 +110,6 @@ class _Canvas:
 
     Attributes
     ----------
-    axes : matplotlib.axes.Axes
     axis : (2, d) array
         Unit vectors to the right and up.
     names : dict of int to array
@@ -138,7 +134,6 @@ def draw_contents(contents: Contents, path: str | Path) -> Path:
 
     Parameters
     ----------
-    contents : Contents
     path : str or Path
         .png, .svg or .pdf.
     """

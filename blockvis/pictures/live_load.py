@@ -60,8 +60,6 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
 
     Parameters
     ----------
-    response : solver.Response
-    increment : solver.Increment
     extent : float [m]
         Of the picture.
 
@@ -114,7 +112,6 @@ class LiveLoads:
 
     Parameters
     ----------
-    response : solver.Response
     increments : iterable of solver.Increment
         Gone through once.
     extent : float [m]
@@ -162,7 +159,6 @@ class LiveLoads:
 
         Parameters
         ----------
-        increment : solver.Increment
         pose : solver.Pose
             Of its blocks, as drawn.
         """

@@ -57,7 +57,6 @@ def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndar
 
     Parameters
     ----------
-    assembly : solver.Assembly
     corners : (n_vertices, 2) array [m]
     parts : (n_blocks,) int array
         As ``solver.mechanics.rigid_parts`` gives them.
@@ -126,8 +125,6 @@ def marks_of(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    joints : InitialJoints
     increment : solver.Increment
         Its mechanism has the hinges, sliding and crushing joints.
     shown : solver.Pose
@@ -149,8 +146,6 @@ def cracks_between(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    joints : InitialJoints
     pose : solver.Pose
         At which the joints are open or not.
     shown : solver.Pose
@@ -311,9 +306,6 @@ def settlement_arrows(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    settlement : solver.Settlement
-    pose : solver.Pose
     seen : Frame, optional
         What a picture in the plane shows.
 
@@ -427,8 +419,6 @@ def sliding_lines(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    contacts : solver.mechanics.Contacts
     k : (k,) int array
         Numbers of the contact points that slide.
     points : (n_contacts, 2) array [m]

@@ -36,7 +36,6 @@ class PairedScenes(Scene):
 
     Parameters
     ----------
-    assembly : solver.Assembly
     views : sequence of View
     frame : Frame
         What is shown, in the axes of each view in turn.

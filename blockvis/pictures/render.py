@@ -89,13 +89,7 @@ def draw_still(
 
 
 def seen_from(view: Any, section: Any) -> tuple[Sight | None, Cut | None]:
-    """Read from where blocks in space are seen, and what cuts them open.
-
-    Parameters
-    ----------
-    view : str or mapping, optional
-    section : str or mapping, optional
-        Both as of :func:`draw_still`.
+    """Read from where blocks in space are seen, and what cuts them open, both as of :func:`draw_still`.
 
     Raises
     ------

@@ -21,8 +21,6 @@ class SightLines:
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    pose : solver.Pose
     weights : (n_blocks,) array
         What it is worth to see each; blocks that are worth little are not looked for where there are many.
     """
@@ -47,7 +45,6 @@ class SightLines:
         ----------
         axes : (3, 3) array
             Rows to the right, up in the picture, and to the eye.
-        n_blocks : int
         """
         showing = self._areas * (self._faces.normals @ axes[2])
         faces = self._chosen[showing[self._chosen] > 0.0]

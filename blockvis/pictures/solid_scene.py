@@ -81,8 +81,6 @@ class SolidScene(Scene):
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    view : View
     frame : Frame
         What is shown, in the axes of the view, the same in all frames.
     size : (int, int)
@@ -168,7 +166,6 @@ class SolidScene(Scene):
 
         Parameters
         ----------
-        shown : solver.Pose
         block_fill : (n_blocks, 3) uint8 array, optional
             New colours.
         """
@@ -234,7 +231,6 @@ class SolidScene(Scene):
 
         Parameters
         ----------
-        layer : str
         ends : (n, 2, 3) array [m]
         colour : (int, int, int), or (n, 2, 3) uint8 array
             Of all, or of each end.
@@ -261,7 +257,6 @@ class SolidScene(Scene):
 
         Parameters
         ----------
-        layer : str
         polygons : sequence of (k, 3) arrays [m]
         colour : (int, int, int), or (n_points, 3) uint8 array
             Of all, or of each corner.

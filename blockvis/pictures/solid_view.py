@@ -76,10 +76,8 @@ def views_of(
 
     Parameters
     ----------
-    response : solver.Response
     motion : (n_blocks, 3) array [m]
         As of :func:`chosen_view`.
-    joints : InitialJoints
     sight : Sight, optional
         As asked for.
     cut : Cut, optional
@@ -174,7 +172,6 @@ def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View]
 
     Parameters
     ----------
-    response : solver.Response
     motion : (n_blocks, 3) array [m]
         Of the centroids, in any scale: of the mechanism.
     views : list of View, optional
@@ -218,7 +215,6 @@ def showing_faces(shapes: mechanics.Polyhedra, eye: np.ndarray) -> tuple[np.ndar
 
     Parameters
     ----------
-    shapes : solver.mechanics.Polyhedra
     eye : (3,) array
         Unit vector to the eye.
 

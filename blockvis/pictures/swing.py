@@ -113,10 +113,8 @@ def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing)
 
     Parameters
     ----------
-    assembly : solver.Assembly
     fill : (n_blocks, 3) uint8 array
         As :func:`blockvis.pictures.palette.block_colours` gives it.
-    swing : Swing
     """
     if swing.n_parts <= MOST_PARTS:
         still = palette.pale(fill, assembly.free & (swing.parts < 0), palette.STILL)

@@ -82,7 +82,6 @@ class DrawnTies:
 
     Parameters
     ----------
-    response : solver.Response
     cut : (2, 3) array, optional
         A point [m] of the plane of a section and its unit normal towards what is kept.
 
@@ -123,7 +122,6 @@ class DrawnTies:
 
         Parameters
         ----------
-        increment : solver.Increment
         shown : solver.Pose
             Where the blocks are drawn.
         dash : float [m]

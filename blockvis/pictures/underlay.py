@@ -67,8 +67,6 @@ class CarriedPhotograph:
 
     Parameters
     ----------
-    underlay : Underlay
-    assembly : solver.Assembly
     low : (2,) array [m]
     pixel : float [m]
     size : (int, int)

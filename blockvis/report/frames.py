@@ -45,8 +45,6 @@ def surveyed(
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    joints : InitialJoints
     shown : list of solver.Increment
         Gone through once.
     """
@@ -82,8 +80,6 @@ def model_of_frames(
 
     Parameters
     ----------
-    response : solver.Response
-    joints : InitialJoints
     shown : list of solver.Increment
         What the page shows, frame after frame.
     frame : Frame
@@ -160,8 +156,6 @@ class FrameTables:
 
     Parameters
     ----------
-    assembly : solver.Assembly
-    joints : InitialJoints
     shown : list of solver.Increment
         Gone through once.
     origin : (d,) array [m]

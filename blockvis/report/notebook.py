@@ -35,7 +35,6 @@ class Player:
 
     Attributes
     ----------
-    response : solver.Response
     height : int
         Pixels.
     """

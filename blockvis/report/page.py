@@ -142,7 +142,6 @@ def add_error(path: str | os.PathLike[str], error: str) -> None:
 
     Parameters
     ----------
-    path : path
     error : str
         As of :func:`write_report`.
     """

@@ -61,8 +61,6 @@ def write_pdf(
 
     Parameters
     ----------
-    response : solver.Response
-    path : path
     case_text : str
         The case file, shown as it is.
     fall : Fall, optional

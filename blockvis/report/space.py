@@ -27,7 +27,6 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
 
     Parameters
     ----------
-    response : solver.Response
     swing : Swing
         Its mechanism decides where the page looks from.
     shown : list of solver.Increment
