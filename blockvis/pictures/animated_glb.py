@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import struct
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -34,8 +32,8 @@ TIE_RADIUS = 0.03
 #: Rotation that turns z upwards into y upwards, as glTF has it.
 UPRIGHT = Rotation.from_euler("x", -90, degrees=True)
 
-#: Component type of single precision in glTF, and the tags of its two chunks.
-FLOAT, JSON, BIN = 5126, 0x4E4F534A, 0x004E4942
+#: Component type of single precision in glTF.
+FLOAT = 5126
 
 
 def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None = None) -> Path:
@@ -69,37 +67,54 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     # Of the two quaternions of a rotation the one next to the last: players go the short way.
     for k in range(1, len(turns)):
         turns[k] *= np.where((turns[k] * turns[k - 1]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
-    tree, binary = _chunks(_still(response.assembly, ties))
-    buffer = _Buffer(tree, binary)
-    numbers = {node["name"]: number for number, node in enumerate(tree["nodes"]) if "mesh" in node}
-    clock = buffer.added(times, "SCALAR")
-    samplers: list[dict[str, Any]] = []
-    channels: list[dict[str, Any]] = []
     sizes = np.repeat(stands[:, :, None].astype(float), 3, axis=2)
     rods = _rods(response, ties, poses, tied)
     # Numbers in single precision are those about the first place of the first block.
-    origin, scene = places[0, 0].copy(), tree["scenes"][tree["scene"]]
-    tree["nodes"].append({"children": scene["nodes"], "translation": origin.tolist()})
-    scene["nodes"] = [len(tree["nodes"]) - 1]
+    origin = places[0, 0].copy()
+    blocks, members = (places - origin, turns, sizes), (rods[0] - origin, *rods[1:])
+    courses = {
+        what: np.concatenate([of_blocks, of_members], axis=1)
+        for what, of_blocks, of_members in zip(("translation", "rotation", "scale"), blocks, members, strict=True)
+    }
     names = [*response.assembly.names, *map(_rod_name, ties)]
-    for what, of_blocks, of_rods in zip(
-        ("translation", "rotation", "scale"),
-        (places - origin, turns, sizes),
-        (rods[0] - origin, *rods[1:]),
-        strict=True,
-    ):
-        for name, values in zip(names, np.moveaxis(np.concatenate([of_blocks, of_rods], axis=1), 1, 0), strict=True):
-            tree["nodes"][numbers[name]][what] = values[0].tolist()
-            if np.abs(values - values[0]).max() == 0.0:
-                continue
-            output = buffer.added(values, "VEC4" if what == "rotation" else "VEC3")
-            channels.append({"sampler": len(samplers), "target": {"node": numbers[name], "path": what}})
-            # Blocks and rods come and go at once.
-            how = "STEP" if what == "scale" else "LINEAR"
-            samplers.append({"input": clock, "output": output, "interpolation": how})
-    if channels:
-        tree["animations"] = [{"name": response.analysis, "samplers": samplers, "channels": channels}]
-    return write_atomic(path, buffer.packed())
+    scene = _still(response.assembly, ties)
+
+    def animated(buffer: dict[str, bytes], tree: dict[str, Any]) -> None:
+        """Add the motion to what trimesh writes of the blocks at rest."""
+
+        def added(values: np.ndarray, kind: str) -> int:
+            data, number = np.ascontiguousarray(values, dtype="<f4"), len(tree["accessors"])
+            least, most = (np.atleast_1d(of).astype(float).tolist() for of in (data.min(axis=0), data.max(axis=0)))
+            tree["accessors"][f"motion {number}"] = {
+                "bufferView": len(buffer), "componentType": FLOAT, "count": len(data), "type": kind,
+                "min": least, "max": most,
+            }  # fmt: skip
+            buffer[f"motion {number}"] = data.tobytes()
+            return number
+
+        numbers = {node["name"]: number for number, node in enumerate(tree["nodes"]) if "mesh" in node}
+        clock, samplers, channels = added(times, "SCALAR"), list[dict[str, Any]](), list[dict[str, Any]]()
+        for what, course in courses.items():
+            for name, values in zip(names, np.moveaxis(course, 1, 0), strict=True):
+                tree["nodes"][numbers[name]][what] = values[0].tolist()
+                if np.abs(values - values[0]).max() == 0.0:
+                    continue
+                output = added(values, "VEC4" if what == "rotation" else "VEC3")
+                channels.append({"sampler": len(samplers), "target": {"node": numbers[name], "path": what}})
+                # Blocks and rods come and go at once.
+                how = "STEP" if what == "scale" else "LINEAR"
+                samplers.append({"input": clock, "output": output, "interpolation": how})
+        for node in tree["nodes"]:
+            # What moves has no matrix of its own.
+            node.pop("matrix", None)
+        roots = tree["scenes"][tree["scene"]]
+        tree["nodes"].append({"children": roots["nodes"], "translation": origin.tolist()})
+        roots["nodes"] = [len(tree["nodes"]) - 1]
+        tree["asset"]["generator"] = "blockvis"
+        if channels:
+            tree["animations"] = [{"name": response.analysis, "samplers": samplers, "channels": channels}]
+
+    return write_atomic(path, bytes(scene.export(file_type="glb", buffer_postprocessor=animated)))
 
 
 def _played(
@@ -182,8 +197,8 @@ def _as_gltf(pose: solver.Pose, dimension: int) -> tuple[np.ndarray, np.ndarray]
     return np.hstack([pose.positions, flat]), Rotation.from_rotvec(spins).as_quat()
 
 
-def _still(assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> bytes:
-    """Write the blocks about their centroids as .glb, each a node with its row in the extras, and rods for ties."""
+def _still(assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> Any:
+    """Make a scene of the blocks about their centroids, each a node with its row in the extras, and rods for ties."""
     import trimesh
 
     layout = layout_of(assembly)
@@ -211,55 +226,4 @@ def _still(assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> bytes:
         )
         rod.visual = trimesh.visual.TextureVisuals(material=paint)
         scene.add_geometry(rod, node_name=_rod_name(tie), geom_name=_rod_name(tie))
-
-    def signed(tree: dict[str, Any]) -> None:
-        tree["asset"]["generator"] = "blockvis"
-        for node in tree["nodes"]:
-            # What moves has no matrix of its own.
-            node.pop("matrix", None)
-
-    return bytes(scene.export(file_type="glb", tree_postprocessor=signed))
-
-
-def _chunks(glb: bytes) -> tuple[dict[str, Any], bytes]:
-    """Split a .glb into its tree and its numbers."""
-    length = struct.unpack("<I", glb[12:16])[0]
-    return json.loads(glb[20 : 20 + length]), glb[28 + length :]
-
-
-class _Buffer:
-    """The numbers of a .glb, to which others are added.
-
-    Parameters
-    ----------
-    tree : dict
-        Of the file, completed.
-    binary : bytes
-        Its numbers.
-    """
-
-    def __init__(self, tree: dict[str, Any], binary: bytes) -> None:
-        self._tree, self._parts = tree, [binary]
-        self._length = len(binary)
-
-    def added(self, values: np.ndarray, kind: str) -> int:
-        """Add an array in single precision; gives the number of its accessor."""
-        data = np.ascontiguousarray(values, dtype="<f4")
-        views, accessors = self._tree["bufferViews"], self._tree["accessors"]
-        views.append({"buffer": 0, "byteOffset": self._length, "byteLength": data.nbytes})
-        least, most = (np.atleast_1d(of).astype(float).tolist() for of in (data.min(axis=0), data.max(axis=0)))
-        accessor = {"componentType": FLOAT, "count": len(data), "type": kind, "min": least, "max": most}
-        accessors.append({"bufferView": len(views) - 1, **accessor})
-        self._parts.append(data.tobytes())
-        self._length += data.nbytes
-        return len(accessors) - 1
-
-    def packed(self) -> bytes:
-        """Pack the file."""
-        self._tree["buffers"] = [{"byteLength": self._length}]
-        text = json.dumps(self._tree, separators=(",", ":")).encode()
-        text += b" " * (-len(text) % 4)
-        binary = b"".join(self._parts)
-        binary += bytes(-len(binary) % 4)
-        head = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(binary))
-        return head + struct.pack("<II", len(text), JSON) + text + struct.pack("<II", len(binary), BIN) + binary
+    return scene
