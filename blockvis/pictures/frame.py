@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -282,78 +283,52 @@ def write_labels(
         Of their rims, one per place; that of open joints by default.
     """
     draw, font = ImageDraw.Draw(picture), _font(round(0.85 * text))
-    high, pad, rim = 1.2 * text, 0.25 * text, 0.4 * text
-    written: list[Label] = []
+    rim, written = 0.4 * text, list[_Label]()
     # A label over the place of another would seem to be its.
     dots = np.concatenate([dots, np.repeat(places, CROSSED, axis=0)])
-    for (x, y), label, colour in zip(places.tolist(), words, colours or [palette.OPEN] * len(words), strict=True):
-        if not (0.0 <= x <= picture.width and 0.0 <= y <= picture.height):
+    away = np.repeat(np.multiply(LABELS_AWAY, text), len(BESIDE))
+    beside = np.tile(BESIDE, (len(LABELS_AWAY), 1))
+    for place, label, colour in zip(places, words, colours or [palette.OPEN] * len(words), strict=True):
+        if not ((place >= 0.0) & (place <= picture.size)).all():
             continue
-        wide = font.getlength(label) + 2.0 * pad
-        free: list[tuple[float, int, Label]] = []
-        for away in np.multiply(LABELS_AWAY, text):
-            for right, down in BESIDE:
-                middle = x + right * (wide / 2.0 + away), y + down * (high / 2.0 + away)
-                one = Label((x, y), (middle[0] - wide / 2.0, middle[1] - high / 2.0, wide, high), label, colour)
-                if one.inside(picture.size) and not any(one.overlaps(other) for other in written):
-                    left, top = one.box[:2]
-                    hidden = (dots > (left - rim, top - rim)) & (dots < (left + wide + rim, top + high + rim))
-                    crossed = sum(one.crosses(other) or other.crosses(one) for other in written)
-                    free.append((int(hidden.all(axis=1).sum()) + away / text + CROSSED * crossed, len(free), one))
-        if free:
-            written.append(min(free, key=lambda one: one[:2])[2])
+        size = np.array([font.getlength(label) + 0.5 * text, 1.2 * text])
+        lows = place + beside * (size / 2.0 + away[:, None]) - size / 2.0
+        nearest = np.clip(place, lows, lows + size)
+        leaders = np.linspace(np.broadcast_to(place, nearest.shape), nearest, 12)[1:]
+        free = (lows >= 0.0).all(axis=1) & (lows + size <= picture.size).all(axis=1)
+        cost = _inside(dots[:, None], lows - rim, lows + size + rim).sum(axis=0) + away / text
+        for other in written:
+            free &= ~((lows < other.high) & (other.low < lows + size)).all(axis=1)
+            over = _inside(other.leader[:, None], lows, lows + size).any(axis=0)
+            cost += CROSSED * (over.astype(int) + _inside(leaders, other.low, other.high).any(axis=0))
+        if free.any():
+            best = int(np.where(free, cost, np.inf).argmin())
+            written.append(_Label(place, lows[best], lows[best] + size, leaders[:, best], label, colour))
     for one in written:
-        if np.hypot(*np.subtract(one.nearest, one.place)) > text:
+        if np.hypot(*(one.leader[-1] - one.place)) > text:
             # Grey and with a dot at its end: a coloured one would look like a crack.
-            draw.line((*one.place, *one.nearest), fill=palette.FAINT, width=max(1, text // 16))
-            draw.circle(one.place, text / 8.0, fill=palette.FAINT)
+            draw.line((*one.place, *one.leader[-1]), fill=palette.FAINT, width=max(1, text // 16))
+            draw.circle(tuple(one.place.tolist()), text / 8.0, fill=palette.FAINT)
     for one in written:
-        left, top, wide, high = one.box
-        box = (left, top, left + wide, top + high)
+        box = (*one.low.tolist(), *one.high.tolist())
         draw.rounded_rectangle(box, 0.25 * text, fill=palette.PAPER, outline=one.colour, width=max(1, text // 15))
-        draw.text((left + wide / 2.0, top + high / 2.0), one.words, palette.INK, font, anchor="mm")
+        draw.text(tuple(((one.low + one.high) / 2.0).tolist()), one.words, palette.INK, font, anchor="mm")
 
 
-@dataclass(frozen=True)
-class Label:
-    """Words beside a place of a picture.
+class _Label(NamedTuple):
+    """Words in a box beside a place of a picture, with points of the leader from there to the box [pixel]."""
 
-    Attributes
-    ----------
-    place : (float, float) [pixel]
-    box : (float, float, float, float) [pixel]
-        Left, top, width and height.
-    colour : (int, int, int)
-        Of its rim.
-    """
-
-    place: tuple[float, float]
-    box: tuple[float, float, float, float]
+    place: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    leader: np.ndarray
     words: str
     colour: tuple[int, int, int]
 
-    @property
-    def nearest(self) -> tuple[float, float]:
-        """Where a leader from the place meets the box."""
-        (x, y), (left, top, wide, high) = self.place, self.box
-        return min(max(x, left), left + wide), min(max(y, top), top + high)
 
-    def inside(self, size: tuple[int, int]) -> bool:
-        """Whether it lies inside a picture."""
-        left, top, wide, high = self.box
-        return left >= 0.0 and top >= 0.0 and left + wide <= size[0] and top + high <= size[1]
-
-    def overlaps(self, other: Label) -> bool:
-        """Whether its box lies over that of another."""
-        left, top, wide, high = self.box
-        x, y, across, up = other.box
-        return left < x + across and x < left + wide and top < y + up and y < top + high
-
-    def crosses(self, other: Label) -> bool:
-        """Whether its box lies over the leader of another."""
-        left, top, wide, high = self.box
-        leader = np.linspace(other.place, other.nearest, 12)[1:]
-        return bool(((leader > (left, top)) & (leader < (left + wide, top + high))).all(axis=1).any())
+def _inside(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(...) bool array: whether points (..., 2) lie inside boxes between corners (..., 2)."""
+    return np.asarray(((points > low) & (points < high)).all(axis=-1))
 
 
 def write_words(picture: Image.Image, place: tuple[float, float], words: str, text: int) -> None:
