@@ -17,7 +17,6 @@ from blockvis.results.viewer_files import ViewerFiles, ViewerFormat
 from blockvis.system.atomic_files import partial_of, remove
 from blockvis.system.worker import Say, Worker, WorkerEnded, serve
 
-from .underlay import Underlay
 from .video import find_encoder
 
 #: Seconds that a process has to remove its half-written film.
@@ -34,10 +33,8 @@ class FilmFailed(RuntimeError):
 class FilmProcess:
     """A process that loads what drawing needs, writes files for viewers meanwhile, and draws the film at the end.
 
-    Notes
-    -----
-    It ends where this process ends, however that happens. It is told which increments there
-    are, and reads them from the results folder.
+    It ends where this process ends, however that happens. It is told which increments there are, and reads them from
+    the results folder.
     """
 
     def __init__(self) -> None:
@@ -45,13 +42,7 @@ class FilmProcess:
         self._worker = Worker("blockvis.pictures.film_process")
 
     def follow(self, folder: Path, assembly: solver.Assembly, vtu: ViewerFormat, count: int) -> None:
-        """Write the files for viewers of a results folder, from an increment on.
-
-        Parameters
-        ----------
-        count : int
-            Increments whose files are there already.
-        """
+        """Write the files for viewers of a results folder in which those of the first ``count`` increments are."""
         self._worker.say("follow", (folder, assembly, vtu, count))
 
     def add(self, increment: solver.Increment) -> None:
@@ -73,37 +64,21 @@ class FilmProcess:
             return False
         return True
 
-    def draw(
-        self,
-        response: solver.Response,
-        path: Path,
-        fall: Fall | None = None,
-        *,
-        falls: bool = False,
-        underlay: Underlay | None = None,
-        seen_from: dict[str, Any] | None = None,
-    ) -> None:
+    def draw(self, response: solver.Response, path: Path, falls: bool, fall: Fall | None, look: dict[str, Any]) -> None:
         """Begin to draw the curve, where there is one, as ``curve.png`` beside the film, and the film; returns at once.
 
         Parameters
         ----------
         falls : bool
             Whether the process works out the fall; :meth:`fall` waits for it.
-        underlay : Underlay, optional
-            A photograph under blocks in the plane.
-        seen_from : dict, optional
-            View and section of blocks in space, as of :func:`blockvis.animate`.
+        look : dict
+            Underlay, view and section, as of :func:`blockvis.animate`.
         """
         self._path = path
-        self._worker.say("draw", (response, path, fall, falls, underlay, seen_from or {}))
+        self._worker.say("draw", (response, path, falls, fall, look))
 
     def fall(self, progress: Callable[[float], None]) -> Fall | None:
-        """Wait for the fall.
-
-        Parameters
-        ----------
-        progress : callable
-            Called with the seconds of the fall that are worked out.
+        """Wait for the fall; ``progress`` is called with the seconds of it that are worked out.
 
         Raises
         ------
@@ -116,12 +91,7 @@ class FilmProcess:
         return found
 
     def wait(self, progress: Callable[[int, int], None]) -> None:
-        """Wait for curve and film.
-
-        Parameters
-        ----------
-        progress : callable
-            Called with the pictures drawn and their number.
+        """Wait for curve and film; ``progress`` is called with the pictures drawn and their number.
 
         Raises
         ------
@@ -184,13 +154,7 @@ def _load() -> None:
 
 
 class _Followed:
-    """A results folder whose files for viewers this process writes.
-
-    Parameters
-    ----------
-    folder, assembly, vtu, count
-        As of :meth:`FilmProcess.follow`.
-    """
+    """A results folder whose files for viewers this process writes, from an increment on."""
 
     def __init__(self, folder: Path, assembly: solver.Assembly, vtu: ViewerFormat, count: int) -> None:
         self._stored, self._count = StoredIncrements(folder), count
@@ -216,13 +180,7 @@ class _Followed:
 
 
 def _draw(
-    say: Say,
-    response: solver.Response,
-    path: Path,
-    fall: Fall | None,
-    falls: bool,
-    underlay: Underlay | None,
-    seen_from: dict[str, Any],
+    say: Say, response: solver.Response, path: Path, falls: bool, fall: Fall | None, look: dict[str, Any]
 ) -> None:
     """Draw a film, its fall worked out here where it is asked for."""
     from .curves import draw_curve
@@ -233,6 +191,6 @@ def _draw(
         say("fall", fall)
     if response.path:
         draw_curve(response, path.with_name("curve.png"), band=stored_range(path.parent))
-    look: dict[str, Any] = {"underlay": underlay, "poster": path.with_name("poster.png"), **seen_from}
-    animate(response, path, fall=fall, progress=lambda done, total: say("drawing", (done, total)), **look)
+    poster = path.with_name("poster.png")
+    animate(response, path, fall=fall, poster=poster, progress=lambda *counts: say("drawing", counts), **look)
     say("drawn", None)

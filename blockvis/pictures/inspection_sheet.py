@@ -8,15 +8,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 
 import solver
 from blockvis.layout.joints.facing_edges import Facing
+from blockvis.system.atomic_files import atomic_file
 from blockvis.text import rounded_length
 from solver import mechanics
 
 from . import palette
 from .figures import plain_text
-from .frame import room_in
+from .frame import Frame, room_in
 
 if TYPE_CHECKING:
     from blockvis.layout.layout import Layout
@@ -137,10 +144,6 @@ def draw_contents(contents: Contents, path: str | Path) -> Path:
     path : str or Path
         .png, .svg or .pdf.
     """
-    from matplotlib.figure import Figure
-
-    from blockvis.system.atomic_files import atomic_file
-
     lines = [line.strip(" ·") for text in contents.findings for line in textwrap.wrap(text, LINE)]
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], f"{lines[MOST_LINES - 1]} ..."]
@@ -163,8 +166,6 @@ def draw_contents(contents: Contents, path: str | Path) -> Path:
 
 def _in_the_plane(figure: Any, contents: Contents) -> _Canvas:
     """Draw the blocks as outlines, over axes with their coordinates."""
-    from matplotlib.collections import PolyCollection
-
     layout = contents.layout
     low, high = _box(contents)
     width, height = np.maximum(high - low, 1e-9)
@@ -193,7 +194,6 @@ def _in_the_plane(figure: Any, contents: Contents) -> _Canvas:
 
 def _in_space(figure: Any, contents: Contents) -> _Canvas:
     """Draw the blocks as a scene sees them, with a bar to scale."""
-    from .frame import Frame
     from .solid_scene import SolidScene, seen_faces
     from .solid_view import ABOVE, AROUND, View
 
@@ -262,8 +262,6 @@ def _box(contents: Contents) -> tuple[np.ndarray, np.ndarray]:
 
 def _keys(contents: Contents) -> list[Any]:
     """Return the entries of the legend for the blocks."""
-    from matplotlib.patches import Patch
-
     hatched = contents.layout.dimension == 2
     return [
         Patch(
@@ -279,8 +277,6 @@ def _keys(contents: Contents) -> list[Any]:
 
 def _add_marks(canvas: _Canvas, contents: Contents) -> list[Any]:
     """Ring places, mark open ends and edges, name blocks at fault beside them; returns entries of the legend."""
-    from matplotlib.collections import LineCollection
-
     axes, warning, keys = canvas.axes, palette.hexadecimal(palette.WARNING), []
     if len(contents.edges):
         lines = LineCollection(
@@ -314,8 +310,6 @@ def _add_marks(canvas: _Canvas, contents: Contents) -> list[Any]:
 
 def _inside(ring: np.ndarray) -> np.ndarray:
     """(2,) array [m]: the centroid of an outline, or another place in it where that lies outside."""
-    import shapely
-
     shape = shapely.Polygon(ring)
     if not shape.is_valid or not shape.area:
         return _middle(ring)
@@ -329,8 +323,6 @@ def _middle(corners: np.ndarray) -> np.ndarray:
 
 def _add_left_out(canvas: _Canvas, contents: Contents) -> list[Any]:
     """Draw outlines and lines that were left out, and those that cannot be; of a drawing without blocks all lines."""
-    from matplotlib.collections import LineCollection
-
     alone, dashes = not contents.kinds, (0, (5, 3))
     keys = []
     for serious, label, colour, style in (
@@ -358,8 +350,6 @@ def _add_left_out(canvas: _Canvas, contents: Contents) -> list[Any]:
 
 def _add_names(canvas: _Canvas, contents: Contents) -> int:
     """Write the name of each block into it where it can be read; returns how many could not be."""
-    from matplotlib.patheffects import withStroke
-
     rim = [withStroke(linewidth=2.0, foreground="#ffffffb0")]
     marked, missing = set(contents.marked), 0
     for k in contents.named:
@@ -392,9 +382,6 @@ def _add_names(canvas: _Canvas, contents: Contents) -> int:
 
 def _add_gaps(figure: Any, axes: Any, joints: Facing) -> None:
     """Draw the joints by their widest gap [mm], in classes with round limits."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-
     if not len(joints):
         return
     gaps = joints.gaps.max(axis=1) * 1e3

@@ -127,9 +127,7 @@ class Drawing:
         eye = seen_from(case, response) if self._pictures else {}
         if apart is not None:
             # It works out the fall as well, and what needs none is drawn here meanwhile.
-            apart.draw(
-                response, folder / str(animation), stored, falls=stored is None, underlay=underlay, seen_from=eye
-            )
+            apart.draw(response, folder / str(animation), stored is None, stored, {"underlay": underlay, **eye})
         if self._pictures:
             with clock.counting("mechanism"):
                 from blockvis.pictures.render import draw_mechanism
