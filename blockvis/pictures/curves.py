@@ -57,6 +57,9 @@ WIDE_BAND = 0.2
 #: Height of the text of the file [points], and how many letters a smaller line of it has per inch.
 TEXT, LETTERS = 11.0, 11.0
 
+#: Behind words on a curve.
+PATCH = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+
 
 @plain_text
 def draw_curve(
@@ -232,10 +235,7 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
             first = np.flatnonzero(states == state)[:1]
             axes.plot(total[first], forces[first] / factor, mark, color=colour, markersize=7, zorder=4)
             for k in first.tolist():
-                axes.annotate(
-                    word, (total[k], forces[k] / factor), xytext=(7, 4), textcoords="offset points",
-                    fontsize=0.8 * TEXT, color=colour,
-                )  # fmt: skip
+                _word(axes, word, (total[k], forces[k] / factor), (7, 4), fontsize=0.8 * TEXT, color=colour)
     axes.axhline(0.0, color=palette.hexadecimal(palette.FAINT), linewidth=0.8)
     axes.set_ylabel(f"force of ties, tension + [{unit}]", fontsize=TEXT)
     axes.set_xlabel(parameter_label(response), fontsize=TEXT)
@@ -252,7 +252,7 @@ def _mark_phases(axes: Axes, response: solver.Response, letters: int) -> float:
     path, grey, lines = response.path, palette.hexadecimal(palette.FAINT), list[str]()
     (per_length, unit), others, height = parameter_unit(response), new_motions(response), 0.85 * TEXT
     total = response.parameters * per_length
-    style: dict[str, Any] = {"textcoords": "offset points", "va": "bottom", "fontsize": height, "color": grey}
+    style: dict[str, Any] = {"va": "bottom", "fontsize": height, "color": grey}
     for k in range(1, len(path)):
         if path[k].phase == path[k - 1].phase:
             continue
@@ -265,14 +265,14 @@ def _mark_phases(axes: Axes, response: solver.Response, letters: int) -> float:
         words += ["dead load changed"] * any(change.dead is not None for change in changes)
         words += [f"'{tie.name}' installed" for tie in response.ties if tie.phase == path[k].phase + 1]
         axes.axvline(total[k - 1], color=grey, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1)
-        axes.annotate(
-            str(path[k].phase + 1), (total[k - 1], 1.0), (0, 2), ("data", "axes fraction"), ha="center", **style
+        _word(
+            axes, str(path[k].phase + 1), (total[k - 1], 1.0), (0, 2), ("data", "axes fraction"), ha="center", **style
         )
         where = f"phase {path[k].phase + 1} from {total[k - 1]:.4g} {unit}"
         lines += wrap(f"{where}: {', '.join(words)}" if words else where, letters, subsequent_indent="    ")
     if not lines:
         return 0.0
-    axes.annotate("\n".join(lines), (0.0, 1.0), (0.0, 2.0 + 1.4 * height), "axes fraction", ha="left", **style)
+    _word(axes, "\n".join(lines), (0.0, 1.0), (0.0, 2.0 + 1.4 * height), "axes fraction", ha="left", **style)
     return 1.4 * height * (len(lines) + 1)
 
 
@@ -307,12 +307,9 @@ def _draw_line(
     if first:
         # On the side that the curve leaves free.
         above = values[0] > values[1]
-        axes.annotate(
-            "at rest" if response.measured.is_force else "rigid",
-            (total[0], values[0]), xytext=(-4, 6 if above else -6), textcoords="offset points",
-            va="bottom" if above else "top", fontsize=0.9 * text, zorder=4,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
-        )  # fmt: skip
+        word, up = "at rest" if response.measured.is_force else "rigid", "bottom" if above else "top"
+        offset = -4, 6 if above else -6
+        _word(axes, word, (total[0], values[0]), offset, va=up, fontsize=0.9 * text, zorder=4, bbox=PATCH)
 
 
 def _mark_failure(
@@ -324,10 +321,8 @@ def _mark_failure(
     what = (
         f"solver failed at {parameter_text(response.path[-1].parameter, response)}" if len(total) else "solver failed"
     )
-    axes.annotate(
-        f"{what}: the curve is not complete" if words else "solver failed",
-        (0.98, 0.03), xycoords="axes fraction", ha="right", va="bottom", fontsize=0.9 * text, color=red,
-    )  # fmt: skip
+    told = f"{what}: the curve is not complete" if words else "solver failed"
+    _word(axes, told, (0.98, 0.03), (0, 0), "axes fraction", ha="right", va="bottom", fontsize=0.9 * text, color=red)
 
 
 def _draw_single(axes: Axes, response: solver.Response, known: np.ndarray, text: float) -> None:
@@ -347,9 +342,7 @@ def _draw_single(axes: Axes, response: solver.Response, known: np.ndarray, text:
     axes.plot(*ends, "-", color=blue, linewidth=2.5, zorder=3, clip_on=False)
     arrow = {"arrowstyle": "->", "color": blue, "linewidth": 2.0}
     axes.annotate("", (reach, alpha), (0.96 * reach, alpha), arrowprops=arrow)
-    axes.annotate(
-        f"α = {alpha:.6g}", (0.5 * reach, alpha), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=text
-    )
+    _word(axes, f"α = {alpha:.6g}", (0.5 * reach, alpha), (0, 7), ha="center", fontsize=text)
 
 
 def _mark_unbounded(axes: Axes, total: np.ndarray, unbounded: np.ndarray, text: float) -> None:
@@ -360,10 +353,9 @@ def _mark_unbounded(axes: Axes, total: np.ndarray, unbounded: np.ndarray, text: 
         low, high = total[max(first - 1, 0)], total[min(stop, len(total) - 1)]
         axes.axvspan(low, high, color=grey, alpha=0.15, linewidth=0)
         wide = high - low > WIDE_BAND * (total[-1] - total[0])
-        axes.annotate(
-            "unbounded", ((low + high) / 2.0, 0.5), xycoords=("data", "axes fraction"), ha="center", va="center",
-            rotation=0 if wide else 90, fontsize=0.9 * text, color=grey,
-        )  # fmt: skip
+        style: dict[str, Any] = {"ha": "center", "va": "center", "rotation": 0 if wide else 90, "color": grey}
+        middle = (low + high) / 2.0, 0.5
+        _word(axes, "unbounded", middle, (0, 0), ("data", "axes fraction"), fontsize=0.9 * text, **style)
 
 
 def _mark_unproved(axes: Axes, response: solver.Response, factor: float, text: float | None) -> None:
@@ -374,9 +366,7 @@ def _mark_unproved(axes: Axes, response: solver.Response, factor: float, text: f
         place = (state.parameter, state.measured / factor)
         axes.plot(*place, "o", mfc="white", mec=grey, mew=1.6, markersize=5 if text is None else 8, zorder=5)
         if number == 0 and text is not None:
-            axes.annotate(
-                "not converged", place, xytext=(8, 5), textcoords="offset points", fontsize=0.9 * text, color=grey
-            )
+            _word(axes, "not converged", place, (8, 5), fontsize=0.9 * text, color=grey)
 
 
 def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool) -> None:
@@ -387,16 +377,9 @@ def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool
     place = (lowest.parameter, lowest.measured)
     axes.plot(*place, "o", color=red, markersize=8 if words else 5, zorder=4)
     if words:
-        axes.annotate(
-            f"lowest {response.measured.symbol} = {place[1]:.5g} at {response.parameter.symbol} = {place[0]:.4g} "
-            f"{response.parameter.unit}",
-            (0.5, 0.96),
-            xycoords="axes fraction",
-            ha="center",
-            va="top",
-            fontsize=text,
-            color=red,
-        )
+        where = f"{response.parameter.symbol} = {place[0]:.4g} {response.parameter.unit}"
+        told = f"lowest {response.measured.symbol} = {place[1]:.5g} at {where}"
+        _word(axes, told, (0.5, 0.96), (0, 0), "axes fraction", ha="center", va="top", fontsize=text, color=red)
 
 
 def _mark_collapse(
@@ -426,19 +409,13 @@ def _mark_collapse(
         above = len(beside) > 0 and head - beside.max() > beside.min() - foot
         # Other runs may go on for long.
         left = middle >= sum(axes.get_xlim()) / 2.0
-        axes.annotate(
+        told = (
             f"{what} at {collapse.displacement:.5g} {collapse.unit}{in_phase(response, phase)}\n"
-            f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}",
-            (middle, 0.96 if above else 0.04),
-            xycoords=("data", "axes fraction"),
-            xytext=(-6 if left else 6, 0),
-            textcoords="offset points",
-            ha="right" if left else "left",
-            va="top" if above else "bottom",
-            fontsize=0.9 * text,
-            color=red,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+            f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}"
         )
+        place, offset = (middle, 0.96 if above else 0.04), (-6 if left else 6, 0)
+        style = {"ha": "right" if left else "left", "va": "top" if above else "bottom", "color": red, "bbox": PATCH}
+        _word(axes, told, place, offset, ("data", "axes fraction"), fontsize=0.9 * text, **style)
 
 
 def _counts(response: solver.Response) -> str:
@@ -447,6 +424,18 @@ def _counts(response: solver.Response) -> str:
     if mechanism is None or response.collapse is None or response.collapse.lost != "equilibrium":
         return ""
     return f"\n{counts_text(mechanism)}"
+
+
+def _word(
+    axes: Axes,
+    words: str,
+    place: tuple[float, float],
+    offset: tuple[float, float],
+    coordinates: str | tuple[str, str] = "data",
+    **style: Any,
+) -> None:
+    """Write words at a place, so many points to the right and up."""
+    axes.annotate(words, place, offset, coordinates, "offset points", **style)
 
 
 def _style(axes: Axes, text: float) -> None:

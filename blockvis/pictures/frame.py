@@ -240,20 +240,14 @@ class Sheet:
         font = _font(round(0.85 * self.text))
         unit, factor = ("mm", 1e3) if bar.largest < 1.0 else ("m", 1.0)
         step = rounded_length(bar.largest * factor / 4.0)
-        value, end = 0.0, bar.largest * factor * (1 + 1e-9)
+        value, largest = 0.0, bar.largest * factor
+        end = largest * (1 + 1e-9)
         while value <= end:
-            y = (
-                top + height - 1 - value / (bar.largest * factor) * (height - 1)
-                if bar.largest > 0
-                else top + height - 1
-            )
-            x = left + strip.shape[1]
+            x, y = left + strip.shape[1], top + height - 1 - value / (largest or 1.0) * (height - 1)
             draw.line((x, y, x + 0.3 * self.text, y), fill=palette.INK, width=max(1, self.text // 14))
             label = f"{'≥ ' * (bar.exceeded and value + step > end)}{value:g}"
             draw.text((x + 0.5 * self.text, y), label, palette.INK, font, anchor="lm")
             value += step
-            if bar.largest == 0:
-                break
         draw.text((left, top - 0.6 * self.text), f"displacement\n[{unit}]", palette.INK, font, anchor="ld")
 
 
