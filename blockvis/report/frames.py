@@ -38,43 +38,8 @@ from .packing import (
 AWAY = 4.0
 
 
-def surveyed(
-    assembly: solver.Assembly, joints: InitialJoints, shown: list[solver.Increment]
-) -> tuple[Frame, float, float]:
-    """Frame that holds all poses, the largest resultant of a joint in equilibrium [N] or 1, and the widest crack [m].
-
-    Parameters
-    ----------
-    shown : list of solver.Increment
-        Gone through once.
-    """
-    largest = widest = 0.0
-
-    def poses() -> Iterator[solver.Pose]:
-        nonlocal largest, widest
-        yield solver.Pose.initial(assembly)
-        for increment in shown:
-            yield increment.pose
-            if increment.status != solver.Status.FALLING:
-                sizes = np.linalg.norm(resultants(increment)[1], axis=1)
-                largest = max(largest, float(sizes.max(initial=0.0)))
-                gaps = carried_faces(assembly, joints, increment.pose, increment.fallen).gaps
-                widest = max(widest, float(gaps.max(initial=0.0)))
-
-    if assembly.dimension == 2:
-        frame = framed(assembly, poses())
-    else:
-        frame = framed(assembly, poses(), margin=0.0, supports=0.25)
-    return frame, largest or 1.0, widest
-
-
 def model_of_frames(
-    response: solver.Response,
-    joints: InitialJoints,
-    shown: list[solver.Increment],
-    frame: Frame,
-    largest: float,
-    live: LiveLoads,
+    response: solver.Response, joints: InitialJoints, shown: list[solver.Increment], held: np.ndarray
 ) -> dict[str, Any]:
     """Pack what moves, and the scales of all frames.
 
@@ -82,14 +47,13 @@ def model_of_frames(
     ----------
     shown : list of solver.Increment
         What the page shows, frame after frame.
-    frame : Frame
-        In which all of it lies.
-    largest : float [N]
-        Resultant of a joint.
-    live : LiveLoads
-        Of what is shown.
+    held : (n, d) array [m]
+        Points that it has to hold beside the blocks and the live load.
     """
     assembly = response.assembly
+    frame, largest, widest = _surveyed(assembly, joints, shown)
+    live = LiveLoads(response, shown, float(frame.size.max()))
+    frame = frame.holding(np.concatenate([live.tails, held]))
     # Coordinates far from the origin (UTM) would waste the digits.
     origin, extent = np.round(frame.low, 3), float(frame.size.max())
     unit = FINENESS * extent
@@ -100,6 +64,7 @@ def model_of_frames(
         "unit": unit,
         "origin": origin.tolist(),
         "bounds": [*(frame.low - origin).tolist(), *(frame.high - origin).tolist()],
+        "widest_crack": widest,
         "largest_displacement": tables.largest_displacement,
         "arrows": _arrows(response, frame, origin),
         "has_forces": bool(len(sizes)),
@@ -118,6 +83,27 @@ def model_of_frames(
             **_packed_live(live, shown, origin, unit),
         },
     }
+
+
+def _surveyed(
+    assembly: solver.Assembly, joints: InitialJoints, shown: list[solver.Increment]
+) -> tuple[Frame, float, float]:
+    """Frame of all poses, the largest resultant of a joint in equilibrium [N] or 1, and the widest crack [m]."""
+    largest = widest = 0.0
+
+    def poses() -> Iterator[solver.Pose]:
+        nonlocal largest, widest
+        yield solver.Pose.initial(assembly)
+        for increment in shown:
+            yield increment.pose
+            if increment.status != solver.Status.FALLING:
+                sizes = np.linalg.norm(resultants(increment)[1], axis=1)
+                largest = max(largest, float(sizes.max(initial=0.0)))
+                gaps = carried_faces(assembly, joints, increment.pose, increment.fallen).gaps
+                widest = max(widest, float(gaps.max(initial=0.0)))
+
+    frame = framed(assembly, poses()) if assembly.dimension == 2 else framed(assembly, poses(), 0.0, 0.25)
+    return frame, largest or 1.0, widest
 
 
 def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:

@@ -37,7 +37,6 @@ from blockvis.pictures.captions import (
     unit_for,
     value_label,
 )
-from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.marks import STEEPEST, WIDEST
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.pictures.ties import DrawnTies
@@ -51,7 +50,7 @@ from blockvis.text import force_text
 from solver import mechanics
 from solver.mechanics import counted
 
-from .frames import model_of_frames, surveyed
+from .frames import model_of_frames
 from .packing import TURN_UNIT, deflated, hexadecimals, rounded
 from .space import model_in_space
 
@@ -325,20 +324,18 @@ def _model_in_plane(response: solver.Response, shown: list[solver.Increment], gr
     """Pack what only blocks in the plane have: joints as lines, live loads, the ground of a fall."""
     assembly = response.assembly
     joints = initial_joints(assembly)
-    frame, largest, _ = surveyed(assembly, joints, shown)
-    live = LiveLoads(response, shown, float(frame.size.max()))
     tied = DrawnTies(response).ends([shown[0].pose, shown[-1].pose])
     heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, 2)
-    frame = frame.holding(np.concatenate([live.tails, tied, heads]))
-    model = model_of_frames(response, joints, shown, frame, largest, live)
+    model = model_of_frames(response, joints, shown, np.concatenate([tied, heads]))
     origin, unit = np.array(model["origin"]), model["unit"]
+    extent = float(np.subtract(model["bounds"][2:], model["bounds"][:2]).max())
     own = {
         "offsets": deflated(assembly.offsets, len(assembly.offsets)),
         "joint_ends": deflated(rounded(joints.ends - origin, unit), len(joints)),
     }
     return model | {
         "ground": None if ground is None else float(ground - origin[1]),
-        "fill": _fill(response, shown, origin, FILL_ARROW * float(frame.size.max())),
+        "fill": _fill(response, shown, origin, FILL_ARROW * extent),
         "packed": model["packed"] | own,
     }
 

@@ -9,13 +9,12 @@ import numpy as np
 import solver
 from blockvis.pictures import palette
 from blockvis.pictures.backfill import FillBodies, fill_bodies
-from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.solid_view import chosen_view
 from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import Swing
 from blockvis.results.joint_faces import initial_joints
 
-from .frames import model_of_frames, surveyed
+from .frames import model_of_frames
 from .packing import deflated, hexadecimals, rounded
 
 #: Directions are stored in this unit.
@@ -35,18 +34,15 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
     assembly, shapes = response.assembly, response.assembly.polyhedra
     view = chosen_view(response, swing.displaced.positions - swing.increment.pose.positions)
     joints = initial_joints(assembly)
-    frame, largest, widest = surveyed(assembly, joints, shown)
     bodies = [fill_bodies(response, increment.pose, increment.fallen) for increment in shown]
-    live = LiveLoads(response, shown, float(frame.size.max()))
-    frame = frame.holding(np.concatenate([live.tails, *(fill.heads.reshape(-1, 3) for fill in bodies)]))
-    model = model_of_frames(response, joints, shown, frame, largest, live)
+    heads = np.concatenate([fill.heads.reshape(-1, 3) for fill in bodies])
+    model = model_of_frames(response, joints, shown, heads)
     triangles, _ = triangles_of(shapes)
     edges, rings = sharp_edges(shapes), joints.rings
     corners = rounded(rings.points - np.array(model["origin"]), model["unit"])
     return model | {
         "view": np.radians([view.around, view.above]).tolist(),
         "cracks": hexadecimals(palette.CRACKS.astype(int)),
-        "widest_crack": widest,
         "fill": _fill(bodies, np.array(model["origin"])) if response.loads.fills else None,
         "packed": model["packed"]
         | {
