@@ -30,6 +30,16 @@ view.Background = [1.0, 1.0, 1.0]
 view.UseColorPaletteForBackground = 0
 view.OrientationAxesVisibility = 0
 
+
+def legend(colours, title, corner, length):
+    bar = GetScalarBar(colours, view)
+    bar.Title, bar.ComponentTitle = title, ""
+    bar.TitleColor = bar.LabelColor = [0.1, 0.1, 0.1]
+    bar.TitleFontSize = bar.LabelFontSize = 12
+    bar.WindowLocation, bar.ScalarBarLength = corner, length
+    return bar
+
+
 blocks = OpenDataFile(os.path.join(here, "blocks.pvd"))
 contacts = OpenDataFile(os.path.join(here, "contacts.pvd"))
 joints = OpenDataFile(os.path.join(here, "joints.pvd"))
@@ -67,11 +77,7 @@ bodies.Annotations = ["-1", "at rest"] + [word for k in range(parts) for word in
 bodies.IndexedColors = [$rest] + [c for k in range(parts) for c in tints[3 * (k % (len(tints) // 3)):][:3]]
 faces.SetScalarBarVisibility(view, 0 < parts <= 8)
 if 0 < parts <= 8:
-    bar = GetScalarBar(bodies, view)
-    bar.Title, bar.ComponentTitle = "macro-block", ""
-    bar.TitleColor = bar.LabelColor = [0.1, 0.1, 0.1]
-    bar.TitleFontSize = bar.LabelFontSize = 12
-    bar.WindowLocation, bar.ScalarBarLength = "Lower Right Corner", 0.25
+    legend(bodies, "macro-block", "Lower Right Corner", 0.25)
 
 edges = ExtractEdges(Input=blocks)
 RenameSource("outlines", edges)
@@ -93,12 +99,8 @@ for share, above, width in ((0.02, 0.1, 1.5), (0.1, 0.3, 3.0), (0.3, 0.6, 5.0), 
     ColorBy(lines, ("CELLS", "opening"))
 lines.SetScalarBarVisibility(view, True)
 openings.RescaleTransferFunction(0.0, max(widest, 1e-9))
-crack_bar = GetScalarBar(openings, view)
-crack_bar.Title, crack_bar.ComponentTitle = "opening [m]", ""
-crack_bar.TitleColor = crack_bar.LabelColor = [0.1, 0.1, 0.1]
-crack_bar.TitleFontSize = crack_bar.LabelFontSize = 12
+crack_bar = legend(openings, "opening [m]", "Lower Left Corner", 0.35)
 crack_bar.AutomaticLabelFormat, crack_bar.LabelFormat, crack_bar.RangeLabelFormat = 0, "%.3g", "%.3g"
-crack_bar.WindowLocation, crack_bar.ScalarBarLength = "Lower Left Corner", 0.35
 
 carrying = Threshold(Input=contacts, Scalars=["POINTS", "state"])
 carrying.LowerThreshold, carrying.UpperThreshold = 1.0, 3.0
@@ -115,11 +117,7 @@ states.InterpretValuesAsCategories = 1
 states.Annotations = ["0", "open", "1", "sticking", "2", "sliding", "3", "hinging"]
 states.IndexedColors = [$open, $sticking, $sliding, $hinge]
 points.SetScalarBarVisibility(view, True)
-state_bar = GetScalarBar(states, view)
-state_bar.Title, state_bar.ComponentTitle = "contact", ""
-state_bar.TitleColor = state_bar.LabelColor = [0.1, 0.1, 0.1]
-state_bar.TitleFontSize = state_bar.LabelFontSize = 12
-state_bar.WindowLocation, state_bar.ScalarBarLength = "Upper Right Corner", 0.25
+legend(states, "contact", "Upper Right Corner", 0.25)
 
 forces = Glyph(Input=carrying, GlyphType="Arrow")
 forces.OrientationArray, forces.ScaleArray = ["POINTS", "force"], ["POINTS", "force"]
