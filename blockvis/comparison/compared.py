@@ -117,12 +117,7 @@ class Comparison:
         return max(self.sides, key=lambda side: side.end).response
 
     def place_text(self, at: float) -> str:
-        """Write a parameter with its name and unit.
-
-        Parameters
-        ----------
-        at : float [m or rad]
-        """
+        """Write a parameter [m or rad] with its name and unit."""
         response = self.longest
         several = any(increment.phase for side in self.sides for increment in side.response.path)
         return f"{response.parameter.name} {parameter_text(at, response)}{', all phases added' if several else ''}"
@@ -166,18 +161,13 @@ class Comparison:
         return bool(np.abs(one.vertices - other.vertices).max() <= SAME * one.block_size)
 
     def cracks(self, at: float) -> list[tuple[str, np.ndarray]]:
-        """Compare the joints at which the crack lines of either run are widest, the widest first.
-
-        Parameters
-        ----------
-        at : float [m or rad]
-            Over all phases.
+        """Compare the joints at which crack lines of either run are widest at a parameter over all phases [m or rad].
 
         Returns
         -------
         list of (str, (2,) array [m])
-            The two blocks of each joint, and its opening in both runs, to the µm; nan where the run has no such joint,
-            or a block of it has fallen.
+            The two blocks of each joint, and its opening in both runs, to the µm, the widest first; nan where the run
+            has no such joint, or a block of it has fallen.
         """
         (lines, one), (more_lines, other) = (_cracks_at(side, at) for side in self.sides)
         crack_at = {frozenset(line.widest.split(" | ")): line.widest for line in [*more_lines, *lines]}

@@ -80,13 +80,7 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
 
 
 class Pair:
-    """What draws both runs in one picture.
-
-    Parameters
-    ----------
-    falls : bool
-        Whether the falls are drawn, which the frame then holds.
-    """
+    """What draws both runs in one picture; with their falls, which the frame then holds."""
 
     def __init__(self, comparison: Comparison, look: Look, *, falls: bool = False) -> None:
         self.sides, self._longest = comparison.sides, comparison.longest
@@ -131,14 +125,7 @@ class Pair:
         return self.drawers[k].picture(state, title=title, widths=widths)
 
     def at(self, parameter: float, *, widths: bool = False) -> Image.Image:
-        """Draw both at a parameter over all phases [m or rad].
-
-        Parameters
-        ----------
-        parameter : float [m or rad]
-        widths : bool
-            Write the widths of the main cracks.
-        """
+        """Draw both at a parameter over all phases [m or rad], and write the widths of the main cracks if asked to."""
         return self.picture([self.path_picture(k, parameter, widths=widths) for k in (0, 1)])
 
 

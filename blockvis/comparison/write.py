@@ -81,15 +81,7 @@ def compare(
 
 
 def comparison_html(found: Comparison, curves: bytes, stations: bytes, film: str | None) -> str:
-    """Make the page as HTML text; it asks for nothing but the film that lies beside it.
-
-    Parameters
-    ----------
-    curves, stations : bytes
-        The pictures, in PNG.
-    film : str, optional
-        Name of the film.
-    """
+    """Make the page as HTML text, with pictures in PNG; it asks for nothing but the film that lies beside it."""
     report = files("blockvis") / "report"
     heads = ("", *(side.label for side in found.sides))
     cracks = [

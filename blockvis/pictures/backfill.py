@@ -25,12 +25,7 @@ SAME_BODY = 1e-6
 class FillBodies:
     """Columns of fill over pieces of the blocks.
 
-    Attributes
-    ----------
-    feet : (n, d, d) array [m]
-        Corners of each piece where it is drawn.
-    tops : (n,) array [m]
-        Height of the surface over each.
+    They stand on the corners ``feet`` (n, d, d) [m] of each piece where it is drawn, and reach up to ``tops`` (n,) [m].
     """
 
     feet: np.ndarray
@@ -95,13 +90,7 @@ class FillBodies:
 
 
 def fill_bodies(response: solver.Response, shown: solver.Pose, gone: np.ndarray | None = None) -> FillBodies:
-    """Find the columns of fill over the blocks where they are drawn.
-
-    Parameters
-    ----------
-    gone : (n_blocks,) bool array, optional
-        Blocks that have left, with the fill over them.
-    """
+    """Find the columns of fill over the blocks where they are drawn, but those that have left, (n_blocks,) bool."""
     d = response.assembly.dimension
     feet, tops = [np.zeros((0, d, d))], [np.zeros(0)]
     for fill in response.loads.fills:

@@ -69,10 +69,7 @@ def new_motions(response: solver.Response) -> list[int]:
 def in_one_unit(response: solver.Response, phase: int | None = None) -> solver.Response:
     """Leave out the phases that another unit parts from a given one: distances and rotations share no axis.
 
-    Parameters
-    ----------
-    phase : int, optional
-        The last with an increment by default.
+    That is the last phase with an increment by default.
     """
     units = [settlement.unit for settlement in response.settlements]
     if len(set(units)) < 2 or not response.increments:
@@ -103,13 +100,9 @@ def _largest_parameter(response: solver.Response) -> float:
 
 
 def parameter_text(value: float, response: solver.Response) -> str:
-    """Write a parameter with its unit, in mm where the whole response stays below a decimetre.
+    """Write a parameter [m or rad] with its unit, in mm where the whole response stays below a decimetre.
 
     All of a response have as many decimals, of which the largest has three digits at least.
-
-    Parameters
-    ----------
-    value : float [m or rad]
     """
     factor, unit = parameter_unit(response)
     power = int(np.floor(np.log10(factor * _largest_parameter(response) or 1.0)))
@@ -150,10 +143,7 @@ def value_label(response: solver.Response) -> str:
 def shown_range(values: np.ndarray, response: solver.Response) -> tuple[float, float]:
     """Range of the axis of the measured value: 0, and the values but those far above the lowest of an envelope.
 
-    Parameters
-    ----------
-    values : (n,) array
-        Of the path, in the unit of the axis; nan where they are not finite.
+    The values (n,) of the path are in the unit of the axis, nan or infinite where there are none.
     """
     known = values[np.isfinite(values)]
     low, high = min(0.0, float(known.min(initial=0.0))), max(0.0, float(known.max(initial=0.0)))
@@ -249,13 +239,7 @@ def failure_text(response: solver.Response) -> str:
 
 
 def caption_of(response: solver.Response, increment: solver.Increment, magnification: float) -> tuple[str, str]:
-    """First and second line of a caption: what is true of the increment, in frames between two of the one before.
-
-    Parameters
-    ----------
-    magnification : float
-        Of the displacements.
-    """
+    """First and second line of a caption: what is true of the increment, in frames between two of the one before."""
     parts = [_state(response, increment), *phase_words(response, increment)]
     if not _swings_out(response, increment):
         parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")

@@ -119,13 +119,8 @@ class CracksInSpace:
     def image(self, cracks: Sequence[Crack], numbers: Sequence[int]) -> Image.Image:
         """Draw the views, with number and largest width of each crack in the view that shows its widest place.
 
-        Of a crack whose widest place is hidden that is the widest one that some view shows.
-
-        Parameters
-        ----------
-        cracks : sequence of Crack
-        numbers : sequence of int
-            As the report counts them.
+        The numbers are those of the report. Of a crack whose widest place is hidden that is the widest one that some
+        view shows.
         """
         page, left = self._pair.image(), 0
         opened, slid = self._opened, self._slid

@@ -110,15 +110,7 @@ def draw_curve(
 
 
 class CurvePanel:
-    """The curve beside the blocks, drawn once, with a dot that moves.
-
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height in pixels.
-    text : int
-        Height of the text in pixels.
-    """
+    """The curve beside the blocks, drawn once, with a dot that moves; size and height of the text are in pixels."""
 
     @plain_text
     def __init__(self, response: solver.Response, size: tuple[int, int], text: int) -> None:

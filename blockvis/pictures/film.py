@@ -81,12 +81,7 @@ def poster_of(drawer: Drawer) -> Image.Image:
 
 
 def state_at(response: solver.Response, at: float) -> solver.Increment:
-    """Find what is shown at a parameter over all phases [m or rad]: between two increments everything changes evenly.
-
-    Parameters
-    ----------
-    at : float [m or rad]
-    """
+    """Find what is shown at a parameter over all phases [m or rad]: between two increments all changes evenly."""
     return _state_at(response.path, response.parameters, at)
 
 

@@ -90,13 +90,7 @@ class FlatScene(Scene):
         return any(len(layer.corners) for name, layer in self._layers.items() if name.split("/")[0] in layers)
 
     def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
-        """Put the blocks where they are drawn.
-
-        Parameters
-        ----------
-        block_fill : (n_blocks, 3) uint8 array, optional
-            New colours.
-        """
+        """Put the blocks where they are drawn, in new colours (n_blocks, 3) uint8 where these are given."""
         if block_fill is not None:
             self._paint(block_fill)
         self._shown = shown

@@ -57,14 +57,7 @@ class Key:
 
 @dataclass(frozen=True)
 class ColourBar:
-    """The scale of displacements.
-
-    Attributes
-    ----------
-    largest : float [m]
-    exceeded : bool
-        Whether some may go further, as in a fall: they have the last colour.
-    """
+    """The scale of displacements up to a largest [m]; some may exceed it, as in a fall, and have the last colour."""
 
     largest: float
     exceeded: bool = False
@@ -73,12 +66,8 @@ class ColourBar:
 class Sheet:
     """Where the picture of the blocks goes, and the words around it.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height in pixels.
-    beside_width : int
-        Pixels of a picture to the right of the blocks, as high as theirs.
+    Its size is in pixels; to the right of the blocks is room for a picture as high as theirs, ``beside_width`` pixels
+    wide.
     """
 
     def __init__(self, size: tuple[int, int], colour_bar: ColourBar | None = None, beside_width: int = 0) -> None:
@@ -379,13 +368,7 @@ def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
 
 @dataclass(frozen=True)
 class Frame:
-    """The part of the world that a picture shows.
-
-    Attributes
-    ----------
-    low, high : (d,) arrays [m]
-        Opposite corners.
-    """
+    """The part of the world that a picture shows, between opposite corners (d,) [m]."""
 
     low: np.ndarray
     high: np.ndarray

@@ -50,15 +50,7 @@ def draw_inspection(
 def draw_refusal(refused: Refused, path: str | Path) -> Path | None:
     """Draw why a drawing was refused: its lines as they are, their open ends, crossings and blocks at fault.
 
-    Parameters
-    ----------
-    path : str or Path
-        As of :func:`draw_inspection`.
-
-    Returns
-    -------
-    pathlib.Path
-        None where nothing was read that could be drawn.
+    Returns None where nothing was read that could be drawn.
     """
     layout = refused.layout
     if layout is None or not (layout.n_blocks or any(len(item.points) for item in layout.left_out)):

@@ -137,13 +137,7 @@ class _Canvas:
 
 @plain_text
 def draw_contents(contents: Contents, path: str | Path) -> Path:
-    """Draw what a drawing holds on a sheet with title, findings and legend.
-
-    Parameters
-    ----------
-    path : str or Path
-        .png, .svg or .pdf.
-    """
+    """Draw what a drawing holds on a sheet with title, findings and legend, as .png, .svg or .pdf."""
     lines = [line.strip(" ·") for text in contents.findings for line in textwrap.wrap(text, LINE)]
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], f"{lines[MOST_LINES - 1]} ..."]

@@ -55,11 +55,8 @@ END = 0.35
 def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndarray) -> np.ndarray:
     """(n, 2, 2) array [m]: edges of the outline around each part, its blocks merged.
 
-    Parameters
-    ----------
-    corners : (n_vertices, 2) array [m]
-    parts : (n_blocks,) int array
-        As ``solver.mechanics.rigid_parts`` gives them.
+    The corners (n_vertices, 2) are where they are drawn; parts (n_blocks,) as ``solver.mechanics.rigid_parts`` gives
+    them.
     """
     edges = [np.zeros((0, 2, 2))]
     margin = SLIVER * assembly.block_size
@@ -121,14 +118,9 @@ class Marks:
 def marks_of(
     assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment, shown: solver.Pose
 ) -> Marks:
-    """Cracks, sliding joints, hinges and what crushes of an increment, on blocks shown at a pose.
+    """Cracks, and what hinges, slides and crushes in the mechanism of an increment, on blocks shown at a pose.
 
-    Parameters
-    ----------
-    increment : solver.Increment
-        Its mechanism has the hinges, sliding and crushing joints.
-    shown : solver.Pose
-        Where the blocks are drawn: the increment's own pose, a magnified one, or a later one.
+    That is the increment's own pose, a magnified one, or a later one.
     """
     contacts, mechanism = increment.contacts, mechanics.mechanism_of(assembly, increment)
     points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
@@ -302,18 +294,12 @@ def _sliding_faces(
 def settlement_arrows(
     assembly: solver.Assembly, settlement: solver.Settlement, pose: solver.Pose, seen: Frame | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find where arrows show how supports move in a settlement.
-
-    Parameters
-    ----------
-    seen : Frame, optional
-        What a picture in the plane shows.
+    """Find where arrows show how supports move in a settlement, of which a picture in the plane shows what is ``seen``.
 
     Returns
     -------
     blocks : (n,) int array
-        The supports; one or a few of many stand for all.
-        Twice where they turn.
+        The supports, one or a few of many for all; twice where they turn.
     places : (n, d) array [m]
         In the plane inside the part of each that is seen, in space where the arrow leaves the support.
     directions : (n, d) array
@@ -417,12 +403,7 @@ def sliding_lines(
 ) -> np.ndarray:
     """(n, 2, 2) array [m]: ends of the part of each sliding joint in the plane that slides.
 
-    Parameters
-    ----------
-    k : (k,) int array
-        Numbers of the contact points that slide.
-    points : (n_contacts, 2) array [m]
-        Where the contact points are drawn.
+    ``k`` are the numbers of the contact points that slide, ``points`` (n_contacts, 2) [m] where all of them are drawn.
     """
     if len(k) == 0:
         return np.zeros((0, 2, 2))

@@ -85,14 +85,7 @@ RAMP = np.array(
 
 
 def block_colours(materials: tuple[str, ...], free: np.ndarray) -> np.ndarray:
-    """(n_blocks, 3) uint8 array: fill of each block by material, supports grey.
-
-    Parameters
-    ----------
-    materials : tuple of str
-        One per block.
-    free : (n_blocks,) bool array
-    """
+    """(n_blocks, 3) uint8 array: fill of each block by its material, supports, where not ``free`` (n_blocks,), grey."""
     # Supports are grey: their materials take no stone.
     kinds = sorted({m for m, is_free in zip(materials, free, strict=True) if is_free})
     hinted = {kind: k for kind in kinds for k, words in HINTS.items() if any(w in kind.lower() for w in words)}
@@ -114,27 +107,12 @@ def role_colours(assembly: solver.Assembly, settles: bool = True) -> np.ndarray:
 
 
 def pale(fill: np.ndarray, blocks: np.ndarray, left: float = 0.25) -> np.ndarray:
-    """(n_blocks, 3) uint8 array: fills with some blocks, (n_blocks,) bool, nearly as light as the paper.
-
-    Parameters
-    ----------
-    fill : (n_blocks, 3) uint8 array
-    blocks : (n_blocks,) bool array
-    left : float
-        Part of their colour that is left.
-    """
+    """(n_blocks, 3) uint8 array: fills of some blocks, (n_blocks,) bool, with a part of their colour ``left``."""
     return np.where(blocks[:, None], np.rint(left * fill + (1.0 - left) * np.array(PAPER)), fill).astype(np.uint8)
 
 
 def part_colours(fill: np.ndarray, parts: np.ndarray) -> np.ndarray:
-    """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted.
-
-    Parameters
-    ----------
-    fill : (n_blocks, 3) uint8 array
-    parts : (n_blocks,) int array
-        -1 where a block stands still.
-    """
+    """(n_blocks, 3) uint8 array: fills with the parts of a mechanism, (n_blocks,) int, tinted; those of -1 stand."""
     tint = PARTS[parts % len(PARTS)]
     return np.where(parts[:, None] >= 0, np.rint(0.3 * fill + 0.7 * tint), fill).astype(np.uint8)
 

@@ -143,13 +143,7 @@ Render(view)
 
 
 def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
-    """Write ``paraview_colours.py`` beside ``blocks.pvd``, ``joints.pvd`` and ``contacts.pvd``.
-
-    Parameters
-    ----------
-    folder : path
-        The results folder.
-    """
+    """Write ``paraview_colours.py`` into a results folder, beside the files that it opens."""
     path = Path(folder) / "paraview_colours.py"
     text = _SCRIPT.substitute(
         tints=", ".join(f"{v / 255.0:.4f}" for v in palette.PARTS.ravel()),

@@ -19,10 +19,8 @@ NEARER = 0.02
 class SightLines:
     """Blocks at a pose, and middles of their faces that are looked for.
 
-    Parameters
-    ----------
-    weights : (n_blocks,) array
-        What it is worth to see each; blocks that are worth little are not looked for where there are many.
+    The weights (n_blocks,) say what it is worth to see each block: where there are many, those that are worth little
+    are not looked for.
     """
 
     def __init__(self, assembly: solver.Assembly, pose: solver.Pose, weights: np.ndarray) -> None:
@@ -41,10 +39,7 @@ class SightLines:
     def seen(self, axes: np.ndarray, n_blocks: int) -> np.ndarray:
         """(n_blocks,) array: part of what of each block faces the eye that nothing hides; 1 where nobody looked.
 
-        Parameters
-        ----------
-        axes : (3, 3) array
-            Rows to the right, up in the picture, and to the eye.
+        The axes (3, 3) are to the right, up in the picture, and to the eye.
         """
         showing = self._areas * (self._faces.normals @ axes[2])
         faces = self._chosen[showing[self._chosen] > 0.0]

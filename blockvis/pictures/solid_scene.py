@@ -162,13 +162,7 @@ class SolidScene(Scene):
             self._add("traces", self._traces, block_fill[assembly.block_of_vertex], width=2.0 * width, forward=1.0)
 
     def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
-        """Put the blocks where they are drawn.
-
-        Parameters
-        ----------
-        block_fill : (n_blocks, 3) uint8 array, optional
-            New colours.
-        """
+        """Put the blocks where they are drawn, in new colours (n_blocks, 3) uint8 where these are given."""
         corners = mechanics.moved_vertices(self.assembly, shown)
         corners[self._feet, 2] = np.minimum(corners[self._feet, 2], self._floor)
         if self._gone.any():

@@ -41,13 +41,7 @@ HIDING = 0.12
 
 @dataclass(frozen=True)
 class View:
-    """A parallel projection.
-
-    Attributes
-    ----------
-    around, above : float [degrees]
-        Of the direction to the eye: counter-clockwise from x, and above the level.
-    """
+    """A parallel projection: the eye is so far around, counter-clockwise from x, and above the level [degrees]."""
 
     around: float
     above: float
@@ -95,15 +89,7 @@ def views_of(
 
 
 def views_from(sight: Sight, above: float) -> list[View]:
-    """List the views among which one is chosen: that which is asked for, or three-quarter views.
-
-    Parameters
-    ----------
-    sight : Sight
-        As asked for.
-    above : float [degrees]
-        Above the level, where it does not say how far.
-    """
+    """List the views among which one is chosen: as asked for, or three-quarter ones, by default from so far above."""
     arounds = AROUND if sight.azimuth is None else (sight.azimuth,)
     return [View(around, above if sight.elevation is None else sight.elevation) for around in arounds]
 
@@ -170,12 +156,8 @@ def _above(assembly: solver.Assembly) -> float:
 def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View] | None = None) -> View:
     """Choose from where the motion of a structure is seen best: across it, and not behind what stands.
 
-    Parameters
-    ----------
-    motion : (n_blocks, 3) array [m]
-        Of the centroids, in any scale: of the mechanism.
-    views : list of View, optional
-        Among which it is chosen; three-quarter views by default.
+    ``motion`` (n_blocks, 3) is that of the centroids in the mechanism, in any scale; three-quarter views are tried by
+    default.
     """
     assembly = response.assembly
     corners = assembly.vertices[assembly.free[assembly.block_of_vertex]]
@@ -211,20 +193,10 @@ def _scaled(motion: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def showing_faces(shapes: mechanics.Polyhedra, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the face of each block that shows most of itself, hidden or not.
+    """Find the face of each block that shows most of itself to an eye, hidden or not.
 
-    Parameters
-    ----------
-    eye : (3,) array
-        Unit vector to the eye.
-
-    Returns
-    -------
-    places : (n_blocks, 3) array [m]
-        Its middle.
-    faces : (n_blocks,) int array
-    showing : (n_blocks,) array [m²]
-        Its area as seen.
+    ``eye`` (3,) is the unit vector to it. Returns the middle (n_blocks, 3) [m] of each face, its number, and its area
+    as seen (n_blocks,) [m²].
     """
     faces = shapes.faces(shapes.vertices)
     showing = faces.areas * (faces.normals @ eye)

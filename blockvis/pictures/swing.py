@@ -65,10 +65,7 @@ class Swing:
 def swing_of(response: solver.Response) -> Swing:
     """Find the mechanism that follows the last equilibrium, the state that governs, or what is taken away at once.
 
-    Parameters
-    ----------
-    response : solver.Response
-        With an increment at least.
+    The response has an increment at least.
     """
     begins = (falls_from(response) if response.collapse is not None else response.governing) or response.increments[0]
     motion = begins.velocity if response.collapse is None else response.collapse.mechanism
@@ -109,12 +106,7 @@ def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:
 def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing) -> np.ndarray:
     """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted, or darker where they are faster.
 
-    What stands still is pale.
-
-    Parameters
-    ----------
-    fill : (n_blocks, 3) uint8 array
-        As :func:`blockvis.pictures.palette.block_colours` gives it.
+    The fills are as :func:`blockvis.pictures.palette.block_colours` gives them; what stands still is pale.
     """
     if swing.n_parts <= MOST_PARTS:
         still = palette.pale(fill, assembly.free & (swing.parts < 0), palette.STILL)

@@ -78,12 +78,7 @@ class Strands:
 
 
 class DrawnTies:
-    """The ties of a response as its pictures show them.
-
-    Parameters
-    ----------
-    cut : (2, 3) array, optional
-        A point [m] of the plane of a section and its unit normal towards what is kept.
+    """The ties of a response as its pictures show them; a section leaves some of them out.
 
     Attributes
     ----------
@@ -120,12 +115,7 @@ class DrawnTies:
     def strands(self, increment: solver.Increment, shown: solver.Pose, dash: float) -> list[Strands]:
         """List what is drawn of an increment, back to front; in a fall no stubs of what has broken.
 
-        Parameters
-        ----------
-        shown : solver.Pose
-            Where the blocks are drawn.
-        dash : float [m]
-            Length of a dash and a gap.
+        The blocks are drawn at ``shown``; a dash and a gap are ``dash`` [m] long.
         """
         states, ends = self._states(increment), mechanics.tie_ends(self._ties, self._assembly, shown)
         there = self._grounded & (states != mechanics.ABSENT)[:, None]
@@ -241,14 +231,7 @@ def _legend_words(state: int, kinds: Sequence[str]) -> str:
 
 
 def earth_lines(places: np.ndarray, others: np.ndarray, size: float) -> np.ndarray:
-    """(5 n, 2, d) array [m]: hatched plates at the ends (n, d) of members whose other ends are at (n, d) [m].
-
-    Parameters
-    ----------
-    places, others : (n, d) array [m]
-    size : float [m]
-        Half the width of a plate.
-    """
+    """(5 n, 2, d) array [m]: hatched plates, 2 ``size`` [m] wide, at ends (n, d) of members with other ends (n, d)."""
     away = places - others
     away = away / np.linalg.norm(away, axis=1, keepdims=True)
     if places.shape[1] == 2:

@@ -41,15 +41,7 @@ AWAY = 4.0
 def model_of_frames(
     response: solver.Response, joints: InitialJoints, shown: list[solver.Increment], held: np.ndarray
 ) -> dict[str, Any]:
-    """Pack what moves, and the scales of all frames.
-
-    Parameters
-    ----------
-    shown : list of solver.Increment
-        What the page shows, frame after frame.
-    held : (n, d) array [m]
-        Points that it has to hold beside the blocks and the live load.
-    """
+    """Pack what moves, frame after frame, and the scales of all; points ``held`` (n, d) [m] are in the page, too."""
     assembly = response.assembly
     frame, largest, widest = _surveyed(assembly, joints, shown)
     live = LiveLoads(response, shown, float(frame.size.max()))

@@ -31,13 +31,7 @@ WIDE, HIGH = 560, 420
 
 @dataclass(frozen=True)
 class Player:
-    """What a notebook shows as the page that plays a response.
-
-    Attributes
-    ----------
-    height : int
-        Pixels.
-    """
+    """What a notebook shows as the page that plays a response, ``height`` pixels high."""
 
     response: solver.Response
     height: int = 760

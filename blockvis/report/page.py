@@ -137,13 +137,7 @@ def write_report(
 
 
 def add_error(path: str | os.PathLike[str], error: str) -> None:
-    """Say in a report that has been written how exact it is.
-
-    Parameters
-    ----------
-    error : str
-        As of :func:`write_report`.
-    """
+    """Say in a report that has been written how exact it is, in the words of :func:`write_report`."""
     page = Path(path).read_text(encoding="utf-8")
     write_atomic(path, page.replace(ERROR_UNKNOWN, _error(error), 1))
 

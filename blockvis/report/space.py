@@ -22,15 +22,7 @@ DIRECTION_UNIT = 1e-6
 
 
 def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.Increment]) -> dict[str, Any]:
-    """Pack what only blocks in space have.
-
-    Parameters
-    ----------
-    swing : Swing
-        Its mechanism decides where the page looks from.
-    shown : list of solver.Increment
-        What the page shows, frame after frame.
-    """
+    """Pack what only blocks in space have; the mechanism decides where the page looks from."""
     assembly, shapes = response.assembly, response.assembly.polyhedra
     view = chosen_view(response, swing.displaced.positions - swing.increment.pose.positions)
     joints = initial_joints(assembly)
