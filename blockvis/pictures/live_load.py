@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import shapely
 
 import solver
 from blockvis.results.ties import ties_at
@@ -58,15 +59,8 @@ class LiveLoad:
 def live_load_of(response: solver.Response, increment: solver.Increment, extent: float) -> LiveLoad:
     """Live load of an increment; none in a settlement, in a fall, or where it is unbounded.
 
-    Parameters
-    ----------
-    extent : float [m]
-        Of the picture.
-
-    Notes
-    -----
     It is found as what contacts and ties balance beyond the dead load: the increment does not store the position of a
-    load that moves.
+    load that moves. ``extent`` [m] is that of the picture.
     """
     standing = increment.status == solver.Status.EQUILIBRIUM
     finite = np.isfinite(increment.load_multiplier) and increment.load_multiplier != 0.0
@@ -110,12 +104,7 @@ def _of_ties(response: solver.Response, increment: solver.Increment) -> np.ndarr
 class LiveLoads:
     """The live loads of some increments as arrows to one scale, which end where the loads act.
 
-    Parameters
-    ----------
-    increments : iterable of solver.Increment
-        Gone through once.
-    extent : float [m]
-        Of the picture.
+    The increments are gone through once; ``extent`` [m] is that of the picture.
     """
 
     def __init__(self, response: solver.Response, increments: Iterable[solver.Increment], extent: float) -> None:
@@ -157,10 +146,7 @@ class LiveLoads:
     def arrows(self, increment: solver.Increment, pose: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
         """Tails and tips (n, d) [m] of one of the increments, or of a state between two; none in a fall.
 
-        Parameters
-        ----------
-        pose : solver.Pose
-            Of its blocks, as drawn.
+        Its blocks are drawn at ``pose``.
         """
         nothing = np.zeros((0, self._dimension))
         if self.largest == 0.0 or (increment.status == solver.Status.FALLING and not self._swinging):
@@ -191,18 +177,11 @@ def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.nd
     through = centre + moment / size**2 * np.array([force[1], -force[0]])
     corners = mechanics.moved_vertices(assembly, pose)[assembly.offsets[block] : assembly.offsets[block + 1]]
     unit = force / size
-    across = np.array([-unit[1], unit[0]])
-    a = (corners - through) @ across
-    b = np.roll(a, -1)
-    crossing = np.flatnonzero((a <= 0.0) != (b <= 0.0))
-    if len(crossing) == 0:
-        # A moment too large for its force: its line passes beside the block.
-        return centre
-    along = (corners - through) @ unit
-    following = np.roll(along, -1)
-    part = a[crossing] / (a[crossing] - b[crossing])
-    depth = along[crossing] + part * (following[crossing] - along[crossing])
-    return np.asarray(through + depth.min() * unit)
+    reach = float(np.linalg.norm(corners - through, axis=1).max()) * unit
+    line = shapely.LineString([through - reach, through + reach])
+    crossed = shapely.get_coordinates(shapely.intersection(shapely.Polygon(corners), line))
+    # A moment too large for its force: its line passes beside the block.
+    return np.asarray(through + ((crossed - through) @ unit).min() * unit) if len(crossed) else centre
 
 
 def _gathered(points: np.ndarray, forces: np.ndarray, blocks: np.ndarray, pose: solver.Pose, cell: float) -> LiveLoad:
