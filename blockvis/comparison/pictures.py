@@ -142,16 +142,9 @@ def draw_stations(comparison: Comparison, path: Path) -> Path:
 
 
 def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int, int], None] | None = None) -> Path:
-    """Write a film of both at the same settlements; the one that collapses first falls while the other goes on.
+    """Write a film of two paths at the same settlements; the one that collapses first falls while the other goes on.
 
-    Parameters
-    ----------
-    comparison : Comparison
-        Of two paths.
-    path : Path
-        Ending in .mp4, .gif or .webp.
-    progress : callable, optional
-        Called with the frames drawn and their number.
+    ``progress`` is called with the frames drawn and their number.
     """
     pair = Pair(comparison, Look(colour_by="mechanism"), falls=True)
     end = max(side.end for side in comparison.sides)

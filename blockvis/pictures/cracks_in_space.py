@@ -158,16 +158,7 @@ class CracksInSpace:
 
 @dataclass(frozen=True)
 class _Edges:
-    """Pieces of the edges of joints in the layout.
-
-    Attributes
-    ----------
-    ends : (n, 2, 3) array [m]
-    openings : (n,) array [m]
-    joints : (n,) int array
-    across : (n, 3) array
-        Unit normals of the joints.
-    """
+    """Pieces of the edges of joints in the layout: ends [m], openings [m], numbers and unit normals of the joints."""
 
     ends: np.ndarray
     openings: np.ndarray
@@ -210,14 +201,7 @@ def _showing(
 ) -> tuple[View, ...]:
     """Turn views around where they leave a crack unseen that others show: to what shows most cracks, and most of them.
 
-    Parameters
-    ----------
-    views : tuple of View
-        Those of the other pictures.
-    cracks : sequence of Crack
-        That are to be seen.
-    gone : (n_blocks,) bool array
-        Blocks that are not drawn.
+    Blocks that are ``gone`` (n_blocks,) hide nothing.
     """
     lines = SightLines(assembly, solver.Pose.initial(assembly), np.ones(assembly.n_blocks))
     order = np.argsort(-opened.openings, kind="stable")

@@ -82,23 +82,10 @@ WHOLE = 1.4
 
 @dataclass(frozen=True)
 class Look:
-    """What the pictures show.
+    """What the pictures show, as of :func:`blockvis.draw_still`; sight and cut are its view and section.
 
-    Attributes
-    ----------
-    magnification : float
-        Of displacements and rotations; 1 is true scale.
-    colour_by : {"material", "mechanism", "displacement"}
-        By "mechanism" the parts that move as one after the last equilibrium are tinted.
-    forces : {"auto", "thrust", "points", "none"}
-        Resultant of each joint, forces at the contact points, or neither; "auto" draws the resultants of structures in
-        the plane with up to ``FEW_BLOCKS`` blocks. In space the blocks are then drawn as of glass.
-    joints : bool
-        Mark open and sliding joints and hinges.
-    sight : Sight, optional
-        From where blocks in space are looked at; by default where their motion is seen best.
-    cut : Cut, optional
-        The plane that cuts blocks in space open.
+    In space the blocks are as of glass where forces are drawn, by "auto" none; in the plane "auto" draws the resultants
+    of up to ``FEW_BLOCKS`` blocks.
     """
 
     magnification: float = 1.0

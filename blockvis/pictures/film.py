@@ -28,23 +28,10 @@ Draw: TypeAlias = Callable[[], Image.Image]
 def film_of(
     drawer: Drawer, fps: float, seconds: float, progress: Callable[[int, int], None] | None = None
 ) -> tuple[int, Iterator[Image.Image]]:
-    """Plan a film: even motion along the path, a pause, then the fall.
+    """Plan a film: even motion along the path, in so many seconds, a pause, then the fall.
 
-    Parameters
-    ----------
-    fps : float
-        Frames per second.
-    seconds : float [s]
-        Of the path.
-    progress : callable, optional
-        Called with the frames drawn and their number.
-
-    Returns
-    -------
-    count : int
-        Number of the frames.
-    frames : iterator of PIL.Image.Image
-        Drawn as they are asked for; what stands still is drawn once.
+    Returns the number of its frames, and the frames, drawn as they are asked for; what stands still is drawn once.
+    ``progress`` is called with the frames drawn and their number.
     """
     for name, value in (("fps", fps), ("seconds", seconds)):
         if not (np.isfinite(value) and value > 0.0):

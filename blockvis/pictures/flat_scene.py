@@ -46,18 +46,7 @@ MOST_OUTLINES = 6
 class FlatScene(Scene):
     """Blocks of the plane and their marks, drawn frame after frame; see :class:`blockvis.pictures.scene.Scene`.
 
-    Parameters
-    ----------
-    frame : Frame
-        What is shown, the same in all frames.
-    size : (int, int)
-        Width and height of the pictures in pixels.
-    block_fill : (n_blocks, 3) uint8 array
-        Colours of the blocks.
-    underlay : Underlay, optional
-        A photograph, of which the blocks carry their part.
-    outline : (int, int, int)
-        Colour of their edges.
+    The blocks have colours (n_blocks, 3) uint8, and carry their part of a photograph where there is one.
     """
 
     def __init__(
@@ -284,19 +273,9 @@ class FlatScene(Scene):
 
 
 class _Layer:
-    """Outlines or lines of one colour.
+    """Outlines or lines of one colour and opacity, by the number of the point at each corner of matplotlib's path.
 
-    Parameters
-    ----------
-    colour : (int, int, int)
-    corners : (n,) int array
-        Number of the point at each corner of the path.
-    codes : (n,) array
-        What matplotlib's Path does there.
-    width : float
-        Of the lines in pixels; 0 where the outlines are filled.
-    cover : float
-        Opacity.
+    Lines have a width in pixels, outlines that are filled have 0.
     """
 
     def __init__(

@@ -104,18 +104,12 @@ class Sheet:
         pixel: float,
         beside: Image.Image | None = None,
     ) -> Image.Image:
-        """Put the picture of the blocks on the sheet, with caption, scale bar and legend.
+        """Put the picture of the blocks, of :attr:`inside_size`, on the sheet, with caption, scale bar and legend.
 
         Parameters
         ----------
-        picture : PIL.Image.Image
-            Of the blocks, of :attr:`inside_size`.
-        title, detail : str
-            First and second line of the caption.
-        badge : str
-            A warning at the upper right.
-        keys : sequence of Key
-            The legend.
+        title, detail, badge : str
+            First and second line of the caption, and a warning at the upper right.
         places : sequence of Key, optional
             All keys of a film, so that each keeps its place where others come and go; those of the picture by default.
         pixel : float [m]
@@ -248,22 +242,10 @@ def write_labels(
     dots: np.ndarray,
     colours: Sequence[tuple[int, int, int]] = (),
 ) -> None:
-    """Write labels on paper beside places of a picture, in their order, each where none lies yet.
+    """Write labels on paper beside places (n, 2) of a picture, in their order, each where none lies yet.
 
-    They leave dots free where there is room beside them; farther from its place a label has a leader.
-
-    Parameters
-    ----------
-    picture : PIL.Image.Image
-        Drawn upon.
-    places : (n, 2) array [pixel]
-    words : sequence of str
-        One per place.
-    text : int
-        Height of the text in pixels.
-    dots : (n, 2) array [pixel]
-    colours : sequence of (int, int, int)
-        Of their rims, one per place; that of open joints by default.
+    They leave dots (n, 2) free where there is room beside them; farther from its place a label has a leader. All
+    lengths are in pixels; the rims have the colour of open joints by default.
     """
     draw, font = ImageDraw.Draw(picture), _font(round(0.85 * text))
     rim, written = 0.4 * text, list[_Label]()

@@ -40,7 +40,7 @@ def draw_inspection(
     path : str or Path
         .png, .svg or .pdf.
     ground : Layout, optional
-        Supports beside the blocks of the drawing, with their roles, in the plane or in space as these are.
+        Supports beside the blocks of the drawing, with their roles.
     falling : sequence of int
         Blocks of the layout that do not stand.
     """

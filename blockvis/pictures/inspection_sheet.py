@@ -49,15 +49,7 @@ EDGE = "#4a4032"
 
 @dataclass(frozen=True)
 class Kind:
-    """Blocks that are drawn alike.
-
-    Attributes
-    ----------
-    colour : (int, int, int)
-    blocks : tuple of int
-    hatch : str
-        Pattern of matplotlib, in the plane.
-    """
+    """Blocks that are drawn alike; in the plane with a hatch of matplotlib."""
 
     label: str
     colour: tuple[int, int, int]
@@ -115,14 +107,8 @@ class Contents:
 class _Canvas:
     """Axes with the blocks drawn, and how places get there.
 
-    Attributes
-    ----------
-    axis : (2, d) array
-        Unit vectors to the right and up.
-    names : dict of int to array
-        By block: (2, 2), the middle of where its name may stand, and how wide and high that is [m].
-    inches : float
-        Of a metre on paper.
+    The rows of ``axis`` (2, d) are to the right and up; a metre is so many inches on paper. Each name may stand at a
+    place (2,), as wide and high as (2,) [m].
     """
 
     axes: Any

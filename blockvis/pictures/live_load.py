@@ -28,17 +28,10 @@ CELL = 0.12
 
 @dataclass(frozen=True)
 class LiveLoad:
-    """Live loads times their multiplier, in the multiplier's sign.
+    """Live loads times their multiplier, in the multiplier's sign: forces (n, d) [N] at points (n, d) [m].
 
-    Attributes
-    ----------
-    points : (n, d) array [m]
-        Where they act, at ``pose``.
-    forces : (n, d) array [N]
-    blocks : (n,) int array
-        The block each acts on, or one of those whose resultant it is.
-    pose : solver.Pose
-        Of these blocks alone.
+    Each acts on one of the blocks (n,), or on several, of which it is the resultant and one is given; the pose is of
+    these alone.
     """
 
     points: np.ndarray

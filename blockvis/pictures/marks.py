@@ -134,16 +134,9 @@ def marks_of(
 def cracks_between(
     assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose, fallen: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cracks, their openings and which of them gape, as :class:`Marks` has them.
+    """Cracks at a pose, where it is shown, their openings and which of them gape, as :class:`Marks` has them.
 
-    Parameters
-    ----------
-    pose : solver.Pose
-        At which the joints are open or not.
-    shown : solver.Pose
-        At which they are drawn.
-    fallen : (n_blocks,) bool array
-        Blocks that have left for good, whose joints are no cracks.
+    Joints of blocks that have fallen (n_blocks,) are no cracks.
     """
     size, least, rings = assembly.block_size, SMALLEST_OPENING * assembly.block_size, joints.rings
     now, drawn = carried_faces(assembly, joints, pose, fallen), carried_faces(assembly, joints, shown)
@@ -230,19 +223,10 @@ def thrust_line(points: np.ndarray, blocks: np.ndarray, assembly: solver.Assembl
 
 
 def length_per_force(sizes: np.ndarray, largest: float, usual_length: float, extent: float) -> float:
-    """Length per force [m/N] of resultants in a picture.
+    """Length per force [m/N] of resultants of some sizes (n,) [N] in a picture of an extent [m].
 
     Most are drawn up to the usual length: by the 0.9 quantile, not the largest, or one corner that carries everything
     would make all others too short to see. None is longer than 0.12 of the picture.
-
-    Parameters
-    ----------
-    sizes : (n,) array [N]
-        Of the resultants that are drawn.
-    largest : float [N]
-    usual_length : float [m]
-    extent : float [m]
-        Of the picture.
     """
     usual = float(np.quantile(sizes, 0.9)) if len(sizes) else largest
     return min(max(usual_length, 0.015 * extent) / usual, 0.12 * extent / largest)

@@ -34,15 +34,7 @@ def _on_each(name: str) -> Callable[..., None]:
 class PairedScenes(Scene):
     """Scenes of the same blocks at one scale, from left to right; see :class:`blockvis.pictures.scene.Scene`.
 
-    Parameters
-    ----------
-    views : sequence of View
-    frame : Frame
-        What is shown, in the axes of each view in turn.
-    sheet : Sheet
-        On which they find their place.
-    block_fill, opacity, fine, cut, outline
-        As of :class:`SolidScene`.
+    The frame has what is shown in the axes of each view in turn; the look is as of :class:`SolidScene`.
     """
 
     def __init__(

@@ -52,17 +52,10 @@ class SightLines:
     def sees(
         self, points: np.ndarray, across: np.ndarray, axes: np.ndarray, without: np.ndarray | None = None
     ) -> np.ndarray:
-        """(n,) bool array: which points on edges of joints nothing hides.
+        """(n,) bool array: which points (n, 3) [m] on edges of joints nothing hides.
 
-        Parameters
-        ----------
-        points : (n, 3) array [m]
-        across : (n, 3) array
-            Unit normals of the joints: along one the eye would look between its blocks, through both of them.
-        axes : (3, 3) array
-            As of :meth:`seen`.
-        without : (n_blocks,) bool array, optional
-            Blocks that hide nothing.
+        ``across`` (n, 3) are the normals of the joints: along one the eye would look between its blocks, through both
+        of them. Blocks ``without``, (n_blocks,) bool, hide nothing; the axes are as of :meth:`seen`.
         """
         triangles = self._triangles if without is None else self._triangles[~without[self._block_of_triangle]]
         beside = self._near / 2.0 * across

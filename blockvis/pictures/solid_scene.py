@@ -81,14 +81,8 @@ class SolidScene(Scene):
 
     Parameters
     ----------
-    frame : Frame
-        What is shown, in the axes of the view, the same in all frames.
-    size : (int, int)
-        Width and height of the pictures in pixels.
     block_fill : (n_blocks, 3) uint8 array
         Colours of the blocks.
-    opacity : float
-        Of the blocks.
     fine : bool
         Whether smooth edges and the shade of corners are worth the time: in stills.
     cut : (2, 3) array, optional
@@ -223,15 +217,8 @@ class SolidScene(Scene):
     ) -> None:
         """Draw lines, ends (n, 2, 3) [m], ``width`` pixels wide, in one layer, instead of those before.
 
-        Parameters
-        ----------
-        ends : (n, 2, 3) array [m]
-        colour : (int, int, int), or (n, 2, 3) uint8 array
-            Of all, or of each end.
-        width : float
-            Pixels.
-        forward : float
-            How far they are in front of what lies at the same place.
+        They have one colour, or one at each end, (n, 2, 3) uint8, and are so far in front of what lies at the same
+        place.
         """
         points = np.asarray(ends, dtype=float).reshape(-1, 3)
         self.clear(layer)
@@ -249,13 +236,7 @@ class SolidScene(Scene):
     ) -> None:
         """Fill polygons, each (k, 3) [m], in one layer, instead of those before.
 
-        Parameters
-        ----------
-        polygons : sequence of (k, 3) arrays [m]
-        colour : (int, int, int), or (n_points, 3) uint8 array
-            Of all, or of each corner.
-        forward : float
-            As of :meth:`lines`.
+        They have one colour, or one at each corner, (n_points, 3) uint8.
         """
         self.clear(layer)
         if len(polygons):

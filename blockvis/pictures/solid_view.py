@@ -68,14 +68,7 @@ def views_of(
 ) -> tuple[View, ...]:
     """Find from where a structure is drawn: as asked for; vaults and domes from above and, beside that, from below.
 
-    Parameters
-    ----------
-    motion : (n_blocks, 3) array [m]
-        As of :func:`chosen_view`.
-    sight : Sight, optional
-        As asked for.
-    cut : Cut, optional
-        The plane that has to be seen.
+    ``motion`` (n_blocks, 3) is as of :func:`chosen_view`; the cut has to be seen.
     """
     sight = sight or Sight(both=cut is None and has_intrados(response.assembly, joints))
     level = cut is not None and abs(cut.normal[2]) > ACROSS

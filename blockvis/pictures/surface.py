@@ -80,16 +80,7 @@ def sharp_edges(shapes: mechanics.Polyhedra) -> np.ndarray:
 def section_of(
     corners: np.ndarray, triangles: np.ndarray, blocks: np.ndarray, point: np.ndarray, normal: np.ndarray
 ) -> tuple[list[np.ndarray], np.ndarray]:
-    """Cut blocks by a plane.
-
-    Parameters
-    ----------
-    corners : (n_vertices, 3) array [m]
-    triangles : (n, 3) int array
-    blocks : (n,) int array
-        The block of each, as :func:`triangles_of` gives them.
-    point, normal : (3,) arrays
-        On the plane [m], and its unit normal.
+    """Cut blocks, by their triangles as of :func:`triangles_of`, through a point (3,) [m] across a unit normal (3,).
 
     Returns
     -------

@@ -55,19 +55,10 @@ MOST_NAMED = 6
 
 @dataclass(frozen=True)
 class Strands:
-    """Lines of one state and width.
+    """Lines of one state and width, back to front in a layer "tie" and the state in words.
 
-    Attributes
-    ----------
-    layer : str
-        "tie" and the state in words.
-    ends : (n, 2, d) array [m]
-        Of lines, dashes or stubs.
-    anchors : (m, d) array [m]
-        Ends of the members.
-    colour : (int, int, int)
-    width : float
-        In pixels of a picture 1080 high.
+    The ends (n, 2, d) [m] are of lines, dashes or stubs, the anchors (m, d) [m] of the members; the width is in pixels
+    of a picture 1080 high.
     """
 
     layer: str

@@ -39,14 +39,7 @@ class Underlay:
     def seen(self, low: np.ndarray, pixel: float, size: tuple[int, int]) -> np.ndarray:
         """(height, width, 3) uint8 array: what of it is in a picture, paper around it.
 
-        Parameters
-        ----------
-        low : (2,) array [m]
-            Lower left corner of the picture.
-        pixel : float [m]
-            Size of a pixel of the picture.
-        size : (int, int)
-            Width and height of the picture in pixels.
+        The picture begins at ``low`` (2,) [m], its lower left corner, and has so many pixels of a size [m].
         """
         to_world = np.array([[pixel, 0.0, low[0]], [0.0, -pixel, low[1] + pixel * size[1]]])
         back = np.linalg.inv(self.matrix[:, :2])
@@ -65,12 +58,7 @@ class Underlay:
 class CarriedPhotograph:
     """A photograph of which each block carries its part to where it moves; pale where they were.
 
-    Parameters
-    ----------
-    low : (2,) array [m]
-    pixel : float [m]
-    size : (int, int)
-        Of the picture, as in :meth:`Underlay.seen`.
+    The picture is as of :meth:`Underlay.seen`.
     """
 
     def __init__(

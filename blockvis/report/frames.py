@@ -130,16 +130,7 @@ class FrameTables:
     Marks are hinges (1), sliding joints (2) and points that crush (3). A hinge has the ends of its line, in the plane
     its place twice, as what crushes has; a sliding joint has its ends in the plane, and in space its number. Each
     resultant names its two blocks, for which it is drawn; what is told is the normal and the shear force of each joint,
-    of which two blocks may have several.
-
-    Parameters
-    ----------
-    shown : list of solver.Increment
-        Gone through once.
-    origin : (d,) array [m]
-    unit : float [m]
-    largest : float [N]
-        Resultant; a part of it is the unit of force.
+    of which two blocks may have several. A part of the largest resultant [N] is the unit of force.
     """
 
     def __init__(

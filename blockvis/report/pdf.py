@@ -59,20 +59,7 @@ def write_pdf(
 ) -> Path:
     """Write the report as a document of A4 pages.
 
-    Parameters
-    ----------
-    case_text : str
-        The case file, shown as it is.
-    fall : Fall, optional
-        What comes after the last equilibrium.
-    error : str
-        What of and how large, "error of the steps: reaction ± 0.2 %".
-    band : ReactionRange, optional
-        Of the reaction, drawn behind the curve.
-    underlay : Underlay, optional
-        A photograph under blocks in the plane.
-    view, section
-        Of blocks in space, as of :func:`blockvis.draw_still`.
+    Underlay, view and section are as of :func:`blockvis.draw_still`, all else as of :func:`blockvis.write_report`.
 
     Raises
     ------
