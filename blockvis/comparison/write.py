@@ -10,6 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 
+from blockvis.report.page import html_rows
 from blockvis.results.about import about
 from blockvis.results.folder import RUN_FILES, VIDEO_SUFFIXES, refuse_files
 from blockvis.system.atomic_files import make_folder, write_atomic
@@ -117,6 +118,4 @@ def _film(name: str) -> str:
 
 
 def _rows(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["".join(f"<th>{html.escape(head)}</th>" for head in heads)]
-    lines += ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in rows]
-    return "".join(f"<tr>{line}</tr>" for line in lines)
+    return f"<tr>{''.join(f'<th>{html.escape(head)}</th>' for head in heads)}</tr>{html_rows(rows)}"

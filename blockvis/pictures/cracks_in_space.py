@@ -20,7 +20,7 @@ from .drawer import MARGIN, WHOLE
 from .frame import Frame, Key, Sheet, framed, write_labels
 from .paired_scenes import PairedScenes
 from .sight_lines import SightLines
-from .solid_view import AROUND, View, hiding_supports, plane_of, views_of
+from .solid_view import AROUND, View, heights_over, hiding_supports, plane_of, views_of
 from .swing import swing_of
 
 #: Widths between the classes are of these, times a power of ten [mm]; most classes; thinnest and thickest line in
@@ -71,11 +71,11 @@ class CracksInSpace:
         if cut is None and (sight is None or sight.azimuth is None):
             self._views = _showing(assembly, self._views, opened, main_cracks(cracks), increment.fallen)
         plane = plane_of(assembly, cut, self._views[0])
-        self._opened = opened.chosen(_kept(opened.middles, plane))
-        self._joints_kept = joints.rings.ring[_kept(joints.rings.points, plane)]
+        self._opened = opened.chosen(heights_over(plane, opened.middles) >= 0.0)
+        self._joints_kept = joints.rings.ring[heights_over(plane, joints.rings.points) >= 0.0]
         moved = opening_and_slip(assembly, joints, increment.pose, increment.fallen)
         slides = np.isin(edges.joints, slid_joints(assembly, moved))
-        self._slid = edges.chosen(slides & _kept(edges.middles, plane))
+        self._slid = edges.chosen(slides & (heights_over(plane, edges.middles) >= 0.0))
         self._slips = np.abs(moved[self._slid.joints, 1])
         self.slip = float(self._slips.max(initial=0.0))
         self._seen_joints = np.zeros(0, dtype=int)
@@ -237,8 +237,3 @@ def class_limits(widest: float) -> list[float]:
     power = 10.0 ** np.floor(np.log10(widest)) if widest > 0.0 else 1.0
     every = [step * factor * power for factor in (0.01, 0.1, 1.0) for step in STEPS]
     return [float(f"{limit:.3g}") for limit in every if limit < 0.999 * widest][-(MOST_CLASSES - 1) :] if widest else []
-
-
-def _kept(points: np.ndarray, plane: np.ndarray | None) -> np.ndarray:
-    """(n,) bool array: points, (n, 3) [m], on the side of a plane that is kept, as of :func:`plane_of`."""
-    return np.ones(len(points), dtype=bool) if plane is None else (points - plane[0]) @ plane[1] >= 0.0

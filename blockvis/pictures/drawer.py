@@ -34,7 +34,7 @@ from .marks import (
     thrust_line,
 )
 from .scene import OF_STATICS, Scene
-from .solid_view import View, hiding_supports, plane_of, views_of
+from .solid_view import View, heights_over, hiding_supports, plane_of, views_of
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 from .ties import DASH, DrawnTies
 from .underlay import Underlay
@@ -212,8 +212,7 @@ class Drawer:
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
         heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
         ends = np.concatenate([self.live.tails, heads, *self._arrow_ends(frame, extra), tied, self._turned_out(whole)])
-        if self._plane is not None:
-            ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
+        ends = ends[heights_over(self._plane, ends) >= 0.0]
         frame = self._with_floor(frame.holding(self._projected(ends)))
         # Supports in the plane are hatched, and an outline stays where those that move were.
         self.fill = palette.role_colours(assembly, not self._flat and bool(response.settlements))
@@ -458,17 +457,14 @@ class Drawer:
 
     def _kept(self, pose: solver.Pose) -> np.ndarray:
         """(n_blocks,) bool array: blocks of which a section leaves something."""
-        kept = np.ones(self.assembly.n_blocks, dtype=bool)
-        if self._plane is not None:
-            inside = (mechanics.moved_vertices(self.assembly, pose) - self._plane[0]) @ self._plane[1] > 0.0
-            kept = np.bincount(self.assembly.block_of_vertex, inside, self.assembly.n_blocks) > 0
-        return kept
+        inside = heights_over(self._plane, mechanics.moved_vertices(self.assembly, pose)) > 0.0
+        return np.bincount(self.assembly.block_of_vertex, inside, self.assembly.n_blocks) > 0
 
     def _into_sight(self, points: np.ndarray) -> np.ndarray:
         """(n, d) array [m]: the way from points (n, d) [m] to the plane of a section, of those that it leaves out."""
         if self._plane is None:
             return np.zeros_like(points)
-        depths = np.minimum((points - self._plane[0]) @ self._plane[1], 0.0)
+        depths = np.minimum(heights_over(self._plane, points), 0.0)
         return np.asarray(-depths[:, None] * self._plane[1])
 
     def keys(self) -> list[Key]:
@@ -504,29 +500,23 @@ class Drawer:
         return self._keys
 
     def _keys_of_joints(self) -> list[Key]:
-        seen, keys = self._seen, []
-        if "cracks" in seen.marks:
-            # Where a mechanism swings alone, nothing is open in equilibrium.
-            widest = "" if self._flat or seen.widest == 0.0 else f", up to {width_text(seen.widest)}"
-            kind = "area" if self._flat else "line"
-            keys.append(Key(kind, f"open joint{widest}", palette.OPEN, layers=("crack", "crack edge")))
+        marks, widest = self._seen.marks, self._seen.widest
+        # Where a mechanism swings alone, nothing is open in equilibrium.
+        up_to = "" if self._flat or widest == 0.0 else f", up to {width_text(widest)}"
+        crack = Key(
+            "area" if self._flat else "line", f"open joint{up_to}", palette.OPEN, layers=("crack", "crack edge")
+        )
+        keys = [crack] * ("cracks" in marks)
         if self.look.magnification != 1.0:
             told = "are shown at true scale only" if self.look.joints and not self.many else "not shown"
             return [*keys, Key("", f"hinges, sliding joints and forces {told}", palette.FAINT)]
-        marked = [
-            *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if "sliding" in seen.marks else []),
-            *(
-                [Key("dot" if self._flat else "line", "hinge", palette.HINGE, layers=("hinge",))]
-                if "hinges" in seen.marks
-                else []
-            ),
-        ]
-        if "hinges" in seen.marks and len(self._views) == 1 and not self.many:
-            marked.append(Key("dash", "hidden hinge", palette.HINGE))
-        if "crushing" in seen.marks:
-            keys.append(Key("dot", "crushing", palette.CRUSHING, layers=("crushing top",)))
+        keys += [Key("dot", "crushing", palette.CRUSHING, layers=("crushing top",))] * ("crushing" in marks)
+        hinge = Key("dot" if self._flat else "line", "hinge", palette.HINGE, layers=("hinge",))
+        marked = [Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] * ("sliding" in marks)
+        marked += [hinge] * ("hinges" in marks)
         if not self.many:
-            return keys + marked
+            dashed = "hinges" in marks and len(self._views) == 1
+            return keys + marked + [Key("dash", "hidden hinge", palette.HINGE)] * dashed
         # They would hide the cracks: in a wall of many blocks nearly every brick turns or slides a little.
         hidden = " and ".join(f"{key.text}s" for key in marked[::-1])
         return keys + ([Key("", f"{hidden} not shown", palette.FAINT)] if hidden else [])

@@ -139,6 +139,11 @@ def plane_of(assembly: solver.Assembly, cut: Cut | None, view: View | None = Non
     return np.stack([point, -normal if view is not None and normal @ view.axes[2] > 0.0 else normal])
 
 
+def heights_over(plane: np.ndarray | None, points: np.ndarray) -> np.ndarray:
+    """(n,) array [m]: heights of points (n, 3) over a plane as of :func:`plane_of`; infinite where there is none."""
+    return np.full(len(points), np.inf) if plane is None else np.asarray((points - plane[0]) @ plane[1])
+
+
 def _above(assembly: solver.Assembly) -> float:
     """Degrees above the level from which a structure is seen by default."""
     corners = assembly.vertices[assembly.free[assembly.block_of_vertex]]

@@ -6,6 +6,7 @@ import html
 import json
 import math
 import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -227,14 +228,7 @@ def _cracks(response: solver.Response) -> str:
 def _ties(response: solver.Response) -> str:
     """List the ties with their largest forces and what became of them."""
     rows = tie_rows(response)
-    listed = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
-    return f'<h2>Ties and props</h2><table id="ties">{listed}</table>' if rows else ""
-
-
-def _drawn_ties(response: solver.Response, shown: list[solver.Increment]) -> list[list[dict[str, Any]]]:
-    """List what is drawn of the ties in each frame: ends [m], words, colour, width, dashes."""
-    drawn = DrawnTies(response)
-    return [drawn.told(increment) for increment in shown]
+    return f'<h2>Ties and props</h2><table id="ties">{html_rows(rows)}</table>' if rows else ""
 
 
 def tie_rows(response: solver.Response) -> list[tuple[str, str, str]]:
@@ -305,7 +299,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
         },
         "frames": _frames(response, frames),
         "opens": next((k for k, frame in enumerate(frames) if frame.increment is swing.increment), n_static - 1),
-        "ties": _drawn_ties(response, shown),
+        "ties": list(map(DrawnTies(response).told, shown)),
         "times": _times(frames),
         # In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.
         "joints_of_fall": fall is None,
@@ -539,6 +533,6 @@ def certificate_rows(response: solver.Response) -> list[tuple[str, str]]:
     return [(name, f"{value:.1e}{unit}") for name, value, unit in rows if math.isfinite(value)]
 
 
-def html_rows(rows: list[tuple[str, str]]) -> str:
+def html_rows(rows: Iterable[Sequence[str]]) -> str:
     """Write the rows of a table as HTML."""
-    return "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>" for name, value in rows)
+    return "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
