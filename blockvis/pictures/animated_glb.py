@@ -117,29 +117,25 @@ def _played(
     """
     # Positions of a load may be negative, times may not.
     path, along = response.path, response.parameters - response.parameters[:1]
-    initial = solver.Pose.initial(response.assembly)
-    poses = [increment.pose for increment in path] or [initial]
-    stands = [~increment.fallen for increment in path] or [np.ones(response.assembly.n_blocks, dtype=bool)]
-    tied = [increment.ties for increment in path] or [mechanics.TieForces()]
-    reach = float(along[-1]) if len(along) else 0.0
-    times = list(PATH * along / reach) if reach > 0.0 else [0.1 * k for k in range(len(poses))]
-    start = times[-1] + STANDS
+    reach = float(along[-1]) if path else 0.0
+    times = PATH * along / reach if reach > 0.0 else 0.1 * np.arange(len(path))
+    moments = [(float(time), one.pose, one.ties) for time, one in zip(times, path, strict=True)]
+    moments = moments or [(0.0, solver.Pose.initial(response.assembly), mechanics.TieForces())]
+    start, last = moments[-1][0] + STANDS, moments[-1][1:]
     if fall is not None:
-        times += [start + float(time) for time in fall.times]
-        poses += [fall.pose(k) for k in range(len(fall))]
-        tied += [fall.ties_at(float(time), response) for time in fall.times]
-    else:
-        frames = [i for i in shown_increments(response) if i.status == solver.Status.FALLING]
-        if frames:
-            times, poses, tied = [*times, start], [*poses, poses[-1]], [*tied, tied[-1]]
-        times += [start + FRAME * (k + 1) for k in range(len(frames))]
-        poses += [frame.pose for frame in frames]
-        tied += [frame.ties for frame in frames]
-    times, poses, tied = [*times, times[-1] + STANDS], [*poses, poses[-1]], [*tied, tied[-1]]
-    stands += stands[-1:] * (len(times) - len(stands))
+        moments += [
+            (start + time, fall.pose(k), fall.ties_at(time, response)) for k, time in enumerate(fall.times.tolist())
+        ]
+    elif frames := [i for i in shown_increments(response) if i.status == solver.Status.FALLING]:
+        moments.append((start, *last))
+        moments += [(start + FRAME * k, frame.pose, frame.ties) for k, frame in enumerate(frames, start=1)]
+    moments.append((moments[-1][0] + STANDS, *moments[-1][1:]))
+    clock = np.array([time for time, _, _ in moments])
     # What changes between two settlements does so at one parameter; players want times that grow.
-    clock = np.array(times)
-    return clock + AT_ONCE * np.cumsum(np.diff(clock, prepend=-1.0) <= 1e-6), poses, tied, np.array(stands)
+    clock += AT_ONCE * np.cumsum(np.diff(clock, prepend=-1.0) <= 1e-6)
+    stands = [~one.fallen for one in path] or [np.ones(response.assembly.n_blocks, dtype=bool)]
+    stands += stands[-1:] * (len(moments) - len(stands))
+    return clock, [pose for _, pose, _ in moments], [ties for *_, ties in moments], np.array(stands)
 
 
 def _rods(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,12 +15,6 @@ from solver import mechanics
 
 from . import palette
 from .inspection_sheet import Contents, Kind, draw_contents
-
-#: How supports are drawn: label, colour and hatch of each role.
-_SUPPORTS = {
-    mechanics.FIXED: ("fixed", palette.SUPPORT, "////"),
-    mechanics.MOVING: ("moving", palette.MOVING, "\\\\\\\\"),
-}
 
 if TYPE_CHECKING:
     from blockvis.layout.inspect import Inspection
@@ -111,7 +106,8 @@ def _kinds(own: Mapping[int, str], free: str) -> list[Kind]:
     """List the kinds of blocks that there are, from what each block is; free ones are called so."""
     looks = {
         mechanics.FREE: (free, palette.DRAWN, ""),
-        **_SUPPORTS,
+        mechanics.FIXED: ("fixed", palette.SUPPORT, "////"),
+        mechanics.MOVING: ("moving", palette.MOVING, "\\\\\\\\"),
         "twice": ("drawn twice", palette.TWICE, ""),
         "falls": ("does not stand", palette.FALLS, ""),
         "overlap": ("overlapping, refused", palette.REFUSED, ""),
@@ -123,12 +119,8 @@ def _kinds(own: Mapping[int, str], free: str) -> list[Kind]:
 
 def _kinds_of_ground(ground: Layout, first: int) -> list[Kind]:
     """List the kinds of blocks that would be laid as ground, numbered from the first."""
-    blocks = {role: tuple(first + k for k, given in enumerate(ground.roles) if given == role) for role in _SUPPORTS}
-    return [
-        Kind(f"ground of blockvis new, {role}", colour, blocks[role], hatch)
-        for role, (_, colour, hatch) in _SUPPORTS.items()
-        if blocks[role]
-    ]
+    kinds = _kinds(dict(enumerate(ground.roles, start=first)), "free")
+    return [replace(kind, label=f"ground of blockvis new, {kind.label}") for kind in kinds]
 
 
 def _findings(inspection: Inspection, deep: Sequence[tuple[int, int, float]]) -> tuple[str, ...]:

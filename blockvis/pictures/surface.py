@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from blockvis.layout.triangulation import triangles_of_ring
+from blockvis.layout import solids
 from solver import mechanics
 
 #: Edges between faces that differ by less than this cosine are not drawn.
@@ -35,8 +35,9 @@ def triangles_of(shapes: mechanics.Polyhedra) -> tuple[np.ndarray, np.ndarray]:
     # A fan would cover what a re-entrant corner leaves out.
     for number in np.flatnonzero(reentrant).tolist():
         ring = shapes.corners[shapes.face_offsets[number] : shapes.face_offsets[number + 1]]
-        cut = _cut(shapes.vertices[ring])
-        triangles.append(ring[cut])
+        # A face that folds back on itself, as drawings have, is cut, too.
+        cut = solids.triangles_of(shapes.vertices, [ring.tolist()])
+        triangles.append(cut)
         blocks.append(np.full(len(cut), shapes.block_of_face[number]))
     return np.concatenate(triangles), np.concatenate(blocks)
 
@@ -52,15 +53,6 @@ def _reentrant(shapes: mechanics.Polyhedra) -> np.ndarray:
     found = np.zeros(len(shapes.face_offsets) - 1, dtype=bool)
     found[shapes.face_of_corner[bends < -1e-9 * scale]] = True
     return found
-
-
-def _cut(corners: np.ndarray) -> np.ndarray:
-    """(m, 3) int array: triangles of a plane polygon (n, 3) [m], in its sense."""
-    arms = corners - corners[0]
-    normal = np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)
-    keep = [k for k in range(3) if k != int(np.abs(normal).argmax())]
-    # A face that folds back on itself, as drawings have, is cut, too.
-    return triangles_of_ring(corners[:, keep])
 
 
 def sharp_edges(shapes: mechanics.Polyhedra) -> np.ndarray:
