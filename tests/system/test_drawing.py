@@ -44,7 +44,7 @@ def case(tmp_path):
 def test_another_process_draws_the_same_film(tmp_path):
     response = parted(wall(4, 3), 3, 2)
     process, told = FilmProcess(), []
-    process.draw(response, tmp_path / "other.mp4", None)
+    process.draw(response, tmp_path / "other.mp4", False, None, {})
     process.wait(lambda *count: told.append(count))
     blockvis.animate(response, tmp_path / "own.mp4")
     assert (tmp_path / "other.mp4").read_bytes() == (tmp_path / "own.mp4").read_bytes()
@@ -54,7 +54,7 @@ def test_another_process_draws_the_same_film(tmp_path):
 @pytest.mark.slow
 def test_what_fails_in_the_process_is_raised_here(tmp_path):
     process = FilmProcess()
-    process.draw(arch_response(), tmp_path / "film.avi", None)
+    process.draw(arch_response(), tmp_path / "film.avi", False, None, {})
     with pytest.raises(ValueError, match=r"film\.avi.*\.mp4, \.gif, \.webp"):
         process.wait(lambda *_: None)
 
