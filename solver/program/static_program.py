@@ -13,7 +13,7 @@ from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.programs.problem import LinearProgram, Solution, SolveError, Unbounded
-from solver.programs.solve import CONIC_ROUTES, solve_between
+from solver.programs.solve import solve_between
 from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, FALLING_FRACTION
 
 from .model import Model
@@ -148,17 +148,16 @@ class StaticProgram:
         """
         of_forces = sense * self.work
         of_forces[:: self.size] += self.price
-        solution = self._solved(of_forces, sense * np.array(self.senses), [], CONIC_ROUTES, balanced.unbalanced)
+        solution = self._solved(of_forces, sense * np.array(self.senses), [], balanced.unbalanced)
         return self._state(solution)
 
     def most_balanced(self, *, with_live: bool = True) -> tuple[ProgramState, float]:
         """Find forces of least imbalance, and their unbalanced forces over the total load, 0 where that is rounding."""
         rows, k = len(self.dead), len(self.senses)
         unit, cost = sp.eye_array(rows), np.append(np.zeros(k), np.ones(2 * rows))
-        routes = (*CONIC_ROUTES[1::-1], *CONIC_ROUTES[2:])
         first, is_rounding = self.carried.columns.shape[1] + k, False
         try:
-            solution = self._solved(np.zeros_like(self.work), cost, [unit, -unit], routes, with_live=with_live)
+            solution = self._solved(np.zeros_like(self.work), cost, [unit, -unit], with_live=with_live)
         except SolveError as error:
             best = error.best
             if best is None:
@@ -223,7 +222,6 @@ class StaticProgram:
         of_forces: np.ndarray,
         cost: np.ndarray,
         unbalanced: list[sp.sparray],
-        routes: tuple[str, ...],
         left: np.ndarray | float = 0.0,
         with_live: bool = True,
     ) -> Solution:
@@ -241,7 +239,7 @@ class StaticProgram:
             upper=np.append(right + tolerance, carried.most),
             places=np.vstack([places, self.contacts.points[carried.limited]]),
         )
-        return solve_between(program, carried.friction, self.size, routes, vertex=self.exact)
+        return solve_between(program, carried.friction, self.size, vertex=self.exact)
 
     def _state(self, solution: Solution) -> ProgramState:
         columns, rows, k = self.carried.columns, len(self.dead), len(self.senses)

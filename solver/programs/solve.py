@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
 
 from .band import run_band
-from .clarabel import ROUTES, run_clarabel
+from .clarabel import run_clarabel
 from .highs import run_highs
 from .problem import ConicProgram, LinearProgram, Solution, SolveError
 
@@ -27,9 +27,6 @@ VERTEX = ("simplex", "simplex without presolve")
 
 #: Routes of large programs, of which the simplex method alone gives a ray where the band does not apply.
 LADDER = (BAND, "hipo", *VERTEX)
-
-#: Routes of conic programs; whether an equilibrium exists is found sooner by the last first.
-CONIC_ROUTES = tuple(ROUTES)
 
 
 def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, vertex: bool = False) -> Solution:
@@ -67,14 +64,12 @@ def solve_between(
     linear: LinearProgram,
     friction: np.ndarray,
     size: int,
-    routes: Sequence[str] = CONIC_ROUTES,
     *,
     vertex: bool = True,
 ) -> Solution:
     """Solve a linear program, or with friction, (k,), one whose first columns are in round cones in place of x ≥ 0.
 
-    Cones are those of :class:`ConicProgram`, routes are ``CONIC_ROUTES`` in the order in which they are tried. With
-    cones, the first n numbers of x are those of the program, and the first multipliers those of the equations, where
+    Cones are those of :class:`ConicProgram`. With cones, the first n numbers of x are those of the program, and the first multipliers those of the equations, where
     the limits are equal; the slack of the other rows follows. Raises as :func:`solve_lp` does.
     """
     if len(friction) == 0:
@@ -93,4 +88,4 @@ def solve_between(
         size=size,
     )
     what = f"conic program with {len(program.right)} rows and {len(friction)} cones"
-    return _first_accepted({route: partial(run_clarabel, program, route) for route in routes}, what)
+    return _first_accepted({"clarabel": partial(run_clarabel, program)}, what)
