@@ -60,17 +60,12 @@ def _first_accepted(runs: Mapping[str, Callable[[], tuple[Solution | None, str]]
     raise SolveError(f"no solution of the {what} passed its check ({'; '.join(outcomes)})", best)
 
 
-def solve_between(
-    linear: LinearProgram,
-    friction: np.ndarray,
-    size: int,
-    *,
-    vertex: bool = True,
-) -> Solution:
+def solve_between(linear: LinearProgram, friction: np.ndarray, size: int, *, vertex: bool = True) -> Solution:
     """Solve a linear program, or with friction, (k,), one whose first columns are in round cones in place of x ≥ 0.
 
-    Cones are those of :class:`ConicProgram`. With cones, the first n numbers of x are those of the program, and the first multipliers those of the equations, where
-    the limits are equal; the slack of the other rows follows. Raises as :func:`solve_lp` does.
+    Cones are those of :class:`ConicProgram`. With cones, the first n numbers of x are those of the program, and the
+    first multipliers those of the equations, where the limits are equal; the slack of the other rows follows. Raises as
+    :func:`solve_lp` does.
     """
     if len(friction) == 0:
         return solve_lp(linear, vertex=vertex)
