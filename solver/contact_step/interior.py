@@ -55,8 +55,9 @@ class _Iterate:
         self.problem = problem
         self.rough = np.flatnonzero(problem.bound > 1e-8)
         self.limited = np.flatnonzero(np.isfinite(problem.most))
-        # In smaller steps the compliance of the joints decides.
-        self.size = max(problem.size, 1e-5)
+        # In smaller steps the compliance of the joints decides, and where a linearisation has gone too far what blocks
+        # are in each other by.
+        self.size = max(problem.size, 1e-5, -float(problem.gap.min()))
         mean = 0.03 * self.size
         before, bound = problem.forces[:, 0], problem.bound[self.rough]
         # The start lies well inside the cones.
