@@ -64,7 +64,7 @@ def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
     sinks[assembly.moving, 2] = -1.0
     stated: list[ConicProgram] = []
 
-    def kept(program: ConicProgram) -> Solution:
+    def kept(program: ConicProgram, route: str) -> Solution:
         stated.append(program)
         raise StopIteration
 
@@ -86,7 +86,7 @@ def main() -> None:
         assembly = wall(blocks)
         program, points = program_of(assembly)
         started = time.process_time()
-        found, _ = solve.run_clarabel(program)
+        found, _ = solve.run_clarabel(program, "clarabel")
         seconds = time.process_time() - started
         print(
             f"{int(assembly.free.sum()):7} {points:7} {seconds:8.2f} {found.iterations:10} "

@@ -88,7 +88,7 @@ class EquilibriumChecks:
                 forces = self.nearest(place, gap)
                 measured = float(np.clip(self.reaction(place, contacts, forces), low, max(low, high)))
                 return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
-        determined = self.model.has_live or bounds.high - bounds.low <= 1e-6 * max(abs(low), abs(high))
+        determined = self.model.has_live or not bounds.high - bounds.low > 1e-6 * max(abs(low), abs(high))
         try:
             forces = self.nearest(replace(place, multiplier=measured), gap, None if determined else measured)
         except NotSolved:

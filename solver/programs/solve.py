@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from .band import run_band
-from .clarabel import run_clarabel
+from .clarabel import ROUTES, run_clarabel
 from .highs import run_highs
 from .problem import ConicProgram, LinearProgram, Solution, SolveError
 
@@ -83,4 +83,4 @@ def solve_between(linear: LinearProgram, friction: np.ndarray, size: int, *, ver
         size=size,
     )
     what = f"conic program with {len(program.right)} rows and {len(friction)} cones"
-    return _first_accepted({"clarabel": partial(run_clarabel, program)}, what)
+    return _first_accepted({route: partial(run_clarabel, program, route) for route in ROUTES}, what)
