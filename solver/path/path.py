@@ -61,7 +61,7 @@ STANDSTILL = 1e3
 #: Movement, in block sizes, of blocks that have fallen when the first one has moved farthest.
 FALLEN = 0.1
 
-#: Part by which the multiplier falls in the step after a peak that is reported, and by which that exceeds what was.
+#: Part by which the multiplier falls beyond a peak that is reported, and by which that exceeds what was.
 DROP = 0.01
 
 #: Part of the first multiplier under which one may vanish within a bracket.
@@ -210,17 +210,13 @@ class Path:
             # What blocks that drop come to may be at a stop that has not been reported.
             state, outcome = self.advance(self.state, self.driver.next_stop(self.reported))
             self.state = state
-            if outcome.stop is Status.EQUILIBRIUM:
-                yield from self._report_peak(state)
+            report = {Status.EQUILIBRIUM: self._report_peak, Status.LIMIT_REACHED: self._report_reached}
+            if outcome.stop in report:
+                yield from report[outcome.stop](state)
                 continue
-            if outcome.stop is Status.LIMIT_REACHED:
-                yield from self._report_reached(state)
-                continue
-            if outcome.stop is Status.LOCKED:
-                # Forces grew from the last report on, and friction bounds with them.
-                return outcome
-            if outcome.stop is Status.SOLVER_FAILED:
-                yield from self._report_last(state)
+            if outcome.stop is not Status.FALLING:
+                # Towards locked supports forces grew from the last report on, and friction bounds with them.
+                yield from self._report_last(state) if outcome.stop is Status.SOLVER_FAILED else ()
                 return outcome
             beyond = self._place_beyond(state)
             end, at_rest = self.fall.relax(beyond)
@@ -268,8 +264,8 @@ class Path:
                 self.reports.notes.append((0.0, warning))
             check = self._check(replace(place, multiplier=carried if limit is None else limit), known=bounds)
             place = replace(place, multiplier=check.measured)
-        # What rises above the first multiplier by the joints' compliance alone is no peak; where these or ground give,
-        # it is not carried.
+        # Until the joints' compliance is used up what rises above the first multiplier by it alone is no peak; where
+        # these or ground give, it is not carried.
         peak = 0.0 if not model.has_live or model.interfaces.elastic else bounds.high
         self.state = replace(state, place=place, history=(place,), peak=peak)
         yield self._report(self.state, check)
@@ -295,16 +291,15 @@ class Path:
         if resting is None or (is_far and state.refine_until < place.s):
             self.state = self._go_back(state, place.s)
             return
-        ended = place.s >= self.driver.limit * (1.0 - 1e-12)
         if is_far:
             state = self._continue_from(state, resting)
         check = check if carries else self._check(resting, reaction)
         resting, peak = replace(resting, works=place.works), max(state.peak, resting.multiplier)
-        self.state = replace(state, history=(resting,), ended=ended, peak=peak)
+        self.state = replace(state, history=(resting,), ended=place.s >= self.driver.limit * (1.0 - 1e-12), peak=peak)
         yield self._report(self.state, check)
 
     def _report_peak(self, state: PathState) -> Iterator[Increment]:
-        """Report the place from which the multiplier falls as members or joints break, if that is in equilibrium."""
+        """Report the place from which the multiplier falls, if that is in equilibrium."""
         check = self._check(state.place)
         self.state = replace(state, peak=state.place.multiplier, history=(state.place,))
         if check.bounds.in_equilibrium and check.measured > state.peak:
@@ -343,19 +338,25 @@ class Path:
         Where a place has no equilibrium, shorter steps of reduced viscosity, from the last place that has one, enclose
         the parameter beyond which there is none, to the driver's tolerance.
         """
+        highest = state
         for _ in range(MOST_STEPS):
             if state.place.s >= target * (1.0 - 1e-12):
                 return state, Ending(Status.LIMIT_REACHED)
-            width = state.upper_bound - state.place.s
-            if state.refined and width <= self.driver.tolerance * (1.0 + 1e-9):
+            if state.refined and state.upper_bound - state.place.s <= self.driver.tolerance * (1.0 + 1e-9):
                 return state, Ending(Status.FALLING)
             before = state
             state, outcome = self._step(before, target)
             self.tried = state
             self.on_step(state)
-            last, new = before.place, state.place
-            if new.s > last.s > self.reported and (1.0 - DROP) * last.multiplier > max(state.peak, new.multiplier):
-                return before, Ending(Status.EQUILIBRIUM)
+            last, new, peak = before.place, state.place, highest.place
+            fallen = (1.0 - DROP) * peak.multiplier > max(state.peak, new.multiplier)
+            if fallen and new.s > peak.s > self.reported >= 0.0:
+                return highest, Ending(Status.EQUILIBRIUM)
+            if last.s < self._onset() <= new.s:
+                # From here on a peak is one of the structure, not of its joints' compliance.
+                state = highest = replace(state, peak=new.multiplier)
+            elif new.s < peak.s or new.multiplier >= peak.multiplier:
+                highest = state
             if outcome is not None:
                 return state, outcome
         return state, self.reports.no_step(state.place.s, f"{MOST_STEPS} were tried")
@@ -451,9 +452,8 @@ class Path:
                 places[-1] = replace(resting, works=places[-1].works)
                 break
             bound = min(bound, places.pop().s)
-        place = places[-1]
-        step = (bound - place.s) / 4.0
-        return replace(state, place=place, step=step, upper_bound=bound, refined=False, history=tuple(places[:-1]))
+        step = (bound - places[-1].s) / 4.0
+        return replace(state, place=places[-1], step=step, upper_bound=bound, refined=False, history=tuple(places[:-1]))
 
     def _supports_locked(self, place: Place) -> bool:
         """Whether no movement of the blocks is compatible with that of the supports: the reaction has no bound."""

@@ -212,6 +212,23 @@ def test_the_peak_at_which_a_tie_or_a_joint_breaks_is_told_however_long_incremen
     assert glued.pushover(control).load_multiplier[1] == pytest.approx(glued.limit_load().multiplier, rel=0.01)
 
 
+def test_the_peak_of_a_path_that_hardens_is_told_however_long_increments_are():
+    """A tower beside one half as high, of which the largest multiplier was 0.45 with increments of 100 mm."""
+    corners = [(x, 0.5 * k) for x, n in ((0.0, 4), (0.6, 2)) for k in range(n)]
+    outlines = [[[x, y], [x + 0.6, y], [x + 0.6, y + 0.5], [x, y + 0.5]] for x, y in corners]
+    ground = [[-3, -1], [4, -1], [4, 0], [-3, 0]]
+    assembly = solver.Assembly.from_outlines([*outlines, ground], roles=["free"] * 6 + ["fixed"])
+    given = {"loads": sideways(assembly), "interfaces": solver.Interfaces(solver.InterfaceLaw(1.0))}
+    control = solver.ControlDisplacement(assembly.names[3], (1, 0), increment=0.1, limit=0.03)
+    first, peak, last = mechanics.pushover_increments(assembly, control, **given)
+    assert first.load_multiplier < last.load_multiplier < peak.load_multiplier < first.largest
+    assert peak.certificate.equilibrium_residual < 1e-8
+    finer = mechanics.pushover_increments(assembly, replace(control, increment=0.005, limit=0.02), **given)
+    assert peak.load_multiplier == pytest.approx(max(i.load_multiplier for i in finer), rel=0.01)
+    (again,) = mechanics.pushover_increments(assembly, control, resume=peak.checkpoint, **given)
+    assert again.load_multiplier == last.load_multiplier
+
+
 def beside(interfaces=None, pushed_back=0.0, **structure):
     """A wall 0.4 m wide and 2 m high that touches a block 2 m wide, pushed away from it, and its limit loads."""
     outlines = [[[a, b], [c, b], [c, d], [a, d]] for a, b, c, d in ((0, 0, 0.4, 2), (-2, 0, 0, 2), (-5, -0.5, 5, 0))]
