@@ -100,10 +100,15 @@ def _obj(path: Path) -> dae.Drawn:
     there = {*re.findall(r"^[ \t]*(o|g|usemtl)[ \t]", text, re.MULTILINE)}
     word = next((word for word in _WORDS if word in there), "o")
     said, points, objects = dict.fromkeys(_WORDS, ""), list[list[float]](), dict[str, _Object]()
+    since_face = set[str]()
     for line in text.split("\n"):
         first, *rest = line.split() or [""]
         try:
             if first in _WORDS:
+                if first == "o":
+                    # An object without words of its own has not those of the faces before it.
+                    said = {key: words if key in since_face else "" for key, words in said.items()}
+                since_face.add(first)
                 # SketchUp puts a number before the names of a group and of those around it, and "Model" behind.
                 said[first] = re.sub(r"^Mesh\d+ (.+) Model$", r"\1", " ".join(rest))
             elif first == "v":
@@ -116,6 +121,7 @@ def _obj(path: Path) -> dae.Drawn:
                 one.faces.append([k - 1 if k > 0 else len(points) + k for k in numbers])
                 one.groups.add(said["g"])
                 one.materials.add(said["usemtl"])
+                since_face.clear()
         except ValueError:
             raise ValueError(f"'{path}' cannot be read as .obj ('{line.strip()[:60]}'); export it again") from None
     every, parts = np.array(points).reshape(-1, 3), []

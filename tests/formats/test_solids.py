@@ -325,6 +325,16 @@ def test_groups_and_materials_of_an_obj_file_say_roles(tmp_path, lines, names):
     assert found.groups[1] == ("wall" if "o b" in lines[1] else "")
 
 
+@pytest.mark.parametrize("said", ["usemtl fixed", "g fixed"])
+def test_an_object_has_no_group_or_material_of_the_one_before(tmp_path, said):
+    """Blender writes none of what has none; fixed or free it was by the order of the objects."""
+    lintel, pier = ("o lintel", 3), (f"o pier\n{said}", 2)
+    for objects in ((lintel, pier), (pier, lintel)):
+        found = read_layout(wavefront(tmp_path / "a.obj", *objects), dimension=3)
+        assert dict(zip(found.names, found.roles, strict=True)) == {"pier": "fixed", "lintel": ""}
+        assert found.groups[found.names.index("lintel")] == ""
+
+
 def test_groups_of_an_obj_file_are_asked_for_open_surfaces_too(tmp_path):
     path = wavefront(tmp_path / "a.obj", ("o a\ng wall", 3))
     path.write_text(path.read_text(encoding="utf-8") + "o b\ng dims\nf 1 2 4\n", encoding="utf-8")
