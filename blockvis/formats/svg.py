@@ -94,7 +94,8 @@ class _Context:
     """Context of an element: transform of its parents, layers, largest distance of chords from a curve, and painting.
 
     Layers are groups with a label, the innermost last; where none around has one, those with an id: programs without
-    labels write the name of a layer so, and others give every group one. ``named`` says whether one has a label.
+    labels write the name of a layer so, and others give every group one. An id that is a role counts in any case.
+    ``named`` says whether one has a label.
     Painting are values of the properties by which shapes are painted, which elements have from those around them.
     """
 
@@ -348,10 +349,11 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
 
 
 def _in_group(element: ElementTree.Element, where: _Context) -> _Context:
-    """Add a group to the layers, if it is one."""
-    label = element.get(f"{_INKSCAPE}label", "")
+    """Add a group to the layers, if it is one; an id that is a role was not made up by a program."""
+    label, called = element.get(f"{_INKSCAPE}label", ""), element.get("id", "")
     named = bool(label) or element.get(f"{_INKSCAPE}groupmode") == "layer"
-    label = label or (element.get("id", "") if named or not where.named else "")
+    counts = named or not where.named or called.strip().lower() in mechanics.ROLES
+    label = label or (called if counts else "")
     return replace(where, layers=(*where.layers, label), named=named or where.named) if label else where
 
 

@@ -367,6 +367,12 @@ def test_layers_around_a_layer_are_asked_for_with_it(tmp_path):
     assert read_layout(path, only="fixed").names == ("s",)
 
 
+def test_an_id_that_is_a_role_is_one_within_a_labelled_layer(tmp_path):
+    path = saved(tmp_path, GROUPED.replace('id="g5"', 'id="Fixed"').format('inkscape:label="pad"'), INKSCAPE)
+    assert read_layout(path).groups == ("wall", "Fixed", "pad", "Fixed")
+    assert read(path, supports=()).roles.tolist() == ["free", "fixed", "fixed", "fixed"]
+
+
 def test_ids_of_groups_are_layers_where_none_around_has_a_label(tmp_path):
     path = saved(tmp_path, '<g id="A"><g id="B"><rect width="1" height="1"/></g></g>', 'viewBox="0 0 4 4"')
     assert read_layout(path).groups == ("B",)
