@@ -63,8 +63,12 @@ class Backfill:
         turned = np.einsum("nij,nkj->nki", rotation_matrices(pose.rotations)[self.block], arms)
         return pose.positions[self.block][:, None] + turned
 
-    def load(self, assembly: Assembly, pose: Pose) -> np.ndarray:
-        """(n_blocks, n_dof) array [N, N·m]: what the fill does to each block at a pose, moments about its centroid."""
+    def load(self, assembly: Assembly, pose: Pose, acceleration: np.ndarray | None = None) -> np.ndarray:
+        """(n_blocks, n_dof) array [N, N·m]: what the fill does to each block at a pose, moments about its centroid.
+
+        With an acceleration of each block, (n_blocks, d) in units of gravity, what that does to the columns over it:
+        their weight times it, in the middle of their height.
+        """
         given, d = self.corners(assembly, pose), assembly.dimension
         load = np.zeros((assembly.n_blocks, d + pose.rotations.shape[1]))
         places = _PLACES[d]
@@ -79,6 +83,9 @@ class Backfill:
             along[areas[:, -1] <= 0.0] = 0.0
             pressures = unit_weight * depth @ places.T / d
             points = np.einsum("pk,nkj->npj", places, corners)
+            if acceleration is not None:
+                along = -along[:, -1:] * acceleration[block]
+                points[:, :, -1] = (points[:, :, -1] + level) / 2.0
             for place in range(d):
                 force = pressures[:, place, None] * along
                 arms = cross_rows(points[:, place] - pose.positions[block])

@@ -34,6 +34,8 @@ class Loads:
     dead_arms, live_arms : (n_blocks, d, d) array, optional [N·m]
         Sums of arm ⊗ force over the forces whose points turn with their block, as :meth:`with_forces` adds them. All
         other moments stay as they are.
+    dead_acceleration, live_acceleration : (n_blocks, d) array, optional
+        Of the fill over each block, in units of gravity, as :meth:`with_acceleration` adds them.
     """
 
     dead: np.ndarray
@@ -41,15 +43,23 @@ class Loads:
     fills: tuple[Backfill, ...] = ()
     dead_arms: np.ndarray | None = None
     live_arms: np.ndarray | None = None
+    dead_acceleration: np.ndarray | None = None
+    live_acceleration: np.ndarray | None = None
 
     def dead_at(self, assembly: Assembly, pose: Pose) -> np.ndarray:
         """(n_blocks, n_dof) array: dead load where the blocks are, with that of the fill."""
-        dead = self.dead if self.dead_arms is None else self.dead + turned_moments(self.dead_arms, pose)
-        return sum((fill.load(assembly, pose) for fill in self.fills), dead)
+        return sum((fill.load(assembly, pose) for fill in self.fills), self._at("dead", assembly, pose))
 
-    def live_at(self, pose: Pose) -> np.ndarray:
-        """(n_blocks, n_dof) array: live load where the blocks are."""
-        return self.live if self.live_arms is None else self.live + turned_moments(self.live_arms, pose)
+    def live_at(self, assembly: Assembly, pose: Pose) -> np.ndarray:
+        """(n_blocks, n_dof) array: live load where the blocks are, with what an acceleration does to the fill."""
+        return self._at("live", assembly, pose)
+
+    def _at(self, kind: str, assembly: Assembly, pose: Pose) -> np.ndarray:
+        load, arms, acceleration = (getattr(self, kind + of) for of in ("", "_arms", "_acceleration"))
+        load = load if arms is None else load + turned_moments(arms, pose)
+        if acceleration is None:
+            return np.asarray(load)
+        return sum((fill.load(assembly, pose, acceleration) for fill in self.fills), load)
 
     def without(self, fallen: np.ndarray) -> Loads:
         """Return the loads once blocks, (n_blocks,) bool array, have left with their dead load and fill."""
@@ -63,6 +73,30 @@ class Loads:
             raise ValueError(f"kind of the forces is {kind!r}; it is 'dead' or 'live'")
         arms = added(getattr(self, f"{kind}_arms"), forces.arms(assembly))
         return replace(self, **{kind: getattr(self, kind) + forces.load(assembly), f"{kind}_arms": arms})
+
+    def with_acceleration(
+        self, assembly: Assembly, fraction: Sequence[float], kind: str = "live", blocks: ArrayLike | None = None
+    ) -> Loads:
+        """Add :func:`weight_fraction` of the blocks, and of the fill over them, to the dead or live loads."""
+        load, name = weight_fraction(assembly, fraction, blocks), f"{kind}_acceleration"
+        of_fill = np.zeros_like(assembly.centroids)
+        of_fill[slice(None) if blocks is None else chosen_blocks(assembly, blocks)] = fraction
+        return replace(self, **{kind: getattr(self, kind) + load, name: added(getattr(self, name), of_fill)})
+
+    def note_on_mass(self, assembly: Assembly) -> str:
+        """Say how large dead loads are, downwards, on blocks whose only live load is an acceleration; else nothing."""
+        if self.live_acceleration is None:
+            return ""
+        d, weights = assembly.dimension, (assembly.masses * GRAVITY)[:, None]
+        alone = np.isclose(self.live[:, :d], weights * self.live_acceleration).all(axis=1)
+        alone &= assembly.free & self.live_acceleration.any(axis=1)
+        beyond = np.maximum(-self.dead[:, d - 1] - weights[:, 0], 0.0)[alone].sum()
+        if beyond <= 1e-9 * weights.sum():
+            return ""
+        return (
+            f"the acceleration acts on the blocks and the fill over them; {beyond:.6g} N of other dead loads on them "
+            "have no mass: where they have, give them as live loads, too"
+        )
 
 
 def self_weight(assembly: Assembly) -> Loads:
@@ -393,6 +427,7 @@ def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: Array
     Returns
     -------
     (n_blocks, n_dof) array [N, N·m]
+        Of the blocks; fill over them has its part by :meth:`Loads.with_acceleration`.
     """
     load, parts, d = _no_load(assembly), numbers_of(fraction, "a fraction of the weight"), assembly.dimension
     chosen = slice(None) if blocks is None else chosen_blocks(assembly, blocks)
@@ -446,7 +481,9 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
     shape, loads = _no_load(assembly).shape, checked(loads, Loads, "loads")
     components = "fx, fy, moment" if assembly.dimension == 2 else "fx, fy, fz, mx, my, mz"
     of_arms = (*assembly.centroids.shape, assembly.dimension), "arm ⊗ force"
-    wanted = {"dead": (shape, components), "live": (shape, components), "dead_arms": of_arms, "live_arms": of_arms}
+    of_fill = assembly.centroids.shape, "one number per axis, in units of gravity"
+    wanted = {"": (shape, components), "_arms": of_arms, "_acceleration": of_fill}
+    wanted = {f"{kind}{of}": values for of, values in wanted.items() for kind in ("dead", "live")}
     arrays: dict[str, Any] = {
         name: numbers_of(given, f"{name} loads") for name in wanted if (given := getattr(loads, name)) is not None
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,8 @@ class PhaseChange:
         Dead loads that are added from then on.
     dead_arms : (n_blocks, d, d) array, optional [N·m]
         Of those of them that are forces at points, as in :class:`Loads`.
+    dead_acceleration : (n_blocks, d) array, optional
+        That is added, of the fill over each block, likewise.
     ties : tuple of str
         Names of ties that are taken away.
     """
@@ -34,11 +37,13 @@ class PhaseChange:
     dead: np.ndarray | None = None
     ties: tuple[str, ...] = ()
     dead_arms: np.ndarray | None = None
+    dead_acceleration: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         """Make arrays of its own of what is given: the caller may fill theirs again."""
         object.__setattr__(self, "ties", plain(self.ties, "Sequence[str]", "ties of a change"))
-        for name, kind in (("removed", bool), ("dead", float), ("dead_arms", float)):
+        kinds = {"removed": bool, "dead": float, "dead_arms": float, "dead_acceleration": float}
+        for name, kind in kinds.items():
             if (given := getattr(self, name)) is not None:
                 object.__setattr__(self, name, numbers_of(given, f"{name} of a change").astype(kind))
 
@@ -57,6 +62,7 @@ def loads_in(loads: Loads, changes: Sequence[PhaseChange], phase: int) -> Loads:
     """Return the loads during a settlement, by its number from 0."""
     for change in changes:
         if change.phase <= phase and change.dead is not None:
-            arms = added(loads.dead_arms, change.dead_arms)
-            loads = replace(loads, dead=loads.dead + change.dead, dead_arms=arms)
+            names = ("dead", "dead_arms", "dead_acceleration")
+            more: dict[str, Any] = {name: added(getattr(loads, name), getattr(change, name)) for name in names}
+            loads = replace(loads, **more)
     return loads

@@ -18,7 +18,7 @@ from .analysis.settlement import settlement_increments
 from .assembly import Assembly
 from .interfaces import InterfaceLaw, Interfaces, uniform
 from .kinematics import Pose
-from .loads import Loads, PointForces, Settlement, checked_loads, weight_fraction
+from .loads import Loads, PointForces, Settlement, checked_loads
 from .path.controls import Controls
 from .path.drivers import ControlDisplacement
 from .phases import PhaseChange
@@ -94,16 +94,20 @@ class Structure(Shown):
         ----------
         live : (n_blocks, n_dof) array [N, N·m] or PointForces, optional
         acceleration : (d,) sequence, optional
-            Instead: in units of gravity, of every block; (1, 0) pushes to the right with its weight.
+            Instead: in units of gravity, of every block and the fill over it; (1, 0) pushes to the right with their
+            weight. Other dead loads have no mass: a warning tells them.
         """
         if (live is None) == (acceleration is None):
             raise TypeError("with_live needs either the live loads or an acceleration; give one of them")
+        none = replace(self.loads, live=np.zeros_like(self.loads.dead), live_arms=None, live_acceleration=None)
         if acceleration is not None:
-            live = weight_fraction(self.assembly, acceleration)
+            accelerated = none.with_acceleration(self.assembly, acceleration)
+            if note := accelerated.note_on_mass(self.assembly):
+                warnings.warn(note, stacklevel=2)
+            return replace(self, loads=accelerated)
         if isinstance(live, PointForces):
-            none = replace(self.loads, live=np.zeros_like(self.loads.dead), live_arms=None)
             return replace(self, loads=none.with_forces(self.assembly, live, "live"))
-        return replace(self, loads=replace(self.loads, live=numbers_of(live, "live loads"), live_arms=None))
+        return replace(self, loads=replace(none, live=numbers_of(live, "live loads")))
 
     def settle(
         self,
@@ -236,8 +240,9 @@ class Structure(Shown):
         Parameters
         ----------
         acceleration : (d,) sequence, optional
-            Instead of the live loads of the structure: of every block, in units of gravity; the multiplier is then
-            the acceleration. For the other direction give minus this one.
+            Instead of the live loads of the structure: of every block and the fill over it, in units of gravity; the
+            multiplier is then the acceleration. Other dead loads have no mass, see :meth:`with_live`. For the other
+            direction give minus this one.
         pose : Pose, optional
             The geometry: that of an increment gives the capacity left after a settlement, with its ``ties``, ``bonds``
             and ``fallen``. The drawing by default.

@@ -287,6 +287,8 @@ def case_interfaces(case: Case) -> solver.Interfaces:
 def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
     """Sum self-weight and the loads of a case that do not move [N, N·m], and lay its fill over the blocks."""
     loads = loads_of(case.loads, assembly, case.source, gone_in(case.removals, assembly, 1))
+    if note := loads.note_on_mass(assembly):
+        warnings.warn(f"{case.source}: {note}", stacklevel=2)
     return replace(loads, fills=backfills(case.backfills, assembly))
 
 
@@ -301,7 +303,14 @@ def case_changes(case: Case, assembly: solver.Assembly, ties: Sequence[solver.Ti
     ]
     for phase in sorted({load.phase for load in case.loads} - {1}):
         added = loads_of(case.loads, assembly, case.source, gone_in(case.removals, assembly, phase), phase)
-        changes.append(solver.PhaseChange(phase - 1, dead=added.dead, dead_arms=added.dead_arms))
+        changes.append(
+            solver.PhaseChange(
+                phase - 1,
+                dead=added.dead,
+                dead_arms=added.dead_arms,
+                dead_acceleration=added.dead_acceleration,
+            )
+        )
     return tuple(changes)
 
 

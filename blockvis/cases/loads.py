@@ -80,9 +80,10 @@ def loads_of(
         named = _named(load, assembly, taken, f"{source}: [loads {number + 1}] blocks")
         chosen = named[~taken[named]]
         if load.weight_fraction is not None:
-            loads = _plus(loads, load.kind, solver.weight_fraction(assembly, load.weight_fraction, chosen))
+            loads = loads.with_acceleration(assembly, load.weight_fraction, load.kind, chosen)
         for block in _loaded(load, named, taken, assembly, f"{source}: [loads {number + 1}]"):
-            loads = _plus(loads, load.kind, solver.point_load(assembly, block, moment=load.moment))
+            moment = solver.point_load(assembly, block, moment=load.moment)
+            loads = replace(loads, **{load.kind: getattr(loads, load.kind) + moment})
             if load.has_force:
                 point = assembly.centroids[block] if load.point is None else load.point
                 loads = loads.with_forces(assembly, solver.PointForces.at(block, load.force, point), load.kind)
@@ -100,11 +101,6 @@ def loads_of(
                 forces = solver.edge_force(assembly, block, load.edge - 1, load.pressure)
                 loads = loads.with_forces(assembly, forces, load.kind)
     return loads
-
-
-def _plus(loads: solver.Loads, kind: str, more: np.ndarray) -> solver.Loads:
-    """Add loads whose moments stay as they are."""
-    return replace(loads, dead=loads.dead + more) if kind == "dead" else replace(loads, live=loads.live + more)
 
 
 def moving_loads(

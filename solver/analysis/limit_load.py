@@ -297,8 +297,9 @@ def remaining(assembly: Assembly, fallen: np.ndarray | None) -> Assembly:
 def checked_live(assembly: Assembly, loads: Loads) -> Loads:
     """The loads, checked, with live loads on at least one free block; those on supports are taken off."""
     loads = checked_loads(assembly, loads)
-    live = np.where(assembly.free[:, None], loads.live, 0.0)
-    if not live.any():
+    free = assembly.free[:, None]
+    if not (loads.live_at(assembly, Pose.initial(assembly)) * free).any():
         raise ValueError("no live load acts on any free block; give an acceleration, or Loads whose 'live' is not zero")
-    arms = None if loads.live_arms is None else np.where(assembly.free[:, None, None], loads.live_arms, 0.0)
-    return replace(loads, live=live, live_arms=arms)
+    of = {"live": free, "live_arms": free[:, :, None], "live_acceleration": free}
+    live = {name: kept * given for name, kept in of.items() if (given := getattr(loads, name)) is not None}
+    return replace(loads, **live)

@@ -195,7 +195,8 @@ def _check_changes(
         if checked(change, PhaseChange, "one of the changes").phase not in range(len(phases)):
             raise ValueError(f"phase of a change is {change.phase}; give a whole number, 0 to {len(phases) - 1}")
         if change.dead is not None:
-            checked_loads(assembly, Loads(change.dead, change.dead, dead_arms=change.dead_arms))
+            beside = (change.dead_arms, None, change.dead_acceleration)
+            checked_loads(assembly, Loads(change.dead, change.dead, (), *beside))
         if change.removed is not None and np.shape(change.removed) != (assembly.n_blocks,):
             raise ValueError(f"removed has shape {np.shape(change.removed)}; give one per block, {assembly.n_blocks}")
         for name in change.ties:

@@ -55,6 +55,11 @@ class Model:
         """(n_blocks, n_dof) array [N, N·m]: dead load with the blocks as drawn."""
         return self.loads.dead_at(self.assembly, Pose.initial(self.assembly))
 
+    @cached_property
+    def live(self) -> np.ndarray:
+        """(n_blocks, n_dof) array [N, N·m]: live load with the blocks as drawn."""
+        return self.loads.live_at(self.assembly, Pose.initial(self.assembly))
+
     @property
     def n_dof(self) -> int:
         """Degrees of freedom of a block: 3 in the plane, 6 in space."""
@@ -79,8 +84,8 @@ class Model:
         free, units = self.assembly.free[:, None], self.force * unit_lengths(self.n_dof, self.length)
         if not self.has_live:
             return np.zeros((len(free), self.n_dof)), 0.0
-        size = float(np.abs(np.where(free, self.loads.live / units, 0.0)).max(initial=0.0))
-        return np.where(free, self.loads.live_at(pose) / units, 0.0) / (size or 1.0), size
+        size = float(np.abs(np.where(free, self.live / units, 0.0)).max(initial=0.0))
+        return np.where(free, self.loads.live_at(self.assembly, pose) / units, 0.0) / (size or 1.0), size
 
     @cached_property
     def total_load(self) -> float:
@@ -90,4 +95,4 @@ class Model:
     @property
     def live_force(self) -> float:
         """Resultant of the live loads at a multiplier of 1 [N]; zero without."""
-        return float(np.linalg.norm(self.loads.live[:, : self.dimension].sum(axis=0))) if self.has_live else 0.0
+        return float(np.linalg.norm(self.live[:, : self.dimension].sum(axis=0))) if self.has_live else 0.0

@@ -134,7 +134,9 @@ def test_fills_over_the_same_blocks_lie_one_on_another(tmp_path: Path) -> None:
     for layers in ((pressing | {"surface": "1.4"}, {}), ({}, pressing | {"surface": "1.4"})):
         loads = filled(*layers)[1]
         for pose in (start, sunk):
+            pushed = [of.with_acceleration(assembly, (1.0, 0.0)).live_at(assembly, pose) for of in (loads, whole)]
             np.testing.assert_allclose(loads.dead_at(assembly, pose), whole.dead_at(assembly, pose), atol=1e-9)
+            np.testing.assert_allclose(*pushed, atol=1e-9)
     heavy, light = (fill.weight(assembly) for fill in filled({"surface": "1.4"}, {"unit_weight": "9000.0"})[1].fills)
     (low,) = (fill.weight(assembly) for fill in filled({"surface": "1.4"})[1].fills)
     (all_light,) = (fill.weight(assembly) for fill in filled({"unit_weight": "9000.0"})[1].fills)
@@ -212,3 +214,63 @@ def test_fill_of_lists_is_that_of_arrays() -> None:
     assert listed.load(assembly, pose).tolist() == fill.load(assembly, pose).tolist()
     with pytest.raises(ValueError, match="a fill has the thickness of its pieces in the plane"):
         solver.Backfill(fill.pieces, fill.block, 2.0, WEIGHT)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_an_acceleration_acts_on_the_fill_in_the_middle_of_its_columns(dimension: int) -> None:
+    """1 m² or m³ over a block that turned: half of it, as high on average, stands on each half of its top."""
+    if dimension == 2:
+        block = solver.Assembly.from_outlines([rectangle(0.0, 0.0, 1.0, 1.0)])
+    else:
+        block = solver.Assembly.from_solids([box([0, 0, 0], [1, 1, 1])])
+    loads = replace(solver.self_weight(block), fills=(lay(block, "*", 2.0, 0.4),))
+    along = np.eye(dimension)[0]
+    loads = loads.with_acceleration(block, 0.5 * along).with_acceleration(block, -2.0 * along, "dead")
+    start = solver.Pose.initial(block)
+    own = solver.weight_fraction(block, along)[0, 0]
+    pushed, alone = loads.live_at(block, start)[0], solver.self_weight(block).dead
+    turning = 2 if dimension == 2 else 4
+    assert pushed[0] == pytest.approx(0.5 * (own + WEIGHT))
+    # 1 m above the centroid, clockwise in the plane.
+    assert abs(pushed[turning]) == pytest.approx(0.5 * WEIGHT)
+    given = loads.dead_at(block, start) - replace(loads, dead=alone, dead_acceleration=None).dead_at(block, start)
+    np.testing.assert_allclose(given, -4.0 * loads.live_at(block, start), atol=1e-9)
+    # Sunk by 0.2 m, under 1.2 m.
+    sunk = solver.Pose(start.positions - 0.2 * np.eye(dimension)[-1], start.rotations)
+    assert loads.live_at(block, sunk)[0, 0] == pytest.approx(0.5 * (own + 1.2 * WEIGHT))
+    assert abs(loads.live_at(block, sunk)[0, turning]) == pytest.approx(0.5 * 1.2 * WEIGHT * 1.1)
+
+
+DRAWN, MOVED = CASE.split("[settlement]")
+FILLED = "[[backfill]]\n" + "\n".join(f"{key} = {value}" for key, value in FILL.items()) + "\n"
+PUSHED = f'{DRAWN}{FILLED}[analysis]\nkind = "limit load"\n[[loads]]\nkind = "live"\nweight_fraction = [0.5, 0.0]\n'
+
+
+@pytest.mark.slow
+def test_a_weight_fraction_is_one_of_the_fill_over_its_blocks_too(tmp_path: Path) -> None:
+    response = run_case(case_from(f'{PUSHED}blocks = "voussoir 3"\n'), tmp_path, outputs=[]).response
+    assembly, start = response.assembly, solver.Pose.initial(response.assembly)
+    third = np.arange(assembly.n_blocks) == assembly.index("voussoir 3")
+    weights = -response.loads.dead_at(assembly, start)[:, 1]
+    np.testing.assert_allclose(response.loads.live_at(assembly, start)[:, 0], 0.5 * weights * third)
+    assert response.limits[0].live_force == pytest.approx(0.5 * weights[third].sum())
+
+
+def test_a_weight_fraction_that_begins_with_a_settlement_is_one_of_the_fill(tmp_path: Path) -> None:
+    phases = f"[[settlement]]{MOVED}{SHORT}[[settlement]]{MOVED}{SHORT}"
+    later = "[[loads]]\nweight_fraction = [0.01, 0.0]\nphase = 2\n"
+    response = run_case(case_from(DRAWN + FILLED + phases + later), tmp_path, outputs=[]).response
+    dead = response.dead_at(response.path[-1])
+    np.testing.assert_allclose(dead[:, 0], -0.01 * dead[:, 1] * response.assembly.free, atol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("beside", ["", '[[loads]]\nkind = "live"\nforce = [2000.0, 0.0]\nblocks = "voussoir 3"\n'])
+def test_dead_loads_that_an_acceleration_leaves_alone_are_told(
+    beside: str, tmp_path: Path, recwarn: pytest.WarningsRecorder
+) -> None:
+    dead = '[[loads]]\nforce = [0.0, -2000.0]\nblocks = "voussoir 3"\n'
+    run_case(case_from(PUSHED + dead + beside), tmp_path, outputs=[])
+    told = [str(one.message) for one in recwarn if "have no mass" in str(one.message)]
+    assert len(told) == (not beside)
+    assert all("2000 N of other dead loads" in one for one in told)

@@ -272,3 +272,10 @@ def test_what_has_no_equilibrium_has_no_first_reaction():
     response = solver.settle(loose, solver.Settlement((0, -1)))
     assert response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
     assert np.isnan(response.initial_reaction)
+
+
+def test_dead_loads_without_mass_are_told_of_an_acceleration(block):
+    dead = solver.self_weight(block).with_forces(block, solver.PointForces.at(1, (0.0, -500.0), (0.5, 1.0)))
+    structure = solver.Structure(block, loads=dead, friction_coefficient=0.5)
+    with pytest.warns(UserWarning, match="500 N of other dead loads on them have no mass"):
+        structure.limit_load(acceleration=(1, 0))
