@@ -259,7 +259,7 @@ class Structure(Shown):
             Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
         torsion : {"points", "uniform"}
             What a face of blocks in space resists when it turns in its own plane: what friction at its contact
-            points does, or what it does under a uniform pressure, which is up to 1.85 times less.
+            points does, or no more than under a uniform pressure, which is up to 1.85 times less.
         ties_at : TieForces, optional
             ``ties`` of the increment that the pose is from, which tell what is broken, and what is slack and by how
             much: that carries as an open joint does. By default all, none of a later phase, carry up to their strength.

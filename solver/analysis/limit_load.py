@@ -21,9 +21,9 @@ from solver.program.model import Model, mean_load
 from solver.program.non_associative import non_associative_limit
 from solver.program.static_program import ProgramState, StaticProgram
 from solver.program.strength import ForceLimits, crushing_forces
-from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces, point_forces
+from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces
 from solver.programs.problem import Unbounded
-from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
+from solver.results.certificate import Certificate, carrying_gap, largest_penetration
 from solver.results.increment import Bonds, State
 from solver.results.response import LimitLoad, LimitStatus
 from solver.ties import (
@@ -90,9 +90,8 @@ def find_limit_load(
     optimum of this program.
 
     Under a uniform pressure the shear force T and the torsion M of a face, about the centroid of the polygon that its
-    contact points span, are limited together: |(T, M / r)| ≤ μ N with N the sum over its points and r the mean distance
-    of the polygon from its centroid, which is exact for T alone and for M alone. Forces are then reported at the points
-    with the same resultants; single ones may be beyond friction.
+    contact points span, are limited together, besides the forces at its points: |(T, M / r)| ≤ μ N with N the sum over
+    its points and r the mean distance of the polygon from its centroid, which is exact for T alone and for M alone.
 
     Non-associative flow is a sequence of such programs in the manner of Gilbert, Casapulla & Ahmed (2006),
     https://doi.org/10.1016/j.compstruc.2006.02.005: the friction cone of each point is replaced by |T| ≤ μ N⁰ with N⁰
@@ -221,7 +220,7 @@ class _Problem:
         """The state in metres and newtons, its bounds and its certificate recomputed from it."""
         program, model, multiplier = self.program, self.program.model, state.multiplier
         if status is LimitStatus.UNBOUNDED:
-            state = replace(state, velocity=np.zeros_like(state.velocity))
+            state = replace(state, velocity=np.zeros_like(state.velocity), face_rates=0.0)
         velocity, (kinematic, violation) = state.velocity, program.kinematic(state)
         balance = program.matrix @ state.forces.ravel() + program.dead + multiplier * program.live
         total, crushing = model.total_load or 1.0, program.limits.beyond_least
@@ -230,8 +229,7 @@ class _Problem:
         mechanism /= unit_lengths(model.n_dof, model.length)
         found = status not in (LimitStatus.UNBOUNDED, LimitStatus.NO_EQUILIBRIUM)
         static = multiplier * program.unit
-        forces = state.forces if program.faces is None else point_forces(program.contacts, program.faces, state.forces)
-        forces = forces + program.least
+        forces = state.forces + program.least
         nothing = np.inf if status is LimitStatus.UNBOUNDED else np.nan
         in_place = replace(program.contacts, gaps=self.gaps)
         return LimitLoad(
@@ -239,7 +237,7 @@ class _Problem:
             bounds=(static, kinematic * program.unit) if found else (nothing, nothing),
             certificate=Certificate(
                 equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / total,
-                friction_excess=friction_excess(state.forces, program.friction, program.limits.cohesion) / total,
+                friction_excess=program.friction_excess(state.forces, program.limits.cohesion) / total,
                 carrying_gap=carrying_gap(in_place, forces),
                 largest_penetration=largest_penetration(in_place),
                 duality_gap=abs(kinematic - multiplier) / (1.0 + abs(multiplier)) if found else state.gap,

@@ -9,10 +9,10 @@ import scipy.sparse as sp
 
 from solver.programs.problem import LinearProgram, SolveError
 from solver.programs.solve import solve_between
-from solver.results.certificate import friction_excess
 from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, FALLING_FRACTION
 
 from .static_program import ProgramState, StaticProgram
+from .torsion import face_cones
 
 #: Part of the new normal forces in the next program where they hardly depend on the last ones,
 #: and where they do, as in vaults, whose programs go in circles with more; programs at most.
@@ -64,7 +64,7 @@ def non_associative_limit(
                 raise
             break
         largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
-        excess = friction_excess(state.forces, program.friction, program.limits.cohesion) / largest
+        excess = program.friction_excess(state.forces, program.limits.cohesion) / largest
         change = abs(_gained(program, state, normal))
         error = np.inf if state.falls else max(excess, change)
         settled = excess <= most_excess and change <= ACCEPTED_ERROR and not state.falls
@@ -73,7 +73,7 @@ def non_associative_limit(
         if settled or (least <= FRICTION_EXCESS and number - best_at == NO_NEARER):
             break
         added, error = state.forces - forces, FRICTION_EXCESS_IN_SPACE * largest
-        within = friction_excess(added, program.friction) <= error + FRICTION_EXCESS * float(np.abs(added).max())
+        within = program.friction_excess(added) <= error + FRICTION_EXCESS * float(np.abs(added).max())
         locks = within and state.multiplier > multiplier
         locked |= locks
         if not bounded and ((locks and number >= PLAIN_PROGRAMS) or (locked and largest * FRICTION_EXCESS > 1.0)):
@@ -89,7 +89,7 @@ def non_associative_limit(
     assert nearest is not None
     if converged and not plane:
         free = _sliding(program, used, unbalanced, 0.0 * change_cost)
-        nearest = replace(nearest, velocity=free.velocity, gap=free.gap)
+        nearest = replace(nearest, velocity=free.velocity, face_rates=free.face_rates, gap=free.gap)
     return nearest, converged
 
 
@@ -98,7 +98,7 @@ def _gained(program: StaticProgram, state: ProgramState, normal: np.ndarray) -> 
 
     As a part of the multiplier and of what friction takes.
     """
-    slip = np.linalg.norm((program.matrix.T @ state.velocity).reshape(-1, program.size)[:, 1:], axis=1)
+    _, slip = program.rates(state)
     gain = float((program.friction * (state.forces[:, 0] - normal)) @ slip)
     taken = float((program.limits.cohesion + program.friction * normal) @ slip)
     return gain / max(abs(state.multiplier) + taken, 1e-300)
@@ -122,7 +122,7 @@ def _sliding(
 
     Columns: the shear forces, N, p, m, α and unbalanced forces, with N - N⁰ = p - m, and a row N for each point
     that may crush. In the plane T = (u - v) / 2 of columns u + v = 2 B; in space the disc |T| ≤ B is the cone
-    |T| ≤ B s with s = 1.
+    |T| ≤ B s with s = 1, and faces that resist torsion are limited by the sum of B over their points.
     """
     program.programs += 1
     n, rows, size, plane = len(normal), len(program.dead), program.size, program.size == 2
@@ -143,6 +143,18 @@ def _sliding(
         to_shear = program.matrix @ shears
         level = sp.csr_array((np.ones(n), (np.arange(n), size * np.arange(n))), shape=(n, size * n))
         level_is, slopes, slack = np.ones(n), np.ones(n), np.zeros(rows)
+    part: np.ndarray | float = 0.0
+    if program.faces is not None and program.shares is not None:
+        # What faces carry is in parts of what they may carry, as that of points is.
+        most = np.bincount(program.faces.face, bound)
+        part = np.divide(1.0, most, out=np.zeros_like(most), where=most > CARRYING_FRACTION * most.max())[:, None]
+        of_points = sp.diags_array(np.repeat(part, 5)) @ -program.shares @ shears
+        level = sp.block_array([[of_points, face_cones(len(most))], [level, None]], format="csr")
+        level_is, slopes = (
+            np.append(np.tile([0.0, 0.0, 0.0, 0.0, 1.0], len(most)), level_is),
+            np.ones(n + 2 * len(most)),
+        )
+        shears, to_shear = (sp.hstack([of, sp.csr_array((of.shape[0], 6 * len(most)))]) for of in (shears, to_shear))
     first = shears.shape[1]
     blocks = [
         [to_shear, program.matrix[:, 0::size], None, None, sp.csr_array(program.live[:, None]), identity, -identity],
@@ -164,7 +176,8 @@ def _sliding(
     forces = np.column_stack([x[:n], shear[:, int(not plane) :]])
     multiplier, left = float(x[3 * n]), x[3 * n + 1 :][: 2 * rows].max(initial=0.0)
     falls = bool(left > FALLING_FRACTION * program.model.total_load)
-    return ProgramState(forces, multiplier, -solution.row_dual[:rows], solution.gap, falls=falls, drag=bound)
+    velocity, face_rates = -solution.row_dual[:rows], program.face_rates(solution) * part
+    return ProgramState(forces, multiplier, velocity, solution.gap, falls=falls, drag=bound, face_rates=face_rates)
 
 
 def _next_normal(tried: list[tuple[np.ndarray, np.ndarray]], extrapolated: bool) -> np.ndarray:

@@ -14,11 +14,12 @@ from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.programs.problem import LinearProgram, Solution, SolveError, Unbounded
 from solver.programs.solve import solve_between
+from solver.results.certificate import friction_excess
 from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, FALLING_FRACTION
 
 from .model import Model
 from .strength import Admissible, ForceLimits
-from .torsion import Faces, face_wrench_matrix
+from .torsion import Faces, face_shares
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,8 @@ class ProgramState:
     falls: bool = False
     #: (n_contacts,): friction force that slip works against without being in the normal forces' power.
     drag: np.ndarray | None = None
+    #: (n_faces, 3): slips and turn times radius of faces that resist torsion, beside those of their points.
+    face_rates: np.ndarray | float = 0.0
 
 
 class StaticProgram:
@@ -73,7 +76,7 @@ class StaticProgram:
         In which the live load may act, if any.
     rate : (n_blocks, n_dof) array, optional
     faces : Faces, optional
-        That resist torsion in place of their points.
+        That resist torsion as under a uniform pressure, and no more.
     exact : bool
         Whether a mechanism is sought: in the plane solutions are vertices, then, and balanced to the last digit.
     """
@@ -94,9 +97,9 @@ class StaticProgram:
     ) -> None:
         self.model, self.pose, self.contacts, self.faces = model, pose, contacts, faces
         self.friction, self.limits, self.price, self.senses, self.exact = friction, limits, price, senses, exact
-        self.size, self.programs = model.dimension + (faces is not None), 0
-        free, at = np.repeat(model.assembly.free, model.n_dof), (pose, model.length)
-        rows = wrench_matrix(contacts, *at) if faces is None else face_wrench_matrix(contacts, faces, *at)
+        self.size, self.programs = model.dimension, 0
+        free, rows = np.repeat(model.assembly.free, model.n_dof), wrench_matrix(contacts, pose, model.length)
+        self.shares = None if faces is None else face_shares(contacts, faces, friction)
         self.matrix = sp.csr_array(rows)[free]  # (n_rows, size n)
         self.least = limits.least[:, None] * np.eye(model.dimension)[0]
         self.dead = model.scaled_load_at(pose).ravel()[free] + self.matrix[:, :: self.size] @ limits.least
@@ -106,7 +109,8 @@ class StaticProgram:
         speed = float(np.abs(along).max(initial=0.0)) or 1.0
         self.live, self.work = live.ravel()[free], rows.T @ along / speed
         self.unit = 1.0 / live_size if senses else model.force * model.length * speed
-        self.carried = Admissible.of(friction, limits.cohesion, limits.beyond_least, self.size)
+        of_joints = friction, limits.cohesion, limits.beyond_least
+        self.carried = Admissible.of(*of_joints, self.size, faces, self.shares)
 
     def bounds(self) -> EquilibriumBounds:
         """Bound the reaction or the multiplier of all equilibria within friction.
@@ -180,11 +184,11 @@ class StaticProgram:
         Infinite where the live load has no power.
         """
         velocity = state.velocity
-        relative, live_power = (self.matrix.T @ velocity).reshape(-1, self.size), float(self.live @ velocity)
+        (relative, slip), live_power = self.rates(state), float(self.live @ velocity)
         # Points that are open may close by their gap in a motion whose live power is 1.
         relative[:, 0] += self.price * max(live_power, 0.0)
         drag, slope = (self.limits.cohesion, self.friction) if state.drag is None else (state.drag, 0.0)
-        slip, strength = np.linalg.norm(relative[:, 1:], axis=1), self.limits.beyond_least
+        strength = self.limits.beyond_least
         # What crushes may come closer than what is rigid, at the price of its strength.
         brittle = np.isfinite(strength)
         closer = np.where(brittle, np.maximum(slope * slip - relative[:, 0], 0.0), 0.0)
@@ -192,6 +196,34 @@ class StaticProgram:
         value = (taken - float(self.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
         missing = np.maximum(slope * slip - closer - relative[:, 0], 0.0)
         return value + float(self.price @ state.forces[:, 0]), float(missing.max(initial=0.0))
+
+    def rates(self, state: ProgramState) -> tuple[np.ndarray, np.ndarray]:
+        """(n, size) and (n,) arrays: at which points open and slip in a mechanism, and what friction works against."""
+        relative = (self.matrix.T @ state.velocity).reshape(-1, self.size)
+        if self.faces is None or self.shares is None:
+            return relative, np.linalg.norm(relative[:, 1:], axis=1)
+        of_faces = np.zeros((len(self.faces.radii), 5))
+        of_faces[:, :3] = state.face_rates
+        relative -= (self.shares.T @ of_faces.ravel()).reshape(relative.shape)
+        # What a face does by itself is taken from the friction of all of its points.
+        return relative, np.linalg.norm(relative[:, 1:], axis=1) + np.linalg.norm(of_faces, axis=1)[self.faces.face]
+
+    def friction_excess(self, forces: np.ndarray, cohesion: np.ndarray | float = 0.0) -> float:
+        """Largest shear force of a point, or shear and torsion of a face, beyond friction and cohesion."""
+        excess = friction_excess(forces, self.friction, cohesion)
+        if self.faces is None:
+            return excess
+        of_faces = (self.shares @ forces.ravel()).reshape(-1, 5)
+        added = np.bincount(self.faces.face, np.broadcast_to(cohesion, len(forces)))
+        beyond = np.linalg.norm(of_faces[:, :3], axis=1) - of_faces[:, 4] - added
+        return max(excess, float(beyond.max(initial=0.0)))
+
+    def face_rates(self, solution: Solution) -> np.ndarray | float:
+        """(n_faces, 3) array: what faces do by themselves, of rows of theirs that follow those of balance."""
+        if self.faces is None:
+            return 0.0
+        rows = len(self.dead) + np.arange(5 * len(self.faces.radii)).reshape(-1, 5)[:, :3]
+        return np.asarray(-solution.row_dual[rows])
 
     def nearest(
         self, reference: np.ndarray, compliance: np.ndarray, multiplier: float = 0.0, reaction: float | None = None
@@ -245,4 +277,5 @@ class StaticProgram:
         columns, rows, k = self.carried.columns, len(self.dead), len(self.senses)
         x, beside = np.split(solution.x, [columns.shape[1]])
         forces, multiplier = (columns @ x).reshape(-1, self.size), float(np.dot(self.senses, beside[:k]))
-        return ProgramState(forces, multiplier, -solution.row_dual[:rows], solution.gap)
+        velocity, face_rates = -solution.row_dual[:rows], self.face_rates(solution)
+        return ProgramState(forces, multiplier, velocity, solution.gap, face_rates=face_rates)

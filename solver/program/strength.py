@@ -12,6 +12,8 @@ from solver.equilibrium import friction_rays
 from solver.geometry.contacts import Contacts
 from solver.interfaces import Interfaces
 
+from .torsion import Faces, face_cones
+
 
 def crushing_forces(assembly: Assembly, interfaces: Interfaces, contacts: Contacts) -> np.ndarray:
     """(n_contacts,) array [N]: largest normal force of each contact point, infinite where nothing crushes."""
@@ -46,8 +48,8 @@ class ForceLimits:
 class Admissible:
     """The forces that n contact points can carry: columns with coefficients of at least 0, and limits on these.
 
-    The limits are 0 ≤ limits · coefficients ≤ most. Friction has the slopes of the round cones, of as many numbers as a
-    force, that the first coefficients are in; none in the plane.
+    The limits are 0 ≤ limits · coefficients ≤ most; those of faces come first. Friction has the slopes of the round
+    cones, of as many numbers as a force, that the first coefficients are in; none in the plane.
     """
 
     columns: sp.csc_array  #: (size n, m)
@@ -57,12 +59,20 @@ class Admissible:
     friction: np.ndarray  #: (j,)
 
     @classmethod
-    def of(cls, friction: np.ndarray, cohesion: np.ndarray, crushing: np.ndarray, size: int) -> Admissible:
+    def of(
+        cls,
+        friction: np.ndarray,
+        cohesion: np.ndarray,
+        crushing: np.ndarray,
+        size: int,
+        faces: Faces | None = None,
+        shares: sp.csr_array | None = None,
+    ) -> Admissible:
         """All (N, T) with 0 ≤ N ≤ crushing and |T| ≤ friction · N + cohesion, (n,) arrays each.
 
         In the plane the cone of dry friction is spanned by its two rays; cohesion adds a shear force of either sign. In
         space forces of ``size`` numbers are in a round cone; cohesion adds one of slope 1 whose first number has no
-        effect but to be limited.
+        effect but to be limited. Faces with the shares of :func:`face_shares` in them add two cones each.
         """
         n = len(friction)
         sticky, brittle = np.flatnonzero(cohesion > 0.0), np.flatnonzero(np.isfinite(crushing))
@@ -73,9 +83,18 @@ class Admissible:
             columns = sp.csc_array(sp.hstack([sp.eye_array(size * n, format="csc"), added], format="csc"))
             limited = np.concatenate([size * (n + np.arange(p)), size * brittle])
             limits = sp.csc_array((np.ones(p + q), (np.arange(p + q), limited)), shape=(p + q, columns.shape[1]))
-            most = np.concatenate([cohesion[sticky], crushing[brittle]])
+            most, of = np.concatenate([cohesion[sticky], crushing[brittle]]), np.concatenate([sticky, brittle])
             slopes = np.concatenate([friction, np.ones(p)])
-            return cls(columns, limits, most, np.concatenate([sticky, brittle]), slopes)
+            if faces is None:
+                return cls(columns, limits, most, of, slopes)
+            f = len(faces.radii)
+            # Cohesion adds to the friction of its face.
+            adds = (np.ones(p), (5 * faces.face[sticky] + 4, size * (n + np.arange(p))))
+            of_points = shares @ columns + sp.coo_array(adds, shape=(5 * f, columns.shape[1]))
+            limits = sp.csc_array(sp.block_array([[-of_points, face_cones(f)], [limits, None]], format="csc"))
+            columns = sp.csc_array(sp.hstack([columns, sp.csc_array((size * n, 6 * f))], format="csc"))
+            of = np.append(np.repeat(faces.first, 5), of)
+            return cls(columns, limits, np.append(np.zeros(5 * f), most), of, np.append(slopes, np.ones(2 * f)))
         rays = friction_rays(friction)
         values = np.tile([1.0, -1.0], p)
         shear = sp.csc_array((values, (np.repeat(2 * sticky + 1, 2), np.arange(2 * p))), shape=(2 * n, 2 * p))

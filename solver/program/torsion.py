@@ -1,4 +1,4 @@
-"""Torsion of faces under a uniform pressure, in place of friction at their corners."""
+"""Torsion of faces under a uniform pressure, a limit beside friction at their corners."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from solver.assembly import Assembly
-from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.geometry.outlines import polygon_integrals
-from solver.kinematics import Pose
 
 #: Laws of torsion of the faces between blocks in space.
 POINTS, UNIFORM = TORSIONS = ("points", "uniform")
@@ -67,48 +65,39 @@ class Faces:
             )
 
 
-def face_wrench_matrix(contacts: Contacts, faces: Faces, pose: Pose, length: float) -> sp.csc_array:
-    """Make the matrix of :func:`solver.equilibrium.wrench_matrix` with shear and torsion at the centre of each face.
+def face_shares(contacts: Contacts, faces: Faces, friction: np.ndarray) -> sp.csr_array:
+    """(5 n_faces, 3 n_contacts) array: from forces at the points to what limits their faces.
 
-    Of the 4 n_contacts columns each contact point has: normal force, there; both shear forces, at the centre of its
-    face; torsion over the radius of the face.
-
-    A face limited by |(T, M / r)| ≤ μ N, with N the sum over its points, is the sum of as many cones of four numbers,
-    one for each of its points.
+    Each face has five rows: both components of its shear force T, in the tangents of its first point; its torsion over
+    its radius, M / r; one without entries; and its friction, the sum of friction, (n_contacts,), times normal force.
     """
-    n = len(contacts)
-    # The tangents of a face are those of its first point.
-    frames, centres = contacts.frames[faces.first][faces.face], faces.centres[faces.face]
-    at_points = wrench_matrix(contacts, pose, length)[:, 3 * np.arange(n)]
-    at_centre = wrench_matrix(Contacts(**{**vars(contacts), "points": centres, "frames": frames}), pose, length)
-    shear = at_centre[:, np.setdiff1d(np.arange(3 * n), 3 * np.arange(n))]
-    moment = (faces.radii[faces.face] / length)[:, None] * frames[:, 0]
-    spins = [6 * block[:, None] + np.arange(3, 6) for block in (contacts.block_a, contacts.block_b)]
-    rows = np.concatenate(spins, axis=1)
-    columns = np.broadcast_to(np.arange(n)[:, None], rows.shape)
-    values = np.concatenate([moment, -moment], axis=1)
-    twist = sp.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(at_points.shape[0], n))
-    order = np.stack([np.arange(n), n + 2 * np.arange(n), n + 2 * np.arange(n) + 1, 3 * n + np.arange(n)], axis=1)
-    return sp.csc_array(sp.hstack([at_points, shear, twist], format="csc")[:, order.ravel()])
-
-
-def point_forces(contacts: Contacts, faces: Faces, forces: np.ndarray) -> np.ndarray:
-    """(n_contacts, 3) array: forces at the points with the same resultants as those (n_contacts, 4) of their faces."""
-    face, count = faces.face, np.bincount(faces.face)
-    frames = contacts.frames[faces.first]
+    face, frames = faces.face, contacts.frames[faces.first][faces.face]
     # On the block that is the first one of the face's first point.
     sign = np.where(contacts.block_a == contacts.block_a[faces.first][face], 1.0, -1.0)
-    totals = np.stack([np.bincount(face, sign * part) for part in forces.T], axis=1)
-    shear = np.einsum("fi,fix->fx", totals[:, 1:3], frames[:, 1:])
-    middle = np.stack([np.bincount(face, part) / count for part in contacts.points.T], axis=1)
-    arms = contacts.points - middle[face]
-    # Equal shares move it from the centre of the face to the middle of its points.
-    moved = np.einsum("fx,fx->f", np.cross(middle - faces.centres, shear), frames[:, 0])
-    spread = np.bincount(face, (arms**2).sum(axis=1))
-    torsion = np.divide(totals[:, 3] * faces.radii - moved, spread, out=np.zeros(len(count)), where=spread > 0.0)
-    shared = (shear / count[:, None])[face] + torsion[face, None] * np.cross(frames[face, 0], arms)
-    shared *= sign[:, None]
-    return np.concatenate([forces[:, :1], np.einsum("kix,kx->ki", contacts.frames[:, 1:], shared)], axis=1)
+    # Where the radius is zero all points are at the centre.
+    arms = (contacts.points - faces.centres[face]) / np.maximum(faces.radii, 1e-300)[face, None]
+    turning = np.cross(frames[:, 0], arms)
+    parts = np.zeros((len(contacts), 5, 3))
+    along = np.concatenate([frames[:, 1:], turning[:, None]], axis=1)
+    parts[:, :3, 1:] = sign[:, None, None] * np.einsum("kix,kjx->kij", along, contacts.frames[:, 1:])
+    parts[:, 4, 0] = friction
+    rows = np.broadcast_to((5 * face[:, None] + np.arange(5))[:, :, None], parts.shape)
+    columns = np.broadcast_to((3 * np.arange(len(contacts))[:, None] + np.arange(3))[:, None], parts.shape)
+    shape = (5 * len(faces.radii), 3 * len(contacts))
+    shares = sp.csr_array(sp.coo_array((parts.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
+    shares.eliminate_zeros()
+    return shares
+
+
+def face_cones(n_faces: int) -> sp.csr_array:
+    """(5 n_faces, 6 n_faces) array: the rows of :func:`face_shares` in terms of two round cones of each face.
+
+    |(T, M / r)| ≤ F is |T| ≤ P and |(P, M / r)| ≤ F, cones of slope 1 with as many numbers as those of the points:
+    (P, T) and (F, P, M / r), which have the same P in the row without entries.
+    """
+    one = np.zeros((5, 6))
+    one[[0, 1, 2, 3, 3, 4], [1, 2, 5, 4, 0, 3]] = [1.0, 1.0, 1.0, 1.0, -1.0, 1.0]
+    return sp.csr_array(sp.kron(sp.eye_array(n_faces), one, format="csr"))
 
 
 def _faces(contacts: Contacts, length: float) -> np.ndarray:

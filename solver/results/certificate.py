@@ -21,8 +21,8 @@ class Certificate:
     equilibrium_residual : float
         max |A f + loads| / W over the free blocks, moments over the block size: largest force out of balance.
     friction_excess : float
-        max (|T| - μ N - c) / W over the contact points, at least 0: shear force beyond friction and cohesion; the
-        resultant of a face where torsion is that of a uniform pressure.
+        max (|T| - μ N - c) / W over the contact points, at least 0: shear force beyond friction and cohesion; also of
+        shear and torsion of a face where this is that of a uniform pressure.
     carrying_gap : float [m]
         Largest gap of a contact point that carries more than a millionth of the largest normal force.
     largest_penetration : float [m]

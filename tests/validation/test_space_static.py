@@ -210,7 +210,7 @@ def test_a_turned_cube_under_a_uniform_pressure(flow):
     assert found.multiplier == pytest.approx(0.5 * TURNED, rel=EXACT)
     assert found.torsion == "uniform"
     assert "uniform torsion" in str(found)
-    # What is reported at the points has the same resultants.
+    # The forces at the points are those of the face, and each within friction.
     on_block = mechanics.block_forces(found.contacts, found.pose, found.forces)[0]
     np.testing.assert_allclose(
         on_block, np.array([0, 0, 1, 0, 0, -found.multiplier]) * live[0, 5], atol=1e-6 * live[0, 5]
@@ -225,6 +225,39 @@ def test_a_cube_pushed_beside_its_middle_under_a_uniform_pressure(eccentricity):
     live = solver.point_load(assembly, 0, (weight, 0.0, 0.0), point=(0.0, eccentricity, 0.0))
     found = limit(assembly, live, 0.4, torsion="uniform")
     assert found.multiplier == pytest.approx(0.4 / np.hypot(1.0, eccentricity / TURNED), rel=EXACT)
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+def test_cohesion_adds_to_the_torsion_of_a_uniform_pressure(flow):
+    assembly = on_ground([box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))])
+    weight = assembly.masses[0] * solver.GRAVITY
+    loads = replace(solver.self_weight(assembly), live=np.eye(6)[[5, 5]] * [[weight], [0.0]])
+    law = solver.InterfaceLaw(
+        0.5, cohesion=0.3 * weight, tensile_strength=0.2 * weight, compressive_strength=3 * weight
+    )
+    found = solver.limit_load(assembly, loads=loads, interfaces=solver.Interfaces(law), torsion="uniform", flow=flow)
+    assert found.multiplier == pytest.approx(0.8 * TURNED, rel=EXACT)
+    assert found.certificate.kinematic_violation < EXACT
+
+
+@pytest.mark.parametrize(
+    ("eccentricity", "height", "least"),
+    [(0.25, 0.5, 0.6 / np.hypot(1.0, 0.25 / TURNED)), (0.25, 1.0, None), (0.5, 1.5, None), (0.0, 2.0, 0.25)],
+)
+def test_where_a_block_stands_on_an_edge_a_uniform_pressure_carries_no_more_than_its_points(
+    eccentricity, height, least
+):
+    """Twice as high as wide: the face is not pressed all over, and its points limit what the whole of it would carry.
+
+    Where it is pressed all over α √(1 + (e / r)²) = μ, and it overturns without torsion at 1 / 2 z.
+    """
+    assembly = on_ground([box((-0.5, -0.5, 0.0), (0.5, 0.5, 2.0))])
+    weight = assembly.masses[0] * solver.GRAVITY
+    live = solver.point_load(assembly, 0, (weight, 0.0, 0.0), point=(0.0, eccentricity, height))
+    points, uniform = (limit(assembly, live, 0.6, torsion=torsion) for torsion in ("points", "uniform"))
+    assert uniform.multiplier == pytest.approx(points.multiplier if least is None else least, rel=EXACT)
+    sliding = limit(assembly, live, 0.6, "non-associative", torsion="uniform").multiplier
+    assert sliding <= uniform.multiplier * (1.0 + EXACT) <= points.multiplier * (1.0 + 2.0 * EXACT)
 
 
 def test_a_turned_triangle_and_a_turned_plate():
