@@ -246,14 +246,19 @@ class Path:
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, frame.velocity))
         # Without friction a program carries what its own check lets pass.
         least = ACCEPTED_ERROR * model.total_load / max(model.scaled_live(place.pose)[1], 1e-300)
-        if model.has_live and not least < bounds.high < np.inf:
-            if bounds.high > least:
-                message = "at a control displacement of 0 m no live load of this pattern moves the structure"
-                return Ending(Status.LOCKED, message)
-            yield self.reports.falling_increment(place, np.zeros_like(model.load))
-            return Ending(Status.NO_INITIAL_EQUILIBRIUM, self.reports.nothing_carried())
-        if model.has_live:
+        if model.has_live and bounds.high == np.inf:
+            message = "at a control displacement of 0 m no live load of this pattern moves the structure"
+            return Ending(Status.LOCKED, message)
+        # What hangs on its members carries nothing until these give.
+        first_state, carried = state, bounds.high
+        if model.has_live and bounds.high > (-least if model.ties else least):
             first_state, _ = self.advance(state, self._onset())
+            carried = max(carried, first_state.place.multiplier)
+        if model.has_live and not carried > least:
+            as_drawn = np.array_equal(state.start.positions, Pose.initial(model.assembly).positions)
+            yield self.reports.falling_increment(place, np.zeros_like(model.load))
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, self.reports.nothing_carried(place, as_drawn))
+        if model.has_live:
             # What has lost its capacity by then moves along the control all the same.
             if first_state.place.multiplier <= 0.0 and not self.checks.moves_control(place):
                 raise ValueError(self.driver.misdirected)

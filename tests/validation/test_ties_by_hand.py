@@ -244,3 +244,29 @@ def test_impossible_ties_are_refused_in_a_line_that_names_them(change, words):
         _settled(_structure([_box(0, 0, 1, 0.2), _box(0, 0.2, 1, 1.2)], ["moving", "free"], 0.6, [Tie(**given)]))
     assert "rope" in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("stiffness", [2e5, 3e5, 4e5])
+def test_a_wall_that_hangs_on_its_tie_is_pushed_back_and_over(stiffness):
+    """It hinges where it carries no live load before the tie gives: whether that was below zero was rounding."""
+    outlines = [_box(0.0, 0.0, 0.8, 6.0), _box(-3.0, -0.5, 3.0, 0.0)]
+    assembly = solver.Assembly.from_outlines(outlines, names=["wall", "ground"], roles=["free", "moving"])
+    anchor = np.array([4.8, 5.0])
+    tie = solver.Tie("rod", (0, None), ((0.8, 5.0), anchor), stiffness=stiffness, strength=20e3, prestress=5e3)
+    structure = solver.Structure(assembly, friction_coefficient=0.7, ties=[tie])
+    turning = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=1.0, increment=0.02, limit=0.02)
+    hanging = structure.settle(turning).path[-1]
+    control = solver.ControlDisplacement("wall", (-1.0, 0.0), increment=0.3, limit=0.3)
+    pushed = structure.with_live(acceleration=(-1.0, 0.0))
+    path = pushed.pushover(control, pose=hanging.pose, ties_at=hanging.ties).path
+    start, end = path[0], path[-1]
+    assert start.load_multiplier == pytest.approx(0.0, abs=1e-6)
+    assert start.ties.forces[0] == pytest.approx(hanging.ties.forces[0], rel=1e-5)
+    # About the left toe, which has not moved, under its weight and the tie that yields.
+    lean = float(end.pose.rotations[0, 0])
+    turn = np.array([[np.cos(lean), -np.sin(lean)], [np.sin(lean), np.cos(lean)]])
+    centroid, held = turn @ [0.4, 3.0], turn @ [0.8, 5.0]
+    pull = 20e3 * (anchor - held) / np.linalg.norm(anchor - held)
+    weight = assembly.masses[0] * solver.GRAVITY
+    stays = weight * centroid[0] + held[1] * pull[0] - held[0] * pull[1]
+    assert end.load_multiplier == pytest.approx(stays / (weight * centroid[1]), rel=1e-5)
