@@ -115,8 +115,8 @@ class LimitLoadKind(AnalysisKind):
             default=FLOWS[0]),
         Key("torsion", one_of(TORSIONS), "Torsion of faces in space: by their contact points, or at uniform pressure",
             TORSIONS[1], default=TORSIONS[0]),
-        Key("capacity_at", NUMBERS, "Settlements at which limit loads are wanted; of a rotation in rad", [0.0, 0.02],
-            "m", otherwise="every increment"),
+        Key("capacity_at", NUMBERS, "Settlements at which limit loads are wanted, in each [[settlement]] that reaches "
+            "them; of a rotation in rad", [0.0, 0.02], "m", otherwise="every increment"),
         Key("displacement", NOT_NEGATIVE, "Within which joints that a settlement has opened may close", 0.001, "m",
             otherwise=f"{CLOSING:g} block sizes"),
     )  # fmt: skip
@@ -143,7 +143,7 @@ class LimitLoadKind(AnalysisKind):
             raise _capacity_at_without_settlement(case)
 
     def checked(self, case: Case) -> Case:
-        """Check the keys, and let the last settlement stop where limit loads are wanted."""
+        """Check the keys, and let each settlement stop where limit loads are wanted."""
         needs_live_load(case)
         if case.settlements:
             needs_no_crushing(case, " after a settlement")
@@ -160,10 +160,13 @@ class LimitLoadKind(AnalysisKind):
         if not case.settlements or any(load.positions for load in case.loads):
             raise _capacity_at_without_settlement(case)
         try:
-            stopping = replace(case.settlements[-1], stops=settings.capacity_at)
+            # Some settlement has to reach each of them.
+            replace(max(case.settlements, key=lambda settlement: settlement.limit), stops=settings.capacity_at)
         except ValueError as error:
             raise ValueError(f"{case.source}: [analysis] capacity_at: {error}") from None
-        return replace(case, settlements=(*case.settlements[:-1], stopping))
+        reached = [[s for s in settings.capacity_at if s <= phase.limit] for phase in case.settlements]
+        stopping = [replace(phase, stops=stops) for phase, stops in zip(case.settlements, reached, strict=True)]
+        return replace(case, settlements=tuple(stopping))
 
     def course(self, case: Case) -> Course:
         """Run over the positions of a load that moves, else over the settlements of a case."""
@@ -507,19 +510,17 @@ def _numbers(run: AnalysisRun) -> tuple[solver.LimitLoad, ...]:
 
 def _wanted(case: Case, increment: solver.Increment) -> bool:
     """Whether the capacity is asked for at an increment of the settlement."""
-    last = len(case.settlements) - 1
-    if case.settings.capacity_at is None:
-        return True
-    reach = 2e-9 * case.settlements[last].increment
-    return increment.phase == last and any(abs(increment.parameter - s) <= reach for s in case.settings.capacity_at)
+    phase = case.settlements[increment.phase]
+    near = (abs(increment.parameter - s) <= 2e-9 * phase.increment for s in phase.stops)
+    return case.settings.capacity_at is None or any(near)
 
 
 def _is_last_wanted(case: Case, increment: solver.Increment) -> bool:
     """Whether no capacity is asked for beyond an increment of the settlement."""
-    last = case.settlements[-1]
-    asked = case.settings.capacity_at
-    end = last.limit if asked is None else max(asked)
-    return increment.phase == len(case.settlements) - 1 and increment.parameter >= end - 2e-9 * last.increment
+    every = case.settings.capacity_at is None
+    number, last = [one for one in enumerate(case.settlements) if every or one[1].stops][-1]
+    end = last.limit if every else max(last.stops)
+    return increment.phase == number and increment.parameter >= end - 2e-9 * last.increment
 
 
 def _closing_words(run: AnalysisRun) -> str:

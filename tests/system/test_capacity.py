@@ -292,6 +292,26 @@ animation = false
 
 
 @pytest.mark.slow
+def test_the_capacity_is_asked_for_in_each_settlement_that_reaches_it(tmp_path):
+    """The ground tilts downhill, sinks by less than is asked for, and tilts back."""
+    tilt = "[[settlement]]\nrotation_centre = [0.0, 0.0]\nrotation = {}\nincrement = 0.03\nlimit = {}\n"
+    text = (
+        COLUMN
+        + '[roles]\n"ground" = "moving"\n'
+        + tilt.format(-1.0, 0.04)
+        + "[[settlement]]\ndirection = [0.0, -1.0]\nincrement = 0.01\nlimit = 0.01\n"
+        + tilt.format(1.0, 0.03)
+        + '[analysis]\nkind = "limit load"\ncapacity_at = [0.02, 0.04]\n[output]\nanimation = false\n'
+    )
+    rows = table(ran(text + SIDEWAYS, tmp_path)[0] / "capacity.csv")
+    assert [(int(row["phase"]), float(row["settlement"])) for row in rows] == [(0, 0.02), (0, 0.04), (2, 0.02)]
+    expected = np.tan(np.arctan(0.2) - np.array([0.02, 0.04, 0.02]))
+    assert [float(row["load_multiplier"]) for row in rows] == pytest.approx(expected, rel=1e-5)
+    with pytest.raises(ValueError, match=r"capacity_at: settlement stop 0\.05 is not between 0 and the limit of 0\.04"):
+        case_from(text.replace("[0.02, 0.04]", "[0.02, 0.05]") + SIDEWAYS, tmp_path)
+
+
+@pytest.mark.slow
 def test_the_capacity_of_a_wall_is_told_with_and_without_joints_that_close(tmp_path, capsys):
     text = """
 [geometry]
