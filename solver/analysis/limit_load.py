@@ -190,7 +190,7 @@ class _Problem:
         cohesion, tension = (np.where(is_open, 0.0, of[number]) for of in (joints.cohesion, joints.tension))
         friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         friction = np.where(is_member(contacts), 0.0, friction)
-        faces = Faces.of(contacts, model.length) if torsion == UNIFORM and len(contacts) else None
+        faces = Faces.of(contacts, model.length, friction) if torsion == UNIFORM and len(contacts) else None
         if faces is not None:
             faces.refuse_not_convex(contacts, assembly)
         limits = ForceLimits(-tension, crushing, np.maximum(cohesion - friction * tension, 0.0))

@@ -12,7 +12,6 @@ from solver.programs.solve import solve_between
 from solver.tolerances import ACCEPTED_ERROR, CARRYING_FRACTION, FALLING_FRACTION
 
 from .static_program import ProgramState, StaticProgram
-from .torsion import face_cones
 
 #: Part of the new normal forces in the next program where they hardly depend on the last ones,
 #: and where they do, as in vaults, whose programs go in circles with more; programs at most.
@@ -144,17 +143,14 @@ def _sliding(
         level = sp.csr_array((np.ones(n), (np.arange(n), size * np.arange(n))), shape=(n, size * n))
         level_is, slopes, slack = np.ones(n), np.ones(n), np.zeros(rows)
     part: np.ndarray | float = 0.0
-    if program.faces is not None and program.shares is not None:
+    if program.faces is not None:
         # What faces carry is in parts of what they may carry, as that of points is.
-        most = np.bincount(program.faces.face, bound)
+        most, faces = np.bincount(program.faces.face, bound), program.faces
         part = np.divide(1.0, most, out=np.zeros_like(most), where=most > CARRYING_FRACTION * most.max())[:, None]
-        of_points = sp.diags_array(np.repeat(part, 5)) @ -program.shares @ shears
-        level = sp.block_array([[of_points, face_cones(len(most))], [level, None]], format="csr")
-        level_is, slopes = (
-            np.append(np.tile([0.0, 0.0, 0.0, 0.0, 1.0], len(most)), level_is),
-            np.ones(n + 2 * len(most)),
-        )
-        shears, to_shear = (sp.hstack([of, sp.csr_array((of.shape[0], 6 * len(most)))]) for of in (shears, to_shear))
+        shears, level = faces.beside(shears, level, sp.diags_array(np.repeat(part, 5)) @ faces.shares @ shears)
+        to_shear = program.matrix @ shears
+        level_is = np.append(np.tile([0.0, 0.0, 0.0, 0.0, 1.0], len(most)), level_is)
+        slopes = np.append(slopes, np.ones(2 * len(most)))
     first = shears.shape[1]
     blocks = [
         [to_shear, program.matrix[:, 0::size], None, None, sp.csr_array(program.live[:, None]), identity, -identity],

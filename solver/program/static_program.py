@@ -19,7 +19,7 @@ from solver.tolerances import ACCEPTED_ERROR, BALANCE_TOLERANCE, FALLING_FRACTIO
 
 from .model import Model
 from .strength import Admissible, ForceLimits
-from .torsion import Faces, face_shares
+from .torsion import Faces
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,6 @@ class StaticProgram:
         self.friction, self.limits, self.price, self.senses, self.exact = friction, limits, price, senses, exact
         self.size, self.programs = model.dimension, 0
         free, rows = np.repeat(model.assembly.free, model.n_dof), wrench_matrix(contacts, pose, model.length)
-        self.shares = None if faces is None else face_shares(contacts, faces, friction)
         self.matrix = sp.csr_array(rows)[free]  # (n_rows, size n)
         self.least = limits.least[:, None] * np.eye(model.dimension)[0]
         self.dead = model.scaled_load_at(pose).ravel()[free] + self.matrix[:, :: self.size] @ limits.least
@@ -109,8 +108,7 @@ class StaticProgram:
         speed = float(np.abs(along).max(initial=0.0)) or 1.0
         self.live, self.work = live.ravel()[free], rows.T @ along / speed
         self.unit = 1.0 / live_size if senses else model.force * model.length * speed
-        of_joints = friction, limits.cohesion, limits.beyond_least
-        self.carried = Admissible.of(*of_joints, self.size, faces, self.shares)
+        self.carried = Admissible.of(friction, limits.cohesion, limits.beyond_least, self.size, faces)
 
     def bounds(self) -> EquilibriumBounds:
         """Bound the reaction or the multiplier of all equilibria within friction.
@@ -200,11 +198,11 @@ class StaticProgram:
     def rates(self, state: ProgramState) -> tuple[np.ndarray, np.ndarray]:
         """(n, size) and (n,) arrays: at which points open and slip in a mechanism, and what friction works against."""
         relative = (self.matrix.T @ state.velocity).reshape(-1, self.size)
-        if self.faces is None or self.shares is None:
+        if self.faces is None:
             return relative, np.linalg.norm(relative[:, 1:], axis=1)
         of_faces = np.zeros((len(self.faces.radii), 5))
         of_faces[:, :3] = state.face_rates
-        relative -= (self.shares.T @ of_faces.ravel()).reshape(relative.shape)
+        relative -= (self.faces.shares.T @ of_faces.ravel()).reshape(relative.shape)
         # What a face does by itself is taken from the friction of all of its points.
         return relative, np.linalg.norm(relative[:, 1:], axis=1) + np.linalg.norm(of_faces, axis=1)[self.faces.face]
 
@@ -213,7 +211,7 @@ class StaticProgram:
         excess = friction_excess(forces, self.friction, cohesion)
         if self.faces is None:
             return excess
-        of_faces = (self.shares @ forces.ravel()).reshape(-1, 5)
+        of_faces = (self.faces.shares @ forces.ravel()).reshape(-1, 5)
         added = np.bincount(self.faces.face, np.broadcast_to(cohesion, len(forces)))
         beyond = np.linalg.norm(of_faces[:, :3], axis=1) - of_faces[:, 4] - added
         return max(excess, float(beyond.max(initial=0.0)))

@@ -12,7 +12,7 @@ from solver.equilibrium import friction_rays
 from solver.geometry.contacts import Contacts
 from solver.interfaces import Interfaces
 
-from .torsion import Faces, face_cones
+from .torsion import Faces
 
 
 def crushing_forces(assembly: Assembly, interfaces: Interfaces, contacts: Contacts) -> np.ndarray:
@@ -66,13 +66,12 @@ class Admissible:
         crushing: np.ndarray,
         size: int,
         faces: Faces | None = None,
-        shares: sp.csr_array | None = None,
     ) -> Admissible:
         """All (N, T) with 0 ≤ N ≤ crushing and |T| ≤ friction · N + cohesion, (n,) arrays each.
 
         In the plane the cone of dry friction is spanned by its two rays; cohesion adds a shear force of either sign. In
         space forces of ``size`` numbers are in a round cone; cohesion adds one of slope 1 whose first number has no
-        effect but to be limited. Faces with the shares of :func:`face_shares` in them add two cones each.
+        effect but to be limited. Faces that resist torsion add two cones each.
         """
         n = len(friction)
         sticky, brittle = np.flatnonzero(cohesion > 0.0), np.flatnonzero(np.isfinite(crushing))
@@ -87,14 +86,12 @@ class Admissible:
             slopes = np.concatenate([friction, np.ones(p)])
             if faces is None:
                 return cls(columns, limits, most, of, slopes)
-            f = len(faces.radii)
             # Cohesion adds to the friction of its face.
             adds = (np.ones(p), (5 * faces.face[sticky] + 4, size * (n + np.arange(p))))
-            of_points = shares @ columns + sp.coo_array(adds, shape=(5 * f, columns.shape[1]))
-            limits = sp.csc_array(sp.block_array([[-of_points, face_cones(f)], [limits, None]], format="csc"))
-            columns = sp.csc_array(sp.hstack([columns, sp.csc_array((size * n, 6 * f))], format="csc"))
-            of = np.append(np.repeat(faces.first, 5), of)
-            return cls(columns, limits, np.append(np.zeros(5 * f), most), of, np.append(slopes, np.ones(2 * f)))
+            shares = faces.shares @ columns
+            columns, limits = faces.beside(columns, limits, shares + sp.coo_array(adds, shape=shares.shape))
+            of, slopes = np.append(np.repeat(faces.first, 5), of), np.append(slopes, np.ones(2 * len(faces.radii)))
+            return cls(columns, limits, np.append(np.zeros(shares.shape[0]), most), of, slopes)
         rays = friction_rays(friction)
         values = np.tile([1.0, -1.0], p)
         shear = sp.csc_array((values, (np.repeat(2 * sticky + 1, 2), np.arange(2 * p))), shape=(2 * n, 2 * p))

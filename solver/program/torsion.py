@@ -34,15 +34,33 @@ class Faces:
     centres: np.ndarray  #: (n_faces, 3) [m]
     radii: np.ndarray  #: (n_faces,) [m]
     areas: np.ndarray  #: (n_faces,) [m²]
+    #: (5 n_faces, 3 n_contacts): from forces at the points to what limits a face: both components of its shear force T,
+    #: its torsion over its radius, M / r, a row without entries, and friction, the sum of μ N.
+    shares: sp.csr_array
 
     @property
     def first(self) -> np.ndarray:
         """(n_faces,) int array: first contact point of each."""
         return np.unique(self.face, return_index=True)[1]
 
+    def beside(
+        self, columns: sp.sparray, limits: sp.sparray, of_points: sp.sparray
+    ) -> tuple[sp.csc_array, sp.csc_array]:
+        """Columns of forces at points and limits of their coefficients, with two round cones of each face beside them.
+
+        Five limits a face come first, equations: they are those of ``shares``, as the coefficients have them. What is
+        |(T, M / r)| ≤ F is |T| ≤ P and |(P, M / r)| ≤ F, of slope 1 and with as many numbers as the cones of points:
+        (P, T) and (F, P, M / r), which have the same P in the row without entries.
+        """
+        one, f = np.zeros((5, 6)), len(self.radii)
+        one[[0, 1, 2, 3, 3, 4], [1, 2, 5, 4, 0, 3]] = [1.0, 1.0, 1.0, 1.0, -1.0, 1.0]
+        cones = sp.kron(sp.eye_array(f), one)
+        limits = sp.block_array([[-of_points, cones], [limits, None]], format="csc")
+        return sp.csc_array(sp.hstack([columns, sp.csc_array((columns.shape[0], 6 * f))])), sp.csc_array(limits)
+
     @classmethod
-    def of(cls, contacts: Contacts, length: float) -> Faces:
-        """Gather contact points of the same two blocks, of a size [m], in the same plane."""
+    def of(cls, contacts: Contacts, length: float, friction: np.ndarray) -> Faces:
+        """Gather contact points of the same two blocks, of a size [m], in the same plane; friction is of each, (n,)."""
         face = _faces(contacts, length)
         count = np.bincount(face)
         order, first = np.argsort(face, kind="stable"), np.cumsum(count) - count
@@ -52,7 +70,18 @@ class Faces:
             members = order[first[chosen][:, None] + np.arange(corners)]
             points, frames = contacts.points[members], contacts.frames[members[:, 0]]
             centres[chosen], radii[chosen], areas[chosen] = _measured(points, frames)
-        return cls(face, centres, radii, areas)
+        of_first = order[first][face]
+        # On the block that is the first one of the face's first point, in the tangents of that.
+        sign = np.where(contacts.block_a == contacts.block_a[of_first], 1.0, -1.0)
+        along = contacts.frames[of_first][:, [1, 2, 0]]
+        # Where the radius is zero all points are at the centre.
+        arms = (contacts.points - centres[face]) / np.maximum(radii, 1e-300)[face, None]
+        along[:, 2] = np.cross(along[:, 2], arms)
+        parts = np.zeros((len(face), 5, 3))
+        parts[:, :3, 1:] = sign[:, None, None] * np.einsum("kix,kjx->kij", along, contacts.frames[:, 1:])
+        parts[:, 4, 0] = friction
+        starts, shape = np.append(0, np.cumsum(count)), (5 * len(count), 3 * len(face))
+        return cls(face, centres, radii, areas, sp.csr_array(sp.bsr_array((parts[order], order, starts), shape=shape)))
 
     def refuse_not_convex(self, contacts: Contacts, assembly: Assembly) -> None:
         """Raise ``ValueError`` where the polygon of points is larger than what touches there."""
@@ -63,41 +92,6 @@ class Faces:
                 f"torsion is 'uniform', but '{one}' and '{other}' do not touch on all of a convex face; take torsion = "
                 "'points', or cut the stone into convex ones"
             )
-
-
-def face_shares(contacts: Contacts, faces: Faces, friction: np.ndarray) -> sp.csr_array:
-    """(5 n_faces, 3 n_contacts) array: from forces at the points to what limits their faces.
-
-    Each face has five rows: both components of its shear force T, in the tangents of its first point; its torsion over
-    its radius, M / r; one without entries; and its friction, the sum of friction, (n_contacts,), times normal force.
-    """
-    face, frames = faces.face, contacts.frames[faces.first][faces.face]
-    # On the block that is the first one of the face's first point.
-    sign = np.where(contacts.block_a == contacts.block_a[faces.first][face], 1.0, -1.0)
-    # Where the radius is zero all points are at the centre.
-    arms = (contacts.points - faces.centres[face]) / np.maximum(faces.radii, 1e-300)[face, None]
-    turning = np.cross(frames[:, 0], arms)
-    parts = np.zeros((len(contacts), 5, 3))
-    along = np.concatenate([frames[:, 1:], turning[:, None]], axis=1)
-    parts[:, :3, 1:] = sign[:, None, None] * np.einsum("kix,kjx->kij", along, contacts.frames[:, 1:])
-    parts[:, 4, 0] = friction
-    rows = np.broadcast_to((5 * face[:, None] + np.arange(5))[:, :, None], parts.shape)
-    columns = np.broadcast_to((3 * np.arange(len(contacts))[:, None] + np.arange(3))[:, None], parts.shape)
-    shape = (5 * len(faces.radii), 3 * len(contacts))
-    shares = sp.csr_array(sp.coo_array((parts.ravel(), (rows.ravel(), columns.ravel())), shape=shape))
-    shares.eliminate_zeros()
-    return shares
-
-
-def face_cones(n_faces: int) -> sp.csr_array:
-    """(5 n_faces, 6 n_faces) array: the rows of :func:`face_shares` in terms of two round cones of each face.
-
-    |(T, M / r)| ≤ F is |T| ≤ P and |(P, M / r)| ≤ F, cones of slope 1 with as many numbers as those of the points:
-    (P, T) and (F, P, M / r), which have the same P in the row without entries.
-    """
-    one = np.zeros((5, 6))
-    one[[0, 1, 2, 3, 3, 4], [1, 2, 5, 4, 0, 3]] = [1.0, 1.0, 1.0, 1.0, -1.0, 1.0]
-    return sp.csr_array(sp.kron(sp.eye_array(n_faces), one, format="csr"))
 
 
 def _faces(contacts: Contacts, length: float) -> np.ndarray:
