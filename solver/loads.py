@@ -85,17 +85,18 @@ class Loads:
 
     def note_on_mass(self, assembly: Assembly) -> str:
         """Say how large dead loads are, downwards, on blocks whose only live load is an acceleration; else nothing."""
-        if self.live_acceleration is None:
-            return ""
-        d, weights = assembly.dimension, (assembly.masses * GRAVITY)[:, None]
-        alone = np.isclose(self.live[:, :d], weights * self.live_acceleration).all(axis=1)
-        alone &= assembly.free & self.live_acceleration.any(axis=1)
-        beyond = np.maximum(-self.dead[:, d - 1] - weights[:, 0], 0.0)[alone].sum()
-        if beyond <= 1e-9 * weights.sum():
-            return ""
+        weights = -self_weight(assembly).dead[:, assembly.dimension - 1]
+        pushed = np.zeros_like(assembly.centroids) if self.live_acceleration is None else self.live_acceleration
+        alone = np.isclose(self.live[:, : assembly.dimension], weights[:, None] * pushed).all(axis=1)
+        beyond = -self.dead[:, assembly.dimension - 1] - weights
+        large = (beyond * (alone & pushed.any(axis=1) & assembly.free)).clip(0.0).sum()
+        words = (
+            f"the acceleration acts on the blocks and the fill over them; {large:.6g} N of other dead loads on them "
+        )
         return (
-            f"the acceleration acts on the blocks and the fill over them; {beyond:.6g} N of other dead loads on them "
-            "have no mass: where they have, give them as live loads, too"
+            f"{words}have no mass: where they have, give them as live loads, too"
+            if large > 1e-9 * weights.sum()
+            else ""
         )
 
 

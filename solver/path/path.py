@@ -254,14 +254,14 @@ class Path:
         if model.has_live and bounds.high > (-least if model.ties else least):
             first_state, _ = self.advance(state, self._onset())
             carried = max(carried, first_state.place.multiplier)
+            # What has lost its capacity by then moves along the control all the same.
+            if first_state.place.multiplier <= 0.0 and not self.checks.moves_control(place):
+                raise ValueError(self.driver.misdirected)
         if model.has_live and not carried > least:
             as_drawn = np.array_equal(state.start.positions, Pose.initial(model.assembly).positions)
             yield self.reports.falling_increment(place, np.zeros_like(model.load))
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, self.reports.nothing_carried(place, as_drawn))
         if model.has_live:
-            # What has lost its capacity by then moves along the control all the same.
-            if first_state.place.multiplier <= 0.0 and not self.checks.moves_control(place):
-                raise ValueError(self.driver.misdirected)
             # A pushover starts from its limit load or, where that is not found, from what its path carries.
             limit, carried = self.checks.limit_multiplier(place), first_state.place.multiplier
             if limit is None:

@@ -140,22 +140,18 @@ class Reports:
         )
 
     def nothing_carried(self, place: Place, as_drawn: bool) -> str:
-        """Message of a pushover without a start, with what members carry there: as drawn no more than their prestress.
-
-        What they do before the live load acts they do in a settlement.
-        """
+        """Message of a pushover without a start, with what members carry there: as drawn their prestress alone."""
         nothing, ties, contacts = "no live load of this pattern is carried", self.model.ties, place.contacts
         if not ties or contacts is None:
             return nothing
         told = self.stepper.members.told(contacts, place.forces, place.pose, place.tie_lengths)
         forces = [tie.prestress for tie in ties] if as_drawn else np.abs(told.forces)
         carry = ", ".join(f"{tie.kind} '{tie.name}' {force:g} N" for tie, force in zip(ties, forces, strict=True))
-        if not as_drawn:
-            return f"{nothing} with what ties and props carry there ({carry})"
-        return (
-            f"{nothing} as drawn, with the prestress alone ({carry}): where they carry more before the live load acts, "
-            "put a settlement before it, of 1e-6 m, in which they do"
+        more = (
+            "where they carry more before the live load acts, put a settlement before it, of 1e-6 m, in which they do"
         )
+        told_so = f"as drawn, with the prestress alone ({carry}): {more}"
+        return f"{nothing} {told_so if as_drawn else f'with what ties and props carry there ({carry})'}"
 
     def jump(self, start: Pose, end: Pose) -> str:
         """Message that names the blocks of a jump, and how far they moved."""
