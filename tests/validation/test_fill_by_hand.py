@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from structures import box
 
 import solver
 from blockvis import generators, lay_backfill
@@ -133,6 +134,19 @@ def test_limit_loads_under_fill_are_those_of_a_block_by_hand() -> None:
     assert structure.limit_load(pose=lean).multiplier == pytest.approx(multiplier_by_hand(0.1), rel=1e-7)
     resultant = structure.limit_load().live_force
     assert resultant == pytest.approx(OWN + UNIT_WEIGHT, rel=1e-12)
+
+
+def test_in_space_an_acceleration_acts_on_the_fill_along_a_pushover() -> None:
+    """The same block, 1 m deep, which overturns along y: the limit load, and what is left of it as it leans."""
+    solids = [box([0, 0, 0], [1, 1, 2]), box([-1, -1, -1], [2, 2, 0])]
+    assembly = solver.Assembly.from_solids(solids, names=["block", "ground"], roles=["free", "fixed"])
+    loads = under(assembly, lay_backfill(assembly, "block", 3.0, UNIT_WEIGHT))
+    structure = solver.Structure(assembly, loads=loads, friction_coefficient=2.0).with_live(acceleration=(0, 1, 0))
+    assert structure.limit_load().multiplier == pytest.approx(multiplier_by_hand(0.0), rel=1e-7)
+    control = solver.ControlDisplacement("block", (0, 1, 0), point=(0.5, 0.5, 1.0), increment=0.1, limit=0.1)
+    for increment in structure.pushover(control).path:
+        lean = -float(increment.pose.rotations[0, 0])
+        assert increment.measured == pytest.approx(multiplier_by_hand(lean), abs=1e-5)
 
 
 def test_a_pushover_under_fill_is_that_of_a_block_by_hand() -> None:
