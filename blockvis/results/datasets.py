@@ -81,7 +81,7 @@ def block_grid(
     --------
     >>> import solver
     >>> one = solver.Assembly.from_outlines([[[0, 0], [2, 0], [2, 1], [0, 1]]], names=["lintel"])
-    >>> str(block_dataset(one).cell_data["name"][0])
+    >>> block_grid(one).GetCellData().GetAbstractArray("name").GetValue(0)
     'lintel'
     """
     pose = solver.Pose.initial(assembly) if increment is None else increment.pose
