@@ -45,6 +45,9 @@ WIDE = 3.0
 #: Pixels so near to the background may be of its border [pixels].
 BORDER = 3.0
 
+#: What of a mask is nowhere wider than this fraction of the image's smaller side is lines.
+WIDEST_LINE = 0.02
+
 #: Value that stands for what is transparent.
 TRANSPARENT = -1
 
@@ -102,10 +105,11 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
         raise ValueError(f"has no background {background!r}; its values are {', '.join(called[:8])}")
     mask = len(known) == 2
     outer: int | None
+    lines = 1 if found.is_of_lines else _lines_of_mask(numbers) if mask else None
     if wanted is not None:
         outer = known.index(wanted)
-    elif found.is_of_lines:
-        outer = 1
+    elif lines is not None:
+        outer = lines
     elif mask:
         outer = _background_of_mask(_filled(numbers, found, 0, np.inf)[0])
     else:
@@ -122,7 +126,7 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
         order[outer:] -= 1
         order[outer] = 0
     names = () if mask else tuple(word for k, word in enumerate(called) if k != outer)
-    return Labels(order[numbers], names, said, moved, mask, found.is_of_lines)
+    return Labels(order[numbers], names, said, moved, mask, outer is not None and outer == lines)
 
 
 @dataclass(frozen=True)
@@ -400,6 +404,15 @@ def _shades_of_paper(rgb: np.ndarray, colours: np.ndarray) -> bool:
         return False
     inked = np.min([np.abs(rgb - own).max(axis=2) for own in colours], axis=0) > 3 * FLAT
     return bool(inked.mean() > THIN)
+
+
+def _lines_of_mask(numbers: np.ndarray) -> int | None:
+    """Choose which of two values is that of lines: it is nowhere wide, and the other is; None where neither is so."""
+    from scipy import ndimage
+
+    size = max(3, round(WIDEST_LINE * min(numbers.shape)))
+    wide = [bool(ndimage.minimum_filter(numbers == k, size).any()) for k in (0, 1)]
+    return wide.index(False) if sum(wide) == 1 else None
 
 
 def _background_of_mask(numbers: np.ndarray) -> int:

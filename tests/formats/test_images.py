@@ -282,6 +282,20 @@ def test_outlines_of_stones_in_mortar_are_read_without_the_mortar(tmp_path):
     assert (layout.n_blocks, len(layout.left_out)) == (len(stones), 2)
 
 
+@pytest.mark.parametrize("form", ["png", "jpg"])
+def test_thick_outlines_of_stones_in_mortar_are_lines_too(tmp_path, form):
+    image = Image.new("L", (900, 600), 255)
+    draw = ImageDraw.Draw(image)
+    draw.rectangle((40, 40, 860, 560), outline=0, width=7)
+    boxes = [(70 + 130 * i, 70 + 95 * j, 170 + 130 * i, 140 + 95 * j) for i in range(6) for j in range(5)]
+    for box in boxes:
+        draw.ellipse(box, outline=0, width=7)
+    image.save(tmp_path / f"thick.{form}")
+    layout = read_layout(tmp_path / f"thick.{form}", width=9.0)
+    assert (layout.n_blocks, len(layout.left_out)) == (len(boxes), 2)
+    assert any(note.startswith("a drawing of lines") for note in layout.notes)
+
+
 def test_specks_go_to_what_is_around_them_and_are_told(tmp_path, capsys):
     image, n = drawn_wall()
     draw = ImageDraw.Draw(image)
