@@ -166,11 +166,18 @@ def _filled(numbers: np.ndarray, found: _Found, outer: int | None, reach: float)
 
 
 def _opaque(image: Image.Image) -> tuple[np.ndarray, Image.Image]:
-    """(height, width) bool array: where an image is to be seen; and the image without its transparency."""
+    """(height, width) bool array: where an image is to be seen; and the image without its transparency.
+
+    What is transparent around lines is their paper.
+    """
     form = image.format
     if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
-        seen = np.asarray(image.convert("RGBA"))[..., 3] >= 128
-        image = image.convert("RGB")
+        drawn = image.convert("RGBA")
+        seen, image = np.asarray(drawn)[..., 3] >= 128, image.convert("RGB")
+        if seen.any() and not _is_wide(seen):
+            is_dark = np.median(np.asarray(image)[seen]) < 128
+            paper = Image.new("RGBA", drawn.size, "white" if is_dark else "black")
+            seen, image = np.ones_like(seen), Image.alpha_composite(paper, drawn).convert("RGB")
     else:
         seen = np.ones((image.height, image.width), dtype=bool)
     image.format = form
@@ -408,11 +415,15 @@ def _shades_of_paper(rgb: np.ndarray, colours: np.ndarray) -> bool:
 
 def _lines_of_mask(numbers: np.ndarray) -> int | None:
     """Choose which of two values is that of lines: it is nowhere wide, and the other is; None where neither is so."""
+    wide = [_is_wide(numbers == k) for k in (0, 1)]
+    return wide.index(False) if sum(wide) == 1 else None
+
+
+def _is_wide(mask: np.ndarray) -> bool:
+    """Whether what a mask holds is anywhere wider than lines are."""
     from scipy import ndimage
 
-    size = max(3, round(WIDEST_LINE * min(numbers.shape)))
-    wide = [bool(ndimage.minimum_filter(numbers == k, size).any()) for k in (0, 1)]
-    return wide.index(False) if sum(wide) == 1 else None
+    return bool(ndimage.minimum_filter(mask, max(3, round(WIDEST_LINE * min(mask.shape)))).any())
 
 
 def _background_of_mask(numbers: np.ndarray) -> int:

@@ -282,6 +282,15 @@ def test_outlines_of_stones_in_mortar_are_read_without_the_mortar(tmp_path):
     assert (layout.n_blocks, len(layout.left_out)) == (len(stones), 2)
 
 
+@pytest.mark.parametrize("ink", [0, 200])
+def test_what_is_transparent_around_lines_is_paper(tmp_path, ink):
+    wall = [[(x, y), (x + 40, y), (x + 40, y + 30), (x, y + 30)] for y in (20, 50, 80) for x in range(20, 220, 40)]
+    cover = 255 - np.asarray(lines_of(wall, (300, 130), (0, 0, 0)).convert("L"))
+    pixels = np.dstack([np.full((*cover.shape, 3), ink, dtype=np.uint8), cover])
+    Image.fromarray(pixels).save(tmp_path / "lines.png")
+    assert read_layout(tmp_path / "lines.png", width=3.0).n_blocks == len(wall)
+
+
 @pytest.mark.parametrize("form", ["png", "jpg"])
 def test_thick_outlines_of_stones_in_mortar_are_lines_too(tmp_path, form):
     image = Image.new("L", (900, 600), 255)
