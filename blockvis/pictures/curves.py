@@ -63,7 +63,7 @@ PATCH = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
 
 @plain_text
 def draw_curve(
-    response: solver.Response,
+    response: solver.Response | solver.LimitLoad | solver.Envelope,
     path: str | os.PathLike[str],
     *,
     size: tuple[float, float] = (8.0, 5.0),
@@ -76,7 +76,7 @@ def draw_curve(
 
     Parameters
     ----------
-    response : solver.Response
+    response : solver.Response, solver.LimitLoad or solver.Envelope
     path : path
         Ending in .png, .svg or .pdf.
     size : (float, float) [inch]
@@ -84,6 +84,7 @@ def draw_curve(
     band : ReactionRange, optional
         Of the reaction, drawn behind it.
     """
+    response = response if isinstance(response, solver.Response) else response.response
     path, name = Path(path), about(response).name
     if in_one_unit(response) is not response:
         response = in_one_unit(response)

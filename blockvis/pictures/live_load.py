@@ -13,17 +13,20 @@ from blockvis.results.ties import ties_at
 from blockvis.text import force_text
 from solver import mechanics
 
-from .marks import MOST_ARROWS, evenly, leaving
+from .marks import leaving
 
 #: Loads below this fraction of the largest are rounding.
 ROUNDING = 1e-5
 
-#: Length of the longest arrow, as a fraction of the picture.
-LENGTH = 0.11
+#: Length of the longest arrow, as a fraction of the picture, and of arrows of as many equal loads as are not too close.
+LENGTH, MOST_LONG = 0.11, 24
 
-#: More arrows than ``MOST_ARROWS`` are drawn in the plane as resultants, a grid cell each, of this fraction of the
-#: picture. In space these would lie inside the structure, and evenly chosen ones stand for all.
-CELL = 0.12
+#: No arrow is shorter than this fraction of the longest: it would not be seen.
+SHORTEST = 0.125
+
+#: Arrows of at most so many loads, in space of the largest. In the plane those of more are resultants, each of a grid
+#: cell of a fraction of the picture; in space these would lie inside the structure.
+MOST_ARROWS, CELL = 100, 0.12
 
 
 @dataclass(frozen=True)
@@ -31,13 +34,14 @@ class LiveLoad:
     """Live loads times their multiplier, in the multiplier's sign: forces (n, d) [N] at points (n, d) [m].
 
     Each acts on one of the blocks (n,), or on several, of which it is the resultant and one is given; the pose is of
-    these alone.
+    these alone. In space they may be the largest of all that act, ``n_acting``.
     """
 
     points: np.ndarray
     forces: np.ndarray
     blocks: np.ndarray
     pose: solver.Pose
+    n_acting: int = 0
 
     def carried(self, pose: solver.Pose) -> np.ndarray:
         """(n, d) array [m]: where the points are when all blocks are at another pose."""
@@ -66,18 +70,25 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     live[~assembly.free | increment.fallen] = 0.0
     forces = live[:, : assembly.dimension]
     size = np.linalg.norm(forces, axis=1)
-    blocks = np.flatnonzero(size > ROUNDING * np.abs(live).max(initial=0.0))
+    blocks = acting = np.flatnonzero(size > ROUNDING * np.abs(live).max(initial=0.0))
     if assembly.dimension == 3:
-        blocks = evenly(blocks, MOST_ARROWS)
+        blocks = _largest(acting, size[acting])
         # The moment about the centroid tells the line on which a load acts, all but its place along that.
         units = forces[blocks] / size[blocks, None]
         arms = np.cross(units, live[blocks, 3:] / size[blocks, None])
         points = leaving(assembly, pose, blocks, pose.positions[blocks] + arms, -units)
     else:
         points = np.array([_entry(assembly, pose, int(block), live[block]) for block in blocks]).reshape(-1, 2)
-    if len(blocks) > MOST_ARROWS:
-        return _gathered(points, forces[blocks], blocks, pose, CELL * extent)
-    return LiveLoad(points, forces[blocks], blocks, _of(blocks, pose))
+    load = LiveLoad(points, forces[blocks], blocks, _of(blocks, pose), len(acting))
+    return load if len(blocks) <= MOST_ARROWS else _gathered(load, pose, CELL * extent)
+
+
+def _largest(numbers: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Numbers (m,) of the largest of sizes (n,), in their order; of those alike within a tenth evenly chosen ones."""
+    part = sizes / sizes.max(initial=0.0)
+    # Of numbers that go round a circle by the golden section the first few lie evenly among all.
+    first = np.lexsort((np.arange(len(part)) * 0.618034 % 1.0, -part.round(1), part < 0.99))
+    return np.asarray(numbers[np.sort(first[:MOST_ARROWS])])
 
 
 def _of_ties(response: solver.Response, increment: solver.Increment) -> np.ndarray:
@@ -120,20 +131,22 @@ class LiveLoads:
             for place, load in self._loads.items():
                 self._loads[place] = replace(load, forces=load.forces / (load.largest or 1.0))
         self.largest = max((load.largest for load in self._loads.values()), default=0.0)
-        self._scale = LENGTH * extent / (self.largest or 1.0)
+        together = max((float(np.linalg.norm(load.forces)) for load in self._loads.values()), default=0.0)
+        self._scale = LENGTH * extent / (max(self.largest, together / MOST_LONG**0.5) or 1.0)
 
     @property
     def words(self) -> str:
         """Entry of the legend; lengths in space are foreshortened and have no scale."""
+        acting, drawn = max(((load.n_acting, len(load.blocks)) for load in self._loads.values()), default=(0, 0))
         if self._dimension == 3:
-            return "live load · α"
+            return "live load · α" + (f", {drawn} of {acting} loads" if drawn < acting else "")
         scale = " (not to scale)" if self._places else f", longest arrow {force_text(self.largest)}"
-        return f"live load · α{scale}"
+        return f"live load · α{', resultants of neighbours' if drawn < acting else ''}{scale}"
 
     @property
     def tails(self) -> np.ndarray:
         """(n, d) array [m]: where the arrows of all increments begin, at their poses."""
-        tails = [load.points - load.forces * self._scale for load in self._loads.values()]
+        tails = [load.points - self._drawn(load) for load in self._loads.values()]
         return np.concatenate([np.zeros((0, self._dimension)), *tails])
 
     def arrows(self, increment: solver.Increment, pose: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
@@ -146,7 +159,13 @@ class LiveLoads:
             return nothing, nothing
         load, grown = self._load_at(increment)
         tips = load.carried(pose)
-        return tips - grown * load.forces * self._scale, tips
+        return tips - grown * self._drawn(load), tips
+
+    def _drawn(self, load: LiveLoad) -> np.ndarray:
+        """(n, d) array [m]: arrows to scale, but for those that would be too short."""
+        sizes, largest = np.linalg.norm(load.forces, axis=1), load.largest or 1.0
+        longer = np.maximum(sizes, SHORTEST * largest) / np.maximum(sizes, ROUNDING * largest)
+        return np.asarray(self._scale * longer[:, None] * load.forces)
 
     def _load_at(self, increment: solver.Increment) -> tuple[LiveLoad, float]:
         """Find the load of an increment and by what it has grown: between two of a path it is the one before's."""
@@ -177,11 +196,12 @@ def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.nd
     return np.asarray(through + ((crossed - through) @ unit).min() * unit) if len(crossed) else centre
 
 
-def _gathered(points: np.ndarray, forces: np.ndarray, blocks: np.ndarray, pose: solver.Pose, cell: float) -> LiveLoad:
+def _gathered(load: LiveLoad, pose: solver.Pose, cell: float) -> LiveLoad:
     """Resultants of the loads in each cell of a grid, at the load nearest to where their weights meet.
 
     Where they meet itself may lie in an opening.
     """
+    points, forces = load.points, load.forces
     place = np.floor((points - points.min(axis=0)) / cell).astype(np.int64)
     cells, which = np.unique(place, axis=0, return_inverse=True)
     which, n = which.ravel(), len(cells)
@@ -192,8 +212,8 @@ def _gathered(points: np.ndarray, forces: np.ndarray, blocks: np.ndarray, pose: 
     away = np.linalg.norm(points - np.stack(middles, axis=1)[which], axis=1)
     order = np.lexsort((away, which))
     nearest = order[np.searchsorted(which[order], np.arange(n))]
-    blocks = blocks[nearest]
-    return LiveLoad(points[nearest], np.stack(sums, axis=1), blocks, _of(blocks, pose))
+    blocks = load.blocks[nearest]
+    return LiveLoad(points[nearest], np.stack(sums, axis=1), blocks, _of(blocks, pose), load.n_acting)
 
 
 def _of(blocks: np.ndarray, pose: solver.Pose) -> solver.Pose:

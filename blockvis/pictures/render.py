@@ -106,7 +106,7 @@ def seen_from(view: Any, section: Any) -> tuple[Sight | None, Cut | None]:
 
 
 def draw_mechanism(
-    response: solver.Response | solver.LimitLoad,
+    response: solver.Response | solver.LimitLoad | solver.Envelope,
     path: str | os.PathLike[str],
     *,
     size: tuple[int, int] = STILL_SIZE,
@@ -121,7 +121,7 @@ def draw_mechanism(
 
     Parameters
     ----------
-    response : solver.Response or solver.LimitLoad
+    response : solver.Response, solver.LimitLoad or solver.Envelope
     path : path
     size : (int, int)
         Width and height in pixels.
@@ -132,7 +132,7 @@ def draw_mechanism(
     section : str or mapping, optional
         As of :func:`draw_still`.
     """
-    response = response.response if isinstance(response, solver.LimitLoad) else response
+    response = response if isinstance(response, solver.Response) else response.response
     _check_response(response)
     swing = swing_of(response)
     sight, cut = seen_from(view, section)

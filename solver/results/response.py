@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Protocol
 
@@ -425,27 +425,8 @@ class LimitLoad(HasState, Shown):
 
     @property
     def response(self) -> Response:
-        """The limit load as an analysis of its own, of one increment, for pictures, tables and files.
-
-        Raises ``ValueError`` where it was read from a file and not found by :meth:`solver.Structure.limit_load`.
-        """
-        if self.analysed is None:
-            raise ValueError("this limit load does not know its structure; the response that reports it does")
-        assembly, interfaces, loads, ties = self.analysed
-        return Response(
-            assembly,
-            settlements=(),
-            interfaces=interfaces,
-            loads=loads,
-            increments=(self.increment,),
-            stop=Status.LIMIT_REACHED,
-            message=str(self),
-            analysis="limit load",
-            limits=(self,),
-            parameter=LOAD_POSITION,
-            measured=LOAD_MULTIPLIER,
-            ties=ties,
-        )
+        """The limit load as an analysis of its own, as :attr:`Envelope.response`."""
+        return Envelope(np.zeros(1), (self,)).response
 
     def __str__(self) -> str:
         """Say how large it is, or why there is none."""
@@ -494,6 +475,22 @@ class Envelope:
     def worst(self) -> int:
         """Number of the position with the smallest multiplier; no equilibrium counts as smaller than any."""
         return lowest(self.multipliers)
+
+    @property
+    def response(self) -> Response:
+        """The limit loads as an analysis of its own, an increment each, for pictures, tables and files.
+
+        Its loads are those of the worst position. ``ValueError`` where that one was read from a file.
+        """
+        worst = self.limits[self.worst]
+        if worst.analysed is None:
+            raise ValueError("this limit load does not know its structure; the response that reports it does")
+        assembly, interfaces, loads, ties = worst.analysed
+        places = zip(self.limits, self.positions.tolist(), strict=True)
+        increments = tuple(replace(limit.increment, parameter=x) for limit, x in places)
+        found: Any = {"stop": Status.LIMIT_REACHED, "message": str(worst), "limits": self.limits, "ties": ties}
+        found |= {"analysis": "limit load", "parameter": LOAD_POSITION, "measured": LOAD_MULTIPLIER}
+        return Response(assembly, (), interfaces, loads, increments, **found)
 
 
 def lowest(multipliers: Sequence[float] | np.ndarray) -> int:

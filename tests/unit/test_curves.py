@@ -138,6 +138,23 @@ def test_a_single_limit_load_has_numbers_on_both_axes(tmp_path):
     assert sum(bool(re.fullmatch(r"0\.\d+", line)) for line in told) >= 6
 
 
+def test_an_envelope_is_drawn_and_written_as_a_response(tmp_path):
+    """It had no increments, and a picture of it ended in an AttributeError."""
+    assembly = solver.Assembly.from_outlines(
+        [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]],
+        roles=["fixed", "free"],
+    )
+    structure = solver.Structure(assembly, friction_coefficient=0.8)
+    envelope = structure.envelope([0.4, 0.9, 0.6], lambda y: solver.PointForces.at(1, (1000.0, 0.0), (0.0, y)))
+    assert "lowest" in " ".join(said(envelope, tmp_path / "curve.svg"))
+    assert draw_curve(envelope.limits[0], tmp_path / "one.svg").exists()
+    rows = (blockvis.write(envelope.response, tmp_path / "out") / "envelope.csv").read_text().splitlines()[1:]
+    assert [float(row.split(",")[0]) for row in rows] == [0.4, 0.9, 0.6]
+    np.testing.assert_allclose([float(row.split(",")[1]) for row in rows], envelope.multipliers)
+    assert np.array_equal(envelope.response.loads.live, envelope.limits[1].response.loads.live)
+    assert envelope.response.governing.parameter == 0.9
+
+
 def test_a_reaction_that_leaves_that_at_rest_at_once_has_no_line_from_there(tmp_path):
     response = parted(wall(4, 3), 4, 0)
     rest, *others = response.path

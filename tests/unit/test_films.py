@@ -182,6 +182,56 @@ def test_forces_of_ties_are_no_live_load(kind, dimension):
     assert tip[-1] == pytest.approx(1.0)
 
 
+def row_of(number, dimension, forces):
+    """Stones that stand beside each other, a metre apart, pushed along x by forces [N]; the limit load they have."""
+    low, high = (np.zeros((number, dimension)) for _ in range(2))
+    low[:, 0] = np.arange(number)
+    high[:] = low + 0.5
+    ground = np.full(dimension, -1.0), np.full(dimension, 1.0)
+    ground[1][0], ground[1][-1] = number, 0.0
+    boxes = [ground, *zip(low, high, strict=True)]
+    roles = ["fixed", *["free"] * number]
+    if dimension == 2:
+        assembly = solver.Assembly.from_outlines([rectangle(*a, *b) for a, b in boxes], roles=roles)
+    else:
+        assembly = solver.Assembly.from_solids([box(a, b) for a, b in boxes], roles=roles)
+    live = np.zeros((number + 1, 3 * dimension - 3))
+    live[1:, 0] = forces
+    return solver.Structure(assembly, friction_coefficient=0.6).with_live(live).limit_load()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_each_of_few_loads_has_an_arrow_of_its_own(dimension):
+    """From 25 on neighbours were one arrow in the plane, and in space some had none, the largest among them."""
+    forces = np.where(np.arange(27) == 20, 900.0, 300.0)
+    forces[3] = 1.0
+    limit = row_of(27, dimension, forces)
+    loads = LiveLoads(limit.response, limit.response.path, 27.0)
+    tails, tips = loads.arrows(limit.response.path[0], limit.state.pose)
+    lengths = (tips - tails)[:, 0]
+    np.testing.assert_allclose(lengths / lengths.max(), np.maximum(forces / 900.0, 0.125), rtol=1e-4)
+    assert loads.largest == pytest.approx(900.0 * limit.multiplier)
+    assert "loads" not in loads.words
+    assert "neighbours" not in loads.words
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_legend_tells_where_not_each_load_has_an_arrow(dimension):
+    forces = np.where(np.arange(120) == 77, 150.0, 100.0)
+    limit = row_of(120, dimension, forces)
+    loads = LiveLoads(limit.response, limit.response.path, 120.0)
+    tails, tips = loads.arrows(limit.response.path[0], limit.state.pose)
+    if dimension == 2:
+        assert "resultants of neighbours, longest arrow" in loads.words
+        assert len(tips) == 9
+        return
+    assert "100 of 120 loads" in loads.words
+    lengths, places = (tips - tails)[:, 0], tips[:, 0].round()
+    assert len(tips) == 100
+    assert places[lengths.argmax()] == 77
+    assert np.diff(places).max() <= 2.0, "what is left out of loads that are alike lies apart"
+
+
 def test_forces_between_increments_are_those_of_the_reaction_that_the_title_tells():
     response = arch_response()
     moving = int(np.flatnonzero(response.assembly.moving)[0])
