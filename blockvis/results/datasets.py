@@ -110,9 +110,7 @@ def block_grid(
     if increment is not None:
         fallen, motion = increment.fallen, block_motion(assembly, increment, falls)
         add_arrays(grid.GetCellData(), {"fallen": fallen.astype(np.int32), **motion})
-        _describe(grid, increment)
-    _state_units(grid)
-    return grid
+    return _described(grid, increment)
 
 
 def joint_grid(assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved") -> vtkUnstructuredGrid:
@@ -162,9 +160,7 @@ def joint_grid(assembly: solver.Assembly, increment: solver.Increment, *, shape:
     names = assembly.names
     words = (f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True))
     grid.GetCellData().AddArray(string_array("joint", words))
-    _describe(grid, increment)
-    _state_units(grid)
-    return grid
+    return _described(grid, increment)
 
 
 def contact_grid(
@@ -218,9 +214,7 @@ def contact_grid(
         points |= {"shear": shear, "slip": _slip(assembly, increment)}
     add_arrays(grid.GetPointData(), points)
     grid.GetFieldData().AddArray(string_array("state_names", [state.name.lower() for state in mechanics.ContactState]))
-    _describe(grid, increment)
-    _state_units(grid)
-    return grid
+    return _described(grid, increment)
 
 
 def tie_grid(
@@ -252,9 +246,7 @@ def tie_grid(
     for name, words in (("name", [tie.name for tie in ties]), ("kind", [tie.kind for tie in ties])):
         grid.GetCellData().AddArray(string_array(name, words))
     grid.GetFieldData().AddArray(string_array("state_names", STATE_WORDS))
-    _describe(grid, increment)
-    _state_units(grid)
-    return grid
+    return _described(grid, increment)
 
 
 def grids_of(
@@ -335,16 +327,19 @@ def _grid_between(
     return grid
 
 
-def _describe(grid: vtkUnstructuredGrid, increment: solver.Increment) -> None:
-    """Write the numbers of an increment into the field arrays of a grid."""
-    numbers = {
-        "settlement": increment.parameter,
-        "phase": increment.phase,
-        "load_multiplier": increment.load_multiplier,
-        "reaction": increment.reaction,
-    }
-    add_arrays(grid.GetFieldData(), {name: np.array([number]) for name, number in numbers.items()})
-    grid.GetFieldData().AddArray(string_array("status", [str(increment.status)]))
+def _described(grid: vtkUnstructuredGrid, increment: solver.Increment | None) -> vtkUnstructuredGrid:
+    """Write the numbers of an increment, if any, into the field arrays of a grid, and the units of its arrays."""
+    if increment is not None:
+        numbers = {
+            "settlement": increment.parameter,
+            "phase": increment.phase,
+            "load_multiplier": increment.load_multiplier,
+            "reaction": increment.reaction,
+        }
+        add_arrays(grid.GetFieldData(), {name: np.array([number]) for name, number in numbers.items()})
+        grid.GetFieldData().AddArray(string_array("status", [str(increment.status)]))
+    _state_units(grid)
+    return grid
 
 
 def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
