@@ -90,13 +90,11 @@ class Loads:
         alone = np.isclose(self.live[:, : assembly.dimension], weights[:, None] * pushed).all(axis=1)
         beyond = -self.dead[:, assembly.dimension - 1] - weights
         large = (beyond * (alone & pushed.any(axis=1) & assembly.free)).clip(0.0).sum()
-        words = (
-            f"the acceleration acts on the blocks and the fill over them; {large:.6g} N of other dead loads on them "
-        )
+        if large <= 1e-9 * weights.sum():
+            return ""
         return (
-            f"{words}have no mass: where they have, give them as live loads, too"
-            if large > 1e-9 * weights.sum()
-            else ""
+            f"the acceleration acts on the blocks and the fill over them; {large:.6g} N of other dead loads on them "
+            "have no mass: where they have, give them as live loads, too"
         )
 
 

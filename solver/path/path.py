@@ -216,7 +216,8 @@ class Path:
                 continue
             if outcome.stop is not Status.FALLING:
                 # Towards locked supports forces grew from the last report on, and friction bounds with them.
-                yield from self._report_last(state) if outcome.stop is Status.SOLVER_FAILED else ()
+                if outcome.stop is not Status.LOCKED:
+                    yield from self._report_last(state)
                 return outcome
             beyond = self._place_beyond(state)
             end, at_rest = self.fall.relax(beyond)
