@@ -30,7 +30,7 @@ class Loads:
     live : (n_blocks, n_dof) array [N, N·m]
         Loads that the load multiplier scales; a settlement leaves them out.
     fills : tuple of Backfill
-        Fill over the blocks, whose load follows them.
+        Fill over the blocks, whose load follows them. It has mass in accelerations of :meth:`with_acceleration` alone.
     dead_arms, live_arms : (n_blocks, d, d) array, optional [N·m]
         Sums of arm ⊗ force over the forces whose points turn with their block, as :meth:`with_forces` adds them. All
         other moments stay as they are.
@@ -85,11 +85,14 @@ class Loads:
 
     def note_on_mass(self, assembly: Assembly) -> str:
         """Say how large dead loads are, downwards, on blocks whose only live load is an acceleration; else nothing."""
-        weights = -self_weight(assembly).dead[:, assembly.dimension - 1]
-        pushed = np.zeros_like(assembly.centroids) if self.live_acceleration is None else self.live_acceleration
+        weights, down = assembly.masses * GRAVITY, assembly.dimension - 1
+        none = np.zeros_like(assembly.centroids)
+        pushed, heavier = (
+            none if given is None else given for given in (self.live_acceleration, self.dead_acceleration)
+        )
         alone = np.isclose(self.live[:, : assembly.dimension], weights[:, None] * pushed).all(axis=1)
-        beyond = -self.dead[:, assembly.dimension - 1] - weights
-        large = (beyond * (alone & pushed.any(axis=1) & assembly.free)).clip(0.0).sum()
+        beyond = -self.dead[:, down] - weights * (1.0 - heavier[:, down])
+        large = (beyond * (alone & pushed[:, :down].any(axis=1) & assembly.free)).clip(0.0).sum()
         if large <= 1e-9 * weights.sum():
             return ""
         return (

@@ -210,9 +210,11 @@ class Path:
             # What blocks that drop come to may be at a stop that has not been reported.
             state, outcome = self.advance(self.state, self.driver.next_stop(self.reported))
             self.state = state
-            report = {Status.EQUILIBRIUM: self._report_peak, Status.LIMIT_REACHED: self._report_reached}
-            if outcome.stop in report:
-                yield from report[outcome.stop](state)
+            if outcome.stop in (Status.EQUILIBRIUM, Status.FALLING):
+                yield from self._report_peak(state)
+            if outcome.stop is Status.LIMIT_REACHED:
+                yield from self._report_reached(state)
+            if outcome.stop in (Status.EQUILIBRIUM, Status.LIMIT_REACHED):
                 continue
             if outcome.stop is not Status.FALLING:
                 # Towards locked supports forces grew from the last report on, and friction bounds with them.
@@ -221,7 +223,7 @@ class Path:
                 return outcome
             beyond = self._place_beyond(state)
             end, at_rest = self.fall.relax(beyond)
-            continued = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
+            continued = self._continue_from(self.state, end) if at_rest else self._remove_fallen(self.state, end)
             if continued is None:
                 yield from self._report_last(state)
                 check = self._check(state.place)
@@ -274,7 +276,7 @@ class Path:
         # these or ground give, it is not carried.
         peak = 0.0 if not model.has_live or model.interfaces.elastic else bounds.high
         self.state = replace(state, place=place, history=(place,), peak=peak)
-        yield self._report(self.state, check)
+        yield self._report(check)
         return None
 
     def _onset(self) -> float:
@@ -302,14 +304,18 @@ class Path:
         check = check if carries else self._check(resting, reaction)
         resting, peak = replace(resting, works=place.works), max(state.peak, resting.multiplier)
         self.state = replace(state, history=(resting,), ended=place.s >= self.driver.limit * (1.0 - 1e-12), peak=peak)
-        yield self._report(self.state, check)
+        yield self._report(check)
 
     def _report_peak(self, state: PathState) -> Iterator[Increment]:
-        """Report the place from which the multiplier falls, if that is in equilibrium."""
-        check = self._check(state.place)
-        self.state = replace(state, peak=state.place.multiplier, history=(state.place,))
-        if check.bounds.in_equilibrium and check.measured > state.peak:
-            yield self._report(self.state, check)
+        """Report the highest place, or the last in equilibrium before it; the path goes on from where it is."""
+        for place in (self.highest.place, *self.highest.history[::-1]):
+            if place.s <= self.reported or (1.0 - DROP) * place.multiplier <= state.peak:
+                return
+            check = self._check(place)
+            if check.bounds.in_equilibrium and check.measured > state.peak:
+                self.state = replace(state, peak=check.measured)
+                yield self._report(check, place)
+                return
 
     def _without_viscosity(self, place: Place) -> Place:
         """The place once the supports have stood still: joints of given stiffness have given by their forces alone."""
@@ -325,11 +331,12 @@ class Path:
         """Whether joints of given stiffness carry at a place: they move where their forces change."""
         return bool((self.stepper.mortar.points(place, self.stepper.contacts_at(place)).give > COMPLIANCE).any())
 
-    def _report(self, state: PathState, check: EquilibriumCheck) -> Increment:
-        """The increment of an equilibrium, with the state as its checkpoint."""
-        increment = self.reports.increment(check, self._next_motion(state.place), state.place.works)
-        self.reported = state.place.s
-        return replace(increment, checkpoint=state)
+    def _report(self, check: EquilibriumCheck, place: Place | None = None) -> Increment:
+        """The increment of an equilibrium, at the state's place or one before, with the state as its checkpoint."""
+        place = place or self.state.place
+        increment = self.reports.increment(check, self._next_motion(place), place.works)
+        self.reported = self.state.place.s
+        return replace(increment, checkpoint=self.state)
 
     def _report_last(self, state: PathState) -> Iterator[Increment]:
         """The increment at the last equilibrium of the path, unless it has been reported."""
@@ -344,7 +351,7 @@ class Path:
         Where a place has no equilibrium, shorter steps of reduced viscosity, from the last place that has one, enclose
         the parameter beyond which there is none, to the driver's tolerance.
         """
-        highest = state
+        self.highest = state
         for _ in range(MOST_STEPS):
             if state.place.s >= target * (1.0 - 1e-12):
                 return state, Ending(Status.LIMIT_REACHED)
@@ -354,15 +361,15 @@ class Path:
             state, outcome = self._step(before, target)
             self.tried = state
             self.on_step(state)
-            last, new, peak = before.place, state.place, highest.place
+            last, new, peak = before.place, state.place, self.highest.place
             fallen = (1.0 - DROP) * peak.multiplier > max(state.peak, new.multiplier)
             if fallen and new.s > peak.s > self.reported >= 0.0:
-                return highest, Ending(Status.EQUILIBRIUM)
+                return state, Ending(Status.EQUILIBRIUM)
             if last.s < self._onset() <= new.s:
                 # From here on a peak is one of the structure, not of its joints' compliance.
-                state = highest = replace(state, peak=new.multiplier)
+                state = self.highest = replace(state, peak=min(state.peak, state.history[0].multiplier))
             elif new.s < peak.s or new.multiplier >= peak.multiplier:
-                highest = state
+                self.highest = state
             if outcome is not None:
                 return state, outcome
         return state, self.reports.no_step(state.place.s, f"{MOST_STEPS} were tried")

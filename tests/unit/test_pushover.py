@@ -229,6 +229,29 @@ def test_the_peak_of_a_path_that_hardens_is_told_however_long_increments_are():
     assert again.load_multiplier == last.load_multiplier
 
 
+@pytest.mark.slow
+def test_the_peak_before_a_jump_is_told_and_leaves_the_path_as_it_was():
+    """Three stacks 10 mm apart, where the multiplier falls from 0.9 to 0.5 as one comes to lean on the next."""
+    outlines = [
+        [[a, b], [c, b], [c, d], [a, d]]
+        for a, b, c, d in (
+            (0, 0, 0.48, 0.5),
+            (0.49, 0, 1.22, 0.5),
+            (0.49, 0.5, 1.22, 1),
+            (1.23, 0, 1.8, 0.5),
+            (-5, -1, 9, 0),
+        )
+    ]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["free"] * 4 + ["fixed"])
+    structure = solver.Structure(assembly, friction_coefficient=1.0).with_live(acceleration=(-1, 0))
+    control = solver.ControlDisplacement(assembly.names[0], (-1, 0), increment=0.1, limit=0.1)
+    paths = [structure.pushover(replace(control, increment=increment)) for increment in (0.1, 0.05, 0.02)]
+    largest = [max(path.load_multiplier) for path in paths]
+    assert largest == pytest.approx([0.89] * 3, rel=0.02)
+    assert [path.load_multiplier[-1] for path in paths] == pytest.approx([0.48] * 3, rel=0.03)
+    assert all((np.diff(path.settlement) > 0.0).all() for path in paths)
+
+
 def beside(interfaces=None, pushed_back=0.0, **structure):
     """A wall 0.4 m wide and 2 m high that touches a block 2 m wide, pushed away from it, and its limit loads."""
     outlines = [[[a, b], [c, b], [c, d], [a, d]] for a, b, c, d in ((0, 0, 0.4, 2), (-2, 0, 0, 2), (-5, -0.5, 5, 0))]

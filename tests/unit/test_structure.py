@@ -279,3 +279,10 @@ def test_dead_loads_without_mass_are_told_of_an_acceleration(block):
     structure = solver.Structure(block, loads=dead, friction_coefficient=0.5)
     with pytest.warns(UserWarning, match="500 N of other dead loads on them have no mass"):
         structure.limit_load(acceleration=(1, 0))
+
+
+def test_a_dead_acceleration_has_mass(block, recwarn):
+    dead = solver.self_weight(block).with_acceleration(block, (0.0, -0.2), "dead")
+    structure = solver.Structure(block, loads=dead, friction_coefficient=0.5)
+    assert structure.limit_load(acceleration=(1, 0)).multiplier == pytest.approx(0.5 * 1.2)
+    assert not len(recwarn)
