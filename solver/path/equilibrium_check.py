@@ -35,7 +35,10 @@ class EquilibriumChecks:
 
     def in_equilibrium(self, place: Place, gap: float = COMPUTED_GAP, part: float = 0.0) -> bool:
         """Whether points with gaps up to this one [block sizes] hold a place with some, or a part, of its live load."""
-        program, _ = self._program(place, gap)
+        standing = self.stepper.standing(place)
+        if standing is None:
+            return False
+        program, _ = self._program(standing, gap)
         self.stepper.programs += 1
         balanced, unbalanced = program.most_balanced()
         if unbalanced > FALLING_FRACTION or not program.senses:

@@ -16,7 +16,7 @@ from solver.program.static_program import EquilibriumBounds
 from solver.programs.problem import SolveError
 from solver.results.increment import Bonds, Increment, Status
 from solver.ties import TieForces, is_member
-from solver.tolerances import ACCEPTED_ERROR, CLOSING_GAP, COMPLIANCE, COMPUTED_GAP, FRICTION_MEMORY, JUMP
+from solver.tolerances import ACCEPTED_ERROR, CLOSING_GAP, COMPUTED_GAP, FRICTION_MEMORY, JUMP
 
 from .collapse import MECHANISM, Fall
 from .controls import Controls, Ending
@@ -54,9 +54,6 @@ REFINED = 1e-3
 
 #: Tolerances beyond a bound that has an equilibrium after all in which the viscosity stays reduced.
 ENCLOSED = 8.0
-
-#: Time, in units of √(block size / g), in which what viscosity retards comes to rest at once.
-STANDSTILL = 1e3
 
 #: Movement, in block sizes, of blocks that have fallen when the first one has moved farthest.
 FALLEN = 0.1
@@ -161,13 +158,14 @@ class Path:
             lengths[[tie.name in ties for tie in self.model.ties]] = np.nan
             state = replace(state, place=replace(state.place, tie_lengths=lengths))
         self.stood = True
-        if self._gives(state.place) or not self.checks.in_equilibrium(state.place):
+        if self.stepper.gives(state.place) or not self.checks.in_equilibrium(state.place):
             end, at_rest = self.fall.relax(state.place)
             settled = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
             if settled is None:
                 return state
             state = settled
-        place = self._without_viscosity(self._at_rest(state.place, anew=False) or state.place)
+        place = self._at_rest(state.place, anew=False) or state.place
+        place = self.stepper.standing(place) or place
         return replace(state, place=place, history=(place,))
 
     def _at_rest(self, place: Place, anew: bool = True, multiplier: float | None = None) -> Place | None:
@@ -285,10 +283,15 @@ class Path:
 
     def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
-        place = self._without_viscosity(state.place)
+        standing = self.stepper.standing(state.place)
+        place = standing or state.place
         reaction = self._reaction(place)
         check = self.checks.check(place, reaction)
-        carries = check.bounds.in_equilibrium and (not self.model.has_live or check.bounds.high > 0.0)
+        carries = (
+            standing is not None
+            and check.bounds.in_equilibrium
+            and (not self.model.has_live or check.bounds.high > 0.0)
+        )
         if carries and not self.model.has_live and abs(check.measured - reaction) > self.tolerance * abs(reaction):
             # Joints that close carry along the path while they are wider open than a computed pose leaves them.
             wider = self.checks.check(place, reaction, CLOSING_GAP)
@@ -316,20 +319,6 @@ class Path:
                 self.state = replace(state, peak=check.measured)
                 yield self._report(check, place)
                 return
-
-    def _without_viscosity(self, place: Place) -> Place:
-        """The place once the supports have stood still: joints of given stiffness have given by their forces alone."""
-        if not self._gives(place):
-            return place
-        try:
-            still, _, error = self.stepper.step(replace(place, velocity=None), STANDSTILL, in_time=True, exact=True)
-        except NotSolved:
-            return place
-        return place if error.moved > JUMP else replace(still, velocity=place.velocity, works=place.works)
-
-    def _gives(self, place: Place) -> bool:
-        """Whether joints of given stiffness carry at a place: they move where their forces change."""
-        return bool((self.stepper.mortar.points(place, self.stepper.contacts_at(place)).give > COMPLIANCE).any())
 
     def _report(self, check: EquilibriumCheck, place: Place | None = None) -> Increment:
         """The increment of an equilibrium, at the state's place or one before, with the state as its checkpoint."""

@@ -28,7 +28,16 @@ from solver.program.model import Model
 from solver.program.strength import ForceLimits
 from solver.results.increment import Bonds
 from solver.ties import TieForces, is_member
-from solver.tolerances import COMPLIANCE, FRICTION_MEMORY, IMPERFECTION, SHEAR_COMPLIANCE, VELOCITY_MEMORY, VISCOSITY
+from solver.tolerances import (
+    COMPLIANCE,
+    FARTHEST_FALL,
+    FRICTION_MEMORY,
+    IMPERFECTION,
+    PENETRATION_FRACTION,
+    SHEAR_COMPLIANCE,
+    VELOCITY_MEMORY,
+    VISCOSITY,
+)
 
 from .drivers import Driver
 from .members import Members
@@ -57,6 +66,10 @@ CARRIES = 1e-3
 
 #: Gap, in block sizes, at which half of the friction of a contact point is lost in a step.
 OPEN = 1e-6
+
+#: Times, in units of √(block size / g), in which what viscosity retards comes to rest at once, and in which what falls
+#: hardly moves; movement, in block sizes, in which it has come to rest; and steps after which it does not.
+STANDSTILL, SHORT, STANDING, STANDSTILLS = 1e3, 1e-3, 1e-7, 100
 
 #: Damping of steps in time, in units of mass · √(g / block size): critical for a block that rocks.
 DAMPING = 2.0
@@ -149,7 +162,16 @@ class Stepper:
 
     def contacts_at(self, place: Place) -> Contacts:
         """Return the contact points at a place, those of members last."""
-        return self.members.beside(self.contacts(place.pose), place.pose, place.tie_lengths)
+        found, before = self.contacts(place.pose), place.contacts
+        if self.model.interfaces.elastic and before is not None and len(before):
+            # A corner that is pressed into what gives is deeper behind the edge than blocks are otherwise.
+            pressed = before[(place.forces[:, 0] > 0.0) & ~is_member(before)]
+            pressed = self.measured(pressed[~matched_contacts(pressed, found)[1]], place.pose, place.tie_lengths)
+            deepest = -PENETRATION_FRACTION * np.minimum(
+                *self.model.assembly.widths[[pressed.block_a, pressed.block_b]]
+            )
+            found = joined_contacts([found, pressed[pressed.gaps < deepest]])
+        return self.members.beside(found, place.pose, place.tie_lengths)
 
     def measured(self, contacts: Contacts, pose: Pose, tie_lengths: np.ndarray) -> Contacts:
         """Return the same contact points at another pose, with ties of these lengths."""
@@ -298,6 +320,32 @@ class Stepper:
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * self._largest((motion_so_far - before) * self._shares)
         return new, motion / model.lengths, StepError(work, turn, movement_size, self._penetration(points, new))
+
+    def gives(self, place: Place) -> bool:
+        """Whether joints of given stiffness carry at a place: they move where their forces change."""
+        return bool((self.mortar.points(place, self.contacts_at(place)).give > COMPLIANCE).any())
+
+    def standing(self, place: Place) -> Place | None:
+        """The place once the supports have stood still, as joints of given stiffness give; None where it moves away."""
+        if not self.gives(place):
+            return place
+        still, time, so_far = place, STANDSTILL, 0.0
+        for _ in range(STANDSTILLS):
+            try:
+                still, _, error = self.step(replace(still, velocity=None), time, in_time=True, exact=True)
+            except NotSolved:
+                time /= 10.0
+                if time < SHORT:
+                    break
+                continue
+            # What leans on them moves by a part of the movement before in each step, or by more, and falls.
+            so_far += error.moved
+            if time == STANDSTILL and error.moved < STANDING:
+                return replace(still, velocity=place.velocity, works=place.works)
+            if so_far > FARTHEST_FALL:
+                break
+            time = min(10.0 * time, STANDSTILL)
+        return None
 
     def _solved(
         self,

@@ -339,6 +339,47 @@ def test_a_footing_that_settles_tilts_the_beam_on_springs():
     assert last.certificate.equilibrium_residual < 1e-6
 
 
+def tower(courses, stiffness, friction=0.05):
+    """A tower 1 m wide and 3 m high on one piece of ground."""
+    height = 3.0 / courses
+    shapes = [rectangle(0.0, k * height, 1.0, (k + 1) * height) for k in range(courses)]
+    assembly = solver.Assembly.from_outlines(
+        [*shapes, rectangle(-1.0, -1.0, 2.0, 0.0)],
+        roles=["free"] * courses + ["moving"], names=[*(f"course {k}" for k in range(courses)), "ground"],
+    )  # fmt: skip
+    return assembly, solver.Interfaces(solver.InterfaceLaw(friction), ground={"ground": stiffness})
+
+
+def tilts(courses, times, increment, limit, friction=0.05):
+    """Tilt over tilt of the ground; it resists so many times what its weight gains as it leans."""
+    assembly, _ = tower(courses, 1.0)
+    weight = mechanics.total_weight(assembly)
+    assembly, interfaces = tower(courses, times * weight * 1.5 * 4.0, friction)
+    turns = solver.Settlement(rotation_centre=(0.5, 0.0), rotation=-1, increment=increment, limit=limit)
+    response = solver.Structure(assembly, interfaces).settle(turns, controls=solver.Controls(falling_frames=0))
+    lean = [-i.pose.rotations[0, 0] / i.settlement for i in response.path[1:]]
+    return response, lean
+
+
+@pytest.mark.parametrize(
+    ("courses", "times", "within"), [(1, 4.0, 2e-3), (10, 4.0, 2e-3), (30, 10.0, 2e-3), (1, 2.0, 0.01)]
+)
+def test_a_tower_on_ground_that_tilts_leans_by_more(courses, times, within):
+    """θ = φ / (1 - 1/F), F = k b³/4 / (W h/2): however many courses, and whatever retards them on the path."""
+    _, lean = tilts(courses, times, increment=0.001, limit=0.002)
+    assert lean == pytest.approx([1.0 / (1.0 - 1.0 / times)] * 2, rel=within)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("courses", [1, 10])
+def test_a_tower_falls_when_its_weight_is_over_the_edge_however_deep_that_is_pressed(courses):
+    """tan θ = b/h: the edge of a course of 0.3 m is 42 mm deep in the ground by then."""
+    response, _ = tilts(courses, 4.0, increment=0.05, limit=0.3, friction=0.7)
+    assert response.collapse is not None
+    assert response.collapse.displacement == pytest.approx(0.2407, rel=1e-3)
+    assert -response.path[-1].pose.rotations[0, 0] == pytest.approx(np.arctan(1.0 / 3.0), rel=5e-3)
+
+
 @pytest.mark.slow
 def test_ground_does_not_pull():
     """Where its ground has settled by more than W / K the footing has left it."""
