@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,13 +19,12 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import outlines_of_cells, rectangle, spread_of
 from blockvis.layout.refusal import Refused
 from blockvis.layout.selection import MORTAR
-from blockvis.layout.solids import fans, volume, width_of
+from blockvis.layout.solids import fans, volume
 from blockvis.layout.views import VIEWS, axis_across, view_along
 from blockvis.text import listed
 from solver import mechanics
 from solver.mechanics import counted
 
-from .accepted import bend_of, bent_note, pieces_note
 from .reading import Reading
 
 #: In a prism the sine of the angle between a face's normal and the axis, or the plane across it, is at most this.
@@ -237,7 +237,7 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
         )
     asked, view = _selected(found, path, reading), reading.view
     lying = found.up == "y" if view is None else view == "xy"
-    solids, warped, changed, bent = [], [], [], []
+    solids, warped, changed = [], [], []
     for body in asked.bodies:
         plane = with_plane_faces(body.points, body.faces)
         points, faces = plane.solid
@@ -257,9 +257,6 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
             )
         if plane.warp:
             warped.append((plane.warp, body.name, plane.place))
-        bend, corner = bend_of(points, faces)
-        if bend:
-            bent.append((bend, width_of(points, faces), body.name, corner))
         drawn = body.volume or abs(volume(body.points, body.faces))
         changed.append((volume(points, faces) / drawn - 1.0, body.name))
         solids.append((with_z_up(points) if lying else points, faces))
@@ -276,7 +273,6 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
         notes=(
             *(Note(CHANGED, text) for text in said),
             *_accepted(asked.bodies),
-            *bent_note(bent, len(solids)),
             *found.notes,
         ),
     )
@@ -344,11 +340,19 @@ class _Selection:
 
 def _accepted(bodies: Sequence[Body]) -> tuple[Note, ...]:
     """Say which bodies had holes that were closed, and which objects became several blocks."""
-    pieces = pieces_note([body.piece_of for body in bodies if body.piece_of], sum(not one.piece_of for one in bodies))
+    said = []
     holed = [f"'{body.name}' ({counted(body.n_hole_edges, 'edge')})" for body in bodies if body.n_hole_edges]
-    if not holed:
-        return pieces
-    return (Note(CHANGED, f"small holes in the surface of {listed(holed)} were closed"), *pieces)
+    if holed:
+        said.append(f"small holes in the surface of {listed(holed)} were closed")
+    pieces = Counter(body.piece_of for body in bodies if body.piece_of)
+    # A file of a single object holds all blocks by intention.
+    if len(pieces) > 1 or 0 < pieces.total() < len(bodies):
+        shown = listed([f"'{name}' ({counted(n, 'block')})" for name, n in pieces.items()])
+        said.append(
+            f"objects of several closed bodies that do not share a face became as many blocks: {shown}; join "
+            "them in the drawing if each is one stone"
+        )
+    return tuple(Note(CHANGED, text) for text in said)
 
 
 def _selected(found: Bodies, path: Path | str, reading: Reading) -> _Selection:

@@ -1,7 +1,6 @@
-"""What is no plane-faced stone, or no single one, is told where it is accepted."""
+"""An object that is no single stone is told."""
 
 import numpy as np
-import pytest
 
 from blockvis import read_layout
 
@@ -23,16 +22,6 @@ def obj(path, *objects):
             n += 8
     path.write_text("\n".join(lines) + "\n")
     return path
-
-
-@pytest.mark.parametrize("raised", [0.0, 0.12])
-def test_a_corner_out_of_its_plane_is_told(tmp_path, raised):
-    bent = CUBE.copy()
-    bent[6, 2] += raised
-    layout = read_layout(obj(tmp_path / "a.obj", ("a", bent), ("b", beside(2))), unit="m", dimension=3)
-    told = [note for note in layout.notes if "bent faces of 1 of 2 blocks" in note]
-    assert bool(told) == bool(raised)
-    assert all("12 % of the block" in note and "of 'a' at" in note for note in told)
 
 
 def test_an_object_that_becomes_two_stones_is_told(tmp_path):
