@@ -8,10 +8,11 @@ import re
 import warnings
 import zlib
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.parsers import expat
+from xml.etree import ElementTree
 from xml.sax.saxutils import unescape
 
 import numpy as np
@@ -43,9 +44,6 @@ MOST_PER_BYTE = 1100
 
 #: Numbers that all arrays of a file may hold together: 400 MB, a thousand times a large drawing.
 MOST_NUMBERS = 50_000_000
-
-#: Pieces of text, as the parser hands them out, in which the header of a binary array surely lies.
-LINES_OF_HEADER = 8
 
 #: XML elements nested deeper than this are refused; VTK nests a handful.
 DEEPEST = 64
@@ -109,144 +107,88 @@ def _check_legacy(path: Path) -> None:
     for match in re.finditer(rb"(?im)^[ \t]*DIMENSIONS((?:[ \t]+-?\d+)+)", data):
         sizes = [int(number[:18]) for number in match[1].split()]
         counts += [min(sizes), math.prod(sizes)]
-    _refuse(path, [count for count in counts if not 0 <= count <= MOST_PER_BYTE * len(data)], len(data))
-    _refuse(path, [count for count in counts if count > MOST_NUMBERS], len(data))
+    _refuse(path, counts, len(data))
 
 
 def _check_xml(path: Path) -> None:
-    """Check document type, nesting and counts in one pass of a parser that keeps nothing."""
+    """Check document type, nesting and counts; appended data are no XML, and are looked up from the arrays."""
     data = path.read_bytes()
     if not data.lstrip().startswith(b"<"):
         raise _not_vtk(path, data)
-    parser = expat.ParserCreate()
-    held = _Announced(path, len(data))
-
-    def doctype(*_: object) -> None:
+    start = data.find(b"<AppendedData")
+    markup, appended = (data, b"") if start < 0 else (data[:start], data[start:])
+    if re.search(rb"<!\s*DOCTYPE", markup, re.IGNORECASE):
         raise ValueError(f"'{path}' has an XML document type; no VTK file needs one: export it again")
-
-    parser.StartDoctypeDeclHandler = doctype
-    parser.StartElementHandler, parser.EndElementHandler = held.start, held.end
-    parser.CharacterDataHandler = held.text
+    parser: Any = ElementTree.XMLPullParser(("start", "end"))
     try:
-        # In pieces, so that parsing stops at appended raw data, which are no XML.
-        for first in range(0, len(data), 1 << 20):
-            if not held.appended:
-                parser.Parse(data[first : first + (1 << 20)], False)
-        if not held.appended:
-            parser.Parse(b"", True)
-    except expat.ExpatError as error:
-        if not held.appended:
-            raise ValueError(f"'{path}' cannot be read as {path.suffix} ({error}); export it again") from None
-    if held.appended and held.later:
-        start = data.index(b"_", data.index(b"<AppendedData")) + 1
-        for attributes in held.later:
-            way = "raw" if held.appended == "raw" else "binary"
-            held.check_offsets(data[start + int(attributes.get("offset", 0)) :], attributes | {"format": way})
+        parser.feed(markup)
+        if not appended:
+            parser.close()
+        events = [*parser.read_events()]
+    except ElementTree.ParseError as error:
+        raise ValueError(f"'{path}' cannot be read as {path.suffix} ({error}); export it again") from None
+    file: dict[str, str] = {}
+    depth = items = numbers = 0
+    for event, element in events:
+        depth += 1 if event == "start" else -1
+        if depth > DEEPEST:
+            raise ValueError(f"'{path}' nests elements more than {DEEPEST} deep; no VTK file does: export it again")
+        is_array = element.tag in ("DataArray", "Array")
+        if event == "end":
+            if is_array:
+                _check_array(element, appended, file, path, len(data))
+            continue
+        counts = _counts(element, path, len(data))
+        if element.tag == "VTKFile":
+            file = element.attrib
+        elif element.tag == "Piece":
+            items = max(counts.pop("NumberOfPoints", items), sum(counts.values()))
+        elif is_array:
+            numbers += counts.get("NumberOfComponents", 1) * counts.get("NumberOfTuples", items)
+        items = counts.get("Extent", counts.get("WholeExtent", items))
+        _refuse(path, [items, numbers], len(data))
 
 
-class _Announced:
-    """Numbers of points, cells and values that an XML file announces, added up element by element."""
-
-    def __init__(self, path: Path, size: int) -> None:
-        self.path, self.size = path, size
-        self.points = self.cells = self.numbers = self.depth = 0
-        self.file: dict[str, str] = {}
-        self.appended = ""
-        self.later: list[dict[str, str]] = []
-        self.offsets: dict[str, str] | None = None
-        self.binary: dict[str, str] | None = None
-        self.content: list[str] = []
-
-    def _counts(self, attributes: dict[str, str]) -> dict[str, str]:
-        """Numbers of items that an element announces, none of them more than the file can hold."""
-        counts = {key: value for key, value in attributes.items() if key.startswith("NumberOf")}
-        for key, value in counts.items():
-            if not re.fullmatch(r"\s*\d{1,15}\s*", value) or int(value) > MOST_PER_BYTE * self.size:
-                raise ValueError(
-                    f"'{self.path}' announces {value[:20]} items in {self.size} bytes ({key}); export it again"
-                )
-        return counts
-
-    def start(self, tag: str, attributes: dict[str, str]) -> None:
-        """Check the counts of an element when it begins."""
-        self.depth += 1
-        if self.depth > DEEPEST:
-            raise ValueError(
-                f"'{self.path}' nests elements more than {DEEPEST} deep; no VTK file does: export it again"
-            )
-        counts = self._counts(attributes)
-        for key in ("WholeExtent", "Extent"):
-            ends = [int(end[:15]) for end in re.findall(r"-?\d+", attributes.get(key, ""))]
-            if ends:
-                self.points = math.prod(abs(b - a) + 1 for a, b in zip(ends[::2], ends[1::2], strict=False))
-                self._bound(self.points)
-        if tag == "VTKFile":
-            self.file = attributes
-        elif tag == "Piece":
-            self.points = int(counts.pop("NumberOfPoints", self.points))
-            self.cells = sum(int(value) for value in counts.values())
-        elif tag in ("DataArray", "Array"):
-            self._array(attributes, counts)
-        elif tag == "AppendedData":
-            self.appended = attributes.get("encoding", "base64")
-
-    def _array(self, attributes: dict[str, str], counts: dict[str, str]) -> None:
-        """Check the counts of an array, and prepare to read its header, or all of it if it holds offsets."""
-        components = int(counts.get("NumberOfComponents", 1))
-        self.numbers += components * int(counts.get("NumberOfTuples", max(self.points, self.cells)))
-        self._bound(self.numbers)
-        if attributes.get("format") == "binary":
-            self.binary, self.content = attributes, []
-        if attributes.get("Name", "").endswith("offsets"):
-            if attributes.get("format") == "appended":
-                self.later.append(attributes)
-            else:
-                self.offsets, self.content = attributes, []
-
-    def end(self, tag: str) -> None:
-        """Check the offsets of cells when their element ends."""
-        self.depth -= 1
-        if self.binary is not None:
-            self.check_header("".join(self.content).strip().encode(), self.binary)
-            self.binary = None
-        if self.offsets is not None:
-            self.check_offsets("".join(self.content).strip().encode(), self.offsets)
-            self.offsets = None
-
-    def text(self, data: str) -> None:
-        """Collect the text of an element of offsets, and the beginning of that of any binary array."""
-        if self.offsets is not None or (self.binary is not None and len(self.content) < LINES_OF_HEADER):
-            self.content.append(data)
-
-    def check_header(self, content: bytes, attributes: dict[str, str]) -> None:
-        """Check the size that the header of a binary array announces: VTK reserves as much memory."""
-        try:
-            size = announced_bytes(content, attributes, self.file)
-        except (ValueError, KeyError, OverflowError) as error:
-            raise ValueError(
-                f"'{self.path}' has an array whose size cannot be read ({error}); export it again"
-            ) from None
-        _refuse(self.path, [size] if size > 8 * MOST_NUMBERS else [], self.size)
-
-    def check_offsets(self, content: bytes, attributes: dict[str, str]) -> None:
-        """Check the last offset: VTK reserves memory for so many numbers."""
-        try:
-            largest = largest_number(content, attributes, self.file, 8 * MOST_NUMBERS)
-        except (ValueError, KeyError, OverflowError, zlib.error) as error:
-            raise ValueError(
-                f"'{self.path}' has cells whose offsets cannot be read ({error}); export it again"
-            ) from None
-        self._bound(largest)
-        if largest > MOST_PER_BYTE * self.size:
-            _refuse(self.path, [largest], self.size)
-
-    def _bound(self, count: int) -> None:
-        _refuse(self.path, [count] if count > MOST_NUMBERS else [], self.size)
+def _counts(element: ElementTree.Element, path: Path, size: int) -> dict[str, int]:
+    """Numbers of items that an element announces, those of an extent included, none of them more than a file holds."""
+    counts = dict[str, int]()
+    for key, value in element.items():
+        if key in ("WholeExtent", "Extent"):
+            ends = [int(end[:15]) for end in re.findall(r"-?\d+", value)]
+            counts[key] = math.prod(abs(b - a) + 1 for a, b in zip(ends[::2], ends[1::2], strict=False))
+        elif key.startswith("NumberOf"):
+            if not re.fullmatch(r"\s*\d{1,15}\s*", value):
+                raise ValueError(f"'{path}' announces {value[:20]} items in {size} bytes ({key}); export it again")
+            counts[key] = int(value)
+    _refuse(path, [*counts.values()], size)
+    return counts
 
 
-def _refuse(path: Path, counts: list[int], size: int) -> None:
-    if counts:
-        raise ValueError(f"'{path}' announces {counts[0]} items in {size} bytes; export it again")
+def _check_array(array: ElementTree.Element, appended: bytes, file: dict[str, str], path: Path, size: int) -> None:
+    """Check the size that a binary array announces, and the largest of its offsets: VTK reserves as much memory."""
+    attributes, is_offsets = array.attrib, array.get("Name", "").endswith("offsets")
+    content = (array.text or "").strip().encode()
+    if attributes.get("format") == "appended":
+        if not is_offsets:
+            return
+        raw = re.match(rb"""<AppendedData[^>]*\bencoding\s*=\s*["']raw""", appended)
+        content = appended[appended.find(b"_") + 1 + int(attributes.get("offset", 0)) :]
+        attributes = attributes | {"format": "raw" if raw else "binary"}
+    try:
+        numbers = announced_bytes(content, attributes, file) // 8 if attributes.get("format") == "binary" else 0
+        largest = largest_number(content, attributes, file, 8 * MOST_NUMBERS) if is_offsets else 0
+    except (ValueError, KeyError, OverflowError, zlib.error) as error:
+        raise ValueError(
+            f"'{path}' has an array '{array.get('Name', '')}' that cannot be read ({error}); export it again"
+        ) from None
+    _refuse(path, [numbers, largest], size)
+
+
+def _refuse(path: Path, counts: Sequence[int], size: int) -> None:
+    """Refuse more items than a file of so many bytes can hold, or than a drawing has."""
+    wrong = [count for count in counts if not 0 <= count <= min(MOST_NUMBERS, MOST_PER_BYTE * size)]
+    if wrong:
+        raise ValueError(f"'{path}' announces {wrong[0]} items in {size} bytes; export it again")
 
 
 def _not_vtk(path: Path, data: bytes) -> ValueError:

@@ -25,10 +25,9 @@ def largest_number(text: bytes, attributes: dict[str, str], file: dict[str, str]
     if attributes.get("format", "ascii") == "ascii":
         numbers = np.array(re.findall(rb"-?\d{1,18}", text), dtype=np.int64)
     else:
-        order = "<" if file.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
-        word = np.dtype(order + ("u8" if file.get("header_type") == "UInt64" else "u4"))
+        word = _word(file)
         data = _unpacked(text, attributes["format"] == "raw", word, file.get("compressor", ""), most)
-        kind = np.dtype(order + _TYPES[attributes.get("type", "Int64")])
+        kind = np.dtype(_TYPES[attributes.get("type", "Int64")]).newbyteorder(word.byteorder)
         numbers = np.frombuffer(data[: len(data) // kind.itemsize * kind.itemsize], kind)
     return max((abs(int(numbers.max())), abs(int(numbers.min()))), default=0) if len(numbers) else 0
 
@@ -38,15 +37,18 @@ def announced_bytes(text: bytes, attributes: dict[str, str], file: dict[str, str
 
     Given are the beginning of the array's content, and attributes as of :func:`largest_number`.
     """
-    order = "<" if file.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
-    word = np.dtype(order + ("u8" if file.get("header_type") == "UInt64" else "u4"))
-    raw = attributes.get("format") == "raw"
-    if not file.get("compressor", ""):
-        return _words(text, raw, word, 1)[0]
-    if _words(text, raw, word, 1)[0] == 0:
-        return 0
+    raw, word = attributes.get("format") == "raw", _word(file)
+    size = _words(text, raw, word, 1)[0]
+    if not file.get("compressor", "") or size == 0:
+        return size
     count, chunk, last = _words(text, raw, word, 3)
     return count * max(chunk, last)
+
+
+def _word(file: dict[str, str]) -> np.dtype:
+    """Give the type of the whole numbers of a header."""
+    order = "<" if file.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
+    return np.dtype(order + ("u8" if file.get("header_type") == "UInt64" else "u4"))
 
 
 def _unpacked(text: bytes, raw: bool, word: np.dtype, compressor: str, most: int) -> bytes:
