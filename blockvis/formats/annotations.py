@@ -78,8 +78,7 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     program = program_of(content)
     if not program:
         return None
-    if reading.view not in (None, "xy"):
-        raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
+    reading.refuse_view(path)
     try:
         found = _READERS[program](content, path)
     except (LookupError, TypeError, AttributeError, ValueError, OverflowError) as error:

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from glob import escape
 from pathlib import Path
 from typing import Any
 
@@ -120,7 +121,7 @@ def _read_shapefile(path: Path, reading: Reading) -> Layout:
     import shapefile
     from shapely.geometry import shape
 
-    beside = {entry.suffix.lower(): entry for entry in path.parent.glob(f"{_escaped(path.stem)}.*")}
+    beside = {entry.suffix.lower(): entry for entry in path.parent.glob(f"{escape(path.stem)}.*")}
     table, projection = beside.get(".dbf"), beside.get(".prj")
     features, skipped = [], Counter[str]()
     # What pyshp would print of rings that turn the wrong way is no fault of a drawing.
@@ -144,10 +145,6 @@ def _read_shapefile(path: Path, reading: Reading) -> Layout:
     text = projection.read_text(encoding="utf-8", errors="replace") if projection else ""
     unit, degrees = _unit_of_system(text)
     return layout_of_features(features, path, reading, unit=unit, degrees=degrees, skipped=skipped)
-
-
-def _escaped(name: str) -> str:
-    return re.sub(r"([\[\]*?])", r"[\1]", name)
 
 
 def _read_geopackage(path: Path, reading: Reading) -> Layout:

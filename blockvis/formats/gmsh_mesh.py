@@ -22,7 +22,7 @@ from solver.mechanics import counted
 from .bodies import Bodies
 from .closed_surfaces import OpenSurface, bodies_of_surfaces
 from .node_order import GMSH, ring_of_nodes
-from .reading import Reading
+from .reading import Reading, json_object
 from .volumes import GMSH_SOLIDS, Faces, bodies_of_cells
 
 #: Number of nodes of each element type.
@@ -241,7 +241,7 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
         order = "<" if head.split(b"\n", 1)[1][:4] == b"\x01\x00\x00\x00" else ">"
     # Sizes are read as signed numbers: no count of a real file reaches the sign bit, and a hostile one cannot wrap.
     wide = f"{order}i{8 if width == b'8' else 4}"
-    mesh, table = _Mesh(), {}
+    mesh = _Mesh()
 
     def numbers(section: str) -> _Numbers | None:
         body = _section(data, section)
@@ -264,13 +264,7 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
     else:
         _nodes_22(nodes, mesh)
         _elements_22(elements, mesh)
-    own = _section(data, TABLE)
-    if own is not None:
-        try:
-            table = json.loads(own)
-        except ValueError:
-            table = {}
-    return mesh, table if isinstance(table, dict) else {}
+    return mesh, json_object(_section(data, TABLE) or b"")
 
 
 def _section(data: bytes, name: str) -> bytes | None:

@@ -48,8 +48,7 @@ MASK_MAKERS = "by hand GIMP, labelme or CVAT, by a model SAM"
 
 def read(path: Path, reading: Reading) -> Layout:
     """Read the stones of an image."""
-    if reading.view not in (None, "xy"):
-        raise ValueError(f"'{path}' is an image in the plane xy; it has no view {reading.view}")
+    reading.refuse_view(path)
     image, tags = opened(path)
     placement = placement_of(path, image.size, reading, tags=tags)
     try:

@@ -75,8 +75,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         raise ValueError(f"'{path}' is a layout of version {version!r}; version 1 is read: update blockvis")
     more = _not_read(content, KEYS, f"'{path}'")
     in_space = any(isinstance(block, dict) and "points" in block for block in content["blocks"])
-    if reading.view not in (None, "xy") and not in_space:
-        raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
+    if not in_space:
+        reading.refuse_view(path)
     for k, block in enumerate(content["blocks"]):
         if isinstance(block, dict):
             of_block = (*BLOCK_KEYS, *(("points", "faces") if in_space else ("outline", "thickness")))

@@ -1,7 +1,8 @@
-"""Options of a reader."""
+"""What readers have in common: their options, and rows of our own in JSON."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -45,6 +46,11 @@ class Reading:
         labels = [label for label in labels if label]
         return not matches(labels, self.ignore) and (not self.only or matches(labels, self.only))
 
+    def refuse_view(self, path: Path) -> None:
+        """Refuse a view of what is drawn in the plane."""
+        if self.view not in (None, "xy"):
+            raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {self.view}")
+
     def refuse_image_keys(self, path: Path) -> None:
         """Refuse what is said of an image where a file is none; ``outline_tolerance`` is of every drawing."""
         given = [key for key, value in self.image.items() if value is not None and key != "outline_tolerance"]
@@ -52,3 +58,12 @@ class Reading:
             raise ValueError(
                 f"'{path}' is no image: {given[0]} is of images and annotations of them; leave it out, or give the unit"
             )
+
+
+def json_object(text: str | bytes) -> dict[str, Any]:
+    """Parse what one of our writers put beside a block, or a program beside its blocks; empty where it is no object."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}

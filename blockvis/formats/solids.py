@@ -25,7 +25,7 @@ from . import dae
 from .bodies import Bodies, Body, drawn_row
 from .cells import layout_of_cells, merged
 from .closed_surfaces import OpenSurface, enclosed
-from .reading import Reading
+from .reading import Reading, json_object
 
 #: Programs that write coordinates to .glb as they are, whichever of them is up, in small letters.
 AS_THEY_ARE = ("trimesh",)
@@ -232,12 +232,7 @@ def _description(path: Path) -> dict[str, Any]:
     """Read what a .glb file says about itself; empty where it is no JSON."""
     with path.open("rb") as stream:
         head = stream.read(20)
-        content = stream.read(min(int.from_bytes(head[12:16], "little"), LARGEST_HEADER))
-    try:
-        found = json.loads(content)
-    except ValueError:
-        return {}
-    return found if isinstance(found, dict) else {}
+        return json_object(stream.read(min(int.from_bytes(head[12:16], "little"), LARGEST_HEADER)))
 
 
 def _up(path: Path, bodies: Sequence[Body], size: float) -> tuple[str, str]:
@@ -393,11 +388,8 @@ def _own_rows(path: Path) -> list[dict[str, Any]]:
         for line in stream:
             mark = line.find(b"blockvis {")
             if mark >= 0 and line[:1] in b"#c":
-                try:
-                    rows.append(json.loads(line[mark + 9 :]))
-                except ValueError:
-                    return []
-    return rows
+                rows.append(json_object(line[mark + 9 :]))
+    return rows if all(rows) else []
 
 
 def write(layout: Layout, path: Path) -> None:

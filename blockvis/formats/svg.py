@@ -31,7 +31,7 @@ from solver import mechanics
 from .arcs import MOST_CHORDS, Arc, Bezier, Curve, bezier_chords
 from .drawing import Drawing, Line, Outline, Stroke, is_chain, joined_ends
 from .loose_lines import nothing_closed, with_faces
-from .reading import Reading
+from .reading import Reading, json_object
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
@@ -134,8 +134,7 @@ class _Context:
 
 def read(path: Path, reading: Reading) -> Layout:
     """Read a .svg drawing; its unit follows from its width and its viewBox."""
-    if reading.view not in (None, "xy"):
-        raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
+    reading.refuse_view(path)
     root = _root(path)
     own = root.get("data-blockvis-unit", "")
     stated, doubts = (own, []) if own else _unit(root)
@@ -393,13 +392,9 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
 
 def _kept(element: ElementTree.Element, title: str, where: _Context, found: _Found) -> dict[str, Any]:
     """Row of the block table that our own writer put on a shape, with the layer and name that the shape has now."""
-    try:
-        kept = json.loads(element.get("data-blockvis", "{}"))
-    except ValueError:
+    row = kept = json_object(element.get("data-blockvis", "{}"))
+    if not kept:
         return {}
-    if not isinstance(kept, dict) or not kept:
-        return {}
-    row = kept
     # A program that drops the labels of layers leaves ids that it made up.
     if where.named and where.layer not in ("", _in_xml(layer_of(kept)[0] or _LAYER)):
         row = {**_row([where.layer], ""), **on_layer(kept, where.layer)}
