@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,14 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, UPRIGHT, Note, kind_of
-from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
+from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells, spread_of
+from blockvis.layout.solids import fans
 from solver import mechanics
 from solver.mechanics import counted
 
 from .bodies import Bodies, Body, with_role
-from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
+from .closed_surfaces import OpenSurface, bodies_of_surfaces, components, enclosed
+from .reading import Reading
 
 #: Our name of the number of the named set of each cell.
 CELL_SET = "cell set"
@@ -220,20 +222,46 @@ def _row(data: Mapping[str, np.ndarray], cell: int) -> dict[str, Any]:
     return row
 
 
-def layout_of_meshes(
-    meshes: Sequence[tuple[np.ndarray, Sequence[Sequence[int]], Mapping[str, Any]]], path: Path | str, view: str | None
-) -> Layout | Bodies:
-    """Make a layout of flat meshes, each a block: (n, 3) points, the points around each face, and a row."""
+@dataclass(frozen=True)
+class Mesh:
+    """A block of a drawing: (n, 3) points, those around each face, and its row of the block table.
+
+    ``curved`` is the kind of a solid of which faces are missing, as they are not flat.
+    """
+
+    points: np.ndarray
+    faces: list[list[int]]
+    row: dict[str, Any]
+    curved: str = ""
+
+
+def found_in_meshes(meshes: Sequence[Mesh], path: Path | str, reading: Reading) -> Layout | Bodies:
+    """Make outlines of meshes in a plane, and of others the bodies that they enclose.
+
+    Raises
+    ------
+    ValueError
+        For points that are not finite, and as of :func:`blockvis.formats.closed_surfaces.enclosed`.
+    """
+    every = np.concatenate([mesh.points for mesh in meshes])
+    size = float(spread_of(every, f"'{path}'").max())
+    if is_flat(every):
+        return _layout_of_meshes(meshes, path, reading.view)
+    parts = [Body(str(mesh.row["name"]), mesh.points, fans(mesh.faces), mesh.row) for mesh in meshes]
+    bodies, notes = enclosed(parts, size, path, reading)
+    return Bodies(bodies, notes=notes)
+
+
+def _layout_of_meshes(meshes: Sequence[Mesh], path: Path | str, view: str | None) -> Layout | Bodies:
+    """Make a layout of flat meshes, each a block."""
     # Some repeat the corners of each face.
-    points, number = np.unique(np.concatenate([own for own, _, _ in meshes]), axis=0, return_inverse=True)
-    starts = np.cumsum([0, *(len(own) for own, _, _ in meshes)])
-    rings = [
-        number.ravel()[np.add(face, k)] for k, (_, faces, _) in zip(starts, meshes, strict=False) for face in faces
-    ]
-    counts = [len(faces) for _, faces, _ in meshes]
+    points, number = np.unique(np.concatenate([mesh.points for mesh in meshes]), axis=0, return_inverse=True)
+    starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    rings = [number.ravel()[np.add(face, k)] for k, mesh in zip(starts, meshes, strict=False) for face in mesh.faces]
+    counts = [len(mesh.faces) for mesh in meshes]
     data = {"block_id": np.repeat(np.arange(len(meshes)), counts)}
     for key in ("name", "group", "role", "material"):
-        data[key] = np.repeat([str(row.get(key, "")) for _, _, row in meshes], counts)
+        data[key] = np.repeat([str(mesh.row.get(key, "")) for mesh in meshes], counts)
     return layout_of_cells(points, rings, data, path, view)
 
 

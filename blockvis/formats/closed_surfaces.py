@@ -227,26 +227,19 @@ def enclosed(
                 bodies += closed_bodies(part, size, path)
             except ValueError as error:
                 if reading is not None and not reading.wants(part.labels):
-                    unwanted.append(part.name)
+                    unwanted.append(f"'{part.name}'")
                 elif isinstance(error, OpenSurface) and _is_plane(part.points[np.unique(part.faces)], size):
-                    plane.append(part.name)
+                    plane.append(f"'{part.name}'" + " (a support)" * ("role" in part.said))
                 else:
                     raise
                 first = first or (error if isinstance(error, OpenSurface) else None)
         if not bodies and first is not None:
             raise first
-    notes = [without_volume(plane)] if plane else []
-    if unwanted:
-        words = listed([f"'{name}'" for name in unwanted])
-        notes.append(Note(LEFT_OUT, f"left out: {words}, no closed body, as asked for"))
-    return bodies, notes
-
-
-def without_volume(names: Sequence[str], supports: Sequence[str] = ()) -> Note:
-    """Say that faces without volume among the bodies are left out."""
-    words = listed([f"'{name}'" + " (a support)" * (name in supports) for name in names])
-    remedy = "draw a support that it stands for by [[supports]]"
-    return Note(LEFT_OUT, f"left out: {words}, a single face without volume; {remedy}")
+    said = {
+        "a single face without volume; draw a support that it stands for by [[supports]]": plane,
+        "no closed body, as asked for": unwanted,
+    }
+    return bodies, [Note(LEFT_OUT, f"left out: {listed(names)}, {why}") for why, names in said.items() if names]
 
 
 def _is_plane(points: np.ndarray, size: float) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -18,15 +18,12 @@ import numpy as np
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
-from blockvis.layout.notes import Note
-from blockvis.layout.outlines import is_flat, spread_of
-from blockvis.layout.solids import fans
+from blockvis.layout.outlines import is_flat
 from solver import mechanics
 from solver.mechanics import counted
 
-from .bodies import Bodies, Body
-from .cells import layout_of_cells, layout_of_meshes
-from .closed_surfaces import enclosed, without_volume
+from .bodies import Bodies
+from .cells import Mesh, found_in_meshes, layout_of_cells
 from .reading import Reading
 
 #: Objects nested deeper than this are not looked into.
@@ -49,15 +46,6 @@ class _Context:
     passed: Counter[str] = field(default_factory=Counter)
 
 
-@dataclass(frozen=True)
-class _Mesh:
-    """One mesh: (n, 3) points in place, faces, and the row of the block table."""
-
-    points: np.ndarray
-    faces: list[list[int]]
-    row: dict[str, Any]
-
-
 def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies | None:
     """Read the blocks of a parsed .json file; None if it holds no mesh.
 
@@ -66,7 +54,7 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies 
     ValueError
         For damaged meshes, bodies that are not closed, and blocks whose geometry is no mesh.
     """
-    meshes: list[_Mesh] = []
+    meshes: list[Mesh] = []
     context = _Context()
     try:
         meshes.extend(_meshes(content, context))
@@ -83,43 +71,21 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies 
     return replace(found, notes=(*found.notes, *passed_over(context.passed)))
 
 
-def _layout_of(meshes: list[_Mesh], path: Path, reading: Reading) -> Layout | Bodies:
-    """Make outlines of meshes in a plane, and of others the bodies that they enclose."""
-    every = np.concatenate([mesh.points for mesh in meshes])
-    size = float(spread_of(every, f"'{path}'").max())
-    names = [str(mesh.row["name"]) for mesh in meshes]
-    if len(set(names)) < len(names):
+def _layout_of(meshes: list[Mesh], path: Path, reading: Reading) -> Layout | Bodies:
+    """Make blocks of meshes: each is one, but of a single one in a plane each face."""
+    if len({mesh.row["name"] for mesh in meshes}) < len(meshes):
         # COMPAS names a mesh after its class unless it is told otherwise.
         meshes = [replace(mesh, row={**mesh.row, "name": f"block {mesh.row['key']}"}) for mesh in meshes]
-    if is_flat(every):
-        return _flat(meshes, path, reading.view)
-    planes = [mesh for mesh in meshes if len(mesh.faces) == 1]
-    if len(planes) < len(meshes):
-        # A single face among bodies is a ground without depth.
-        meshes = [mesh for mesh in meshes if len(mesh.faces) > 1]
-    notes = [] if len(planes) == 0 else [_without_volume(planes)]
-    parts = [
-        Body(str(mesh.row["name"]), mesh.points, fans(mesh.faces), {k: v for k, v in mesh.row.items() if k != "key"})
-        for mesh in meshes
-    ]
-    bodies, more = enclosed(parts, size, path, reading)
-    return Bodies(bodies, notes=(f"{counted(len(bodies), 'block')} of COMPAS", *notes, *more))
+    if len(meshes) == 1 and is_flat(meshes[0].points):
+        rings = [np.array(face) for face in meshes[0].faces]
+        return layout_of_cells(meshes[0].points, rings, {"block_id": np.arange(len(rings))}, path, reading.view)
+    found = found_in_meshes(meshes, path, reading)
+    if isinstance(found, Layout):
+        return found
+    return replace(found, notes=(f"{counted(len(found.bodies), 'block')} of COMPAS", *found.notes))
 
 
-def _without_volume(planes: Sequence[_Mesh]) -> Note:
-    supports = [str(mesh.row["name"]) for mesh in planes if "role" in mesh.row]
-    return without_volume([str(mesh.row["name"]) for mesh in planes], supports)
-
-
-def _flat(meshes: Sequence[_Mesh], path: Path, view: str | None) -> Layout | Bodies:
-    """Make a layout of flat meshes: each is a block, but of a single one each face."""
-    if len(meshes) > 1:
-        return layout_of_meshes([(mesh.points, mesh.faces, mesh.row) for mesh in meshes], path, view)
-    rings = [np.array(face) for face in meshes[0].faces]
-    return layout_of_cells(meshes[0].points, rings, {"block_id": np.arange(len(rings))}, path, view)
-
-
-def _meshes(value: Any, context: _Context) -> Iterator[_Mesh]:
+def _meshes(value: Any, context: _Context) -> Iterator[Mesh]:
     """Yield the meshes of an object and of those within it."""
     if context.depth > DEEPEST:
         return
@@ -164,7 +130,7 @@ def _unwrapped(value: Any) -> tuple[Any, str]:
     return value, name
 
 
-def _of_graph(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
+def _of_graph(data: dict[str, Any], context: _Context) -> Iterator[Mesh]:
     """Yield the blocks of the nodes of an assembly."""
     default = data.get("default_node_attributes") or data.get("dna") or data.get("node_attributes") or {}
     for key, node in data["node"].items():
@@ -182,7 +148,7 @@ def _of_graph(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
             yield replace(mesh, row={**mesh.row, "name": str(own)}) if own else mesh
 
 
-def _of_old_assembly(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
+def _of_old_assembly(data: dict[str, Any], context: _Context) -> Iterator[Mesh]:
     """Yield the blocks of an assembly that keeps them apart from its nodes, as of before 1.0."""
     graph, _ = _unwrapped(data["assembly"])
     default = graph.get("node_attributes") or graph.get("dva") or {}
@@ -193,7 +159,7 @@ def _of_old_assembly(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]
         yield from _meshes(block, replace(context, name=str(key), support=support))
 
 
-def _of_model(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
+def _of_model(data: dict[str, Any], context: _Context) -> Iterator[Mesh]:
     """Yield the elements of a model at their places."""
     elements = data["elements"]
     listed = list(elements.values()) if isinstance(elements, dict) else elements
@@ -296,7 +262,7 @@ def _shape_of_lists(data: dict[str, Any]) -> tuple[np.ndarray, list[list[int]]] 
     return None
 
 
-def _mesh(points: np.ndarray, faces: list[list[int]], data: dict[str, Any], name: str, context: _Context) -> _Mesh:
+def _mesh(points: np.ndarray, faces: list[list[int]], data: dict[str, Any], name: str, context: _Context) -> Mesh:
     attributes = data.get("attributes") or {}
     support = context.support or bool(attributes.get("is_support"))
     row: dict[str, Any] = {
@@ -318,7 +284,7 @@ def _mesh(points: np.ndarray, faces: list[list[int]], data: dict[str, Any], name
     if outside:
         raise IndexError(f"a face uses point {outside[0]} of {len(points)}")
     matrix = context.matrix
-    return _Mesh(points @ matrix[:3, :3].T + matrix[:3, 3], faces, row)
+    return Mesh(points @ matrix[:3, :3].T + matrix[:3, 3], faces, row)
 
 
 def write(layout: Layout, path: Path) -> None:

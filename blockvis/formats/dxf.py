@@ -25,10 +25,11 @@ from solver.mechanics import counted
 
 from .arcs import Arc
 from .bodies import Bodies
+from .cells import Mesh
 from .drawing import Drawing, Line, Outline, Stroke, is_chain, joined_ends
-from .dxf_bodies import DrawnMesh, drawn_mesh, is_mesh, layout_of_meshes, meshes_of_faces, said_by_layer
+from .dxf_bodies import drawn_mesh, is_mesh, layout_of_meshes, meshes_of_faces, said_by_layer
 from .loose_lines import nothing_closed, with_faces
-from .reading import Reading
+from .reading import Reading, json_object
 
 #: How a binary file begins.
 BINARY = b"AutoCAD Binary DXF"
@@ -70,7 +71,7 @@ class _Found(Drawing):
     """What was found so far; 3DFACEs are outlines, too, unless they enclose bodies."""
 
     hidden: Counter[str] = field(default_factory=Counter)
-    meshes: list[DrawnMesh] = field(default_factory=list)
+    meshes: list[Mesh] = field(default_factory=list)
     faces: list[Outline] = field(default_factory=list)
 
     def add(self, entity: Any, handle: str, stroke: Stroke) -> None:
@@ -153,9 +154,9 @@ def _unit(document: Any, reading: Reading) -> tuple[str, list[str]]:
     ]
 
 
-def _chosen_meshes(found: _Found, reading: Reading) -> list[DrawnMesh]:
+def _chosen_meshes(found: _Found, reading: Reading) -> list[Mesh]:
     """Take the bodies that are asked for, where no outline is; count the others, or the outlines, as skipped."""
-    meshes = [mesh for mesh in found.meshes if reading.wants([mesh.layer, mesh.name])]
+    meshes = [mesh for mesh in found.meshes if reading.wants([mesh.row["group"], mesh.row["name"]])]
     if meshes and not any(reading.wants([one.row["group"], one.row["name"]]) for one in found.outlines):
         flat = len(found.outlines) + len(found.loose)
         found.skipped.update({"outlines and lines beside bodies in space": flat} if flat else {})
@@ -634,13 +635,8 @@ def _wanted_lines(found: _Found, unwanted: Choice, asked: Choice) -> list[bool]:
 
 
 def _own_data(entity: Any) -> dict[str, Any]:
-    if not entity.has_xdata(APPLICATION):
-        return {}
-    try:
-        row = json.loads("".join(str(tag.value) for tag in entity.get_xdata(APPLICATION) if tag.code == 1000))
-    except ValueError:
-        return {}
-    return row if isinstance(row, dict) else {}
+    tags = entity.get_xdata(APPLICATION) if entity.has_xdata(APPLICATION) else ()
+    return json_object("".join(str(tag.value) for tag in tags if tag.code == 1000))
 
 
 def _layer_name(row: Mapping[str, Any]) -> str:

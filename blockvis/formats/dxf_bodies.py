@@ -3,40 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import is_flat, spread_of
 from blockvis.layout.solids import fans
 from solver.mechanics import counted
 
 from .bodies import Bodies, Body
-from .cells import layout_of_meshes as flat_layout
-from .closed_surfaces import closed_bodies, enclosed
+from .cells import Mesh, found_in_meshes
+from .closed_surfaces import closed_bodies
 from .reading import Reading
 
 #: Solids whose geometry is that of the ACIS kernel, of which ezdxf knows the flat faces.
 SOLIDS = ("3DSOLID", "BODY")
-
-
-@dataclass(frozen=True)
-class DrawnMesh:
-    """A mesh of a drawing: (n, 3) points, the points around each face, and its kind where faces of it are missing."""
-
-    name: str
-    layer: str
-    points: np.ndarray
-    faces: list[list[int]]
-    curved: str = ""
-
-    @property
-    def row(self) -> dict[str, Any]:
-        """Its row of the block table."""
-        return {"name": self.name, **said_by_layer(self.layer)}
 
 
 def said_by_layer(layer: str) -> dict[str, Any]:
@@ -54,7 +37,7 @@ def is_mesh(entity: Any) -> bool:
     )
 
 
-def drawn_mesh(entity: Any, handle: str) -> DrawnMesh:
+def drawn_mesh(entity: Any, handle: str) -> Mesh:
     """Take the mesh of an entity, as placed by the blocks that insert it."""
     from ezdxf.render import MeshBuilder
 
@@ -69,7 +52,7 @@ def drawn_mesh(entity: Any, handle: str) -> DrawnMesh:
         start = sum(map(len, points))
         points.append(np.array([tuple(vertex) for vertex in mesh.vertices]).reshape(-1, 3))
         faces += [[start + int(k) for k in face] for face in mesh.faces if len(face) > 2]
-    return DrawnMesh(f"block {handle}", layer, np.concatenate(points), faces, curved)
+    return Mesh(np.concatenate(points), faces, {"name": f"block {handle}", **said_by_layer(layer)}, curved)
 
 
 def _flat_faces(entity: Any) -> tuple[list[Any], str]:
@@ -90,7 +73,7 @@ def _flat_faces(entity: Any) -> tuple[list[Any], str]:
     return meshes, "" if whole else entity.dxftype()
 
 
-def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]], path: Path) -> list[DrawnMesh]:
+def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]], path: Path) -> list[Mesh]:
     """Join 3DFACEs, those of a layer and of an inserted block together; none where none of these encloses a body.
 
     Given are layer, name and (n, 3) corners of each.
@@ -103,7 +86,7 @@ def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]], path: Path) ->
         rings = [ring for _, ring in faces]
         starts = np.cumsum([0, *map(len, rings)])
         numbers = [list(range(start, start + len(ring))) for start, ring in zip(starts.tolist(), rings, strict=False)]
-        meshes.append(DrawnMesh(faces[0][0], layer, np.concatenate(rings), numbers))
+        meshes.append(Mesh(np.concatenate(rings), numbers, {"name": faces[0][0], **said_by_layer(layer)}))
         try:
             size = float(np.ptp(meshes[-1].points, axis=0).max())
             closed = closed or bool(closed_bodies(Body("", meshes[-1].points, fans(numbers)), size, path))
@@ -113,7 +96,7 @@ def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]], path: Path) ->
 
 
 def layout_of_meshes(
-    meshes: Sequence[DrawnMesh], path: Path, reading: Reading, unit: str, notes: Sequence[str]
+    meshes: Sequence[Mesh], path: Path, reading: Reading, unit: str, notes: Sequence[str]
 ) -> Layout | Bodies:
     """Make bodies of the meshes of a drawing, or outlines where all of them are flat.
 
@@ -126,15 +109,9 @@ def layout_of_meshes(
     if curved:
         first = curved[0]
         raise ValueError(
-            f"'{path}': {first.curved} '{first.name}' on layer '{first.layer}' has faces of the ACIS kernel that are "
-            f"not read ({len(curved)} of {counted(len(meshes), 'body', 'bodies')}): export the bodies as .stl "
-            "(AutoCAD: STLOUT) or .step, or leave it out (ignore)"
+            f"'{path}': {first.curved} '{first.row['name']}' on layer '{first.row['group']}' has faces of the ACIS "
+            f"kernel that are not read ({len(curved)} of {counted(len(meshes), 'body', 'bodies')}): export the bodies "
+            "as .stl (AutoCAD: STLOUT) or .step, or leave it out (ignore)"
         )
-    every = np.concatenate([mesh.points for mesh in meshes])
-    size = float(spread_of(every, f"'{path}'").max())
-    if is_flat(every):
-        found = flat_layout([(mesh.points, mesh.faces, mesh.row) for mesh in meshes], path, reading.view)
-        return replace(found, unit=unit, notes=(*found.notes, *notes))
-    parts = [Body(mesh.name, mesh.points, fans(mesh.faces), mesh.row) for mesh in meshes]
-    bodies, more = enclosed(parts, size, path, reading)
-    return Bodies(bodies, unit, notes=(*notes, *more))
+    found = found_in_meshes(meshes, path, reading)
+    return replace(found, unit=unit, notes=(*found.notes, *notes))
