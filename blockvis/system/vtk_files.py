@@ -102,43 +102,23 @@ def _with_bytes(dataset: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
 
 def _by_corners(dataset: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
     """Make a copy of a dataset with polyhedra in the order of their numbers of corners; others are left."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-    from vtkmodules.vtkCommonDataModel import VTK_POLYHEDRON, vtkCellArray
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkIdList
+    from vtkmodules.vtkCommonDataModel import VTK_POLYHEDRON
 
-    faces, locations = dataset.GetPolyhedronFaces(), dataset.GetPolyhedronFaceLocations()
-    if faces is None:
+    if dataset.GetPolyhedronFaces() is None:
         return dataset
-
-    def taken(of: vtkCellArray, order: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        starts, members = (vtk_to_numpy(array) for array in (of.GetOffsetsArray(), of.GetConnectivityArray()))
-        sizes = np.diff(starts)[order]
-        offsets = np.append(0, np.cumsum(sizes))
-        return offsets, members[np.repeat(starts[:-1][order] - offsets[:-1], sizes) + np.arange(offsets[-1])]
-
-    def cells(offsets: np.ndarray, members: np.ndarray) -> vtkCellArray:
-        array = vtkCellArray()
-        array.SetData(*(numpy_to_vtk(ids.astype(np.int64), deep=True) for ids in (offsets, members)))
-        return array
-
     order = np.argsort(np.diff(vtk_to_numpy(dataset.GetCells().GetOffsetsArray())), kind="stable")
-    of_cells, which = taken(locations, order)
-    copy = dataset.NewInstance()
+    copy, faces = dataset.NewInstance(), vtkIdList()
     copy.SetPoints(dataset.GetPoints())
-    copy.SetPolyhedralCells(
-        numpy_to_vtk(np.full(len(order), VTK_POLYHEDRON, dtype=np.uint8), deep=True),
-        cells(*taken(dataset.GetCells(), order)),
-        cells(of_cells, np.arange(len(which))),
-        cells(*taken(faces, which)),
-    )
+    copy.Allocate(len(order))
     copy.GetPointData().ShallowCopy(dataset.GetPointData())
+    copy.GetCellData().CopyAllocate(dataset.GetCellData())
     copy.SetFieldData(dataset.GetFieldData())
-    data = dataset.GetCellData()
-    for array in (data.GetArray(k) for k in range(data.GetNumberOfArrays())):
-        ordered = numpy_to_vtk(vtk_to_numpy(array)[order], deep=True)
-        ordered.SetName(array.GetName())
-        copy.GetCellData().AddArray(ordered)
-    if data.GetScalars() is not None:
-        copy.GetCellData().SetActiveScalars(data.GetScalars().GetName())
+    for place, cell in enumerate(order.tolist()):
+        dataset.GetFaceStream(cell, faces)
+        copy.InsertNextCell(VTK_POLYHEDRON, faces)
+        copy.GetCellData().CopyData(dataset.GetCellData(), cell, place)
     return copy
 
 
