@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -14,6 +15,7 @@ from blockvis.layout.choice import Choice
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import CHANGED, Note
+from blockvis.layout.outlines import drawing_plane, spread_of
 from solver.mechanics import counted
 
 from .arcs import Curve
@@ -135,16 +137,30 @@ class Drawing:
         """All that is drawn."""
         return [*self.outlines, *self.loose, *(outline for outline, _ in self.holed)]
 
-    def turn(self, turn: np.ndarray) -> None:
-        """Take the directions in the rows of a matrix for all coordinates."""
-        self.outlines = [outline.mapped(turn) for outline in self.outlines]
-        self.holed = [(outline.mapped(turn), called) for outline, called in self.holed]
-        self.loose = [line.mapped(turn) for line in self.loose]
+    def turn(self, reading: Reading, path: Path) -> tuple[np.ndarray, list[str]]:
+        """Turn a drawing, of which what is wanted stands upright, into the plane of x and y.
 
-    def choices(self, reading: Reading) -> tuple[Choice, Choice]:
-        """Tell apart what is unwanted and what is asked for."""
-        names = {label for one in (*self.outlines, *self.loose) for label in one.labels if label}
-        return Choice(reading.ignore, names), Choice(reading.only, names)
+        Gives the directions of x, y and across in the rows of a matrix (3, 3), and notes on what that changes.
+        """
+        every, wants = self.strokes, self.wants(reading)
+        spread_of(np.concatenate([one.points for one in every]), f"'{path}'")
+        wanted = [one for one in every if wants(one)]
+        turn, notes = drawing_plane([one.points for one in wanted or every], f"'{path}'", reading.view)
+        self.outlines = [outline.mapped(turn[:2]) for outline in self.outlines]
+        self.holed = [(outline.mapped(turn[:2]), called) for outline, called in self.holed]
+        self.loose = [line.mapped(turn[:2]) for line in self.loose]
+        return turn, notes
+
+    def wants(self, reading: Reading) -> Callable[[Stroke], bool]:
+        """Say of what is drawn whether it is wanted: where something is asked for, nothing else is."""
+        names = {label for one in self.strokes for label in one.labels if label}
+        unwanted, asked = Choice(reading.ignore, names), Choice(reading.only, names)
+        some = any(asked.takes(one.labels, one.looks) for one in self.strokes)
+
+        def wanted(one: Stroke) -> bool:
+            return not unwanted.takes(one.labels, one.looks) and (not some or asked.takes(one.labels, one.looks))
+
+        return wanted
 
     @property
     def is_open(self) -> bool:
@@ -166,12 +182,11 @@ class Drawing:
         )
         return with_rows(layout, rows, own=own) if rows else layout
 
-    def without_lines(self, wanted: Sequence[bool]) -> list[Line]:
+    def without_lines(self, wants: Callable[[Stroke], bool]) -> list[Line]:
         """Leave out the lines that are not wanted, as asked for, and the outlines with holes; give the other lines."""
-        lines = [*zip(self.loose, wanted, strict=True)]
         self.left_out += [outline.left_out(called) for outline, called in self.holed]
-        self.left_out += [line.left_out("asked line") for line, is_wanted in lines if not is_wanted]
-        return [line for line, is_wanted in lines if is_wanted]
+        self.left_out += [line.left_out("asked line") for line in self.loose if not wants(line)]
+        return [line for line in self.loose if wants(line)]
 
 
 def is_chain(dashes: Sequence[float]) -> bool:

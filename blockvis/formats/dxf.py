@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.block_table import layer_of, on_layer, rows_of
-from blockvis.layout.choice import Choice, look_of
+from blockvis.layout.choice import look_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import CHANGED, Note, kind_of
-from blockvis.layout.outlines import chords_of, drawing_plane, filled, spread_of
+from blockvis.layout.outlines import chords_of, filled
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import metres_per
 from solver.mechanics import counted
@@ -129,8 +129,11 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     meshes = _chosen_meshes(found, reading)
     if meshes:
         return layout_of_meshes(meshes, path, reading, stated, _faults(audit) + _skipped(found))
-    _turn(found, reading, path)
-    found.notes += _faults(audit)
+    notes = found.turn(reading, path)[1] if found.strokes else []
+    if found.faces:
+        remedy = "; 3DFACEs of a layer are read as bodies in space where they close one"
+        notes = [Note(CHANGED, f"{note}{remedy}") if kind_of(note) == CHANGED else note for note in notes]
+    found.notes += notes + _faults(audit)
     _add_faces(found, reading, tolerance)
     if found.is_open:
         seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
@@ -175,30 +178,6 @@ def _faults(audit: Any) -> list[str]:
     """Count the faults that ezdxf found in a note."""
     faults = len(audit.fixes) + len(audit.errors)
     return [Note(CHANGED, f"repaired or passed over: {counted(faults, 'fault')} of the file")] if faults else []
-
-
-def _turn(found: _Found, reading: Reading, path: Path) -> None:
-    """Turn a drawing, of which what is wanted stands upright, into the plane of x and y; note what that changes."""
-    unwanted, asked = found.choices(reading)
-
-    def wants(strokes: Sequence[Line | Outline]) -> list[np.ndarray]:
-        kept = (one for one in strokes if not unwanted.takes(one.labels, one.looks))
-        return [one.points for one in kept if not reading.only or asked.takes(one.labels, one.looks)]
-
-    chosen = [*wants(found.outlines), *wants(found.loose)]
-    # Where outlines are asked for by name, other lines are in the plane of something else, as a plan.
-    lines = zip(found.loose, _wanted_lines(found, unwanted, asked), strict=True)
-    chosen = chosen or [line.points for line, is_wanted in lines if is_wanted]
-    every = [stroke.points for stroke in found.strokes]
-    if not every:
-        return
-    spread_of(np.concatenate(every), f"'{path}'")
-    turn, notes = drawing_plane(chosen or every, f"'{path}'", reading.view)
-    found.turn(turn[:2])
-    if found.faces:
-        remedy = "; 3DFACEs of a layer are read as bodies in space where they close one"
-        notes = [Note(CHANGED, f"{note}{remedy}") if kind_of(note) == CHANGED else note for note in notes]
-    found.notes += notes
 
 
 def _bounded(entities: Any, path: Path, frozen: Set[str]) -> Iterator[tuple[Any, str]]:
@@ -607,10 +586,8 @@ def _drawn_already(ring: np.ndarray, found: _Found) -> bool:
 
 def _add_faces(found: _Found, reading: Reading, tolerance: float | None) -> None:
     """Let arcs share their corners, add the faces between loose lines, and cut outlines along the lines within them."""
-    unwanted, asked = found.choices(reading)
     with_faces(
         found,
-        found.without_lines(_wanted_lines(found, unwanted, asked)),
         reading,
         called=lambda name, k: f"{name}.{k}",
         of_face=lambda layer, around, name: {
@@ -618,20 +595,8 @@ def _add_faces(found: _Found, reading: Reading, tolerance: float | None) -> None
             "within": around,
             "looks": ("face",),
         },
-        ignored={i for i, one in enumerate(found.outlines) if unwanted.takes([one.row["group"]], one.looks)},
         tolerance=tolerance,
     )
-
-
-def _wanted_lines(found: _Found, unwanted: Choice, asked: Choice) -> list[bool]:
-    """Which loose lines are wanted: all, unless layers or looks are asked for."""
-    layers = {*(one.row["group"] for one in found.outlines), *(line.layer for line in found.loose)}
-    looks = {look for one in (*found.outlines, *found.loose) for look in one.looks}
-    chosen = any(asked.takes([layer]) for layer in layers) or asked.takes((), looks)
-    return [
-        not unwanted.takes(line.labels, line.looks) and (not chosen or asked.takes(line.labels, line.looks))
-        for line in found.loose
-    ]
 
 
 def _own_data(entity: Any) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches, passed_over
 from blockvis.layout.notes import CHANGED, Note
-from blockvis.layout.outlines import drawing_plane, ring_area
+from blockvis.layout.outlines import ring_area
 from blockvis.layout.units import DOUBTED, UNITS
 from blockvis.system.extras import require
 from solver import mechanics
@@ -271,22 +271,18 @@ def layout_of_features(
         if len(parts := found.outlines[first:]) > 1:
             named = [{**row, "name": f"{row['name']} {k + 1}"} for k in range(len(parts))]
             found.outlines[first:] = [replace(one, row=own) for one, own in zip(parts, named, strict=True)]
-    every, skips = found.strokes, passed_over(found.skipped, "found")
-    if not every:
-        seen = skips[0] if skips else "found: nothing"
+    if not found.strokes:
+        seen = "".join(passed_over(found.skipped, "found")) or "found: nothing"
         raise ValueError(f"'{path}' has no polygon ({seen}); draw each block as one polygon")
-    wanted = [one for one in every if reading.wants(one.labels)]
-    turn, notes = drawing_plane([one.points for one in wanted or every], f"'{path}'", reading.view)
+    turn, notes = found.turn(reading, path)
     found.notes += notes
     if roles:
         listed = ", ".join(f"'{role}'" for role in roles)
         found.notes.append(Note(CHANGED, f"roles were left out ({listed}): roles are {', '.join(mechanics.ROLES)}"))
-    found.turn(turn[:2])
     _check_degrees(found, path, reading, degrees, far=not (unit or degrees or lengths) and (turn == np.eye(3)).all())
     found.notes += passed_over(found.skipped)
     with_faces(
         found,
-        found.without_lines([reading.wants(line.labels) for line in found.loose]),
         reading,
         called=lambda name, k: f"{name} {k + 1}",
         of_face=lambda layer, around, name: {"row": _row(name, layer, {}), "within": around},

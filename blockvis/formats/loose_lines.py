@@ -47,12 +47,10 @@ class Faces:
 
 def with_faces(
     drawing: Drawing,
-    lines: Sequence[Line],
     reading: Reading,
     *,
     called: Callable[[str, int], str],
     of_face: Callable[[str, tuple[str, ...], str], dict[str, Any]],
-    ignored: Set[int] = frozenset(),
     tolerance: float | None = None,
     in_place: bool = False,
 ) -> None:
@@ -62,16 +60,13 @@ def with_faces(
     ----------
     drawing : Drawing
         In the plane; changed.
-    lines : sequence of Line
-        Those of its loose lines that are wanted.
     reading : Reading
+        What is not wanted is left out, if it is a line; if it is an outline, lines do not cut it.
     called : callable
         Names a piece of an outline by the outline's name and its number among the pieces, from 0.
     of_face : callable
         Says of a face what an outline has beside its points, by the layer of most lines around it, those of all, and
         its name.
-    ignored : set of int, optional
-        As of :func:`faces_of_lines`.
     tolerance : float, optional
         As of :func:`blockvis.formats.arcs.with_shared_corners`, in the unit of the drawing.
     in_place : bool
@@ -79,6 +74,9 @@ def with_faces(
     """
     if not drawing.strokes:
         return
+    wants = drawing.wants(reading)
+    lines = drawing.without_lines(wants)
+    ignored = {k for k, one in enumerate(drawing.outlines) if not wants(one)}
     size = float(np.ptp(np.concatenate([stroke.points for stroke in drawing.strokes]), axis=0).max())
     drawn, n = [*drawing.outlines, *lines], len(drawing.outlines)
     shared = with_shared_corners([one.points for one in drawn], [one.curves for one in drawn], tolerance)

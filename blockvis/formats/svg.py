@@ -179,16 +179,9 @@ def _root(path: Path) -> ElementTree.Element:
 
 def _add_faces(found: _Found, reading: Reading, tolerance: float | None) -> None:
     """Leave out what is not wanted, let curves share corners, add the faces of loose lines, cut outlines along them."""
-    unwanted, asked = found.choices(reading)
-    chosen = any(asked.takes(one.labels, one.looks) for one in (*found.outlines, *found.loose))
-
-    def wants(one: Line | Outline) -> bool:
-        return not unwanted.takes(one.labels, one.looks) and (not chosen or asked.takes(one.labels, one.looks))
-
     paths = {line.layer: line.within for line in found.loose}
     with_faces(
         found,
-        found.without_lines([*map(wants, found.loose)]),
         reading,
         called=lambda name, k: f"{name} {k + 1}",
         of_face=lambda layer, around, name: {
@@ -196,7 +189,6 @@ def _add_faces(found: _Found, reading: Reading, tolerance: float | None) -> None
             "within": tuple(word for one in around for word in paths[one]),
             "looks": ("face",),
         },
-        ignored={k for k, one in enumerate(found.outlines) if not wants(one)},
         tolerance=tolerance,
     )
 
