@@ -68,13 +68,7 @@ def program_of(content: Any) -> str:
 
 
 def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
-    """Read the blocks of parsed annotations; None for what is none.
-
-    Raises
-    ------
-    ValueError
-        For annotations of several images, without outlines, without a scale, or damaged.
-    """
+    """Read the blocks of parsed annotations; None for what is none."""
     program = program_of(content)
     if not program:
         return None

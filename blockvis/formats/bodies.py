@@ -173,11 +173,6 @@ def layout_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
 
     Without a view one is taken in which no body lies behind another, of several that in which the bodies come closest
     to lying between the same two planes.
-
-    Raises
-    ------
-    ValueError
-        If the bodies are not prisms side by side.
     """
     asked, view = _selected(found, path, reading), reading.view
     bodies, size = asked.bodies, asked.size
@@ -223,12 +218,6 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
     """Make a layout in space of bodies of any shape.
 
     The last coordinate of a view is up: y of "xy", else z; without a view what the format has as up.
-
-    Raises
-    ------
-    ValueError
-        For bodies without a volume, or with more faces than a block may have, and for files of which some have y up and
-        others z.
     """
     if not found.up and reading.view is None:
         raise ValueError(

@@ -67,21 +67,9 @@ def layout_of_cells(
 ) -> Layout | Bodies:
     """Make a layout of surface cells; if they do not lie in a plane, find the bodies that they enclose.
 
-    Parameters
-    ----------
-    points : (n_points, 2) or (n_points, 3) array
-    rings : sequence of (n,) int arrays
-        Points around each cell.
-    data : mapping of str to (n_cells, ...) array
-        Cell arrays. ``block_id`` says which cells form one block; without it every cell is a block if one has more
-        than three corners, and triangles that share sides form one; :data:`TABLE_ARRAYS` are optional.
-    path, view
-        Named in messages; as of :func:`blockvis.layout.outlines.flattened`.
-
-    Raises
-    ------
-    ValueError
-        If there are no cells, a cell uses a point that does not exist, or a block has no outline.
+    Given are (n_points, 2) or (n_points, 3) points, those around each cell, and cell arrays (n_cells, ...). Of these
+    ``block_id`` says which cells form one block; without it every cell is a block if one has more than three corners,
+    and triangles that share sides form one; :data:`TABLE_ARRAYS` are optional.
     """
     if not rings:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
@@ -171,11 +159,6 @@ def rows_of_cells(
     """Read the block table from cell arrays, (n_cells, ...), given the number of the block of each cell.
 
     Names hold where no array has them.
-
-    Raises
-    ------
-    ValueError
-        For cells of one block that differ in what the table says of it.
     """
     for key in TABLE_ARRAYS:
         values = np.asarray(data.get(key, ()))
@@ -236,13 +219,7 @@ class Mesh:
 
 
 def found_in_meshes(meshes: Sequence[Mesh], path: Path | str, reading: Reading) -> Layout | Bodies:
-    """Make outlines of meshes in a plane, and of others the bodies that they enclose.
-
-    Raises
-    ------
-    ValueError
-        For points that are not finite, and as of :func:`blockvis.formats.closed_surfaces.enclosed`.
-    """
+    """Make outlines of meshes in a plane, and of others the bodies that they enclose."""
     every = np.concatenate([mesh.points for mesh in meshes])
     size = float(spread_of(every, f"'{path}'").max())
     if is_flat(every):
@@ -276,13 +253,7 @@ def flat_beside(bodies: Sequence[np.ndarray], flat: Sequence[np.ndarray]) -> tup
 
 
 def merged(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path | str) -> Layout | Bodies:
-    """Join the parts of a file to one; blocks without a name of their own are named after their part, "" for none.
-
-    Raises
-    ------
-    ValueError
-        If there are none, if some are flat and others are bodies in space, and if flat ones lie in different planes.
-    """
+    """Join the parts of a file to one; blocks without a name of their own are named after their part, "" for none."""
     if not found:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
     joined = _joined(found, labels, path)
@@ -364,13 +335,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
 
 
 def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path | str) -> Layout | Bodies:
-    """Join what several files hold; the block of a file that holds one is named after it.
-
-    Raises
-    ------
-    ValueError
-        If the files state different units, and as of :func:`merged`.
-    """
+    """Join what several files hold; the block of a file that holds one is named after it."""
     units = {part.unit: file for part, file in zip(found, files, strict=True)}
     if len(units) > 1:
         listed = ", ".join(f"'{file.name}' {unit or 'none'}" for unit, file in units.items())

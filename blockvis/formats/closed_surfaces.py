@@ -59,14 +59,8 @@ def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> t
 def closed_bodies(part: Body, size: float, path: Path | str) -> list[Body]:
     """Split a mesh of triangles, of which the name is for messages, into the closed bodies that it holds.
 
-    ``size`` is that of the drawing, in the unit of the points.
-
-    Raises
-    ------
-    OpenSurface
-        For a mesh that is not closed.
-    ValueError
-        For bodies that touch along an edge.
+    ``size`` is that of the drawing, in the unit of the points. ``OpenSurface`` is raised for a mesh that is not
+    closed, ``ValueError`` for bodies that touch along an edge.
     """
     name = part.name
     points, every = _with_points_merged(part.points, part.faces, size)
@@ -209,14 +203,8 @@ def enclosed(
 ) -> tuple[list[Body], list[Note]]:
     """Find the closed bodies of meshes; plane ones, and open ones that nobody wants, are left out, with notes.
 
-    ``size`` is that of the drawing, in the unit of the points.
-
-    Raises
-    ------
-    OpenSurface
-        For a part that is wanted and neither closed nor plane, and where none is closed.
-    ValueError
-        As of :func:`closed_bodies`.
+    ``size`` is that of the drawing, in the unit of the points. Raises ``OpenSurface`` for a part that is wanted and
+    neither closed nor plane, and where none is closed.
     """
     bodies: list[Body] = []
     plane, unwanted = [], []

@@ -47,13 +47,7 @@ class _Context:
 
 
 def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies | None:
-    """Read the blocks of a parsed .json file; None if it holds no mesh.
-
-    Raises
-    ------
-    ValueError
-        For damaged meshes, bodies that are not closed, and blocks whose geometry is no mesh.
-    """
+    """Read the blocks of a parsed .json file; None if it holds no mesh."""
     meshes: list[Mesh] = []
     context = _Context()
     try:

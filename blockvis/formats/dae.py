@@ -41,13 +41,7 @@ class Drawn:
 
 
 def drawn_in(path: Path) -> Drawn:
-    """Read the meshes of a file, each placed by the nodes above it and named after the innermost that has a name.
-
-    Raises
-    ------
-    ValueError
-        For geometry that cannot be read, and entities of XML.
-    """
+    """Read the meshes of a file, each placed by the nodes above it and named after the innermost that has a name."""
     require("dae", f"COLLADA files ('{path}'; .obj and .glb are read without)")
     import collada
 

@@ -98,13 +98,7 @@ def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]], path: Path) ->
 def layout_of_meshes(
     meshes: Sequence[Mesh], path: Path, reading: Reading, unit: str, notes: Sequence[str]
 ) -> Layout | Bodies:
-    """Make bodies of the meshes of a drawing, or outlines where all of them are flat.
-
-    Raises
-    ------
-    ValueError
-        For solids with curved faces, and meshes that are not closed.
-    """
+    """Make bodies of the meshes of a drawing, or outlines where all of them are flat."""
     curved = [mesh for mesh in meshes if mesh.curved]
     if curved:
         first = curved[0]

@@ -23,11 +23,6 @@ def files_of(path: Path) -> list[Path]:
     """List the files that a name stands for: itself, those of a folder, or those that fit a pattern.
 
     Numbers in names are in the order of counting: stone 2 before stone 10.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or files of several formats.
     """
     if path.is_dir():
         found = [entry for entry in path.iterdir() if entry.is_file() and _readable(entry)]

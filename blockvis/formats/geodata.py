@@ -257,11 +257,6 @@ def layout_of_features(
 
     ``unit`` is "" where the file does not say it, ``degrees`` the name of a system of longitude and latitude;
     ``lengths`` says whether the file says that it has no system, and ``skipped`` counts by its kind what is no outline.
-
-    Raises
-    ------
-    ValueError
-        For coordinates in degrees, and where nothing is an outline.
     """
     found, rows = Drawing(skipped=Counter(skipped or {})), _rows(features)
     roles = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)

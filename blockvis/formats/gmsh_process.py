@@ -38,15 +38,7 @@ def _meshed(source: str, target: str, chords: int, memory: int) -> tuple[str, An
     """Mesh a geometry file with so many chords of a full circle, and so many bytes of memory.
 
     Gives "bodies" and these, of triangles, if it has volumes; else "mesh", which is then in the target (.msh).
-
-    Raises
-    ------
-    ImportError
-        If the library cannot be loaded.
-    MemoryError
-        If the memory does not suffice.
-    Exception
-        As gmsh raises it.
+    Raises ``ImportError`` if the library cannot be loaded, and ``Exception`` as gmsh does.
     """
     try:
         import gmsh

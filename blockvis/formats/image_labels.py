@@ -80,11 +80,7 @@ class Photograph(ValueError):
 def labels_of(image: Image.Image, background: int | str | None = None) -> Labels:
     """Find the labels of an image, of which a background may be given by its value or colour.
 
-    Raises
-    ------
-    Photograph
-    ValueError
-        For values that are no labels, and a background that the image does not have.
+    ``Photograph`` is raised for what has none, ``ValueError`` for values that are no labels.
     """
     opaque, image = _opaque(image)
     values, coloured = _values(image)
@@ -293,13 +289,7 @@ def _of_values(values: np.ndarray, image: Image.Image, wanted: int | None) -> _F
 
 
 def _lines_on_paper(shown: np.ndarray, flat: np.ndarray) -> _Found | None:
-    """Find lines, none of them flat, on what is flat, which is paper; None where there are next to none.
-
-    Parameters
-    ----------
-    shown : (height, width, 1 or 3) array
-    flat : (height, width) bool array
-    """
+    """Find lines on what is flat, which is paper; None where there are next to none. Shown are 1 or 3 channels."""
     paper = np.median(shown[flat], axis=0)
     ink = np.abs(shown - paper).max(axis=2) > FLAT
     if ink.mean() < THIN:

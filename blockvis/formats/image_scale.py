@@ -92,11 +92,6 @@ def placement_of(
     """Find where the pixels of an image lie, or of the image of annotations; the path is named in messages.
 
     ``size`` is width and height in pixels, if they are known; ``tags`` are those of a TIFF.
-
-    Raises
-    ------
-    ValueError
-        Where nothing, or more than one thing, says how large a pixel is.
     """
     given = reading.image
     said = {}

@@ -64,13 +64,7 @@ def read(path: Path, reading: Reading) -> Layout:
 
 
 def opened(path: Path) -> tuple[Image.Image, Mapping[int, Any]]:
-    """Open an image, upright, and read its tags, if it is a TIFF.
-
-    Raises
-    ------
-    ValueError
-        For what is no image, is damaged, or has too many pixels.
-    """
+    """Open an image, upright, and read its tags, if it is a TIFF."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)

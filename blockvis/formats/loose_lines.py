@@ -56,21 +56,10 @@ def with_faces(
 ) -> None:
     """Let curves share corners, add the faces between lines to a drawing, and cut its outlines along lines in them.
 
-    Parameters
-    ----------
-    drawing : Drawing
-        In the plane; changed.
-    reading : Reading
-        What is not wanted is left out, if it is a line; if it is an outline, lines do not cut it.
-    called : callable
-        Names a piece of an outline by the outline's name and its number among the pieces, from 0.
-    of_face : callable
-        Says of a face what an outline has beside its points, by the layer of most lines around it, those of all, and
-        its name.
-    tolerance : float, optional
-        As of :func:`blockvis.formats.arcs.with_shared_corners`, in the unit of the drawing.
-    in_place : bool
-        Whether pieces take the place of their outline; else they come behind the others.
+    The drawing is in the plane. Lines that are not wanted are left out, and outlines that are not wanted are not cut.
+    ``called`` names a piece by its outline's name and its number, from 0; ``of_face`` says what the outline of a face
+    has beside its points, by the layer of most lines around it, those of all, and its name. Pieces come ``in_place`` of
+    their outline, or behind the others. The tolerance is as of :func:`blockvis.formats.arcs.with_shared_corners`.
     """
     if not drawing.strokes:
         return
@@ -99,20 +88,9 @@ def with_faces(
 def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: Set[int], only: Sequence[str]) -> Faces:
     """Find the faces between lines, and the pieces into which they cut outlines.
 
-    Parameters
-    ----------
-    lines : sequence of Line
-    outlines : sequence of Outline
-        Of the same drawing, in the plane.
-    ignored : set of int
-        Numbers of the outlines that will be left out: lines may end on them within another, as at openings; those that
-        lines cross are as if they were not there.
-    only : sequence of str
-        What the caller asks for: where that is faces, strips of mortar stay, and chain lines of its layers are joints.
-
-    Notes
-    -----
-    Chain lines are no joints.
+    ``ignored`` are numbers of outlines that will be left out: lines may end on them within another, as at openings;
+    those that lines cross are as if they were not there. Chain lines are no joints, unless their layers are asked for
+    (``only``); where faces are, strips of mortar stay.
 
     Lines cut an outline if they lie within it and it has two or more pieces along its border then; a line that reaches
     beyond, as an axis or a dimension does, cuts nothing. An outline around lines that do not reach it stays whole.

@@ -214,27 +214,17 @@ def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
             _check_parts(target, (*seen, path))
 
 
-def layout_of_dataset(
-    data: Any, path: Path | str = "dataset", view: str | None = None, dimension: int | None = None
-) -> Layout:
-    """Make a layout of a pyvista dataset: a mesh, or a multiblock of meshes.
+def layout_of_dataset(data: Any, dimension: int | None = None) -> Layout:
+    """Make a layout of a pyvista dataset, a mesh or a multiblock of meshes, in 2 or 3 dimensions.
 
-    Parameters
-    ----------
-    data : pyvista.DataSet or pyvista.MultiBlock
-    path : Path or str
-        Named in messages.
-    view : {"xy", "xz", "yz"}, optional
-        As of :func:`blockvis.read_layout`.
-    dimension : {2, 3}, optional
-        In the plane or in space; by default in space where bodies are not prisms side by side.
+    By default it is in space where bodies are not prisms side by side.
     """
-    found = found_in_dataset(data, path, view)
-    return in_dimension(found, path, Reading(view=view, dimension=dimension)) if isinstance(found, Bodies) else found
+    found = found_in_dataset(data, "dataset", None)
+    return in_dimension(found, "dataset", Reading(dimension=dimension)) if isinstance(found, Bodies) else found
 
 
 def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:
-    """Read the blocks of a pyvista dataset, flat or in space; the parameters are those of ``layout_of_dataset``."""
+    """Read the blocks of a pyvista dataset, flat or in space; the path is named in messages."""
     import pyvista
 
     if isinstance(data, pyvista.MultiBlock):

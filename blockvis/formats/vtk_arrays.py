@@ -16,11 +16,6 @@ def largest_number(text: bytes, attributes: dict[str, str], file: dict[str, str]
 
     ``text`` is the content of the array, or the file's appended data from the beginning of the array on; attributes are
     those of XML, of the array, with ``format`` "ascii", "binary" (base64) or "raw", and of the file.
-
-    Raises
-    ------
-    ValueError
-        If the array cannot be unpacked or is too large.
     """
     if attributes.get("format", "ascii") == "ascii":
         numbers = np.array(re.findall(rb"-?\d{1,18}", text), dtype=np.int64)
