@@ -40,11 +40,13 @@ TABLE = "BlockvisBlocks"
 class _Mesh:
     """Content of the sections of a file; of elements only those of surfaces and volumes.
 
-    Groups are those of an entity by its dimension and number, parents the numbers of the entities that were partitioned
-    by those of their parts. Cells of volumes are kept by their shape, with the number of the volume of each.
+    Numbers of nodes are in order, with their places among the coordinates. Groups are those of an entity by its
+    dimension and number, parents the numbers of the entities that were partitioned by those of their parts. Cells of
+    volumes are kept by their shape, with the number of the volume of each.
     """
 
-    points: dict[int, int] = field(default_factory=dict)
+    nodes: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    places: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     coordinates: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     group_names: dict[tuple[int, int], str] = field(default_factory=dict)
     groups: dict[tuple[int, int], list[int]] = field(default_factory=dict)
@@ -129,22 +131,12 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
     flat, note = flattened(mesh.coordinates, f"'{path}'", reading.view)
     unusable: dict[int, LeftOut] = {}
     outlines = outlines_of_cells(flat, rings, owner, names, unusable)
-    notes = [
-        f"{counted(len(tags), 'block')}, one per meshed surface; "
-        "a surface in no physical group may be missing from the file"
-    ]
-    if "" in groups:
-        notes.append(f"in no physical group: {groups.count('')} of {counted(len(tags), 'surface')}")
-    notes += [note] if note else []
-    layout = Layout(
-        blocks=tuple(outlines),
-        names=tuple(names),
-        groups=tuple(groups),
-        materials=tuple(groups),
-        unit="",
-        notes=tuple(notes),
-    )
-    return _with_table(layout, table, tags).leaving_out(unusable)
+    notes = _notes(counted(len(tags), "block"), groups, "surface") + ([note] if note else [])
+    layout = Layout(tuple(outlines), tuple(names), tuple(groups), materials=tuple(groups), unit="", notes=tuple(notes))
+    rows = [table.get(str(tag)) for tag in tags]
+    if all(isinstance(row, dict) for row in rows):
+        layout = with_rows(layout, rows, own=True)
+    return layout.leaving_out(unusable)
 
 
 def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Path, reading: Reading) -> Bodies:
@@ -176,28 +168,25 @@ def holds_flat_blocks(path: Path) -> bool:
 
 def _bodies(mesh: _Mesh, path: Path) -> Bodies:
     """Find the bodies of a mesh of volumes; surface cells beside them are their skin."""
-    cells: list[tuple[Faces, np.ndarray]] = []
-    volumes = []
-    for shape in dict.fromkeys(shape for shape, _ in mesh.solids):
-        chosen = [k for k, (one, _) in enumerate(mesh.solids) if one == shape]
-        cells.append((shape, np.concatenate([mesh.solids[k][1] for k in chosen])))
-        volumes += [mesh.volumes[k] for k in chosen]
-    tags, owner = np.unique(np.concatenate(volumes), return_inverse=True)
+    tags, owner = np.unique(np.concatenate(mesh.volumes), return_inverse=True)
     groups = _group_names(mesh, 3, tags, path)
     rows = [
         {"name": name, **_said(group)}
         for name, group in zip(_entity_names(groups, tags, "volume"), groups, strict=True)
     ]
-    bodies = bodies_of_cells(mesh.coordinates, cells, owner, rows)
-    notes = [
-        f"{counted(len(bodies), 'body', 'bodies')}, one per meshed volume; "
-        "a volume in no physical group may be missing from the file"
-    ]
+    bodies = bodies_of_cells(mesh.coordinates, mesh.solids, owner, rows)
+    notes = _notes(counted(len(bodies), "body", "bodies"), groups, "volume")
     if len(bodies) > len(tags):
-        notes = [f"{len(bodies)} bodies, the pieces of {counted(len(tags), 'meshed volume')}"]
-    if "" in groups:
-        notes.append(f"in no physical group: {groups.count('')} of {counted(len(tags), 'volume')}")
+        notes[0] = f"{len(bodies)} bodies, the pieces of {counted(len(tags), 'meshed volume')}"
     return Bodies(bodies, notes=notes)
+
+
+def _notes(found: str, groups: list[str], kind: str) -> list[str]:
+    """Say where blocks come from, and how many entities of a kind are in no physical group."""
+    notes = [f"{found}, one per meshed {kind}; a {kind} in no physical group may be missing from the file"]
+    if "" in groups:
+        notes.append(f"in no physical group: {groups.count('')} of {counted(len(groups), kind)}")
+    return notes
 
 
 def _group_names(mesh: _Mesh, dimension: int, tags: np.ndarray, path: Path) -> list[str]:
@@ -303,17 +292,14 @@ def _entities_41(numbers: _Numbers | None, mesh: _Mesh) -> None:
 
 def _nodes_41(numbers: _Numbers, mesh: _Mesh) -> None:
     n_blocks = int(numbers.take("size", 4)[0])
-    parts = []
+    tags, parts = [mesh.nodes], [mesh.coordinates]
     for _ in range(n_blocks):
         dimension, _tag, parametric = numbers.take("int", 3)
         n = numbers.one("size")
-        tags = numbers.take("size", n)
+        tags.append(numbers.take("size", n))
         width = 3 + (int(dimension) if parametric else 0)
         parts.append(numbers.take("double", n * width).reshape(n, width)[:, :3])
-        for tag in tags:
-            mesh.points[int(tag)] = len(mesh.points)
-    mesh.coordinates = np.concatenate(parts) if parts else mesh.coordinates
-    _check_nodes(mesh, numbers)
+    _set_nodes(mesh, numbers, np.concatenate(tags), np.concatenate(parts))
 
 
 def _nodes_22(numbers: _Numbers, mesh: _Mesh) -> None:
@@ -324,19 +310,18 @@ def _nodes_22(numbers: _Numbers, mesh: _Mesh) -> None:
         if n * record.itemsize > len(numbers.body) - numbers.position:
             numbers.take("int", record.itemsize // 4 * n)
         found = np.frombuffer(numbers.body, record, n, numbers.position)
-        tags, mesh.coordinates = found["tag"].astype(np.int64), found["x"].astype(float)
+        _set_nodes(mesh, numbers, found["tag"].astype(np.int64), found["x"].astype(float))
     else:
         values = numbers.take("double", 4 * n).reshape(n, 4)
-        tags, mesh.coordinates = values[:, 0].astype(np.int64), values[:, 1:]
-    mesh.points = {int(tag): i for i, tag in enumerate(tags)}
-    _check_nodes(mesh, numbers)
+        _set_nodes(mesh, numbers, values[:, 0].astype(np.int64), values[:, 1:])
 
 
-def _check_nodes(mesh: _Mesh, numbers: _Numbers) -> None:
-    if len(mesh.points) != len(mesh.coordinates):
+def _set_nodes(mesh: _Mesh, numbers: _Numbers, tags: np.ndarray, coordinates: np.ndarray) -> None:
+    mesh.coordinates = coordinates
+    mesh.nodes, mesh.places = np.unique(tags, return_index=True)
+    if len(mesh.nodes) < len(tags):
         raise ValueError(
-            f"'{numbers.path}' gives {len(mesh.coordinates)} nodes but {len(mesh.points)} different numbers to them; "
-            "export it again"
+            f"'{numbers.path}' gives {len(tags)} nodes but {len(mesh.nodes)} different numbers to them; export it again"
         )
 
 
@@ -399,20 +384,11 @@ def _add(mesh: _Mesh, numbers: _Numbers, dimension: int, kind: int, nodes: np.nd
 
 def _known(mesh: _Mesh, numbers: _Numbers, nodes: np.ndarray) -> np.ndarray:
     """Replace the numbers of nodes by their positions among the coordinates."""
-    try:
-        return np.array([mesh.points[int(node)] for node in nodes.ravel()], dtype=np.int64).reshape(nodes.shape)
-    except KeyError as error:
-        raise ValueError(
-            f"'{numbers.path}': an element uses node {error}, which the file lacks; export again"
-        ) from None
-
-
-def _with_table(layout: Layout, table: dict[str, dict[str, object]], tags: np.ndarray) -> Layout:
-    """Add the rows of our own section to the layout, if it has one for every block."""
-    rows = [table.get(str(tag)) for tag in tags]
-    if not all(isinstance(row, dict) for row in rows):
-        return layout
-    return with_rows(layout, rows, own=True)
+    missing = nodes[~np.isin(nodes, mesh.nodes)]
+    if len(missing):
+        raise ValueError(f"'{numbers.path}': an element uses node {missing[0]}, which the file lacks; export again")
+    found: np.ndarray = mesh.places[np.searchsorted(mesh.nodes, nodes)]
+    return found
 
 
 def write(layout: Layout, path: Path) -> None:

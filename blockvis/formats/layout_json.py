@@ -77,11 +77,15 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     in_space = any(isinstance(block, dict) and "points" in block for block in content["blocks"])
     if not in_space:
         reading.refuse_view(path)
+    of_block = (*BLOCK_KEYS, *(("points", "faces") if in_space else ("outline", "thickness")))
+    shapes, names = [], []
     for k, block in enumerate(content["blocks"]):
-        if isinstance(block, dict):
-            of_block = (*BLOCK_KEYS, *(("points", "faces") if in_space else ("outline", "thickness")))
-            more += _not_read(block, of_block, f"'{path}': block '{block.get('name', f'block {k}')}'")
-    layout = (_read_solids if in_space else _read_outlines)(content, path)
+        names.append(str(block.get("name", f"block {k}")) if isinstance(block, dict) else f"block {k}")
+        called = f"'{path}': block '{names[-1]}'"
+        more += _not_read(block, of_block, called) if isinstance(block, dict) else []
+        shapes.append(_solid(block, called) if in_space else _outline(block, called))
+    layout = Layout(blocks=tuple(shapes), names=tuple(names), unit=str(content.get("unit", "")))
+    layout = with_rows(layout, content["blocks"])
     if in_space and reading.view == "xy":
         layout = replace(layout, blocks=tuple((with_z_up(points), faces) for points, faces in layout.solids))
     notes = passed_over(Counter(more), "keys that are not known")
@@ -95,21 +99,32 @@ def _not_read(given: Mapping[str, Any], known: Sequence[str], where: str) -> lis
     return more
 
 
-def _read_outlines(content: dict[str, Any], path: Path) -> Layout:
-    """Read blocks in the plane."""
-    outlines, names = [], []
-    for k, block in enumerate(content["blocks"]):
-        name = str(block.get("name", f"block {k}")) if isinstance(block, dict) else f"block {k}"
-        try:
-            ring = np.array(block["outline"], dtype=float)
-        except (KeyError, TypeError, ValueError):
-            raise ValueError(f"'{path}': block '{name}' has no outline of numbers [[x, y], ...]; repair it") from None
-        if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3:
-            raise ValueError(f"'{path}': block '{name}' needs at least three corners [x, y]; its shape is {ring.shape}")
-        outlines.append(ring)
-        names.append(name)
-    layout = Layout(blocks=tuple(outlines), names=tuple(names), unit=str(content.get("unit", "")))
-    return with_rows(layout, content["blocks"])
+def _outline(block: Any, called: str) -> np.ndarray:
+    """(n, 2) array: the outline of a block in the plane."""
+    try:
+        ring = np.array(block["outline"], dtype=float)
+    except (KeyError, TypeError, ValueError):
+        raise ValueError(f"{called} has no outline of numbers [[x, y], ...]; repair it") from None
+    if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3:
+        raise ValueError(f"{called} needs at least three corners [x, y]; its shape is {ring.shape}")
+    return ring
+
+
+def _solid(block: Any, called: str) -> Solid:
+    """Points and faces of a block in space."""
+    try:
+        points = np.array(block["points"], dtype=float).reshape(-1, 3)
+        faces = [[int(corner) for corner in face] for face in block["faces"]]
+    except (KeyError, TypeError, ValueError):
+        raise ValueError(f"{called} has no points [[x, y, z], ...] and faces [[0, 1, 2], ...]; repair it") from None
+    outside = [corner for face in faces for corner in face if not 0 <= corner < len(points)]
+    if outside:
+        raise ValueError(f"{called} is no closed block: a face uses point {outside[0]} of {len(points)}; repair it")
+    if len(faces) < 4 or any(len(face) < 3 for face in faces):
+        raise ValueError(f"{called} is no closed block: it has {counted(len(faces), 'face')}; repair it")
+    if not np.isfinite(points).all():
+        raise ValueError(f"{called} has a point that is not finite; repair it")
+    return cleaned(points, faces)
 
 
 def _is_own(content: Any) -> bool:
@@ -120,35 +135,6 @@ def _is_own(content: Any) -> bool:
     return content.get("format") == FORMAT or any(
         isinstance(block, dict) and ("outline" in block or "points" in block) for block in blocks
     )
-
-
-def _read_solids(content: dict[str, Any], path: Path) -> Layout:
-    """Read blocks in space."""
-    solids: list[Solid] = []
-    names = []
-    for k, block in enumerate(content["blocks"]):
-        name = str(block.get("name", f"block {k}")) if isinstance(block, dict) else f"block {k}"
-        try:
-            points = np.array(block["points"], dtype=float).reshape(-1, 3)
-            faces = [[int(corner) for corner in face] for face in block["faces"]]
-        except (KeyError, TypeError, ValueError):
-            raise ValueError(
-                f"'{path}': block '{name}' has no points [[x, y, z], ...] and faces [[0, 1, 2], ...]; repair it"
-            ) from None
-        outside = [corner for face in faces for corner in face if not 0 <= corner < len(points)]
-        if outside or len(faces) < 4 or any(len(face) < 3 for face in faces):
-            what = (
-                f"a face uses point {outside[0]} of {len(points)}"
-                if outside
-                else f"it has {counted(len(faces), 'face')}"
-            )
-            raise ValueError(f"'{path}': block '{name}' is no closed block: {what}; repair it")
-        if not np.isfinite(points).all():
-            raise ValueError(f"'{path}': block '{name}' has a point that is not finite; repair it")
-        solids.append(cleaned(points, faces))
-        names.append(name)
-    layout = Layout(blocks=tuple(solids), names=tuple(names), unit=str(content.get("unit", "")))
-    return with_rows(layout, content["blocks"])
 
 
 def write(layout: Layout, path: Path) -> None:
