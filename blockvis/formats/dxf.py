@@ -134,7 +134,13 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         remedy = "; 3DFACEs of a layer are read as bodies in space where they close one"
         notes = [Note(CHANGED, f"{note}{remedy}") if kind_of(note) == CHANGED else note for note in notes]
     found.notes += notes + _faults(audit)
-    _add_faces(found, reading, tolerance)
+    with_faces(
+        found,
+        reading,
+        called=lambda name, k: f"{name}.{k}",
+        row_of=lambda layers, name: {**said_by_layer(layers[-1]), "name": name},
+        tolerance=tolerance,
+    )
     if found.is_open:
         seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
         listed = "; ".join(words for words in (nothing_closed(found.left_out), seen) if words) or "nothing"
@@ -582,21 +588,6 @@ def _drawn_already(ring: np.ndarray, found: _Found) -> bool:
         return False
     last = found.outlines[-1].points.mean(0)
     return bool(np.abs(last - ring.mean(0)).max() <= CLOSES * float(np.ptp(ring, axis=0).max()))
-
-
-def _add_faces(found: _Found, reading: Reading, tolerance: float | None) -> None:
-    """Let arcs share their corners, add the faces between loose lines, and cut outlines along the lines within them."""
-    with_faces(
-        found,
-        reading,
-        called=lambda name, k: f"{name}.{k}",
-        of_face=lambda layer, around, name: {
-            "row": {**said_by_layer(layer), "name": name},
-            "within": around,
-            "looks": ("face",),
-        },
-        tolerance=tolerance,
-    )
 
 
 def _own_data(entity: Any) -> dict[str, Any]:

@@ -280,7 +280,7 @@ def layout_of_features(
         found,
         reading,
         called=lambda name, k: f"{name} {k + 1}",
-        of_face=lambda layer, around, name: {"row": _row(name, layer, {}), "within": around},
+        row_of=lambda layers, name: _row(name, layers[-1], {}),
         in_place=True,
     )
     if found.is_open:

@@ -38,15 +38,6 @@ class ImageKeys(TypedDict, total=False):
     outline_tolerance: float | None
 
 
-#: Names of world files end in these letters, by the suffix of the image, or in .wld.
-_WORLD = {
-    ".png": (".pgw", ".pngw"),
-    ".tif": (".tfw", ".tifw"),
-    ".tiff": (".tfw", ".tiffw"),
-    ".jpg": (".jgw", ".jpgw"),
-    ".jpeg": (".jgw", ".jpegw"),
-}
-
 #: Tags of GeoTIFF: size of a pixel, tie point, matrix, keys.
 _SIZE, _TIE, _MATRIX, _KEYS = 33550, 33922, 34264, 34735
 
@@ -106,10 +97,9 @@ def placement_of(
     if drawn is not None:
         return drawn
     wide = f" of the {size[0]:g} pixels" if size else ""
-    suffix = _WORLD.get((image or path).suffix.lower(), (".pgw",))[0]
     raise ValueError(
         f"'{path}' has no scale; give the width{wide} in m, --width 1.2 or [geometry] width = 1.2, or height, or the "
-        f"size of a pixel, pixel = 0.002; or a world file {(image or path).with_suffix(suffix).name} beside it"
+        f"size of a pixel, pixel = 0.002; or a world file {_world_files(image or path)[0].name} beside it"
     )
 
 
@@ -143,11 +133,17 @@ def _of_keys(
     return Placement(np.array([[pixel, 0.0, 0.0], [0.0, -pixel, pixel * height]]), "m", words)
 
 
+def _world_files(image: Path) -> list[Path]:
+    """List the names of world files: first and last letter of the image's suffix and w, all of it and w, or wld."""
+    # Annotations may not name their image.
+    letters = "png" if image.suffix.lower() in ("", ".json") else image.suffix[1:].lower()
+    suffixes = (f".{letters[0]}{letters[-1]}w", f".{letters}w", ".wld")
+    return [image.with_suffix(end) for suffix in suffixes for end in (suffix, suffix.upper())]
+
+
 def _of_world_file(image: Path) -> Placement | None:
     """Read the world file beside an image; None if there is none."""
-    suffixes = (*_WORLD.get(image.suffix.lower(), ()), ".wld")
-    names = [image.with_suffix(end) for suffix in suffixes for end in (suffix, suffix.upper())]
-    file = next((name for name in [*names, image.with_name(image.name + "w")] if name.is_file()), None)
+    file = next((name for name in _world_files(image) if name.is_file()), None)
     if file is None:
         return None
     try:

@@ -30,16 +30,20 @@ STRIP, BETWEEN = 0.25, 0.7
 LEAST_STRIPS, MOSTLY = 3, 1.0 / 3.0
 
 
+@dataclass(frozen=True, eq=False)
+class Face:
+    """A face between lines, (n, 2), the layers around most of its lines, innermost last, and those around all."""
+
+    ring: np.ndarray
+    layers: tuple[str, ...]
+    within: tuple[str, ...]
+
+
 @dataclass
 class Faces:
-    """What lines enclose: faces between them, (n, 2), the layer of most lines around each, and those of all of them.
+    """What lines enclose: faces between them, and the pieces into which they cut an outline, by its number."""
 
-    ``pieces`` are those into which lines cut an outline, by its number.
-    """
-
-    rings: list[np.ndarray] = field(default_factory=list)
-    layers: list[str] = field(default_factory=list)
-    around: list[tuple[str, ...]] = field(default_factory=list)
+    faces: list[Face] = field(default_factory=list)
     pieces: dict[int, list[np.ndarray]] = field(default_factory=dict)
     left_out: list[LeftOut] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -50,16 +54,16 @@ def with_faces(
     reading: Reading,
     *,
     called: Callable[[str, int], str],
-    of_face: Callable[[str, tuple[str, ...], str], dict[str, Any]],
+    row_of: Callable[[tuple[str, ...], str], dict[str, Any]],
     tolerance: float | None = None,
     in_place: bool = False,
 ) -> None:
     """Let curves share corners, add the faces between lines to a drawing, and cut its outlines along lines in them.
 
     The drawing is in the plane. Lines that are not wanted are left out, and outlines that are not wanted are not cut.
-    ``called`` names a piece by its outline's name and its number, from 0; ``of_face`` says what the outline of a face
-    has beside its points, by the layer of most lines around it, those of all, and its name. Pieces come ``in_place`` of
-    their outline, or behind the others. The tolerance is as of :func:`blockvis.formats.arcs.with_shared_corners`.
+    ``called`` names a piece by its outline's name and its number, from 0; ``row_of`` writes the row of a face by the
+    layers around most of its lines, and its name. Pieces come ``in_place`` of their outline, or behind the others. The
+    tolerance is as of :func:`blockvis.formats.arcs.with_shared_corners`.
     """
     if not drawing.strokes:
         return
@@ -79,8 +83,9 @@ def with_faces(
             replace(whole, points=ring, row={**whole.row, "name": called(whole.row.get("name", "block"), k)}, curves=())
             for k, ring in enumerate(pieces)
         ]
-    for k, (ring, layer, around) in enumerate(zip(faces.rings, faces.layers, faces.around, strict=True)):
-        drawing.outlines.append(Outline(points=ring, **of_face(layer, around, f"face {k}")))
+    for k, face in enumerate(faces.faces):
+        row = row_of(face.layers, f"face {k}")
+        drawing.outlines.append(Outline(points=face.ring, row=row, within=face.within, looks=("face",)))
     drawing.left_out += faces.left_out
     drawing.notes += faces.notes + joined_note(drawing.misses, size)
 
@@ -119,7 +124,7 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
     _add_faces([lines[k] for k in rest], [segments[k] for k in rest], kept, every, size, found)
     mortar = [] if matches(["face"], only) else _without_mortar(found, 4 * GRID * size)
     found.notes += [*_cut_notes(found, len(cutting), openings), *mortar]
-    found.notes += [_faces_note(found, lines)] if found.rings else []
+    found.notes += [_faces_note(found, lines)] if found.faces else []
     return found
 
 
@@ -182,7 +187,8 @@ def _without_mortar(found: Faces, reach: float) -> list[Note]:
     """Leave out the strips between pairs of lines, if they are as many as joints are, and say so; else doubt them."""
     import shapely
 
-    every = [*((-1, ring) for ring in found.rings), *((i, ring) for i, own in found.pieces.items() for ring in own)]
+    every = [(-1, face.ring) for face in found.faces]
+    every += [(i, ring) for i, own in found.pieces.items() for ring in own]
     if not every:
         return []
     shapes = np.array([shapely.Polygon(ring) for _, ring in every], dtype=object)
@@ -212,11 +218,7 @@ def _without_mortar(found: Faces, reach: float) -> list[Note]:
     for k in np.flatnonzero(strip):
         found.left_out.append(LeftOut("mortar", every[k][1], "the faces between pairs of lines are mortar"))
     kept = [one for k, one in enumerate(every) if not strip[k]]
-    layers = [
-        one for one, is_strip in zip(zip(found.layers, found.around, strict=True), strip, strict=False) if not is_strip
-    ]
-    found.layers, found.around = [layer for layer, _ in layers], [around for _, around in layers]
-    found.rings = [ring for i, ring in kept if i < 0]
+    found.faces = [face for face, is_strip in zip(found.faces, strip, strict=False) if not is_strip]
     found.pieces = {i: [ring for k, ring in kept if k == i] for i in found.pieces}
     said = 'are taken for joints drawn as pairs of lines; joint_thickness = "auto" closes them, only = "*" keeps them'
     return [Note(CHANGED, f"{words} {said} as blocks")]
@@ -252,7 +254,7 @@ def _faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
     """Say that blocks are what loose lines enclose."""
     return Note(
         CHANGED,
-        f"{counted(len(faces.rings), 'block is a face', 'blocks are faces')} between "
+        f"{counted(len(faces.faces), 'block is a face', 'blocks are faces')} between "
         f"{counted(len(lines), 'loose line')}; an opening enclosed by lines counts as a block too: "
         "erase it or draw closed outlines",
     )
@@ -419,7 +421,7 @@ def _add_faces(
 
     if not lines:
         return
-    grid = GRID * size
+    grid, paths = GRID * size, {line.layer: line.within or (line.layer,) for line in lines}
     faces, cuts, dangles, _ = shapely.polygonize_full([shapely.union_all(segments, grid_size=grid)])
     loose = shapely.union_all([dangles, cuts]).buffer(2 * grid)
     shapely.prepare(loose)
@@ -451,9 +453,8 @@ def _add_faces(
             message = "loose lines enclose a face across closed outlines; leave their layer out (ignore)"
             found.left_out.append(LeftOut("across", ring, message, layer, "face"))
             continue
-        found.rings.append(ring)
-        found.layers.append(layer)
-        found.around.append(tuple(sorted({*nearest})))
+        within = tuple(word for one in sorted({*nearest}) for word in paths[one] if word)
+        found.faces.append(Face(ring, paths[layer], within))
         borders.append({*border})
     found.notes += _crossing_notes(lines, segments, borders, MEETS * size)
 

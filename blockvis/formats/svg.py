@@ -148,7 +148,7 @@ def read(path: Path, reading: Reading) -> Layout:
     # What sheets that are not read say may paint a shape.
     found.sheets_missed = len(styled) > 0
     _walk(root, _Context(np.eye(3), (), tolerance, path), found)
-    _add_faces(found, reading, tolerance)
+    with_faces(found, reading, called=lambda name, k: f"{name} {k + 1}", row_of=_row, tolerance=tolerance)
     if found.is_open:
         said = (nothing_closed(found.left_out), *passed_over(found.skipped), *_pattern_fills(root))
         rest = "; ".join(words for words in said if words)
@@ -175,22 +175,6 @@ def _root(path: Path) -> ElementTree.Element:
     if _tag(root) != "svg":
         raise ValueError(f"'{path}' is XML with the root <{_tag(root)}>, not <svg>; save it as plain SVG")
     return root
-
-
-def _add_faces(found: _Found, reading: Reading, tolerance: float | None) -> None:
-    """Leave out what is not wanted, let curves share corners, add the faces of loose lines, cut outlines along them."""
-    paths = {line.layer: line.within for line in found.loose}
-    with_faces(
-        found,
-        reading,
-        called=lambda name, k: f"{name} {k + 1}",
-        of_face=lambda layer, around, name: {
-            "row": _row(paths[layer], name),
-            "within": tuple(word for one in around for word in paths[one]),
-            "looks": ("face",),
-        },
-        tolerance=tolerance,
-    )
 
 
 def _unit(root: ElementTree.Element) -> tuple[str, list[str]]:
