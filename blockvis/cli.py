@@ -1125,7 +1125,6 @@ def _levels(fill: solver.Backfill) -> str:
 
 
 def _in_words(response: solver.Response, folder: Path) -> str:
-    """Sum up a run in words."""
     import numpy as np
 
     from solver.mechanics import counted, worst_of

@@ -61,7 +61,6 @@ def _mesh_reader(path: str, **options: Any) -> Any:
 
 
 def _writer(dataset: Any, path: str, **options: Any) -> None:
-    """Write the blocks of a dataset to a layout file."""
     write_layout(BlockvisAccessor(dataset).layout(), path)
 
 

@@ -164,7 +164,6 @@ def _drawable(found: Bodies) -> list[Body]:
 
 
 def _refused(message: str, found: Bodies, wrong: Body) -> Refused:
-    """Refuse bodies for one of them."""
     return Refused(message, as_drawn(found), [k for k, body in enumerate(_drawable(found)) if body is wrong])
 
 

@@ -41,17 +41,12 @@ OF_BLOCKS = BLOCK_ARRAYS[:3]
 TABLE_ARRAYS = ("name", "group", "material", "role_name", "role", "thickness", "density")
 
 
-def block_array(data: Mapping[str, np.ndarray]) -> str | None:
-    """Name of the cell array that numbers the blocks; None if there is none."""
+def owners(data: Mapping[str, np.ndarray], n_cells: int) -> tuple[str | None, list[str], np.ndarray]:
+    """Name of the cell array that numbers the blocks, None for none, their names, and (n_cells,) numbers of these."""
     numbered = [name for name in BLOCK_ARRAYS if name in data and np.ndim(data[name]) == 1]
     # An array with one value everywhere, as some programs write by default, does not distinguish blocks.
     named = (BLOCK_ARRAYS[0], CELL_SET)
-    return next((name for name in numbered if name in named or (data[name] != data[name][0]).any()), None)
-
-
-def owners(data: Mapping[str, np.ndarray], n_cells: int) -> tuple[str | None, list[str], np.ndarray]:
-    """Name of the cell array that numbers the blocks, None for none, their names, and (n_cells,) numbers of these."""
-    key = block_array(data)
+    key = next((name for name in numbered if name in named or (data[name] != data[name][0]).any()), None)
     if key is None:
         return None, ["block"], np.zeros(n_cells, dtype=np.int64)
     values, owner = np.unique(data[key], return_inverse=True)
@@ -230,7 +225,6 @@ def found_in_meshes(meshes: Sequence[Mesh], path: Path | str, reading: Reading) 
 
 
 def _layout_of_meshes(meshes: Sequence[Mesh], path: Path | str, view: str | None) -> Layout | Bodies:
-    """Make a layout of flat meshes, each a block."""
     # Some repeat the corners of each face.
     points, number = np.unique(np.concatenate([mesh.points for mesh in meshes]), axis=0, return_inverse=True)
     starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])

@@ -125,7 +125,6 @@ def _unwrapped(value: Any) -> tuple[Any, str]:
 
 
 def _of_graph(data: dict[str, Any], context: _Context) -> Iterator[Mesh]:
-    """Yield the blocks of the nodes of an assembly."""
     default = data.get("default_node_attributes") or data.get("dna") or data.get("node_attributes") or {}
     for key, node in data["node"].items():
         attributes = {**default, **node}

@@ -175,13 +175,11 @@ def _chosen_meshes(found: _Found, reading: Reading) -> list[Mesh]:
 
 
 def _skipped(found: _Found) -> list[str]:
-    """Count what was skipped in notes."""
     hidden = {f"on '{layer}'": n for layer, n in found.hidden.items()}
     return [*passed_over(found.skipped), *passed_over(hidden, "skipped on layers that are off or frozen")]
 
 
 def _faults(audit: Any) -> list[str]:
-    """Count the faults that ezdxf found in a note."""
     faults = len(audit.fixes) + len(audit.errors)
     return [Note(CHANGED, f"repaired or passed over: {counted(faults, 'fault')} of the file")] if faults else []
 
@@ -414,7 +412,6 @@ def _in_world(entity: Any, flat: Stroke, level: float) -> Stroke:
 
 
 def _arc(first: int, centre: Any, radius: float, start: float, sweep: float, tolerance: float | None) -> Arc:
-    """Make an arc of a circle."""
     n = chords_of(sweep, radius, tolerance)
     return Arc(first, n, np.array([centre.x, centre.y]), radius * np.eye(2), start, sweep)
 
@@ -428,7 +425,6 @@ def _ellipse(centre: Sequence[float], axes: np.ndarray, start: float, end: float
 
 
 def _along(arc: Arc) -> Stroke:
-    """Draw an arc."""
     return Stroke(points=arc.at(np.linspace(0.0, 1.0, arc.chords + 1)), curves=(arc,))
 
 
@@ -492,7 +488,6 @@ def _hatch_rings(entity: Any, tolerance: float | None) -> list[Stroke]:
 
 
 def _backwards(edge: Stroke) -> Stroke:
-    """Turn edges of a hatch round."""
     arcs = (arc.backwards(len(edge.points)) for arc in edge.curves[::-1] if isinstance(arc, Arc))
     return replace(edge, points=edge.points[::-1], curves=tuple(arcs))
 

@@ -188,7 +188,6 @@ class _Layer:
 
 
 def _layers(base: sqlite3.Connection, path: Path) -> list[_Layer]:
-    """Read the tables of a GeoPackage."""
     base.execute("PRAGMA trusted_schema = OFF")
     base.row_factory = sqlite3.Row
     found = []
@@ -290,7 +289,6 @@ def layout_of_features(
 
 
 def _add(geometry: Any, row: dict[str, Any], found: Drawing) -> None:
-    """Add the outlines and lines of a geometry."""
     import shapely
 
     kind = geometry.geom_type

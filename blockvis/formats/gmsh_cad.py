@@ -88,7 +88,6 @@ def _meshed(path: Path, target: Path, chords: int) -> list[dict[str, object]] | 
 
 
 def _failed(path: Path, said: str, target: Path) -> ValueError:
-    """Make the error for what gmsh has said of its failure."""
     reason = " ".join(said.split())[-300:].replace(str(target), "the mesh")
     most = f"{MOST_MEMORY / 2**30:.3g} GiB of memory"
     remedy = "run gmsh on it yourself, with a coarser mesh, and give the .msh"

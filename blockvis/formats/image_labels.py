@@ -319,7 +319,6 @@ def _half_covered(place: np.ndarray, label: np.ndarray, shown: np.ndarray) -> np
 
 
 def _of_noise(image: Image.Image) -> _Found:
-    """Find the colours of a noisy image."""
     from scipy import ndimage
 
     if image.mode in ("I", "F") or image.mode.startswith("I;16"):

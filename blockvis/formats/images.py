@@ -224,7 +224,6 @@ def _named(labels: Labels, regions: Regions) -> tuple[tuple[str, ...], tuple[str
 
 
 def _notes(labels: Labels, regions: Regions, found: Outlined, placement: Placement) -> tuple[str, ...]:
-    """Say how the image was read, and what was dropped."""
     height, width = labels.numbers.shape
     of = counted(len(set(regions.labels.tolist())), "label") if labels.names else "labels of a noisy image"
     what = "a drawing of lines" if labels.is_of_lines else "a mask of stones" if labels.is_mask else of

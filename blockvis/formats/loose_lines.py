@@ -251,7 +251,6 @@ def _crossing_notes(
 
 
 def _faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
-    """Say that blocks are what loose lines enclose."""
     return Note(
         CHANGED,
         f"{counted(len(faces.faces), 'block is a face', 'blocks are faces')} between "

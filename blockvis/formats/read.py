@@ -208,7 +208,6 @@ def _outlines(path: Path, reading: Reading) -> Layout:
 
 
 def _in_dimension(content: Layout | Bodies, path: Path, reading: Reading) -> Layout:
-    """Make a layout of what a file holds, in the plane or in space."""
     if isinstance(content, Layout):
         if content.dimension == 3 and reading.dimension == 2:
             raise ValueError(f"'{path}' draws its blocks in space; leave out dimension = 2")
@@ -454,7 +453,6 @@ def _remedy(
 
 
 def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
-    """Read a file with the module of its suffix."""
     if path.stat().st_size == 0:
         raise ValueError(f"'{path}' is empty (0 bytes); export it again")
     module = _module_of(path, "read")

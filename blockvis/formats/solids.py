@@ -62,7 +62,6 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
 
 
 def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> tuple[list[Body], list[Note]]:
-    """Find the closed bodies of a file."""
     try:
         return enclosed(drawn.parts, size, path, reading)
     except OpenSurface as error:
@@ -165,7 +164,6 @@ def _distinct(rows: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def _scene(path: Path) -> dae.Drawn:
-    """Read the meshes of a file by trimesh."""
     import trimesh
 
     # What it would print of a missing texture is no fault of a stone.

@@ -162,7 +162,6 @@ def read(path: Path, reading: Reading) -> Layout:
 
 
 def _root(path: Path) -> ElementTree.Element:
-    """Parse a file without entities."""
     text = path.read_bytes()
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise ValueError(f"'{path}' is not in UTF-8; save it as plain SVG")
@@ -567,7 +566,6 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
 
 
 def _numbers_of(command: str, taken: Sequence[tuple[str, str]]) -> list[float]:
-    """Read the numbers of a path command."""
     if len(taken) < _TAKES[command.upper()] or any(not token[1] for token in taken):
         raise ValueError(f"has a path command '{command}' with too few numbers; repair it")
     return [float(token[1]) for token in taken]

@@ -219,7 +219,6 @@ def _says(head: str, words: list[str], model: _Model) -> bool:
 
 
 def _made(line: int, words: list[str], path: Path) -> _Block:
-    """Make the block that a command describes."""
     lists, about = list[tuple[str, list[float]]](), dict[str, str]()
     for word in words:
         number = _number(word)
@@ -287,7 +286,6 @@ def _polyhedron(faces: list[list[float]], line: int, path: Path) -> tuple[np.nda
 
 
 def _turn(words: list[str], model: _Model) -> None:
-    """Take the direction of gravity."""
     numbers = [number for word in words if (number := _number(word)) is not None]
     if len(numbers) == 3 and numbers[1] < 0.0 and numbers[0] == numbers[2] == 0.0:
         model.up, model.up_says = "y", "gravity acts along -y in the file"

@@ -41,7 +41,6 @@ def announced_bytes(text: bytes, attributes: dict[str, str], file: dict[str, str
 
 
 def _word(file: dict[str, str]) -> np.dtype:
-    """Give the type of the whole numbers of a header."""
     order = "<" if file.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
     return np.dtype(order + ("u8" if file.get("header_type") == "UInt64" else "u4"))
 
