@@ -146,10 +146,8 @@ def _of_old_assembly(data: dict[str, Any], context: _Context) -> Iterator[Mesh]:
     graph, _ = _unwrapped(data["assembly"])
     default = graph.get("node_attributes") or graph.get("dva") or {}
     nodes = graph.get("node") or graph.get("vertex") or {}
-    for key, block in data["blocks"].items():
-        attributes = {**default, **(nodes.get(key) or {})}
-        support = context.support or bool(attributes.get("is_support"))
-        yield from _meshes(block, replace(context, name=str(key), support=support))
+    together = {key: {**(nodes.get(key) or {}), "block": block} for key, block in data["blocks"].items()}
+    yield from _of_graph({"node": together, "node_attributes": default}, context)
 
 
 def _of_model(data: dict[str, Any], context: _Context) -> Iterator[Mesh]:

@@ -10,7 +10,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -500,35 +500,31 @@ def _segment(element: ElementTree.Element, where: _Context) -> list[_Part]:
     return [_Part(ends, False)]
 
 
-def _tokens(d: str) -> list[tuple[str, str]]:
-    """Split a path into (command, "") and ("", number), in order."""
-    tokens = []
+def _steps(d: str) -> Iterator[tuple[str, list[float]]]:
+    """Yield the commands of a path, each as often as it is repeated, with the numbers that it takes."""
     for command, arguments in _COMMAND.findall(d):
-        tokens.append((command, ""))
-        if command in "Aa":
-            numbers = [number for arc in _ARC.findall(arguments) for number in arc]
-        else:
-            numbers = re.findall(_NUMBER, arguments)
-        tokens += [("", number) for number in numbers]
-    return tokens
+        # Only of arcs: the pattern of one takes long for a long number.
+        groups = _ARC.findall(arguments) if command in "Aa" else [re.findall(_NUMBER, arguments)]
+        numbers, takes = [float(number) for group in groups for number in group], _TAKES[command.upper()]
+        if takes == 0 and numbers:
+            raise ValueError("has numbers without a command in its path; repair it")
+        if takes and (not numbers or len(numbers) % takes):
+            raise ValueError(f"has a path command '{command}' with too few numbers; repair it")
+        # What follows a move is a line.
+        following = {"M": "L", "m": "l"}.get(command, command)
+        for k in range(0, max(len(numbers), 1), max(takes, 1)):
+            yield following if k else command, numbers[k : k + takes]
 
 
 def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
     """Points of each subpath, and whether Z closes it."""
-    tokens = _tokens(element.get("d", ""))
     parts: list[_Part] = []
     points: list[np.ndarray] = []
     curves: list[Curve] = []
     at = start = control = np.zeros(2)
-    command, before, k = "", "", 0
-    while k < len(tokens):
-        if tokens[k][0]:
-            command, k = tokens[k][0], k + 1
-        elif not command or command in "Zz":
-            raise ValueError("has numbers without a command in its path; repair it")
+    before = ""
+    for command, v in _steps(element.get("d", "")):
         kind, relative = command.upper(), command.islower()
-        v = _numbers_of(command, tokens[k : k + _TAKES[kind]])
-        k += _TAKES[kind]
         if kind == "Z":
             parts.append(_Part(np.array(points).reshape(-1, 2), True, tuple(curves)))
             at, points, curves = start, [start], []
@@ -540,7 +536,6 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
                 parts.append(_Part(np.array(points), False, tuple(curves)))
             at = start = base + v
             points, curves = [at], []
-            command = "l" if relative else "L"
         elif kind in "LHV":
             if kind == "L":
                 at = base + v
@@ -563,12 +558,6 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
     if len(points) > 1:
         parts.append(_Part(np.array(points), False, tuple(curves)))
     return parts
-
-
-def _numbers_of(command: str, taken: Sequence[tuple[str, str]]) -> list[float]:
-    if len(taken) < _TAKES[command.upper()] or any(not token[1] for token in taken):
-        raise ValueError(f"has a path command '{command}' with too few numbers; repair it")
-    return [float(token[1]) for token in taken]
 
 
 def _bezier(first: int, controls: np.ndarray, where: _Context) -> Bezier:
