@@ -206,8 +206,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"blockvis {_version()}")
     verbs = parser.add_subparsers(required=True, metavar="VERB")
-    run = verbs.add_parser(
-        "run",
+    run = _verb(
+        verbs,
+        _run,
         help="solve a case, write everything, draw",
         epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -249,14 +250,12 @@ def _parser() -> argparse.ArgumentParser:
         help="follow a settlement eight times more, with friction, compliance of the joints and imperfection varied, "
         "and give the range of collapse and reaction; as [analysis] range = true",
     )
-    run.set_defaults(verb=_run)
-    info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
+    info = _verb(verbs, _info, help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
     info.add_argument("file", metavar="FILE", help="or a folder or a pattern of files, one per stone")
     _add_reading(info)
     info.add_argument("--picture", metavar="PNG", help="draw what was found, or why it is refused")
-    info.set_defaults(verb=_info)
-    convert = verbs.add_parser(
-        "convert", help="any layout file to any other; results to one file, a .vtkhdf, .glb or layout"
+    convert = _verb(
+        verbs, _convert, help="any layout file to any other; results to one file, a .vtkhdf, .glb or layout"
     )
     convert.add_argument(
         "source", metavar="IN", help="or a folder or a pattern of files, one per stone; or a results folder"
@@ -272,9 +271,9 @@ def _parser() -> argparse.ArgumentParser:
         "--joint-thickness", default="0", metavar="M", help='close mortar joints up to this, or "auto"'
     )
     convert.add_argument("--force", action="store_true", help="replace OUT if it is there already")
-    convert.set_defaults(verb=_convert)
-    layout = verbs.add_parser(
-        "layout",
+    layout = _verb(
+        verbs,
+        _layout,
         help="a parametric layout as a file",
         add_help=False,
     )
@@ -285,7 +284,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     layout.add_argument("-o", "--output", required=True, metavar="FILE")
     layout.add_argument("--force", action="store_true", help="replace FILE if it is there already")
-    layout.set_defaults(verb=_layout)
     added = (
         *(_add_render, _add_bond, _add_compare, _add_report, _add_explain, _add_sweep, _add_new, _add_schema),
         *(_add_example, _add_completion),
@@ -295,14 +293,21 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _verb(verbs: Any, carry_out: Callable[[argparse.Namespace], int], **options: Any) -> argparse.ArgumentParser:
+    """Add the verb that a function carries out, which has its name."""
+    verb: argparse.ArgumentParser = verbs.add_parser(carry_out.__name__.removeprefix("_"), **options)
+    verb.set_defaults(verb=carry_out)
+    return verb
+
+
 def _add_completion(verbs: Any) -> None:
-    completion = verbs.add_parser(
-        "completion",
+    completion = _verb(
+        verbs,
+        _completion,
         help="a script that completes verbs and options in a shell",
         epilog="; ".join(f"{shell}: {command}" for shell, command in SHELLS.items()),
     )
     completion.add_argument("shell", choices=tuple(SHELLS))
-    completion.set_defaults(verb=_completion)
 
 
 class _LayoutHelp(argparse.Action):
@@ -343,7 +348,7 @@ def _version() -> str:
 
 
 def _add_render(verbs: Any) -> None:
-    render = verbs.add_parser("render", help="draw again from a results folder, without solving")
+    render = _verb(verbs, _render, help="draw again from a results folder, without solving")
     render.add_argument("results", metavar="OUT")
     render.add_argument(
         "--animation", default="collapse.mp4", help="in OUT: .mp4, .gif, .webp, a folder such as frames/, or none"
@@ -357,7 +362,6 @@ def _add_render(verbs: Any) -> None:
         "--cracks", type=int, metavar="N", help="nothing but cracks.png, of increment N (-1: the last equilibrium)"
     )
     _add_sight(render)
-    render.set_defaults(verb=_render)
 
 
 def _add_sight(verb: argparse.ArgumentParser) -> None:
@@ -409,8 +413,9 @@ def _add_reading(verb: argparse.ArgumentParser, *, in_space: bool = True) -> Non
 
 
 def _add_bond(verbs: Any) -> None:
-    bond = verbs.add_parser(
-        "bond",
+    bond = _verb(
+        verbs,
+        _bond,
         help="fill outlines with openings with the stones of a bond, and write them as a file",
         epilog="keys as of [[bond]] in a case: blockvis bond facade.dxf -o bricks.dxf walls='A-WALL*' bond=flemish",
     )
@@ -421,13 +426,10 @@ def _add_bond(verbs: Any) -> None:
     bond.add_argument("-o", "--output", required=True, metavar="OUT")
     _add_reading(bond, in_space=False)
     bond.add_argument("--force", action="store_true", help="replace OUT if it is there already")
-    bond.set_defaults(verb=_bond)
 
 
 def _add_compare(verbs: Any) -> None:
-    compare = verbs.add_parser(
-        "compare", help="two runs side by side: numbers, curves, cracks, pictures, a film in step"
-    )
+    compare = _verb(verbs, _compare, help="two runs side by side: numbers, curves, cracks, pictures, a film in step")
     compare.add_argument("one", metavar="OUT1", help="results folder of one run")
     compare.add_argument("other", metavar="OUT2", help="and of the other")
     compare.add_argument("-o", "--output", metavar="OUT", help="folder of the comparison (default: <OUT1>-<OUT2>)")
@@ -435,20 +437,19 @@ def _add_compare(verbs: Any) -> None:
         "--animation", default="compare.mp4", help=".mp4, .gif, .webp, a folder such as frames/, or none"
     )
     compare.add_argument("--force", action="store_true", help="replace a comparison that is there already")
-    compare.set_defaults(verb=_compare)
 
 
 def _add_report(verbs: Any) -> None:
-    report = verbs.add_parser("report", help="the report of a results folder again, as a page or on paper")
+    report = _verb(verbs, _report, help="the report of a results folder again, as a page or on paper")
     report.add_argument("results", metavar="OUT")
     report.add_argument("--pdf", action="store_true", help="write report.pdf, A4, as well")
     _add_sight(report)
-    report.set_defaults(verb=_report)
 
 
 def _add_explain(verbs: Any) -> None:
-    explain = verbs.add_parser(
-        "explain",
+    explain = _verb(
+        verbs,
+        _explain,
         help="which movements of the supports may have caused observed cracks",
         epilog='observations: a table with joint ("A | B") or x and y, width [mm] and perhaps uncertainty [mm]; '
         "or with block, dx [mm] and dy [mm]; or a drawing of the damaged state",
@@ -459,11 +460,10 @@ def _add_explain(verbs: Any) -> None:
     explain.add_argument("--force", action="store_true", help="replace an explanation that is there already")
     explain.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster that exists, tcp://host:8786")
     explain.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: one per core)")
-    explain.set_defaults(verb=_explain)
 
 
 def _add_sweep(verbs: Any) -> None:
-    sweep = verbs.add_parser("sweep", help="many runs of one case, on this machine or a Dask cluster")
+    sweep = _verb(verbs, _sweep, help="many runs of one case, on this machine or a Dask cluster")
     sweep.add_argument("study", metavar="STUDY.toml")
     sweep.add_argument("-o", "--output", metavar="OUT", help="folder of the study (default: <study>-study)")
     sweep.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster that exists, tcp://host:8786")
@@ -471,33 +471,30 @@ def _add_sweep(verbs: Any) -> None:
     sweep.add_argument("--retry-failed", action="store_true", help="make runs again that had no result")
     sweep.add_argument("--keep", metavar="RUNS", default="", help="runs whose results folder is wanted, as 0,17,42")
     sweep.add_argument("--force", action="store_true", help="throw away the runs of another study in OUT")
-    sweep.set_defaults(verb=_sweep)
 
 
 def _add_new(verbs: Any) -> None:
-    new = verbs.add_parser("new", help="a case file for a drawing, with a comment on every key")
+    new = _verb(verbs, _new, help="a case file for a drawing, with a comment on every key")
     new.add_argument("drawing", metavar="DRAWING", help="or a folder or a pattern of files, one per stone")
     new.add_argument("-o", "--output", metavar="CASE.toml", help="(default: <drawing>.toml)")
     _add_reading(new)
     new.add_argument("--force", action="store_true", help="replace CASE.toml if it is there already")
-    new.set_defaults(verb=_new)
 
 
 def _add_schema(verbs: Any) -> None:
-    schema = verbs.add_parser(
-        "schema",
+    schema = _verb(
+        verbs,
+        _schema,
         help="JSON schema of the case or study file, for editors of TOML",
         epilog="blockvis schema > case.schema.json; then #:schema ./case.schema.json is the first line of a case",
     )
     schema.add_argument("file", nargs="?", choices=("case", "study"), default="case")
-    schema.set_defaults(verb=_schema)
 
 
 def _add_example(verbs: Any) -> None:
-    example = verbs.add_parser("example", help="copy a shipped case and its drawing into this folder, or list all")
+    example = _verb(verbs, _example, help="copy a shipped case and its drawing into this folder, or list all")
     example.add_argument("example", metavar="NAME", nargs="?", help="without it all are listed")
     example.add_argument("--force", action="store_true", help="replace files that are there already")
-    example.set_defaults(verb=_example)
 
 
 def _completion(options: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import io
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -42,11 +43,7 @@ class _Annotated:
     image: str = ""
     size: tuple[float, float] | None = None
     shapes: list[tuple[str, list[np.ndarray | _Mask]]] = field(default_factory=list)
-    dropped: dict[str, int] = field(default_factory=dict)
-
-    def drop(self, kind: str) -> None:
-        """Count something that is no outline."""
-        self.dropped[kind] = self.dropped.get(kind, 0) + 1
+    dropped: Counter[str] = field(default_factory=Counter)
 
 
 def program_of(content: Any) -> str:
@@ -92,14 +89,14 @@ def _layout_of(found: _Annotated, placement: Placement, reading: Reading) -> Lay
     smallest, tolerance = (reading.image.get(key) for key in ("smallest", "outline_tolerance"))
     stairs = STAIRS if tolerance is None else tolerance / placement.pixel
     speck = None if smallest is None else smallest / placement.pixel
-    of_label: dict[str, int] = {}
+    of_label = Counter[str]()
     rings, names, groups, several = [], [], [], 0
     for label, outlines in found.shapes:
-        of_label[label] = of_label.get(label, 0) + 1
+        of_label[label] += 1
         name = f"{label or 'stone'} {of_label[label]}"
         pieces = [ring for outline in outlines for ring in _rings(outline, stairs, speck)]
         if not pieces:
-            found.drop("masks of a few pixels")
+            found.dropped["masks of a few pixels"] += 1
         several += len(pieces) > 1
         for k, ring in enumerate(pieces):
             rings.append(placement.placed(ring))
@@ -201,7 +198,7 @@ def _coco(content: Mapping[str, Any], path: Path) -> _Annotated:
         if rings:
             found.shapes.append((name, list(rings)))
         else:
-            found.drop("boxes without an outline" if one.get("bbox") else "annotations without an outline")
+            found.dropped["boxes without an outline" if one.get("bbox") else "annotations without an outline"] += 1
     return found
 
 
@@ -263,7 +260,7 @@ def _labelme(content: Mapping[str, Any], path: Path) -> _Annotated:
         elif kind == "mask" and one.get("mask"):
             outline = _Mask(_picture_of(str(one["mask"]), path), (int(points[:, 0].min()), int(points[:, 1].min())))
         else:
-            found.drop(f"shapes of kind {kind}")
+            found.dropped[f"shapes of kind {kind}"] += 1
             continue
         found.shapes.append((label, [outline]))
     return found
@@ -294,7 +291,7 @@ def _via(content: Mapping[str, Any], path: Path) -> _Annotated:
             shape = region["shape_attributes"]
             outline = _via_outline(shape)
             if outline is None:
-                found.drop(f"shapes of kind {shape.get('name')}")
+                found.dropped[f"shapes of kind {shape.get('name')}"] += 1
             else:
                 found.shapes.append((_via_label(region.get("region_attributes") or {}), [outline]))
     return found

@@ -7,6 +7,7 @@ name in different dimensions, and reserves whatever memory the file asks for. It
 from __future__ import annotations
 
 import json
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -205,11 +206,10 @@ def _group_names(mesh: _Mesh, dimension: int, tags: np.ndarray, path: Path) -> l
 
 
 def _entity_names(groups: list[str], tags: np.ndarray, kind: str) -> list[str]:
-    total = {group: groups.count(group) for group in set(groups)}
-    seen: dict[str, int] = {}
+    total, seen = Counter(groups), Counter[str]()
     names = []
     for group, tag in zip(groups, tags, strict=True):
-        seen[group] = seen.get(group, 0) + 1
+        seen[group] += 1
         names.append(f"{kind} {tag}" if not group else group if total[group] == 1 else f"{group} {seen[group]}")
     return names
 
