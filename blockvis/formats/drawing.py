@@ -142,23 +142,32 @@ class Drawing:
 
         Gives the directions of x, y and across in the rows of a matrix (3, 3), and notes on what that changes.
         """
-        every, wants = self.strokes, self.wants(reading)
-        spread_of(np.concatenate([one.points for one in every]), f"'{path}'")
-        wanted = [one for one in every if wants(one)]
-        turn, notes = drawing_plane([one.points for one in wanted or every], f"'{path}'", reading.view)
+        every = [one.points for one in self.strokes]
+        spread_of(np.concatenate(every), f"'{path}'")
+        unwanted, asked = self.choice(reading.ignore), self.choice(reading.only)
+        wanted = [one for one in self.strokes if not unwanted.takes(one.labels, one.looks)]
+        chosen = [one for one in wanted if asked.takes(one.labels, one.looks)] or wanted
+        turn, notes = drawing_plane([one.points for one in chosen] or every, f"'{path}'", reading.view)
         self.outlines = [outline.mapped(turn[:2]) for outline in self.outlines]
         self.holed = [(outline.mapped(turn[:2]), called) for outline, called in self.holed]
         self.loose = [line.mapped(turn[:2]) for line in self.loose]
         return turn, notes
 
+    def choice(self, patterns: Sequence[str]) -> Choice:
+        """Take patterns for names of what is drawn, or else for kinds and colours."""
+        return Choice(patterns, {label for one in self.strokes for label in one.labels if label})
+
     def wants(self, reading: Reading) -> Callable[[Stroke], bool]:
-        """Say of what is drawn whether it is wanted: where something is asked for, nothing else is."""
-        names = {label for one in self.strokes for label in one.labels if label}
-        unwanted, asked = Choice(reading.ignore, names), Choice(reading.only, names)
-        some = any(asked.takes(one.labels, one.looks) for one in self.strokes)
+        """Say of what is drawn whether it is wanted: where something is asked for, nothing else is.
+
+        What nothing is called that is drawn may be a face or a piece of an outline: of these all lines are wanted.
+        """
+        unwanted, asked = self.choice(reading.ignore), [self.choice([pattern]) for pattern in reading.only]
+        drawn = all(any(one.takes(stroke.labels, stroke.looks) for stroke in self.strokes) for one in asked)
 
         def wanted(one: Stroke) -> bool:
-            return not unwanted.takes(one.labels, one.looks) and (not some or asked.takes(one.labels, one.looks))
+            chosen = not asked or not drawn or any(choice.takes(one.labels, one.looks) for choice in asked)
+            return chosen and not unwanted.takes(one.labels, one.looks)
 
         return wanted
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 _CAD = "save it as .dxf in the program that drew it (SAVEAS), or turn it by the ODA File Converter, free of charge"
+_REVIT = "in Revit: File, Export, CAD Formats, DXF, of an elevation; of a 3D view with solids as polymesh"
 _SOLIDS = "export its bodies as STEP (.step, read with the extra 'cad') in the program that drew it, or in FreeCAD"
 _MODEL = "export it as .obj or .glb, one object per block, from the program that made it, or from Blender"
 _VECTORS = "open it in Inkscape, or the program that drew it, and save it as plain SVG (.svg)"
@@ -14,8 +15,6 @@ _TABLE = 'a table has no outlines; write .json: {"blocks": [{"name": "a", "outli
 
 #: By suffix.
 ELSEWHERE = {
-    ".rvt": "in Revit: File, Export, CAD Formats, DXF, of an elevation; of a 3D view with solids as polymesh",
-    ".rfa": "in Revit: File, Export, CAD Formats, DXF, of an elevation; of a 3D view with solids as polymesh",
     ".3dm": "in Rhino: Export Selected, of closed solids as .obj (one object per block), of outlines as .dxf",
     ".gh": "in Rhino: bake the blocks, then Export Selected, of closed solids as .obj, of outlines as .dxf",
     ".skp": "in SketchUp: make each block a solid group, then File, Export, 3D Model: .obj, or .dae (extra 'dae')",
@@ -23,11 +22,10 @@ ELSEWHERE = {
     "walls, no blocks, of which an elevation as .dxf or .svg gives the outline",
     ".pdf": "open it in Inkscape (File, Import), delete what is no stone, and save it as plain SVG (.svg)",
     ".blend": "in Blender: File, Export, Wavefront (.obj), one object per block",
-    ".dbf": "give the .shp beside it",
-    ".shx": "give the .shp beside it",
-    ".prj": "give the .shp beside it",
     ".unv": "in gmsh: File, Open, then File, Export as .msh (gmsh a.unv -save -o a.msh)",
     ".toml": "it is a case or a study; give the drawing that it names under [geometry] file",
+    **dict.fromkeys((".dbf", ".shx", ".prj"), "give the .shp beside it"),
+    **dict.fromkeys((".rvt", ".rfa"), _REVIT),
     **dict.fromkeys((".dwg", ".dgn", ".pln"), _CAD),
     **dict.fromkeys(
         (".iges", ".igs", ".sat", ".x_t", ".x_b", ".fcstd", ".ipt", ".iam", ".f3d", ".sldprt", ".sldasm", ".catpart"),

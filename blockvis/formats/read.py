@@ -191,7 +191,9 @@ def _outlines(path: Path, reading: Reading) -> Layout:
     found = [_read_by_suffix(file, reading) for file in files]
     content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
     with carrying(lambda: as_drawn(content)):
-        layout = _in_dimension(content, path, reading)
+        if isinstance(content, Layout) and content.dimension == 3 and reading.dimension == 2:
+            raise ValueError(f"'{path}' draws its blocks in space; leave out dimension = 2")
+        layout = content if isinstance(content, Layout) else in_dimension(content, path, reading)
     layout = replace(layout, source=str(path), notes=layout.notes + _rounded_note(content, layout))
     if layout.dimension == 3:
         return _in_metres(layout, unit)
@@ -205,14 +207,6 @@ def _outlines(path: Path, reading: Reading) -> Layout:
                 "coordinates must be finite numbers: repair the file"
             )
     return _in_metres(layout, unit)
-
-
-def _in_dimension(content: Layout | Bodies, path: Path, reading: Reading) -> Layout:
-    if isinstance(content, Layout):
-        if content.dimension == 3 and reading.dimension == 2:
-            raise ValueError(f"'{path}' draws its blocks in space; leave out dimension = 2")
-        return content
-    return in_dimension(content, path, reading)
 
 
 def _apart(content: Layout | Bodies, path: Path) -> Layout | Bodies:

@@ -387,3 +387,17 @@ def test_strokes_of_dashes_and_dots_are_no_joints(tmp_path):
     for dashes, n in (("8 2 0 2", 1), ("8 2", 2), ("none", 2)):
         axis = f'<g stroke-dasharray="{dashes}" id="axes"><path d="M250 -9V700" stroke="red"/></g>'
         assert read_layout(svg(tmp_path, frame + axis)).n_blocks == n
+
+
+def test_an_outline_that_is_asked_for_by_its_name_is_not_cut_unless_a_piece_is_asked_for_too(tmp_path):
+    def draw(space):
+        for x in (0, 3000):
+            space.add_lwpolyline([(x, 0), (x + 2000, 0), (x + 2000, 1000), (x, 1000)], close=True)
+        space.add_line((1000, 0), (1000, 1000))
+
+    path = dxf(tmp_path, draw)
+    whole, left, right = read_layout(path).names
+    cut = left.removesuffix(".0")
+    assert right == f"{cut}.1"
+    for only in ([cut], [whole], [whole, left]):
+        assert sorted(read_layout(path, only=only).names) == sorted(only)
