@@ -14,18 +14,10 @@ __all__ = ["FORMATS", "Format"]
 
 @dataclass(frozen=True)
 class Format:
-    """One family of files.
+    """One family of files: the module of this room, and whether it writes them, also blocks in space.
 
-    Attributes
-    ----------
-    module : str
-        In this room.
-    writes, writes_space : bool
-        Whether it writes them, also blocks in space.
-    shapes_only : bool
-        Whether it holds no more of a block than its shape and name.
-    alone : bool
-        Whether a file holds all blocks: in a folder of one file per stone it is something else, such as a picture.
+    ``shapes_only`` are files that hold no more of a block than its shape and name. ``alone`` are those of all blocks:
+    in a folder of one file per stone such a file is something else, as a picture.
     """
 
     module: str

@@ -33,15 +33,9 @@ SAMPLES, STEPS = 33, 8
 class Arc:
     """Part of an outline that is an arc, drawn by chords that are equal on its circle.
 
-    Attributes
-    ----------
-    first, chords : int
-        Number of the corner at which it starts, and of its chords.
-    centre : (d,) array
-    axes : (d, 2) array
-        Its points are ``centre + axes @ (cos, sin)``: of a circle two radii, else conjugate half axes of an ellipse.
-    start, sweep : float [rad]
-        First angle and signed opening.
+    ``first`` is the number of the corner at which it starts. Its points are ``centre + axes @ (cos, sin)``, where axes
+    (d, 2) are two radii of a circle or conjugate half axes of an ellipse, from the angle ``start`` over the signed
+    opening ``sweep`` [rad].
     """
 
     first: int

@@ -66,21 +66,11 @@ ECCENTRIC = 1e-3
 
 @dataclass(frozen=True)
 class Body:
-    """A closed surface of triangles.
+    """A closed surface of triangles: (n, 3) points, and (m, 3) numbers of those around each face.
 
-    Attributes
-    ----------
-    name : str
-    points : (n, 3) array
-    faces : (m, 3) int array
-    said : dict
-        What the file says of it: values of the block table.
-    n_hole_edges : int
-        Edges of holes that were closed.
-    piece_of : str
-        Object of which it is one of several bodies.
-    volume : float
-        With its curved faces, where the file knows it; else 0.
+    What the file says of it, ``said``, are values of the block table. ``n_hole_edges`` are those of holes that were
+    closed, ``piece_of`` names the object of which it is one of several bodies, and ``volume`` is that with its curved
+    faces, where the file knows it; else 0.
     """
 
     name: str

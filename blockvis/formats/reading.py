@@ -15,22 +15,9 @@ from blockvis.layout.left_out import matches
 class Reading:
     """Options of a reader.
 
-    Attributes
-    ----------
-    unit : str or None
-        Unit of the file's lengths, if the caller gives it.
-    chord_tolerance : float or None [m]
-        Largest distance of an arc from its chords.
-    view : {"xy", "xz", "yz"} or None
-        Coordinates that become x and y; None for those that fit the drawing.
-    ignore, only : tuple of str
-        Layers, groups, materials and names, or patterns of them, that are left out, and beside which all others are.
-        Readers of drawings ask :meth:`wants` for loose lines, which later are no lines any more, and for the plane of
-        a drawing; outlines are left out when all are read.
-    dimension : {2, 3} or None
-        Whether bodies are read in the plane or in space; None for space where they are not prisms side by side.
-    image : mapping
-        What is said of an image; see :class:`blockvis.formats.image_scale.ImageKeys`.
+    They are those of :func:`blockvis.read_layout`, None where the caller says nothing; ``chord_tolerance`` is in m, and
+    ``image`` has what :class:`blockvis.formats.image_scale.ImageKeys` lists. Readers ask ``ignore`` and ``only`` for
+    bodies that are not closed, for lines, and for the plane of a drawing; outlines are left out when all are read.
     """
 
     unit: str | None = None
