@@ -235,6 +235,21 @@ def _is_behind_face(
         # The block of a corner that came through the neighbouring face lies on that face's side.
         from_neighbour_side = inward[:, 0] * tangent[:, 1] - inward[:, 1] * tangent[:, 0] > 0.0
         through[k] &= ~(shapes.convex_vertex[shared] & from_neighbour_side & (distance > gap[k] + end[k]))
+    k = k[through[k]]
+    # Nor one beyond another face of the block, as of a lip that it touches from below.
+    b = shapes.block_of_vertex[edge[k]]
+    owner, position = expand_ranges(np.diff(shapes.offsets)[b])
+    k, other = k[owner], shapes.offsets[b][owner] + position
+    tangent = _unit(vertices[following[edge[k]]] - vertices[edge[k]])
+    starts, ends = (vertices[corner] - vertices[vertex[k]] for corner in (other, following[other]))
+    along, across = ((dot(starts, axis), dot(ends, axis)) for axis in (tangent, tangent @ [[0.0, -1.0], [1.0, 0.0]]))
+    part = np.clip(-along[0] / np.where(along[0] == along[1], 1.0, along[1] - along[0]), 0.0, 1.0)
+    height = gap[k] + across[0] + part * (across[1] - across[0])
+    crosses = (np.minimum(*along) <= end[k]) & (np.maximum(*along) >= -end[k])
+    neighbour = ((other == following[edge[k]]) & shapes.convex_vertex[other]) | (
+        (other == previous[edge[k]]) & shapes.convex_vertex[edge[k]]
+    )
+    through[k[crosses & ~neighbour & (height < -end[k]) & (height >= 2.0 * gap[k])]] = False
     return through
 
 

@@ -327,3 +327,17 @@ def test_where_three_blocks_meet_two_corners_touch_along_their_closest_faces_onl
     assert sorted(contacts.points[chosen].tolist()) == [[2.0, 1.0], [2.4, 0.0]]
     across = np.array([1.0, 0.4]) / np.hypot(1.0, 0.4)
     np.testing.assert_allclose(np.abs(contacts.frames[chosen, 0] @ across), 1.0)
+
+
+@pytest.mark.parametrize("flip", [1, -1])
+@pytest.mark.parametrize(("under", "lip"), [(0.004, 0.03), (0.012, 0.008), (0.03, 0.002)])
+@pytest.mark.parametrize("below", [0.0, 0.003])
+def test_a_stone_whose_tenon_is_under_a_lip_does_not_rest_on_it(under, lip, below, flip):
+    """Its only bed is to the right of its centroid: the upper face of the lip is behind the lower one."""
+    held = [[0, -0.5], [0.95, -0.5], [0.95, under], [1, under], [1, under + lip], [0, under + lip]]
+    stone = [[0.95, 0], [2, 0], [2, 0.5], [1, 0.5], [1, under - below], [0.95, under - below]]
+    bed = [[1.8, -0.5], [2.2, -0.5], [2.2, 0], [1.8, 0]]
+    outlines = [[[flip * x, y] for x, y in outline][::flip] for outline in (held, stone, bed)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "free", "fixed"])
+    found = solver.Structure(assembly, friction_coefficient=0.6).limit_load(acceleration=(flip, 0))
+    assert found.status is solver.LimitStatus.NO_EQUILIBRIUM
