@@ -5,7 +5,7 @@ In the plane blocks are polygons and joints lines, in space polyhedra and faces;
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -51,31 +51,12 @@ def block_grid(
     shape: str = "moved",
     falls: np.ndarray | None = None,
 ) -> vtkUnstructuredGrid:
-    """Make a grid of the blocks of one increment, one cell per block: a polygon, or in space a polyhedron.
+    """Make a grid of the blocks of one increment, or as laid out: a polygon for each, in space a polyhedron.
 
-    Parameters
-    ----------
-    increment : solver.Increment, optional
-        The blocks as laid out by default.
-    shape : {"moved", "undeformed"}
-        Whether the points are where the blocks are at the increment, or where the layout has them. The active vectors,
-        by which a viewer warps first, lead from there on: those of the layout to where the blocks are, moved ones along
-        the mechanism that follows.
-    falls : (n_blocks,) bool array, optional
-        Blocks that the collapse takes; by default those that have fallen, in frames of a fall those that move.
-
-    Returns
-    -------
-    vtkUnstructuredGrid
-        Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
-        ``fallen`` (1 for blocks that have left for good), ``falls`` (1 for those that collapse takes), ``translation``
-        (n_blocks, 3) of the centroids [m] and ``rotation`` [rad], in space a vector; of the motion that follows
-        ``macro_block``, -1 at rest, and per unit of the parameter ``mechanism_velocity`` (n_blocks, 3) of the centroids
-        and ``mechanism_rotation``; point arrays ``displacement`` (n_vertices, 3) [m], ``reference``, the coordinates in
-        the layout [m], and of moved shapes ``mechanism``, a step along the motion that follows [m], and
-        ``to_reference``, the vector back to the layout [m]; field arrays ``units`` as "displacement [m]",
-        ``settlement`` (the parameter: of a pushover the control displacement, of a load that moves its position),
-        ``phase``, ``load_multiplier``, ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
+    Its points are where the blocks are, "moved", or where the layout has them, "undeformed". The active vectors, by
+    which a viewer warps first, lead from there on: those of the layout to where the blocks are, moved ones along the
+    mechanism that follows. ``falls`` (n_blocks,) bool are the blocks that the collapse takes; by default those that
+    have fallen, in frames of a fall those that move. `docs/results.md` lists the arrays of all grids.
 
     Examples
     --------
@@ -98,15 +79,15 @@ def block_grid(
         "material_id": np.array([number[material] for material in assembly.materials], dtype=np.int32),
         "translation": _in_space(pose.positions - assembly.centroids),
         "rotation": pose.rotations[:, 0].copy() if assembly.dimension == 2 else pose.rotations.copy(),
+        "name": assembly.names,
+        "role_name": assembly.roles.tolist(),
+        "material": assembly.materials,
     }
     add_arrays(grid.GetCellData(), cells)
     grid.GetCellData().SetActiveScalars("block_id")
-    for name, words in (("name", assembly.names), ("role_name", assembly.roles), ("material", assembly.materials)):
-        grid.GetCellData().AddArray(string_array(name, words))
     ahead = None if increment is None else next_places(assembly, increment, corners, assembly.block_of_vertex)
     _give_shape(grid, assembly.vertices, shape, ahead)
-    grid.GetFieldData().AddArray(string_array("role_names", mechanics.ROLES))
-    grid.GetFieldData().AddArray(string_array("material_names", materials))
+    add_arrays(grid.GetFieldData(), {"role_names": mechanics.ROLES, "material_names": materials})
     if increment is not None:
         fallen, motion = increment.fallen, block_motion(assembly, increment, falls)
         add_arrays(grid.GetCellData(), {"fallen": fallen.astype(np.int32), **motion})
@@ -114,23 +95,7 @@ def block_grid(
 
 
 def joint_grid(assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved") -> vtkUnstructuredGrid:
-    """Make a grid of the joints of one increment: a line for each, in space a face, midway between its two faces.
-
-    Parameters
-    ----------
-    shape : {"moved", "undeformed"}
-        As of :func:`block_grid`.
-
-    Returns
-    -------
-    vtkUnstructuredGrid
-        Cell arrays ``opening`` and ``slip`` [m], ``normal_force`` (compression positive) and ``shear_force`` [N] on
-        ``block_a``, ``length`` of the faces in common [m], ``block_a``, ``block_b``, ``joint`` (their names) and
-        ``initial``: 1 for joints of the layout, 0 for blocks that have come to touch since, whose opening and slip are
-        0. In frames of a fall there are no forces. Point and field arrays as those of :func:`block_grid`. In space
-        ``slip`` and ``shear_force`` are sizes, ``area`` [m²] takes the place of ``length``, ``normal`` and ``force``
-        [N] are vectors, and the point array ``gap`` [m] is the distance of the faces at each corner.
-    """
+    """Make a grid of the joints of one increment: a line for each, in space a face, midway between its two faces."""
     states = joint_states(assembly, initial_joints(assembly), increment)
     rings, in_space = states.rings, assembly.dimension == 3
     # Lines or vertices also where blocks touch at an edge or a corner.
@@ -140,6 +105,7 @@ def joint_grid(assembly: solver.Assembly, increment: solver.Increment, *, shape:
     grid = _grid_between(assembly, increment, rings, blocks, kind, shape)
     if in_space:
         add_arrays(grid.GetPointData(), {"gap": states.gaps})
+    names = assembly.names
     add_arrays(
         grid.GetCellData(),
         {
@@ -155,36 +121,16 @@ def joint_grid(assembly: solver.Assembly, increment: solver.Increment, *, shape:
             "block_a": states.block_a.astype(np.int32),
             "block_b": states.block_b.astype(np.int32),
             "initial": states.initial.astype(np.int32),
+            "joint": [f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True)],
         },
     )
-    names = assembly.names
-    words = (f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True))
-    grid.GetCellData().AddArray(string_array("joint", words))
     return _described(grid, increment)
 
 
 def contact_grid(
     assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
 ) -> vtkUnstructuredGrid:
-    """Make a grid of the contact points of one increment, one vertex cell each.
-
-    Parameters
-    ----------
-    shape : {"moved", "undeformed"}
-        As of :func:`block_grid`.
-
-    Returns
-    -------
-    vtkUnstructuredGrid
-        Point arrays ``normal`` and ``tangent`` (n_contacts, 3), ``force`` (n_contacts, 3) on ``block_a`` [N],
-        ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``,
-        ``utilisation``, the part of the friction that the shear force uses up, ``state``
-        (number of :class:`solver.mechanics.ContactState`), with mortar ``intact``, the part of its strength that is
-        left, ``carries`` (1 with a force), ``block_a`` and ``block_b``, ``displacement`` and ``reference`` as of
-        :func:`block_grid`; its field arrays, and ``state_names``. In
-        frames of a fall, which are no equilibrium, forces are 0. In space ``shear_force`` is the size of the vector
-        ``shear`` [N], and ``slip`` [m] is how far block a has moved along block b there since the layout.
-    """
+    """Make a grid of the contact points of one increment, one vertex cell each; in a fall their forces are 0."""
     contacts, states = increment.contacts, increment.states
     blocks = (contacts.block_a, contacts.block_b)
     places = Rings(contacts.points, np.arange(len(contacts) + 1))
@@ -213,39 +159,27 @@ def contact_grid(
     if in_space:
         points |= {"shear": shear, "slip": _slip(assembly, increment)}
     add_arrays(grid.GetPointData(), points)
-    grid.GetFieldData().AddArray(string_array("state_names", [state.name.lower() for state in mechanics.ContactState]))
+    add_arrays(grid.GetFieldData(), {"state_names": [state.name.lower() for state in mechanics.ContactState]})
     return _described(grid, increment)
 
 
 def tie_grid(
     ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
 ) -> vtkUnstructuredGrid:
-    """Make a grid of the ties, props and bars of one increment: a line for each, from end to end.
-
-    Parameters
-    ----------
-    shape : {"moved", "undeformed"}
-        As of :func:`block_grid`.
-
-    Returns
-    -------
-    vtkUnstructuredGrid
-        Cell arrays ``force`` [N], tension positive, ``elongation`` [m], ``state`` (number), ``name``, ``kind``; point
-        and field arrays as those of the blocks, and ``state_names``.
-    """
+    """Make a grid of the ties, props and bars of one increment: a line for each, from end to end."""
     found, d = ties_at(ties, assembly, increment), assembly.dimension
     grid = _grid_of_cells(found.ends.reshape(-1, d), 2 * np.arange(len(ties) + 1), VTK_LINE)
     _give_shape(grid, np.array([tie.points for tie in ties]).reshape(-1, d), shape, None)
-    cells = {
+    cells: dict[str, np.ndarray | Iterable[str]] = {
         "force": found.forces,
         "elongation": found.elongations,
         "state": found.states.astype(np.int32),
+        "name": [tie.name for tie in ties],
+        "kind": [tie.kind for tie in ties],
     }
     add_arrays(grid.GetCellData(), cells)
     grid.GetCellData().SetActiveScalars("force")
-    for name, words in (("name", [tie.name for tie in ties]), ("kind", [tie.kind for tie in ties])):
-        grid.GetCellData().AddArray(string_array(name, words))
-    grid.GetFieldData().AddArray(string_array("state_names", STATE_WORDS))
+    add_arrays(grid.GetFieldData(), {"state_names": STATE_WORDS})
     return _described(grid, increment)
 
 
@@ -330,23 +264,26 @@ def _grid_between(
 def _described(grid: vtkUnstructuredGrid, increment: solver.Increment | None) -> vtkUnstructuredGrid:
     """Write the numbers of an increment, if any, into the field arrays of a grid, and the units of its arrays."""
     if increment is not None:
-        numbers = {
-            "settlement": increment.parameter,
-            "phase": increment.phase,
-            "load_multiplier": increment.load_multiplier,
-            "reaction": increment.reaction,
+        numbers: dict[str, np.ndarray | Iterable[str]] = {
+            "settlement": np.array([increment.parameter]),
+            "phase": np.array([increment.phase]),
+            "load_multiplier": np.array([increment.load_multiplier]),
+            "reaction": np.array([increment.reaction]),
+            "status": [str(increment.status)],
         }
-        add_arrays(grid.GetFieldData(), {name: np.array([number]) for name, number in numbers.items()})
-        grid.GetFieldData().AddArray(string_array("status", [str(increment.status)]))
+        add_arrays(grid.GetFieldData(), numbers)
     _state_units(grid)
     return grid
 
 
-def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
-    """Add arrays to the point, cell or field data of a VTK grid."""
+def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray | Iterable[str]]) -> None:
+    """Add arrays of numbers or words to the point, cell or field data of a VTK grid."""
     for name, array in arrays.items():
-        values = numpy_to_vtk(np.ascontiguousarray(array), deep=True)
-        values.SetName(name)
+        if isinstance(array, np.ndarray):
+            values = numpy_to_vtk(np.ascontiguousarray(array), deep=True)
+            values.SetName(name)
+        else:
+            values = string_array(name, array)
         attributes.AddArray(values)
 
 
@@ -379,7 +316,7 @@ def _state_units(grid: vtkUnstructuredGrid) -> None:
             if array.GetName() in UNITS:
                 array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), UNITS[array.GetName()])
                 listed.append(f"{array.GetName()} [{UNITS[array.GetName()]}]")
-    grid.GetFieldData().AddArray(string_array("units", dict.fromkeys(listed)))
+    add_arrays(grid.GetFieldData(), {"units": dict.fromkeys(listed)})
 
 
 def _in_space(vectors: np.ndarray) -> np.ndarray:
