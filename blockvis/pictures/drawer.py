@@ -33,7 +33,7 @@ from .marks import (
     settlement_arrows,
     thrust_line,
 )
-from .scene import OF_STATICS, Scene
+from .scene import OF_STATICS
 from .solid_view import View, heights_over, hiding_supports, plane_of, views_of
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 from .ties import DASH, DrawnTies
@@ -41,6 +41,8 @@ from .underlay import Underlay
 
 if TYPE_CHECKING:
     from .curves import CurvePanel
+    from .paired_scenes import PairedScenes
+    from .solid_scene import SolidScene
 
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
@@ -261,7 +263,7 @@ class Drawer:
         """(2 n_views, 3) array: to the right and up in each view."""
         return np.concatenate([view.axes[:2] for view in self._views])
 
-    def _scene(self, frame: Frame) -> Scene:
+    def _scene(self, frame: Frame) -> FlatScene | SolidScene | PairedScenes:
         """Set up what draws blocks in the plane, or in space."""
         if not self._views:
             scene = FlatScene(self.assembly, frame, self.sheet.inside_size, self.fill, self._underlay)
@@ -661,7 +663,7 @@ class Drawer:
 
     def _draw_bearings(self, shown: solver.Pose) -> None:
         """Draw where supports carry the structure in the plane."""
-        if not self._flat:
+        if not isinstance(self.scene, FlatScene):
             return
         joints, free = self.joints, self.assembly.free
         drawn = solver.Pose.initial(self.assembly)

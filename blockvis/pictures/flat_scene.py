@@ -44,7 +44,7 @@ MOST_OUTLINES = 6
 
 
 class FlatScene(Scene):
-    """Blocks of the plane and their marks, drawn frame after frame; see :class:`blockvis.pictures.scene.Scene`.
+    """Blocks of the plane and their marks.
 
     The blocks have colours (n_blocks, 3) uint8, and carry their part of a photograph where there is one.
     """
@@ -58,14 +58,10 @@ class FlatScene(Scene):
         underlay: Underlay | None = None,
         outline: Colour = palette.OUTLINE,
     ) -> None:
-        self.assembly, self.size = assembly, size
-        self.frame = frame.fitted(*size)
-        #: Size of a pixel in the world [m].
-        self.pixel = float(self.frame.size[0]) / size[0]
+        super().__init__(assembly, frame, size)
         self._photograph = (
             None if underlay is None else CarriedPhotograph(underlay, assembly, self.frame.low, self.pixel, size)
         )
-        self._gone = np.zeros(assembly.n_blocks, dtype=bool)
         self._layers: dict[str, _Layer] = {}
         self._fills: list[_Layer] = []
         self._outlines = _rings(np.diff(assembly.offsets))
@@ -227,11 +223,6 @@ class FlatScene(Scene):
         else:
             under = self._photograph.picture(self._shown, self._gone)
         return painted(under, self._paths(), Affine2D().translate(*-self.frame.low).scale(1.0 / self.pixel))
-
-    def at_pixel(self, points: np.ndarray) -> np.ndarray:
-        """(n, 2) array: pixel (column, row) of points (n, 2) [m]."""
-        place = (np.asarray(points) - self.frame.low) / self.pixel
-        return np.column_stack([place[:, 0], self.size[1] - place[:, 1]])
 
     def _paths(self) -> Iterator[tuple[Colour, float, float, Path]]:
         """Colour, width of the line (0 where it is filled), opacity and outlines, back to front.

@@ -12,7 +12,6 @@ import solver
 
 from . import palette
 from .frame import Frame, Sheet, write_words
-from .scene import Scene
 from .solid_scene import SolidScene
 from .solid_view import View, hiding_supports
 from .swing import Swing
@@ -31,10 +30,10 @@ def _on_each(name: str) -> Callable[..., None]:
     return call
 
 
-class PairedScenes(Scene):
-    """Scenes of the same blocks at one scale, from left to right; see :class:`blockvis.pictures.scene.Scene`.
+class PairedScenes:
+    """Scenes of the same blocks at one scale, from left to right, as one :class:`SolidScene`.
 
-    The frame has what is shown in the axes of each view in turn; the look is as of :class:`SolidScene`.
+    The frame has what is shown in the axes of each view in turn; the look is that of each scene.
     """
 
     def __init__(

@@ -77,7 +77,7 @@ class _Arrows:
 
 
 class SolidScene(Scene):
-    """Blocks in space and their marks, drawn frame after frame; see :class:`blockvis.pictures.scene.Scene`.
+    """Blocks in space and their marks.
 
     Parameters
     ----------
@@ -110,10 +110,8 @@ class SolidScene(Scene):
         hidden_hinges: bool = True,
         outline: tuple[int, int, int] = palette.OUTLINE,
     ) -> None:
-        self.assembly, self.view, self.size = assembly, view, size
-        self.frame = frame.fitted(*size)
-        #: Size of a pixel in the world [m].
-        self.pixel = float(self.frame.size[0]) / size[0]
+        super().__init__(assembly, frame, size)
+        self.view = view
         self._over = OVER if fine else 1
         self._plotter = _plotter((self._over * size[0], self._over * size[1]))
         if fine and opacity == 1.0:
@@ -125,7 +123,6 @@ class SolidScene(Scene):
         #: Diagonal of the largest support [m].
         self._support = _largest_support(assembly)
         self._layers: dict[str, Any] = {}
-        self._gone = np.zeros(assembly.n_blocks, dtype=bool)
         self._overlays: dict[str, _Arrows] = {}
         self._look_at()
         self._cut = cut
@@ -354,8 +351,7 @@ class SolidScene(Scene):
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: pixel (column, row) of points (n, 3) [m]."""
-        place = (self.view.projected(np.asarray(points)) - self.frame.low) / self.pixel
-        return np.column_stack([place[:, 0], self.size[1] - place[:, 1]])
+        return super().at_pixel(self.view.projected(points))
 
     def sees(self, points: np.ndarray) -> np.ndarray:
         """(n,) bool array: which points (n, 3) [m] on the blocks nothing hides in the last picture."""
