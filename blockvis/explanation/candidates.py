@@ -61,39 +61,22 @@ Motions = Mapping[str, tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A movement of supports, of which one parameter says how far it goes.
+    """A movement of supports, of which one parameter says how far it goes."""
 
-    Attributes
-    ----------
-    cause : str
-        In words; candidates of one cause differ in parameters that the cause leaves open.
-    motions : mapping of str to (n_dof,) tuple [m and rad]
-        Motion of each support that takes part, at the middle of where it carries something.
-    prior : float
-        Weight before anything was observed, relative to other causes; shared by the candidates of the cause.
-    detail : str
-        What the cause leaves open, in words.
-    centre, inflection : float [m]
-        Of a trough; nan for others.
-    refines : str
-        The detail of the candidate that this one was added to look at more closely; empty for those of the start.
-    ways : tuple of str
-        Directions in which supports move.
-    turns : bool
-        Whether supports turn as one body: its amount is the angle.
-    bends : bool
-        Whether the ground bends, in a trough or at the beginning of a slope: its amount is the differential settlement.
-    """
-
-    cause: str
+    cause: str  #: In words; candidates of one cause differ in parameters that the cause leaves open.
+    #: (n_dof,) tuples [m and rad]: of each support that takes part, at the middle of where it carries something.
     motions: Motions
+    #: Weight before anything was observed, relative to other causes; shared by the candidates of the cause.
     prior: float = 1.0
-    detail: str = ""
+    detail: str = ""  #: What the cause leaves open, in words.
+    #: [m] Both of a trough; nan for others.
     centre: float = float("nan")
     inflection: float = float("nan")
+    #: The detail of the candidate that this one was added to look at more closely; empty for those of the start.
     refines: str = ""
-    ways: tuple[str, ...] = ()
-    turns: bool = False
+    ways: tuple[str, ...] = ()  #: Directions in which supports move.
+    turns: bool = False  #: Whether supports turn as one body: its amount is the angle.
+    #: Whether the ground bends, in a trough or at the beginning of a slope: its amount is the differential settlement.
     bends: bool = False
 
     @property
@@ -104,24 +87,12 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Ground:
-    """The supports of a structure, as drawn and as cut for troughs.
+    """The supports of a structure, as drawn and as cut for troughs."""
 
-    Attributes
-    ----------
-    assembly : solver.Assembly
-        Every support fixed; cut where troughs are looked at.
-    pieces : mapping of str to tuple of str
-        What became of each support of the drawing.
-    troughs : bool
-        Whether troughs are looked at.
-    notes : tuple of str
-        What was cut.
-    """
-
-    assembly: solver.Assembly
-    pieces: Mapping[str, tuple[str, ...]]
-    troughs: bool
-    notes: tuple[str, ...] = field(default=())
+    assembly: solver.Assembly  #: Every support fixed; cut where troughs are looked at.
+    pieces: Mapping[str, tuple[str, ...]]  #: What became of each support of the drawing.
+    troughs: bool  #: Whether troughs are looked at.
+    notes: tuple[str, ...] = field(default=())  #: What was cut.
 
 
 def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path) -> Ground:
@@ -376,21 +347,11 @@ def _oblique(ground: Ground, one: Candidate, names: Sequence[str]) -> Iterator[C
 
 @dataclass(frozen=True)
 class Twin:
-    """How a candidate differs from one that opens the same cracks: by a translation of everything.
+    """How a candidate differs from one that opens the same cracks: by a translation of everything."""
 
-    Attributes
-    ----------
-    of : int
-        Number of the candidate whose run it shares.
-    scale : float
-        Amount of this one per amount of the other.
-    travel : (d,) array
-        Translation of everything, per amount of this one.
-    """
-
-    of: int
-    scale: float
-    travel: np.ndarray
+    of: int  #: Number of the candidate whose run it shares.
+    scale: float  #: Amount of this one per amount of the other.
+    travel: np.ndarray  #: (d,) array: translation of everything, per amount of this one.
 
 
 def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list[Twin]:

@@ -55,34 +55,19 @@ FOLLOWED = SettlementKind()
 
 @dataclass(frozen=True)
 class Variant:
-    """What a run assumes besides the movement of the supports.
+    """What a run assumes besides the movement of the supports."""
 
-    Attributes
-    ----------
-    friction : float
-        Coefficient of [material]; those of pairs of materials follow in proportion.
-    heavier_side : {-1, 0, 1}
-        Whether stones are a little heavier towards the left, nowhere, or towards the right.
-    """
-
-    friction: float
+    friction: float  #: Coefficient of [material]; those of pairs of materials follow in proportion.
+    #: {-1, 0, 1}: whether stones are a little heavier towards the left, nowhere, or towards the right.
     heavier_side: int = 0
 
 
 @dataclass(frozen=True)
 class Order:
-    """One run: a structure, and how its supports move.
+    """One run: a structure, and how its supports move."""
 
-    Attributes
-    ----------
-    given : RunInput
-        The case has the one settlement of the supports that move, which have the role "moving".
-    enough : float [m]
-        Opening at which the run may stop.
-    """
-
-    given: RunInput
-    enough: float
+    given: RunInput  #: The case has the one settlement of the supports that move, which have the role "moving".
+    enough: float  #: [m] Opening at which the run may stop.
 
     @property
     def settlement(self) -> solver.Settlement:
@@ -92,21 +77,11 @@ class Order:
 
 @dataclass(frozen=True)
 class Run:
-    """What a candidate does, for every amount.
+    """What a candidate does, for every amount."""
 
-    Attributes
-    ----------
-    amounts : (n,) array [m or rad]
-        Of the increments in equilibrium, from 0; empty where there is none.
-    moved : (n, n_blocks, n_dof) array [m and rad]
-        Displacement and rotation of each block.
-    fell : bool
-        Whether it ended in a collapse.
-    """
-
-    amounts: np.ndarray
-    moved: np.ndarray
-    fell: bool
+    amounts: np.ndarray  #: (n,) array [m or rad]: of the increments in equilibrium, from 0; empty where there is none.
+    moved: np.ndarray  #: (n, n_blocks, n_dof) array [m and rad]: displacement and rotation of each block.
+    fell: bool  #: Whether it ended in a collapse.
 
     def at(self, amounts: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Interpolate values (n, ...) of the increments at amounts (m,): (m, ...) array."""

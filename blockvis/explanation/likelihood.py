@@ -43,21 +43,11 @@ INDEPENDENT = 20
 
 @dataclass(frozen=True)
 class Trust:
-    """How far observations and model are trusted.
+    """How far observations and model are trusted."""
 
-    Attributes
-    ----------
-    model : float
-        Standard deviation of computed widths, as a fraction of the observed ones.
-    place : float [m]
-        Within which a crack at x, y may be another joint.
-    outliers : float
-        Probability that an observation has another cause.
-    """
-
-    model: float
-    place: float
-    outliers: float
+    model: float  #: Standard deviation of computed widths, as a fraction of the observed ones.
+    place: float  #: [m] Within which a crack at x, y may be another joint.
+    outliers: float  #: Probability that an observation has another cause.
 
 
 class Comparison:
@@ -230,44 +220,24 @@ def _log_normal(gap: np.ndarray, sigma: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Trial:
-    """A candidate at one friction, against the observations.
-
-    Attributes
-    ----------
-    run : Run
-        Of the candidate itself, or of its twin.
-    twin : Twin
-        How the amount of the candidate follows from that of the run.
-    shared : Candidate
-        The candidate that was run: itself, or its twin.
-    unit : str
-        Of the amounts.
-    amounts : (n,) array [m or rad]
-        Of the candidate, each larger than the one before by the same factor, up to the largest that is looked at.
-    log_likelihood : (n,) array
-        -inf where the structure has fallen, where the run was not followed, and where nothing observed is made.
-    widths : (n, n_widths) array [m]
-        What it shows of the observations: in the joint near each of them that fits best.
-    pairs : (n, n_widths) int array
-        Which joint that is, as a pair of the comparison.
-    gaps : (n_increments, n_corners) array [m]
-        Openings at the corners of the faces, at the increments of the run.
-    displacements : (n, n_points, d) array [m]
-        Of the observed points.
-    """
+    """A candidate at one friction, against the observations."""
 
     candidate: Candidate
     variant: Variant
-    run: Run
-    twin: Twin
-    shared: Candidate
-    unit: str
+    run: Run  #: Of the candidate itself, or of its twin.
+    twin: Twin  #: How the amount of the candidate follows from that of the run.
+    shared: Candidate  #: The candidate that was run: itself, or its twin.
+    unit: str  #: Of the amounts.
+    #: (n,) array [m or rad]: of the candidate, in a geometric series up to the largest that is looked at.
     amounts: np.ndarray
+    #: (n,) array: -inf where the structure has fallen, the run was not followed, or nothing observed is made.
     log_likelihood: np.ndarray
+    #: (n, n_widths) array [m]: what it shows of the observations: in the joint near each of them that fits best.
     widths: np.ndarray
-    pairs: np.ndarray
+    pairs: np.ndarray  #: (n, n_widths) int array: which joint that is, as a pair of the comparison.
+    #: (n_increments, n_corners) array [m]: openings at the corners of the faces, at the increments of the run.
     gaps: np.ndarray
-    displacements: np.ndarray
+    displacements: np.ndarray  #: (n, n_points, d) array [m]: of the observed points.
 
     @cached_property
     def log_evidence(self) -> float:

@@ -62,39 +62,19 @@ NEAR_MIDDLE = 0.1
 
 @dataclass(frozen=True)
 class Observations:
-    """Widths of cracks, and displacements of points, where and how certain they are.
+    """Widths of cracks, and displacements of points, where and how certain they are."""
 
-    Attributes
-    ----------
-    places : (n, d) array [m]
-        Of the widths, in the drawing.
-    named : (n,) bool array
-        Whether the joint itself is known, not only a place.
-    whole : (n,) bool array
-        Whether the width is the largest of a joint, not that at a place along it.
-    widths, uncertainties : (n,) arrays [m]
-        A width of 0 is a closed joint.
-    labels : tuple of str
-        Of the widths, in words.
-    points : (m, d) array [m]
-        Of the displacements, in the drawing.
-    blocks : tuple of str
-        On which the points lie.
-    displacements : (m, d) array [m]
-    point_uncertainties : (m,) array [m]
-        Of each coordinate.
-    """
-
-    places: np.ndarray
-    named: np.ndarray
-    whole: np.ndarray
+    places: np.ndarray  #: (n, d) array [m]: of the widths, in the drawing.
+    named: np.ndarray  #: (n,) bool array: whether the joint itself is known, not only a place.
+    whole: np.ndarray  #: (n,) bool array: whether the width is the largest of a joint, not that at a place along it.
+    #: (n,) arrays [m]; a width of 0 is a closed joint.
     widths: np.ndarray
     uncertainties: np.ndarray
-    labels: tuple[str, ...]
-    points: np.ndarray
-    blocks: tuple[str, ...]
-    displacements: np.ndarray
-    point_uncertainties: np.ndarray
+    labels: tuple[str, ...]  #: Of the widths, in words.
+    points: np.ndarray  #: (m, d) array [m]: of the displacements, in the drawing.
+    blocks: tuple[str, ...]  #: On which the points lie.
+    displacements: np.ndarray  #: (m, d) array [m].
+    point_uncertainties: np.ndarray  #: (m,) array [m]: of each coordinate.
     source: str = ""
 
     @property

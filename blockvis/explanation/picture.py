@@ -167,18 +167,12 @@ def _pieces(rings: Rings) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Canvas:
-    """A panel on which blocks are drawn, in the plane or as they are seen in space.
-
-    Attributes
-    ----------
-    view : View, optional
-        Of blocks in space.
-    """
+    """A panel on which blocks are drawn, in the plane or as they are seen in space."""
 
     panel: Axes
     assembly: solver.Assembly
     frame: Frame
-    view: View | None
+    view: View | None  #: Of blocks in space.
 
     def placed(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array [m]: where points, or arrows, (n, d) [m] are drawn."""
@@ -260,20 +254,12 @@ class _Canvas:
 
 @dataclass(frozen=True)
 class _Sights:
-    """What a panel shows of the edges of joints: all of them in the plane.
-
-    Attributes
-    ----------
-    pieces : (n_points, PIECES, 3) array [m], optional
-        Places along the edges, of joints in space.
-    seen : (n_points, PIECES) bool array, optional
-        Those that nothing hides.
-    """
+    """What a panel shows of the edges of joints: all of them in the plane."""
 
     canvas: _Canvas
     rings: Rings
-    pieces: np.ndarray | None = None
-    seen: np.ndarray | None = None
+    pieces: np.ndarray | None = None  #: (n_points, PIECES, 3) array [m]: places along the edges, of joints in space.
+    seen: np.ndarray | None = None  #: (n_points, PIECES) bool array: those that nothing hides.
 
     def of(self, places: np.ndarray, joints: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
         """Find what is seen of joints (n,) int, and whether anything is, (n,) bool.

@@ -111,29 +111,15 @@ class Look:
 
 @dataclass
 class _Series:
-    """What must be the same in all pictures of some increments.
+    """What must be the same in all pictures of some increments."""
 
-    Attributes
-    ----------
-    sampled : frozenset of int
-        Numbers of the increments whose forces set the scale.
-    largest : float [m]
-        Displacement of any free block.
-    widest : float [m]
-        Opening of any crack in equilibrium.
-    marks : set of str
-        What there is anywhere of "cracks", "sliding", "hinges", "crushing", "lost" blocks, and joints with "pulls".
-    largest_force : float [N]
-    forces : list of arrays [N]
-        Sizes, of the increments sampled.
-    """
-
-    sampled: frozenset[int]
-    largest: float = 0.0
-    widest: float = 0.0
+    sampled: frozenset[int]  #: Numbers of the increments whose forces set the scale.
+    largest: float = 0.0  #: [m] Displacement of any free block.
+    widest: float = 0.0  #: [m] Opening of any crack in equilibrium.
+    #: What there is anywhere of "cracks", "sliding", "hinges", "crushing", "lost" blocks, and joints with "pulls".
     marks: set[str] = field(default_factory=set)
-    largest_force: float = 0.0
-    forces: list[np.ndarray] = field(default_factory=list)
+    largest_force: float = 0.0  #: [N]
+    forces: list[np.ndarray] = field(default_factory=list)  #: [N] Sizes, of the increments sampled.
 
 
 class Drawer:

@@ -35,24 +35,13 @@ LEGEND_GAP = 1.3
 
 @dataclass(frozen=True)
 class Key:
-    """One entry of the legend.
+    """One entry of the legend."""
 
-    Attributes
-    ----------
-    kind : {"area", "line", "dash", "dot", "bar", ""}
-        What stands before the text; nothing before a note.
-    colour : (int, int, int)
-    length : float
-        Pixels, of a bar drawn to scale.
-    layers : tuple of str
-        Of the scene that it explains; none of what is in every picture.
-    """
-
-    kind: str
+    kind: str  #: {"area", "line", "dash", "dot", "bar", ""}: what stands before the text; nothing before a note.
     text: str
     colour: tuple[int, int, int]
-    length: float = 0.0
-    layers: tuple[str, ...] = ()
+    length: float = 0.0  #: Pixels, of a bar drawn to scale.
+    layers: tuple[str, ...] = ()  #: Of the scene that it explains; none of what is in every picture.
 
 
 @dataclass(frozen=True)

@@ -59,43 +59,22 @@ class Kind:
 
 @dataclass(frozen=True)
 class Contents:
-    """What a picture of a drawing shows.
+    """What a picture of a drawing shows."""
 
-    Attributes
-    ----------
-    layout : Layout
-        All that is drawn.
-    findings : tuple of str
-        Lines below it.
-    kinds : tuple of Kind
-    named : tuple of int
-        Blocks whose names are written into them where there is room.
-    marked : tuple of int
-        Blocks that are named beside them.
-    rings : (n, d) array [m]
-        Places to look at, and what they are.
-    ends : (n, 2) array [m]
-        Ends of open lines.
-    edges : (n, 2, 3) array [m]
-        Edges of open surfaces.
-    joints : Facing
-        In the plane.
-    unit : str
-        Of the coordinates.
-    """
-
-    layout: Layout
+    layout: Layout  #: All that is drawn.
     title: str
-    findings: tuple[str, ...]
+    findings: tuple[str, ...]  #: Lines below it.
     kinds: tuple[Kind, ...]
-    named: tuple[int, ...] = ()
-    marked: tuple[int, ...] = ()
+    named: tuple[int, ...] = ()  #: Blocks whose names are written into them where there is room.
+    marked: tuple[int, ...] = ()  #: Blocks that are named beside them.
+    #: (n, d) array [m]: places to look at, and what they are.
     rings: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     rings_are: str = ""
-    ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  #: (n, 2) array [m]: ends of open lines.
+    #: (n, 2, 3) array [m]: edges of open surfaces.
     edges: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
-    joints: Facing = field(default_factory=Facing.none)
-    unit: str = "m"
+    joints: Facing = field(default_factory=Facing.none)  #: Of blocks in the plane.
+    unit: str = "m"  #: Of the coordinates.
 
     @property
     def drawn(self) -> list[int]:

@@ -74,34 +74,19 @@ def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndar
 
 @dataclass(frozen=True)
 class Marks:
-    """What is marked at one pose.
+    """What is marked at one pose."""
 
-    Attributes
-    ----------
-    cracks : (n, 4, d) array [m]
-        Quadrilateral between the two faces of each open joint, in space between the edges of the faces, where they are
-        open: along the one on block a, then back along block b.
-    openings : (n, 2) array [m]
-        Distance of the faces at both ends of each, unmagnified.
-    gapes : (n,) bool array
-        Which are open so wide that there is air between the faces, which alone are marked.
-    sliding : (n, 2, d) array [m]
-        Ends of each sliding joint, in space of the edges around it.
-    exposed : list of (k, 3) arrays [m]
-        Faces in space that slide, of both blocks.
-    hinges : (n, 2, d) array [m]
-        Ends of the line about which each hinge turns; the same twice for a point, as in the plane.
-    crushing : (n, d) array [m]
-        Contact points that crush.
-    """
-
+    #: (n, 4, d) array [m]: quadrilateral between the two faces of each open joint, in space between the edges of the
+    #: faces, where they are open: along the one on block a, then back along block b.
     cracks: np.ndarray
-    openings: np.ndarray
+    openings: np.ndarray  #: (n, 2) array [m]: distance of the faces at both ends of each, unmagnified.
+    #: (n,) bool array: which are open so wide that there is air between the faces, which alone are marked.
     gapes: np.ndarray
-    sliding: np.ndarray
-    exposed: list[np.ndarray]
+    sliding: np.ndarray  #: (n, 2, d) array [m]: ends of each sliding joint, in space of the edges around it.
+    exposed: list[np.ndarray]  #: (k, 3) arrays [m]: faces in space that slide, of both blocks.
+    #: (n, 2, d) array [m]: ends of the line about which each hinge turns; the same twice for a point, as in the plane.
     hinges: np.ndarray
-    crushing: np.ndarray
+    crushing: np.ndarray  #: (n, d) array [m]: contact points that crush.
 
     @property
     def middles(self) -> np.ndarray:

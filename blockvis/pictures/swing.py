@@ -28,33 +28,15 @@ MOST_PARTS = len(palette.PARTS)
 
 @dataclass(frozen=True)
 class Swing:
-    """A mechanism and where it takes the blocks, out of scale.
+    """A mechanism and where it takes the blocks, out of scale."""
 
-    Attributes
-    ----------
-    increment : solver.Increment
-        The state it begins at, with the motion that follows.
-    begins : solver.Increment
-        That state as the response has it.
-    displaced : solver.Pose
-        After the motion; at the increment's own pose where nothing moves.
-    parts : (n_blocks,) int array
-        As ``solver.mechanics.rigid_parts`` gives them.
-    moves : bool
-        Whether anything moves.
-    motion : (n_blocks, n_dof) array
-        From the increment's pose to the displaced one.
-    share : float
-        How much this is of the motion whose fastest corner goes ``REACH`` of the picture.
-    """
-
-    increment: solver.Increment
-    begins: solver.Increment
-    displaced: solver.Pose
-    parts: np.ndarray
-    moves: bool
-    motion: np.ndarray
-    share: float
+    increment: solver.Increment  #: The state it begins at, with the motion that follows.
+    begins: solver.Increment  #: That state as the response has it.
+    displaced: solver.Pose  #: After the motion; at the increment's own pose where nothing moves.
+    parts: np.ndarray  #: (n_blocks,) int array: as ``solver.mechanics.rigid_parts`` gives them.
+    moves: bool  #: Whether anything moves.
+    motion: np.ndarray  #: (n_blocks, n_dof) array: from the increment's pose to the displaced one.
+    share: float  #: How much this is of the motion whose fastest corner goes ``REACH`` of the picture.
 
     @property
     def n_parts(self) -> int:

@@ -24,17 +24,10 @@ STILL = 0.5
 
 @dataclass(frozen=True)
 class Underlay:
-    """A photograph and where it lies.
+    """A photograph and where it lies."""
 
-    Attributes
-    ----------
-    pixels : (height, width, 3) uint8 array
-    matrix : (2, 3) array [m]
-        From column and row, (0, 0) its upper left corner, and 1 to x and y.
-    """
-
-    pixels: np.ndarray
-    matrix: np.ndarray
+    pixels: np.ndarray  #: (height, width, 3) uint8 array.
+    matrix: np.ndarray  #: (2, 3) array [m]: from column and row, (0, 0) its upper left corner, and 1 to x and y.
 
     def seen(self, low: np.ndarray, pixel: float, size: tuple[int, int]) -> np.ndarray:
         """(height, width, 3) uint8 array: what of it is in a picture, paper around it.

@@ -25,22 +25,13 @@ NOTHING = 1e-8
 
 @dataclass(frozen=True)
 class About:
-    """Where a response comes from.
+    """Where a response comes from."""
 
-    Attributes
-    ----------
-    name, file : str
-        Name of the case, empty for one made in Python, and of its file.
-    finished : str
-        When it was found.
-    version : str
-        Of this program, when the run began.
-    """
-
+    #: Name of the case, empty for one made in Python, and of its file.
     name: str
     file: str
-    finished: str
-    version: str
+    finished: str  #: When it was found.
+    version: str  #: Of this program, when the run began.
 
 
 def governing_limit(response: solver.Response) -> solver.LimitLoad | None:
@@ -141,18 +132,10 @@ def counts_text(mechanism: mechanics.Mechanism) -> str:
 
 @dataclass(frozen=True)
 class Loss:
-    """What a collapse mechanism takes with it.
+    """What a collapse mechanism takes with it."""
 
-    Attributes
-    ----------
-    weight : float [N]
-        Of the free blocks that move in the mechanism.
-    share : float
-        Of the weight of all free blocks.
-    """
-
-    weight: float
-    share: float
+    weight: float  #: [N] Of the free blocks that move in the mechanism.
+    share: float  #: Of the weight of all free blocks.
 
     @property
     def local(self) -> bool:

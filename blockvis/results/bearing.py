@@ -18,22 +18,12 @@ ONE_END = 0.02
 
 @dataclass(frozen=True)
 class Bearing:
-    """A support with a stiffness, at an increment.
-
-    Attributes
-    ----------
-    force : float [N]
-        Normal to its face.
-    pressures : (float, float) [Pa]
-        The mean, and that of the end of a block with the largest.
-    tilt : float [rad]
-        By which a block on it has turned, the largest of them.
-    """
+    """A support with a stiffness, at an increment."""
 
     name: str
-    force: float
-    pressures: tuple[float, float]
-    tilt: float
+    force: float  #: [N] Normal to its face.
+    pressures: tuple[float, float]  #: [Pa] The mean, and that of the end of a block with the largest.
+    tilt: float  #: [rad] By which a block on it has turned, the largest of them.
 
     def __str__(self) -> str:
         """One line."""

@@ -68,37 +68,19 @@ class Crack:
     """A course of joints of the layout that have parted or slid one after another, at least one of them open.
 
     In space joints that meet and part alike are one crack.
-
-    Attributes
-    ----------
-    joints : (n,) int array
-        Numbers of its joints, the widest first.
-    width : float [m]
-        Largest opening.
-    slip : float [m]
-        Of the widest joint.
-    widest : str
-        Names of the two blocks that part most.
-    at : (d,) array [m]
-        Middle of that joint in the layout.
-    ends : (2, d) array [m]
-        Where it begins and ends in the layout, the lower first; in space its two corners that are farthest apart.
-    size : float
-        Length [m] of all its joints together, in space their area [m²].
-    mean_width : float [m]
-        Opening of its joints, by their sizes.
-    places : (str, str)
-        What its two ends are at, as "the top" and "the upper left corner of opening 2"; empty in space.
     """
 
-    joints: np.ndarray
-    width: float
-    slip: float
-    widest: str
-    at: np.ndarray
+    joints: np.ndarray  #: (n,) int array: numbers of its joints, the widest first.
+    width: float  #: [m] Largest opening.
+    slip: float  #: [m] Of the widest joint.
+    widest: str  #: Names of the two blocks that part most.
+    at: np.ndarray  #: (d,) array [m]: middle of that joint in the layout.
+    #: (2, d) array [m]: where it begins and ends in the layout, the lower first; in space its two corners that are
+    #: farthest apart.
     ends: np.ndarray
-    size: float
-    mean_width: float
+    size: float  #: Length [m] of all its joints together, in space their area [m²].
+    mean_width: float  #: [m] Opening of its joints, by their sizes.
+    #: What its two ends are at, as "the top" and "the upper left corner of opening 2"; empty in space.
     places: tuple[str, str] = ("", "")
 
     @property

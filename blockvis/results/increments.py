@@ -25,19 +25,11 @@ CACHED, AT_LEAST = 8 << 20, 2
 
 @dataclass(frozen=True)
 class StateInFile:
-    """The state of an increment in a file, read whenever it is asked for.
-
-    Attributes
-    ----------
-    number : int
-        Of the increment.
-    numbers : tuple of float
-        Of the increment, by which a file that was replaced is noticed.
-    """
+    """The state of an increment in a file, read whenever it is asked for."""
 
     files: StoredIncrements
-    number: int
-    numbers: tuple[float, ...]
+    number: int  #: Of the increment.
+    numbers: tuple[float, ...]  #: Of the increment, by which a file that was replaced is noticed.
 
     def read(self) -> mechanics.State:
         """Read the state; raises ``ValueError`` where the file is missing, damaged or of another increment."""

@@ -27,18 +27,11 @@ SMALLEST_FACE = 1e-4
 
 @dataclass(frozen=True)
 class Rings:
-    """Polygons in space, or lines in the plane, as flat arrays.
+    """Polygons in space, or lines in the plane, as flat arrays."""
 
-    Attributes
-    ----------
-    points : (n_points, d) array [m]
-        Corners of all polygons, one after another; of two the ends of a line, of one a point.
-    offsets : (n + 1,) int array
-        Polygon ``i`` owns ``points[offsets[i]:offsets[i + 1]]``.
-    """
-
+    #: (n_points, d) array [m]: corners of all polygons, one after another; of two the ends of a line, of one a point.
     points: np.ndarray
-    offsets: np.ndarray
+    offsets: np.ndarray  #: (n + 1,) int array: polygon ``i`` owns ``points[offsets[i]:offsets[i + 1]]``.
 
     def __len__(self) -> int:
         """Count the polygons."""
@@ -88,22 +81,15 @@ class Rings:
 
 @dataclass(frozen=True)
 class InitialJoints:
-    """Pairs of faces that touch in the layout.
+    """Pairs of faces that touch in the layout."""
 
-    Attributes
-    ----------
-    block_a, block_b : (n_joints,) int arrays
-    rings : Rings
-        What they have in common where the layout has it: in the plane both ends, in space a polygon, counter-clockwise
-        seen from ``block_a``.
-    normals : (n_joints, d) array
-        Unit normal in the layout, from ``block_b`` into ``block_a``.
-    """
-
+    #: (n_joints,) int arrays.
     block_a: np.ndarray
     block_b: np.ndarray
+    #: What they have in common where the layout has it: in the plane both ends, in space a polygon, counter-clockwise
+    #: seen from ``block_a``.
     rings: Rings
-    normals: np.ndarray
+    normals: np.ndarray  #: (n_joints, d) array: unit normal in the layout, from ``block_b`` into ``block_a``.
 
     def __len__(self) -> int:
         """Count the joints."""

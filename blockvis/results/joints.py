@@ -19,25 +19,14 @@ CLOSED = 1e-6
 
 @dataclass(frozen=True)
 class Faces:
-    """The two faces of each joint of the layout, carried to a pose.
+    """The two faces of each joint of the layout, carried to a pose."""
 
-    Attributes
-    ----------
-    on_a, on_b : (n_points, d) arrays [m]
-        Corners of what they have in common, riding on block a and on block b.
-    gaps : (n_points,) array [m]
-        Distance of the two faces at each corner, along the normal.
-    along : (n_points, d) array [m]
-        Movement of block a along the face of block b there.
-    normals : (n_joints, d) array
-        Unit normal from block b into block a, turned with block b.
-    """
-
+    #: (n_points, d) arrays [m]: corners of what they have in common, riding on block a and on block b.
     on_a: np.ndarray
     on_b: np.ndarray
-    gaps: np.ndarray
-    along: np.ndarray
-    normals: np.ndarray
+    gaps: np.ndarray  #: (n_points,) array [m]: distance of the two faces at each corner, along the normal.
+    along: np.ndarray  #: (n_points, d) array [m]: movement of block a along the face of block b there.
+    normals: np.ndarray  #: (n_joints, d) array: unit normal from block b into block a, turned with block b.
 
 
 def carried_faces(
@@ -95,35 +84,20 @@ class JointStates:
 
     Those of the layout come first, in their order; pairs of blocks that have come to touch since follow. Joints of
     blocks that have fallen or were taken away have no gap, slip or force.
-
-    Attributes
-    ----------
-    block_a, block_b : (n,) int arrays
-    initial : (n,) bool array
-        Whether the joint is one of the layout.
-    rings : Rings
-        Midway between the two faces, where they are now; of later joints, around their contact points.
-    normals : (n, d) array
-        Unit normal from block b into block a.
-    gaps : (n_points,) array [m]
-        Distance of the two faces at each corner, along the normal; 0 for later joints.
-    opening : (n,) array [m]
-        The largest of them.
-    along : (n, d) array [m]
-        Movement of block a along the face of block b, at the corner that is open least; 0 for later joints.
-    force : (n, d) array [N]
-        Resultant on block a; 0 in frames of a fall, where there is no equilibrium.
     """
 
+    #: (n,) int arrays.
     block_a: np.ndarray
     block_b: np.ndarray
-    initial: np.ndarray
-    rings: Rings
-    normals: np.ndarray
+    initial: np.ndarray  #: (n,) bool array: whether the joint is one of the layout.
+    rings: Rings  #: Midway between the two faces, where they are now; of later joints, around their contact points.
+    normals: np.ndarray  #: (n, d) array: unit normal from block b into block a.
+    #: (n_points,) array [m]: distance of the two faces at each corner, along the normal; 0 for later joints.
     gaps: np.ndarray
-    opening: np.ndarray
+    opening: np.ndarray  #: (n,) array [m]: the largest of them.
+    #: (n, d) array [m]: of block a along the face of block b, at the corner that is open least; 0 for later joints.
     along: np.ndarray
-    force: np.ndarray
+    force: np.ndarray  #: (n, d) array [N]: resultant on block a; 0 in frames of a fall, where there is no equilibrium.
 
     @property
     def ends(self) -> np.ndarray:

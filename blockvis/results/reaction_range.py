@@ -29,23 +29,14 @@ WORDS = (
 
 @dataclass(frozen=True)
 class ReactionRange:
-    """The least and the largest reaction of several runs at n settlements.
+    """The least and the largest reaction of several runs at n settlements."""
 
-    Attributes
-    ----------
-    phases : (n,) array
-    settlements : (n,) array [m or rad]
-        Within the phase.
-    low, high : (n,) array [N or N·m]
-    runs : (n,) array
-        How many stand there.
-    """
-
-    phases: np.ndarray
-    settlements: np.ndarray
+    phases: np.ndarray  #: (n,) array.
+    settlements: np.ndarray  #: (n,) array [m or rad]: within the phase.
+    #: (n,) arrays [N or N·m].
     low: np.ndarray
     high: np.ndarray
-    runs: np.ndarray
+    runs: np.ndarray  #: (n,) array: how many stand there.
 
     def table(self) -> str:
         """Text of range.csv."""

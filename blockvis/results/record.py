@@ -22,24 +22,15 @@ _DECIDING = ("python", "platform", "blockvis", "numpy", "scipy", "highspy", "cla
 
 @dataclass(frozen=True)
 class Record:
-    """What a run was made from.
+    """What a run was made from."""
 
-    Attributes
-    ----------
-    case : str
-        Text of the case file; empty where the run came from Python.
-    case_file, layout_file : str
-        Absolute paths; empty where there is none.
-    versions : dict
-        Of Python and of the packages, and the platform.
-    """
-
-    case: str = ""
+    case: str = ""  #: Text of the case file; empty where the run came from Python.
+    #: Files are absolute paths; empty where there is none.
     case_file: str = ""
     case_sha256: str = ""
     layout_file: str = ""
     layout_sha256: str = ""
-    versions: dict[str, str] = field(default_factory=dict)
+    versions: dict[str, str] = field(default_factory=dict)  #: Of Python and of the packages, and the platform.
 
     def inputs(self) -> dict[str, str | None]:
         """Names and checksums of the files that were read, for summary.json."""

@@ -93,37 +93,20 @@ def tie_rows(
 
 @dataclass(frozen=True)
 class TieCourse:
-    """What a tie does along a path, or at the state that governs, as summary.json has it.
-
-    Attributes
-    ----------
-    largest_force : float [N]
-        Tension positive.
-    largest_force_at : float [m or rad]
-        Settlement there.
-    phase : int
-        Of it, from 1.
-    yields_at, breaks_at : float or None [m or rad]
-        First settlement at which it does.
-    yields_in_phase, breaks_in_phase : int or None
-        Phase of it, from 1.
-    last_force : float [N]
-        At the last equilibrium.
-    last_state : str
-        There.
-    """
+    """What a tie does along a path, or at the state that governs, as summary.json has it."""
 
     name: str
     kind: str
-    largest_force: float
-    largest_force_at: float
-    phase: int
+    largest_force: float  #: [N] Tension positive.
+    largest_force_at: float  #: [m or rad] Settlement there.
+    phase: int  #: Of that settlement, from 1.
+    #: [m or rad] First settlements at which it does, and their phases, from 1.
     yields_at: float | None = None
     breaks_at: float | None = None
     yields_in_phase: int | None = None
     breaks_in_phase: int | None = None
-    last_force: float = 0.0
-    last_state: str = STATE_WORDS[mechanics.ABSENT]
+    last_force: float = 0.0  #: [N] At the last equilibrium.
+    last_state: str = STATE_WORDS[mechanics.ABSENT]  #: Of that equilibrium.
 
 
 class TieCourses:
@@ -182,21 +165,11 @@ def tie_courses(response: solver.Response) -> tuple[TieCourse, ...]:
 
 @dataclass(frozen=True)
 class TieForceCurves:
-    """Forces of the ties over the increments in equilibrium.
+    """Forces of the ties over the increments in equilibrium."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of at most :data:`MOST_CURVES` ties that carry, the largest force first.
-    forces : (n_increments, n_names) array [N]
-        Tension positive; nan where a tie is not there.
-    states : (n_increments, n_names) int array
-        Numbers of :data:`STATE_WORDS`.
-    """
-
-    names: tuple[str, ...]
-    forces: np.ndarray
-    states: np.ndarray
+    names: tuple[str, ...]  #: Of at most :data:`MOST_CURVES` ties that carry, the largest force first.
+    forces: np.ndarray  #: (n_increments, n_names) array [N]: tension positive; nan where a tie is not there.
+    states: np.ndarray  #: (n_increments, n_names) int array: numbers of :data:`STATE_WORDS`.
 
 
 def tie_force_curves(response: solver.Response) -> TieForceCurves | None:

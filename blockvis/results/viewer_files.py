@@ -21,15 +21,9 @@ GRIDS, TIE_GRID = ("blocks", "contacts", "joints"), "ties"
 
 @dataclass(frozen=True)
 class ViewerFormat:
-    """How the VTU files of a results folder are written.
+    """How the VTU files of a results folder are written."""
 
-    Attributes
-    ----------
-    shape : {"moved", "undeformed"}
-        Of the blocks; see :func:`blockvis.results.datasets.block_grid`.
-    """
-
-    shape: str = "moved"
+    shape: str = "moved"  #: {"moved", "undeformed"}: of the blocks; see :func:`blockvis.results.datasets.block_grid`.
     strings: bool = True
 
 

@@ -30,19 +30,11 @@ ROUGH = 5.0
 
 @dataclass(frozen=True)
 class FirstEquilibrium:
-    """What came of a case as drawn.
+    """What came of a case as drawn."""
 
-    Attributes
-    ----------
-    stands : bool or None
-        None where it was not tried.
-    falling : tuple of int
-        Blocks that fall.
-    """
-
-    stands: bool | None
+    stands: bool | None  #: None where it was not tried.
     says: str
-    falling: tuple[int, ...] = ()
+    falling: tuple[int, ...] = ()  #: Blocks that fall.
 
 
 def first_equilibrium(case: Case, assembly: solver.Assembly) -> FirstEquilibrium:

@@ -33,29 +33,15 @@ LESS_URGENT = 5
 
 @dataclass(frozen=True)
 class Traced:
-    """What is compared of a path of n increments in equilibrium.
+    """What is compared of a path of n increments in equilibrium."""
 
-    Attributes
-    ----------
-    phases : (n,) array
-    parameters : (n,) array [m or rad]
-        Within the phase.
-    measured : (n,) array
-    positions : (n, n_blocks, d) array [m]
-        Of centroids.
-    collapse : float, optional [m or rad]
-        Parameter at collapse; 0 of what does not stand as drawn.
-    collapse_phase : int
-        Number of the phase of the collapse, from 0.
-    """
-
-    phases: np.ndarray
-    parameters: np.ndarray
-    measured: np.ndarray
-    positions: np.ndarray
-    collapse: float | None
+    phases: np.ndarray  #: (n,) array.
+    parameters: np.ndarray  #: (n,) array [m or rad]: within the phase.
+    measured: np.ndarray  #: (n,) array.
+    positions: np.ndarray  #: (n, n_blocks, d) array [m]: of centroids.
+    collapse: float | None  #: [m or rad] Parameter at collapse; 0 of what does not stand as drawn.
     stop: str
-    collapse_phase: int = 0
+    collapse_phase: int = 0  #: Number of the phase of the collapse, from 0.
 
     def without_rounding(self, least: np.ndarray) -> Traced:
         """Return it with 0 for what is measured of at most so much, by phases (n,)."""

@@ -67,18 +67,10 @@ UNFINISHED = (solver.Status.SOLVER_FAILED, solver.Status.INTERRUPTED)
 
 @dataclass(frozen=True)
 class PathRange:
-    """Several runs of one case, the first as it is.
+    """Several runs of one case, the first as it is."""
 
-    Attributes
-    ----------
-    runs : list of (Variation, Traced or None)
-        None for one that came to nothing.
-    units : sequence of str
-        Of each settlement: "m" or "rad", whose reaction is a moment.
-    """
-
-    runs: list[tuple[Variation, Traced | None]]
-    units: Sequence[str]
+    runs: list[tuple[Variation, Traced | None]]  #: None for one that came to nothing.
+    units: Sequence[str]  #: Of each settlement: "m" or "rad", whose reaction is a moment.
 
     @property
     def followed(self) -> list[Traced]:

@@ -42,39 +42,22 @@ LOOK, WORTH_A_WORD = 0.2, 2.0
 
 @dataclass(frozen=True)
 class StepCheck:
-    """How far a run and the same with a quarter of the step tolerance are apart.
+    """How far a run and the same with a quarter of the step tolerance are apart."""
 
-    Attributes
-    ----------
-    what : str
-        What the analysis measures, in words.
-    difference : float
-        Largest difference of what is measured at the same parameter, as a fraction of what is measured there, or of
-        ``LEAST_REACTION`` times the first where that is more; nan where only the state at rest, which takes no steps,
-        is in both.
-    at : float [m or rad]
-        Parameter where it is.
-    unit : str
-        Of the parameter.
-    collapse : float
-        Difference of the displacements at collapse, as a fraction; nan unless both collapse.
-    position : float [m]
-        Largest distance between the two places of a block at the same parameter; nan where the difference is.
-    stop, stop_of_check : str
-        How the run and the other ended.
-    phase : int, optional
-        Number of the settlement, from 1, within which ``at`` counts, where there are several.
-    """
-
-    what: str
+    what: str  #: What the analysis measures, in words.
+    #: Largest difference of what is measured at the same parameter, as a fraction of what is measured there, or of
+    #: ``LEAST_REACTION`` times the first where that is more; nan where only the state at rest, which takes no steps, is
+    #: in both.
     difference: float
-    at: float
-    unit: str
-    collapse: float
+    at: float  #: [m or rad] Parameter where it is.
+    unit: str  #: Of the parameter.
+    collapse: float  #: Difference of the displacements at collapse, as a fraction; nan unless both collapse.
+    #: [m] Largest distance between the two places of a block at the same parameter; nan where the difference is.
     position: float
+    #: How the run and the other ended.
     stop: str
     stop_of_check: str
-    phase: int | None = None
+    phase: int | None = None  #: Number of the settlement, from 1, within which ``at`` counts, where there are several.
 
     @property
     def step_error(self) -> dict[str, float | None]:

@@ -13,21 +13,13 @@ METHODS = ("grid", "latin hypercube", "sobol", "random", "saltelli")
 
 @dataclass(frozen=True)
 class Design:
-    """The runs of a study.
+    """The runs of a study."""
 
-    Attributes
-    ----------
-    probabilities : (n_runs, n_parameters) array
-        Between 0 and 1, exclusive; the quantiles of each parameter's distribution are its values.
-    seeds : (n_runs,) int array
-        Of the imperfections.
-    factors : int
-        Number of factors that a "saltelli" design exchanges one by one: the parameters and, if there are any, all
-        imperfections together; 0 for other designs.
-    """
-
+    #: (n_runs, n_parameters) array: between 0 and 1, exclusive; values are the quantiles of distributions there.
     probabilities: np.ndarray
-    seeds: np.ndarray
+    seeds: np.ndarray  #: (n_runs,) int array: of the imperfections.
+    #: Number of factors that a "saltelli" design exchanges one by one: the parameters and, if there are any, all
+    #: imperfections together; 0 for other designs.
     factors: int = 0
 
     @property

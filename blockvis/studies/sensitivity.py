@@ -25,27 +25,19 @@ FEWEST_RUNS = 64
 
 @dataclass(frozen=True)
 class Swing:
-    """Difference of the mean outcome between low and high values of a parameter, the others at random.
-
-    Attributes
-    ----------
-    low_value, high_value : float or str
-        Mean of the parameter in the compared runs, or the value itself if it has few.
-    low, high : float [m or rad]
-        Mean outcome of the runs with the lowest and with the highest values.
-    low_error, high_error : float [m or rad]
-        Half the 95 % interval of these means.
-    at_least : (bool, bool)
-        Whether runs of the one and of the other stood as far as they were followed: their means may be larger.
-    """
+    """Difference of the mean outcome between low and high values of a parameter, the others at random."""
 
     name: str
+    #: Mean of the parameter in the compared runs, or the value itself if it has few.
     low_value: float | str
     high_value: float | str
+    #: [m or rad] Mean outcome of the runs with the lowest and with the highest values.
     low: float
     high: float
+    #: [m or rad] Half the 95 % interval of these means.
     low_error: float
     high_error: float
+    #: Whether runs of the one and of the other stood as far as they were followed: their means may be larger.
     at_least: tuple[bool, bool] = (False, False)
 
     @property

@@ -44,31 +44,15 @@ CHECKED = 10_000
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number, or other value, of the case that is varied.
+    """A number, or other value, of the case that is varied."""
 
-    Attributes
-    ----------
-    path : str
-        Its path in the case file, as ``material.friction_coefficient``.
-    name : str
-        Its column in the table; by default the path.
-    also : tuple of str
-        Further paths of the same value.
-    values : tuple
-        The values to choose from, if there is no distribution.
-    weights : (n_values,) array
-        Their probabilities.
-    points : int
-        Number of values of the distribution in a grid.
-    """
-
-    path: str
-    name: str
-    also: tuple[str, ...]
+    path: str  #: Its path in the case file, as ``material.friction_coefficient``.
+    name: str  #: Its column in the table; by default the path.
+    also: tuple[str, ...]  #: Further paths of the same value.
     distribution: Distribution | None
-    values: tuple[Any, ...]
-    weights: np.ndarray
-    points: int
+    values: tuple[Any, ...]  #: The values to choose from, if there is no distribution.
+    weights: np.ndarray  #: (n_values,) array: their probabilities.
+    points: int  #: Number of values of the distribution in a grid.
 
     @property
     def numeric(self) -> bool:
