@@ -241,13 +241,7 @@ def _likeliest(causes: Sequence[Cause]) -> list[Trial]:
 
 
 class _Search:
-    """The trials so far.
-
-    Parameters
-    ----------
-    runs : dict
-        Followed earlier, by what they depend on; new ones are added.
-    """
+    """The trials so far; runs followed earlier are kept by what they depend on, and new ones are added."""
 
     def __init__(self, case: Case, ground: Ground, observations: Observations, runs: dict[Any, Run]) -> None:
         self.case, self.ground, self.observations, self.runs = case, ground, observations, runs

@@ -51,17 +51,12 @@ class Trust:
 
 
 class Comparison:
-    """Observations laid over the joints of a model.
+    """Observations laid over the joints of a model, whose supports go so far [m] at most.
 
     An observation at x, y may be of any joint near its place: which of two neighbouring joints opens, the model cannot
     say, and where the drawing has other blocks than the structure its joints lie elsewhere. Each of these is compared
     with every joint near it, and what these comparisons say is averaged, the nearer ones counting more; one that names
     its joint is of that. Along a joint nothing is left open: on which side it gapes tells one hinge from another.
-
-    Parameters
-    ----------
-    farthest : float [m]
-        How far a support goes that is looked at.
     """
 
     def __init__(

@@ -89,21 +89,11 @@ def read_observations(
     assembly: solver.Assembly,
     drawn: solver.Assembly | None = None,
 ) -> Observations:
-    """Read observations.
+    """Read a table (.csv), its rows, or a drawing of the damaged state in any layout format.
 
-    Parameters
-    ----------
-    source : str, Path or sequence of mappings
-        A table (.csv), a drawing of the damaged state in any layout format, or the rows of a table.
-    assembly : solver.Assembly
-        As drawn, or its ground cut: a name of a whole support is that of all its pieces.
-    drawn : solver.Assembly, optional
-        As drawn where the ground is cut: a drawing of the damaged state is beside it.
-
-    Raises
-    ------
-    ValueError
-        For a file, row or column that cannot be used; names the file, the line, the column and the remedy.
+    Where the ground of an assembly is cut, a name of a whole support is that of all its pieces, and a drawing of the
+    damaged state is beside what was ``drawn``. Raises ``ValueError`` for a file, row or column that cannot be used;
+    names the file, the line, the column and the remedy.
     """
     if not isinstance(source, str | Path):
         rows = [{str(key): value for key, value in row.items()} for row in source]

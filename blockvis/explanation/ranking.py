@@ -32,43 +32,20 @@ SAMPLES, AS_MUCH = 24, 1e-3
 
 @dataclass(frozen=True)
 class Cause:
-    """A cause, with what it leaves open weighed by the observations.
+    """A cause, with what it leaves open weighed by the observations."""
 
-    Attributes
-    ----------
-    name : str
-        In words.
-    also : tuple of str
-        Other movements that open the same cracks: the same but for a translation of everything.
-    probability : float
-        Among the causes that were looked at.
-    amount : (float, float, float) [m or rad]
-        5 %, median and 95 % of its amount: the largest displacement of a support.
-    unit : str
-        "m" or "rad".
-    friction : (float, float)
-        Range of the coefficients that agree.
-    detail : str
-        What the best of its candidates adds in words.
-    best : Trial
-        The likeliest candidate and friction.
-    at : int
-        Number of the likeliest amount.
-    weights : tuple of float
-        Of the trials within the cause.
-    """
-
-    name: str
-    also: tuple[str, ...]
-    probability: float
+    name: str  #: In words.
+    also: tuple[str, ...]  #: Other movements that open the same cracks: the same but for a translation of everything.
+    probability: float  #: Among the causes that were looked at.
+    #: [m or rad] 5 %, median and 95 % of its amount: the largest displacement of a support.
     amount: tuple[float, float, float]
-    unit: str
-    friction: tuple[float, float]
-    detail: str
-    best: Trial
-    at: int
+    unit: str  #: "m" or "rad".
+    friction: tuple[float, float]  #: Range of the coefficients that agree.
+    detail: str  #: What the best of its candidates adds in words.
+    best: Trial  #: The likeliest candidate and friction.
+    at: int  #: Number of the likeliest amount.
     trials: tuple[Trial, ...]
-    weights: tuple[float, ...]
+    weights: tuple[float, ...]  #: Of the trials within the cause.
 
     @property
     def falls_at(self) -> float:
@@ -79,26 +56,13 @@ class Cause:
 
 @dataclass(frozen=True)
 class Measurement:
-    """A joint at which the next measurement tells causes apart best.
+    """A joint at which the next measurement tells causes apart best."""
 
-    Attributes
-    ----------
-    joint : int
-        Number of the joint of the layout.
-    name : str
-        Its two blocks.
-    place : tuple of d floats [m]
-    widths : tuple of (str, float) [m]
-        What the causes have there.
-    deviations : float
-        By how many standard deviations the two that differ most do.
-    """
-
-    joint: int
-    name: str
-    place: tuple[float, ...]
-    widths: tuple[tuple[str, float], ...]
-    deviations: float
+    joint: int  #: Number of the joint of the layout.
+    name: str  #: Its two blocks.
+    place: tuple[float, ...]  #: [m]
+    widths: tuple[tuple[str, float], ...]  #: [m] What the causes have there.
+    deviations: float  #: By how many standard deviations the two that differ most do.
 
 
 def ranked(trials: Sequence[Trial], *, apart: bool) -> list[Cause]:

@@ -37,17 +37,12 @@ FLOAT = 5126
 
 
 def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None = None) -> Path:
-    """Write the path of a response and what follows it as an animation in a .glb file.
+    """Write the path of a response and what follows it as an animation in a .glb file; ValueError without an increment.
 
     Without a fall in time the frames of the mechanism follow. The path takes six seconds in proportion to its
     parameter. Between two poses glTF turns each block about its centroid, and no corner takes a short cut. Blocks in
     the plane are extruded by their thickness. Ties are rods from end to end. What is gone has no size from then on: a
     block that was taken away or lost, a tie that is broken or not there yet.
-
-    Raises
-    ------
-    ValueError
-        Where there is no increment.
     """
     if not response.increments:
         raise ValueError(f"there is no motion to write to '{path}': {response.message or response.stop}")

@@ -39,25 +39,14 @@ def draw_cracks(
     view: str | Mapping[str, float] | Sight | None = None,
     section: str | Mapping[str, Any] | Cut | None = None,
 ) -> Path:
-    """Draw the cracks of an increment alone, on the layout.
+    """Draw the cracks of an increment in equilibrium, by its number, alone, on the layout.
 
     In the plane each main crack has a colour of its own and its largest width written at its widest point; the others
     are grey. In space lines are the darker and the thicker the more joints are open there, in classes of width; main
-    cracks have their numbers and widths.
+    cracks have their numbers and widths. View and section are as of :func:`blockvis.draw_still`; cracks that the
+    section cuts away are counted, no more.
 
-    Parameters
-    ----------
-    number : int
-        Of the increment; -1 is the last equilibrium.
-    size : (int, int)
-        Width and height in pixels.
-    view, section
-        Of blocks in space, as of :func:`blockvis.draw_still`. Cracks that the section cuts away are counted, no more.
-
-    Raises
-    ------
-    ValueError
-        For a number that no increment in equilibrium has, and a view or a section of blocks in the plane.
+    Raises ``ValueError`` for a number that no increment in equilibrium has, and for a view of blocks in the plane.
     """
     assembly = response.assembly
     increments = response.path or response.increments

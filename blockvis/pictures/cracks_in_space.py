@@ -35,22 +35,7 @@ class CracksInSpace:
     """The layout of blocks in space, pale, with lines where joints have opened at an increment.
 
     The blocks stand where the layout has them: in the moved shape a gap between stones would look like one of them.
-
-    Parameters
-    ----------
-    cracks : sequence of Crack
-        As of :func:`blockvis.results.cracks.cracks_of`: the main ones of them are to be seen.
-    sight, cut
-        From where the blocks are seen and what cuts them open, as of :func:`blockvis.draw_still`.
-
-    Attributes
-    ----------
-    pixel : float [m]
-        Size of a pixel.
-    keys : list of Key
-        The classes of width.
-    slip : float [m]
-        The largest of joints that have slid by far and are not open; 0 without any.
+    The main ones of the cracks are to be seen, from where and cut open as asked for.
     """
 
     def __init__(

@@ -123,30 +123,14 @@ class _Series:
 
 
 class Drawer:
-    """A scene and its sheet, set up for some increments of one response.
+    """A scene and its sheet, set up for some increments of one response, which share frame, scales and legend.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height of the pictures in pixels.
-    increments : tuple of solver.Increment
-        All that will be drawn: they share frame, scales and legend.
-    curve : bool
-        Whether the curve stands beside the blocks.
-    extra : tuple of solver.Pose
-        Poses that the frame has to hold, too.
-    fall : Fall, optional
-        What comes after the last equilibrium; its frames are drawn beside those of the increments.
-    underlay : Underlay, optional
-        A photograph under blocks in the plane.
-    still : bool
-        Whether this is one picture, worth more time than a frame of a film: in space with smooth edges, shaded corners,
-        and of vaults and domes the intrados beside the extrados.
+    The curve stands beside the blocks where it is asked for. ``extra`` are poses that the frame has to hold, too, the
+    fall comes after the last equilibrium, and the underlay is a photograph under blocks in the plane. ``still`` is one
+    picture, worth more time than a frame of a film: in space with smooth edges, shaded corners, and of vaults and domes
+    the intrados beside the extrados.
 
-    Raises
-    ------
-    ValueError
-        For a view or a section of blocks in the plane.
+    Raises ``ValueError`` for a view or a section of blocks in the plane.
     """
 
     def __init__(
@@ -339,14 +323,9 @@ class Drawer:
     ) -> Image.Image:
         """Draw one increment, or a state between two.
 
-        Parameters
-        ----------
-        title, note, badge : str
-            First and second line of the caption, and the warning, instead of those of the increment.
-        blocks_only : bool
-            Leave out what statics knows: joints, forces, what stands on what, and where supports go.
-        widths : bool
-            Write the largest width of the widest crack lines beside them [mm]; in space the legend has the largest.
+        Title, note and badge, first and second line of the caption and the warning, stand in place of its own. Of
+        ``blocks_only`` what statics knows is left out: joints, forces, what stands on what, where supports go. With
+        ``widths`` the largest width of the widest crack lines is beside them [mm]; in space the legend has the largest.
         """
         increment = self._shown(increment)
         shown = self._drawn_at or magnified(self.assembly, increment.pose, self.look.magnification)

@@ -52,10 +52,7 @@ class FilmProcess:
     def finish(self) -> bool:
         """Wait until the files for viewers are written; False if the process has ended before.
 
-        Raises
-        ------
-        OSError
-            That kept it from writing.
+        Raises the ``OSError`` that kept it from writing.
         """
         self._worker.say("finish")
         try:
@@ -67,23 +64,16 @@ class FilmProcess:
     def draw(self, response: solver.Response, path: Path, falls: bool, fall: Fall | None, look: dict[str, Any]) -> None:
         """Begin to draw the curve, where there is one, as ``curve.png`` beside the film, and the film; returns at once.
 
-        Parameters
-        ----------
-        falls : bool
-            Whether the process works out the fall; :meth:`fall` waits for it.
-        look : dict
-            Underlay, view and section, as of :func:`blockvis.animate`.
+        Where it ``falls`` the process works out the fall, for which :meth:`fall` waits; underlay, view and section of
+        the look are as of :func:`blockvis.animate`.
         """
         self._path = path
         self._worker.say("draw", (response, path, falls, fall, look))
 
     def fall(self, progress: Callable[[float], None]) -> Fall | None:
-        """Wait for the fall; ``progress`` is called with the seconds of it that are worked out.
+        """Wait for the fall, ``progress`` called with the seconds of it that are worked out.
 
-        Raises
-        ------
-        FilmFailed
-            If the process ends before.
+        Raises :class:`FilmFailed` if the process ends before.
         """
         while (heard := self._hear("falling", "fall"))[0] == "falling":
             progress(heard[1])
@@ -91,14 +81,9 @@ class FilmProcess:
         return found
 
     def wait(self, progress: Callable[[int, int], None]) -> None:
-        """Wait for curve and film; ``progress`` is called with the pictures drawn and their number.
+        """Wait for curve and film, ``progress`` called with the pictures drawn and their number.
 
-        Raises
-        ------
-        FilmFailed
-            If the process ends without having drawn.
-        Exception
-            As in :func:`blockvis.animate`.
+        Raises :class:`FilmFailed` if the process ends without having drawn, and what :func:`blockvis.animate` does.
         """
         try:
             while (heard := self._hear("drawing", "drawn"))[0] == "drawing":

@@ -95,16 +95,9 @@ class Sheet:
     ) -> Image.Image:
         """Put the picture of the blocks, of :attr:`inside_size`, on the sheet, with caption, scale bar and legend.
 
-        Parameters
-        ----------
-        title, detail, badge : str
-            First and second line of the caption, and a warning at the upper right.
-        places : sequence of Key, optional
-            All keys of a film, so that each keeps its place where others come and go; those of the picture by default.
-        pixel : float [m]
-            Size of a pixel, for the scale bar.
-        beside : PIL.Image.Image, optional
-            The picture to the right, as large as :attr:`beside`.
+        Title and detail are the lines of the caption, the badge is a warning at the upper right. ``places`` are all
+        keys of a film, so that each keeps its place where others come and go, else those of the picture. A pixel has a
+        size [m], and the picture ``beside`` that of :attr:`beside`.
         """
         shared = tuple(keys), tuple(keys if places is None else places), pixel, detail, badge
         if shared != self._page_of:

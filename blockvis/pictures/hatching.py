@@ -30,12 +30,7 @@ def hatch_lines(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Hatch supports (n_supports,) as laid out, inside a box between two corners (2,) [m].
 
-    Returns
-    -------
-    ends : (2 n, 2) array [m]
-        Both ends of each line.
-    blocks : (2 n,) int array
-        The support of each end.
+    Gives both ends of each line, (2 n, 2) [m], and the support of each end, (2 n,) int.
     """
     box = shapely.box(*low, *high)
     found = [

@@ -30,14 +30,8 @@ def draw_inspection(
 ) -> Path:
     """Draw what was found: blocks with their names and roles, joints by their thickness, what was left out.
 
-    Parameters
-    ----------
-    path : str or Path
-        .png, .svg or .pdf.
-    ground : Layout, optional
-        Supports beside the blocks of the drawing, with their roles.
-    falling : sequence of int
-        Blocks of the layout that do not stand.
+    The file is .png, .svg or .pdf. ``ground`` are supports beside the blocks of the drawing, with their roles,
+    ``falling`` the numbers of blocks that do not stand.
     """
     return draw_contents(_contents(inspection, ground, set(falling)), path)
 

@@ -89,13 +89,7 @@ def draw_still(
 
 
 def seen_from(view: Any, section: Any) -> tuple[Sight | None, Cut | None]:
-    """Read from where blocks in space are seen, and what cuts them open, both as of :func:`draw_still`.
-
-    Raises
-    ------
-    ValueError
-        Naming what is wrong and the remedy.
-    """
+    """Read from where blocks in space are seen, and what cuts them open, both as of :func:`draw_still`."""
     found: list[Any] = []
     for name, value, read in (("view", view, read_sight), ("section", section, read_cut)):
         try:

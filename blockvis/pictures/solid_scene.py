@@ -77,22 +77,11 @@ class _Arrows:
 
 
 class SolidScene(Scene):
-    """Blocks in space and their marks.
+    """Blocks in space and their marks, in colours (n_blocks, 3) uint8.
 
-    Parameters
-    ----------
-    block_fill : (n_blocks, 3) uint8 array
-        Colours of the blocks.
-    fine : bool
-        Whether smooth edges and the shade of corners are worth the time: in stills.
-    cut : (2, 3) array, optional
-        A point [m] of a plane and its unit normal towards what is kept of the blocks.
-    outlined : (n_blocks,) bool array, optional
-        Blocks of which the edges alone are drawn, in their colours.
-    hidden_hinges : bool
-        Whether hinges behind blocks are dashed.
-    outline : (int, int, int)
-        Colour of the edges.
+    A ``fine`` scene has smooth edges and the shade of corners, which stills are worth. A cut (2, 3) is a point [m] of a
+    plane and its unit normal towards what is kept. Of ``outlined`` blocks, (n_blocks,) bool, the edges alone are drawn,
+    in their colours. Hidden hinges are dashed over the blocks; ``outline`` is the colour of the edges.
     """
 
     def __init__(
@@ -442,12 +431,8 @@ def blocks_picture(assembly: solver.Assembly, size: tuple[int, int], fill: np.nd
 def seen_faces(scene: SolidScene) -> tuple[np.ndarray, np.ndarray]:
     """Find where the name of each block can stand: on the face that shows most of itself in the last picture.
 
-    Returns
-    -------
-    places : (n_blocks, 3) array [m]
-        Middle of that face.
-    room : (n_blocks, 2) array [m]
-        Its width and height in the picture; 0 where something hides it.
+    Gives the middle of that face, (n_blocks, 3) [m], and its width and height in the picture, (n_blocks, 2) [m]: 0
+    where something hides it.
     """
     shapes = scene.assembly.polyhedra
     places, best, showing = showing_faces(shapes, scene.view.axes[2])

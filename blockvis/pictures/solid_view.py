@@ -118,12 +118,8 @@ def hiding_supports(assembly: solver.Assembly, view: View) -> np.ndarray:
 def plane_of(assembly: solver.Assembly, cut: Cut | None, view: View | None = None) -> np.ndarray | None:
     """(2, 3) array: a point [m] of the plane that cuts blocks open, and its unit normal; None without one.
 
-    Seen from a view the normal points away from the eye: what lies between the plane and the eye is left out.
-
-    Raises
-    ------
-    ValueError
-        For a plane that misses the blocks.
+    Seen from a view the normal points away from the eye: what lies between the plane and the eye is left out. Raises
+    ``ValueError`` for a plane that misses the blocks.
     """
     if cut is None:
         return None

@@ -16,15 +16,7 @@ IN_PLANE = 1e-9
 
 
 def triangles_of(shapes: mechanics.Polyhedra) -> tuple[np.ndarray, np.ndarray]:
-    """Cut all faces into triangles.
-
-    Returns
-    -------
-    triangles : (n, 3) int array
-        Vertices, counter-clockwise seen from outside.
-    blocks : (n,) int array
-        The block of each.
-    """
+    """Cut all faces into triangles: vertices (n, 3) int, counter-clockwise from outside, and the block of each (n,)."""
     first, counts = shapes.face_offsets[:-1], np.diff(shapes.face_offsets)
     reentrant = _reentrant(shapes)
     fans = np.flatnonzero(~reentrant)
@@ -74,12 +66,7 @@ def section_of(
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """Cut blocks, by their triangles as of :func:`triangles_of`, through a point (3,) [m] across a unit normal (3,).
 
-    Returns
-    -------
-    outlines : list of (k, 3) arrays [m]
-        What of each block lies in the plane; several of a block that is bent.
-    owners : (n_outlines,) int array
-        The block of each.
+    Gives the outlines (k, 3) [m] of what lies in the plane, several of a block that is bent, and the block of each.
     """
     across = np.eye(3)[int(np.abs(normal).argmin())]
     u = np.cross(normal, across)

@@ -69,13 +69,7 @@ class Strands:
 
 
 class DrawnTies:
-    """The ties of a response as its pictures show them; a section leaves some of them out.
-
-    Attributes
-    ----------
-    seen : set of (int, str)
-        States and kinds that were found so far by :meth:`survey`.
-    """
+    """The ties of a response as its pictures show them; a section leaves some of them out."""
 
     def __init__(self, response: solver.Response, cut: np.ndarray | None = None) -> None:
         self._assembly, self._ties, self._cut = response.assembly, response.ties, cut

@@ -46,25 +46,11 @@ def write_film(
     size: tuple[int, int],
     fps: float,
 ) -> Path:
-    """Write frames as a film, whole or not at all.
+    """Write frames as a film, whole or not at all, and draw each as it is asked for.
 
-    Parameters
-    ----------
-    frames : iterable of PIL.Image.Image
-        RGB; drawn one at a time, as they are asked for.
-    path : path
-        Ending in .mp4, .gif or .webp; a name without an ending is a folder of pictures, frame_00000.png and so on.
-    size : (int, int)
-        Width and height in pixels, both even.
-    fps : float
-        Frames per second, as they were planned; of a gif no more than ``FASTEST_GIF``.
-
-    Raises
-    ------
-    ValueError
-        For a suffix or a size that cannot be written.
-    OSError
-        If the disk is full, or the encoder stops before its end.
+    The path ends in .mp4, .gif or .webp; a name without an ending is a folder of pictures, frame_00000.png and so on.
+    Width and height are even; a gif has no more than ``FASTEST_GIF`` frames per second. Raises ``ValueError`` for what
+    cannot be written so, and ``OSError`` if the disk is full or the encoder stops before its end.
     """
     path = Path(path)
     suffix = path.suffix.lower()

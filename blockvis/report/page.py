@@ -164,8 +164,6 @@ def report_html(
 ) -> str:
     """Make the report as HTML text; parameters as those of :func:`write_report`.
 
-    Notes
-    -----
     Everything that comes from a file (names, materials, the case) is escaped or goes through ``textContent``; the page
     forbids itself any request.
     """

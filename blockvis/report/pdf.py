@@ -60,11 +60,7 @@ def write_pdf(
     """Write the report as a document of A4 pages.
 
     Underlay, view and section are as of :func:`blockvis.draw_still`, all else as of :func:`blockvis.write_report`.
-
-    Raises
-    ------
-    ValueError
-        If there is no increment to show.
+    Raises ``ValueError`` if there is no increment to show.
     """
     if not response.increments:
         raise ValueError(f"there is no increment to show: {response.message or response.stop}")

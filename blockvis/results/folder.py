@@ -99,31 +99,10 @@ def refuse_files(folder: Path, names: Iterable[str], what: str, overwrite: bool,
 class ResultsFolder:
     """A results folder that grows with the run: readable at every moment, whatever ends it.
 
-    Parameters
-    ----------
-    record : Record, optional
-        What the run is made from.
-    overwrite : bool
-        Whether results that are there already may be replaced.
-    parameter : solver.mechanics.Quantity
-        What the increments run over.
-    vtu : ViewerFormat
-        Of the VTU files.
-    ties : sequence of solver.Tie
-        Of the structure.
+    The increments run over a parameter, the structure has ties, and the VTU files a format. Results that are there
+    already may be replaced, or :class:`ResultsExist` is raised, as where another run is writing to the folder. Who
+    writes the VTU files and their lists is its ``viewer``: this process, or another that is put in its place.
 
-    Attributes
-    ----------
-    viewer : ViewerWriter
-        Who writes the VTU files and their lists: this process, or another that is put in its place.
-
-    Raises
-    ------
-    ResultsExist
-        If the folder holds results and ``overwrite`` is false, or another run is writing to it.
-
-    Notes
-    -----
     The checkpoint is the last file of an increment to be written: files of later increments, which a killed run may
     have left, are removed when the run goes on. Each increment waits for the disk with its state and the checkpoint;
     lists are flushed at the end, and VTU files by :meth:`flush`, which a run calls while it draws: both can be made

@@ -41,13 +41,7 @@ class StateInFile:
 
 
 class StoredIncrements:
-    """The files of the increments of one results folder; the few read last are kept in memory.
-
-    Parameters
-    ----------
-    folder : Path
-        The results folder.
-    """
+    """The files of the increments of one results folder; the few read last are kept in memory."""
 
     def __init__(self, folder: Path) -> None:
         # What is read later is read from there, wherever the process stands then.

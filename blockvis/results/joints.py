@@ -204,13 +204,7 @@ def _later_joints(contacts: mechanics.Contacts) -> tuple[InitialJoints, np.ndarr
 
 
 class LargestMovements:
-    """The largest opening and slip of each joint over the increments in equilibrium so far: what joints.csv holds.
-
-    Parameters
-    ----------
-    parameter : solver.mechanics.Quantity
-        What the increments run over.
-    """
+    """The largest opening and slip of each joint over the increments in equilibrium so far: what joints.csv holds."""
 
     def __init__(self, assembly: solver.Assembly, parameter: mechanics.Quantity) -> None:
         self.assembly, self.parameter, self.joints = assembly, parameter, initial_joints(assembly)

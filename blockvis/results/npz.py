@@ -24,16 +24,10 @@ _TREE = "tree"
 
 
 def packed(value: Any, *, compressed: bool = True, **extra: int | float | str) -> bytes:
-    """Pack a dataclass into the bytes of an .npz file.
+    """Pack a dataclass, small or fast, into the bytes of an .npz file.
 
-    Parameters
-    ----------
-    value : dataclass
-        Its fields hold numbers, texts, None, arrays, other dataclasses, and tuples of these.
-    compressed : bool
-        Whether the file is to be small rather than written fast.
-    **extra
-        Numbers and texts that go with it; :func:`unpacked` gives them back.
+    Its fields hold numbers, texts, None, arrays, other dataclasses, and tuples of these. Extra numbers and texts go
+    with it: :func:`unpacked` gives them back.
     """
     arrays: dict[str, np.ndarray] = {}
     tree = {"value": _plain(value, arrays), "extra": extra}

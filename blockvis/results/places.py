@@ -29,13 +29,7 @@ SIDE = 0.25
 
 
 class Places:
-    """Edges and openings of a layout in the plane.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-        In the plane.
-    """
+    """Edges and openings of a layout in the plane."""
 
     def __init__(self, assembly: solver.Assembly) -> None:
         outlines = np.array([shapely.Polygon(assembly.outline(block)) for block in range(assembly.n_blocks)])

@@ -42,13 +42,7 @@ class ViewerWriter(Protocol):
 
 
 class ViewerFiles:
-    """The files for viewers of a results folder, written increment by increment.
-
-    Parameters
-    ----------
-    increments : sequence of solver.Increment
-        Whose files are there already.
-    """
+    """The files for viewers of a results folder beyond those of some increments, written increment by increment."""
 
     def __init__(
         self, folder: Path, assembly: solver.Assembly, vtu: ViewerFormat, increments: Sequence[solver.Increment]

@@ -24,23 +24,10 @@ COMPRESSION = 4
 
 
 def write_vtkhdf(response: solver.Response, path: Path) -> Path:
-    """Write the path of a response as one file: blocks, contact points, joints and ties, time is the parameter.
+    """Write the path of a response as one .vtkhdf file: blocks, contact points, joints and ties, time is the parameter.
 
-    Parameters
-    ----------
-    path : Path
-        Ending in .vtkhdf.
-
-    Raises
-    ------
-    ValueError
-        Where nothing is in equilibrium.
-    OSError
-        Where VTK cannot write the file.
-
-    Notes
-    -----
-    VTK knows no strings in series: names are left out, ``block_id`` counts the blocks.
+    VTK knows no strings in series: names are left out, ``block_id`` counts the blocks. Raises ``ValueError`` where
+    nothing is in equilibrium, ``OSError`` where VTK cannot write the file.
     """
     if not response.path:
         raise ValueError(f"there is no path to write to '{path}': {response.message or response.stop}")

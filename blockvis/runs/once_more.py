@@ -56,14 +56,9 @@ class Traced:
 
 
 class OnceMore:
-    """The path of a case, followed by a process of its own.
+    """The path of a case that :func:`takes_steps`, followed by a process of its own.
 
-    Parameters
-    ----------
-    case : Case
-        That :func:`takes_steps`.
-    folder : Path, optional
-        Where the assembly is stored, for a run that has begun.
+    The folder is where the assembly of a run that has begun is stored.
     """
 
     def __init__(self, case: Case, folder: Path | None = None) -> None:

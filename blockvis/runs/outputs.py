@@ -56,16 +56,8 @@ class Clock:
 class Drawing:
     """What a run makes beside its numbers: fall, pictures, report and film, which a process of its own draws.
 
-    It is told of the run by :meth:`begin`, :meth:`follow`, :meth:`finish` and :meth:`close`, in this order.
-
-    Parameters
-    ----------
-    film, pictures : bool
-        Draw the film of the case; draw anything at all, the report included.
-
-    Notes
-    -----
-    The process has time until the case is solved: it loads what it needs and writes what only viewers open meanwhile.
+    It is told of the run by :meth:`begin`, :meth:`follow`, :meth:`finish` and :meth:`close`, in this order. The process
+    has time until the case is solved: it loads what it needs and writes what only viewers open meanwhile.
     """
 
     def __init__(self, *, film: bool = True, pictures: bool = True) -> None:

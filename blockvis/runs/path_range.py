@@ -145,19 +145,9 @@ def wants_range(case: Case) -> bool:
 def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda *_: None) -> PathRange:
     """Follow the settlement of a results folder again, varied, on all cores, and write what comes out.
 
-    ``range.csv`` has the range of the reaction, ``range`` in ``summary.json`` that of the collapse.
-
-    Parameters
-    ----------
-    folder : str or Path
-        That a run of a case file has written.
-    waiting : callable, optional
-        Called before it begins with the number of runs and of those at a time.
-
-    Raises
-    ------
-    ValueError
-        For a run without a case file, that follows no settlement in steps, or that came to no end.
+    ``range.csv`` has the range of the reaction, ``range`` in ``summary.json`` that of the collapse. ``waiting`` is
+    called before it begins with the number of runs and of those at a time. Raises ``ValueError`` for a run without a
+    case file, that follows no settlement in steps, or that came to no end.
     """
     folder = Path(folder)
     case, response = stored_case(folder), open_results(folder)

@@ -30,19 +30,9 @@ def planned(
 ) -> AnalysisRun:
     """Prepare the analysis of a case, its input checked.
 
-    Parameters
-    ----------
-    resume : optional
-        Where it goes on from: the checkpoint of an increment, of the type that its kind of analysis has.
-    found : sequence of solver.Increment
-        Found up to there.
-    ties : sequence of solver.Tie, optional
-        Those of the case by default.
-
-    Raises
-    ------
-    ValueError
-        For input that cannot be analysed. Limit loads and pushovers solve their first increment for that.
+    It may go on from the checkpoint of an increment, of the type that its kind of analysis has, after those found up to
+    there; ties are those of the case by default. Raises ``ValueError`` for input that cannot be analysed: limit loads
+    and pushovers solve their first increment for that.
     """
     kind = KINDS[case.analysis]
     if not isinstance(resume, kind.checkpoint | None):

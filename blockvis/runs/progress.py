@@ -82,14 +82,7 @@ class DrawingProgress:
 class Progress:
     """A bar that follows the parameter of an analysis towards its limit, and says what an increment is doing meanwhile.
 
-    Parameters
-    ----------
-    course : Course
-        What the increments run over.
-    assembly : solver.Assembly
-        Whose blocks move.
-    count : int
-        Increments found before.
+    It begins at the ``count`` of increments found before.
     """
 
     def __init__(self, course: Course, assembly: solver.Assembly, count: int = 0) -> None:
@@ -169,13 +162,7 @@ class Progress:
 
 
 class RunsProgress:
-    """A line that counts runs of which each may take long, and names the one that is waited for.
-
-    Parameters
-    ----------
-    shown : bool
-        Whether anything is written.
-    """
+    """A line that counts runs of which each may take long, and names the one that is waited for."""
 
     def __init__(self, *, shown: bool) -> None:
         self.names: list[str] = []

@@ -106,12 +106,7 @@ class StepCheck:
 class StepChecking:
     """The same path in shorter steps, followed by a process of its own while this one follows the case.
 
-    Parameters
-    ----------
-    case : Case
-        That :func:`takes_steps`.
-    folder : Path, optional
-        Where the assembly is stored, for a run that goes on.
+    Case and folder are as of :class:`OnceMore`.
     """
 
     def __init__(self, case: Case, folder: Path | None = None) -> None:
@@ -156,17 +151,8 @@ def stored_case(folder: Path) -> Case:
 def check_steps(folder: str | Path) -> StepCheck:
     """Follow the run of a results folder again in shorter steps, compare, and write what comes out.
 
-    ``step_check.json`` has the differences, ``step_error`` in ``summary.json`` the errors that follow of them.
-
-    Parameters
-    ----------
-    folder : str or Path
-        That a run of a case file has written.
-
-    Raises
-    ------
-    ValueError
-        For a run without a case file, or that takes no steps: a limit load, or increments by linear program.
+    ``step_check.json`` has the differences, ``step_error`` in ``summary.json`` the errors that follow of them. Raises
+    ``ValueError`` for a run without a case file, or that takes no steps: a limit load, or increments by linear program.
     """
     folder = Path(folder)
     case, response = stored_case(folder), open_results(folder)

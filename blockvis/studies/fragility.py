@@ -25,28 +25,16 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Fragility:
-    """A fragility curve: a step at every settlement at which a run collapsed.
+    """A fragility curve: a step at every settlement at which a run collapsed."""
 
-    Attributes
-    ----------
-    settlement : (n_steps,) array [m or rad]
-    probability : (n_steps,) array
-        Of a collapse at this settlement or before.
-    lower, upper : (n_steps,) arrays
-        Pointwise confidence band.
-    furthest : float [m or rad]
-        The curve is known up to the largest settlement of any run.
-    n_runs, n_collapsed, n_stood : int
-        Runs with a result, those that collapsed, and those that did not collapse within their limit.
-    """
-
-    settlement: np.ndarray
-    probability: np.ndarray
+    settlement: np.ndarray  #: (n_steps,) array [m or rad].
+    probability: np.ndarray  #: (n_steps,) array: of a collapse at this settlement or before.
+    #: (n_steps,) arrays: pointwise confidence band.
     lower: np.ndarray
     upper: np.ndarray
-    furthest: float
+    furthest: float  #: [m or rad] The curve is known up to the largest settlement of any run.
+    #: Runs with a result, and those that did not collapse within their limit.
     n_runs: int
-    n_collapsed: int
     n_stood: int
 
     def quantile(self, probability: float) -> float | None:
@@ -111,7 +99,6 @@ def fragility(settlement: ArrayLike, collapsed: ArrayLike) -> Fragility:
         upper=upper,
         furthest=float(end.max(initial=0.0)),
         n_runs=len(end),
-        n_collapsed=int(event.sum()),
         n_stood=int((~event).sum()),
     )
 

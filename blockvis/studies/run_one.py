@@ -50,25 +50,12 @@ def run_once(
 ) -> tuple[dict[str, Any], bytes]:
     """Carry out one run.
 
-    Parameters
-    ----------
-    values : mapping
-        The base case as TOML has it.
-    source : str
-        The case file; paths in the case are relative to its folder.
-    order : mapping
-        Number, seed and values of the run, of :meth:`blockvis.studies.study_file.Study.order`.
-    n_seeded : int
-        Number of the first imperfections, those of the study, which get the run's seed.
-    seconds : float, optional [s]
-        Longest time of a run; after it the run fails.
+    ``values`` are the base case as TOML has it, read from a file ``source`` to whose folder its paths are relative. The
+    order is as of :meth:`blockvis.studies.study_file.Study.order`; its seed is of the last ``n_seeded`` imperfections.
+    A run fails after so many seconds.
 
-    Returns
-    -------
-    row : dict
-        Row of the table. A run that raises an error has the status "failed" and the error as ``message``.
-    shape : bytes
-        The mechanism for its picture, as an npz file; empty without a mechanism.
+    Gives the row of the table, with the status "failed" and the error as ``message`` where one is raised, and the
+    mechanism for its picture, as an npz file; empty without a mechanism.
     """
     started = time.perf_counter()
     try:

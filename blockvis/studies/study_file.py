@@ -75,39 +75,19 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Study:
-    """A checked study. The keys are those of the study file; see `docs/studies.md`.
-
-    Attributes
-    ----------
-    source : Path
-        The study file.
-    case_source : Path
-        The base case; paths in it are relative to its folder.
-    values : dict
-        The base case as parsed TOML, with the imperfections of the study behind its own.
-    n_seeded : int
-        Number of the last of these imperfections, those of the study, which get a new seed in every run.
-    runs : int
-        Number of runs in the study file: of a "saltelli" design the size of its two independent samples.
-    repeats : int
-        Runs per point of a grid, with different imperfections.
-    seconds : float or None
-        Longest time of one run [s].
-    keep : tuple of int
-        Runs whose results folder is written.
-    """
+    """A checked study. The keys are those of the study file; see `docs/studies.md`."""
 
     source: Path
-    case_source: Path
-    values: dict[str, Any]
-    n_seeded: int
+    case_source: Path  #: The base case; paths in it are relative to its folder.
+    values: dict[str, Any]  #: The base case as parsed TOML, with the imperfections of the study behind its own.
+    n_seeded: int  #: Number of the last of these imperfections, those of the study, which get a new seed in every run.
     parameters: tuple[Parameter, ...]
     method: str
-    runs: int
-    repeats: int
+    runs: int  #: Number of runs in the study file: of a "saltelli" design the size of its two independent samples.
+    repeats: int  #: Runs per point of a grid, with different imperfections.
     seed: int
-    seconds: float | None
-    keep: tuple[int, ...]
+    seconds: float | None  #: Longest time of one run [s].
+    keep: tuple[int, ...]  #: Runs whose results folder is written.
 
     @cached_property
     def design(self) -> Design:
@@ -171,18 +151,10 @@ def run_values(values: Mapping[str, Any], order: Mapping[str, Any], n_seeded: in
 
 
 def read_study(source: str | Path | Mapping[str, Any]) -> Study:
-    """Read and check a study file, and its runs as cases.
+    """Read and check a study file, or its content, and its runs as cases; the path of a case is relative to the file.
 
-    Parameters
-    ----------
-    source : str, Path or mapping
-        The file, or its content; the path of the case in the latter is relative to the working directory.
-
-    Raises
-    ------
-    ValueError
-        For an unknown path of a parameter, an impossible distribution, a run that is no valid case; names the file, the
-        key and the remedy.
+    Raises ``ValueError`` for an unknown path of a parameter, an impossible distribution, a run that is no valid case;
+    names the file, the key and the remedy.
     """
     if isinstance(source, Mapping):
         return _study(source, Path("study"))

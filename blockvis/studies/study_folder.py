@@ -50,19 +50,10 @@ def finished_runs(folder: str | Path) -> int:
 
 
 class StudyFolder:
-    """The folder of a study, with the rows of its finished runs.
+    """The folder of a study, with the rows of its finished runs; ``force`` deletes those of another study.
 
-    Parameters
-    ----------
-    force : bool
-        Whether rows of another study are deleted.
-
-    Raises
-    ------
-    StudyExists
-        If the folder holds rows of another study, or something that is no study.
-    ResultsExist
-        If another study is writing to it.
+    Raises :class:`StudyExists` if the folder holds rows of another study, or something that is no study, and
+    :class:`ResultsExist` if another study is writing to it.
     """
 
     def __init__(self, folder: str | Path, study: Study, *, force: bool = False) -> None:

@@ -340,7 +340,7 @@ def test_kaplan_meier_of_published_data():
     curve = fragility(WEEKS, RELAPSE)
     assert curve.settlement.tolist() == list(STANDING)
     np.testing.assert_allclose(1.0 - curve.probability, list(STANDING.values()), atol=5e-4)
-    assert (curve.n_runs, curve.n_collapsed, curve.n_stood, curve.furthest) == (21, 9, 12, 35.0)
+    assert (curve.n_runs, curve.n_stood, curve.furthest) == (21, 12, 35.0)
     reference = st.ecdf(st.CensoredData.right_censored(WEEKS, np.logical_not(RELAPSE))).sf
     np.testing.assert_allclose(1.0 - curve.probability, reference.evaluate(curve.settlement), rtol=1e-12)
     assert curve.quantile(0.5) == 23
@@ -398,7 +398,7 @@ def test_runs_without_result_are_counted_and_left_out():
     table.loc[5, "last_settlement"] = 4.5
     table.loc[2, "message"] = "out of memory"
     curve = fragility_of(table)
-    assert (curve.n_runs, curve.n_collapsed, curve.n_stood) == (7, 6, 1)
+    assert (curve.n_runs, curve.n_stood) == (7, 1)
     summary = summary_of(study, table)
     assert summary["n_without_result"] == 1
     assert "1 failed" in in_words(summary)
