@@ -57,6 +57,12 @@ WIDE_BAND = 0.2
 #: Height of the text of the file [points], and how many letters a smaller line of it has per inch.
 TEXT, LETTERS = 11.0, 11.0
 
+#: Colours of what is measured, of what fails, and of what is beside.
+BLUE, RED, GREY = map(palette.hexadecimal, (palette.FORCE, palette.WARNING, palette.FAINT))
+
+#: Coordinates along the axis of the parameter, and parts of the height.
+AT = ("data", "axes fraction")
+
 #: Behind words on a curve.
 PATCH = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
 
@@ -155,55 +161,180 @@ class CurvePanel:
 
 
 def _draw(
-    axes: Axes,
-    response: solver.Response,
-    *,
-    events: bool,
-    text: float = TEXT,
-    band: ReactionRange | None = None,
+    axes: Axes, response: solver.Response, *, events: bool, text: float = TEXT, band: ReactionRange | None = None
 ) -> None:
-    path = response.path
-    factor, _ = force_unit(response)
-    moment = response.measured.unit == "N·m"
-    per_length, _ = parameter_unit(response)
-    total = response.parameters * per_length
-    values = response.values / factor
-    known = values[np.isfinite(values)]
-    axes.set_ylabel(value_label(response), fontsize=text)
-    _style(axes, text)
-    axes.margins(x=0.02, y=0.12)
-    if len(known) == 0 and len(path) > 1:
-        axes.set_ylim(0.0, 1.0)
-        axes.text(0.5, 0.5, "unbounded everywhere", transform=axes.transAxes, ha="center", fontsize=text)
-    if len(known):
-        low, high = shown_range(values, response)
-        if band is not None:
-            low, high = _draw_band(axes, response, band, factor, (low, high))
-        axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
-    if not response.parameter.is_path and len(path) == 1:
-        _draw_single(axes, response, known, text)
-        return
-    # Also of what is unbounded.
-    axes.update_datalim(np.column_stack([total, total]), updatey=False)
-    _draw_line(axes, response, total, values, text if events else None)
-    axes.set_xlabel(parameter_label(response), fontsize=text)
-    axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5, steps=[1, 2, 2.5, 5, 10]))
-    if not moment and response.measured.is_force and response.total_weight > 0:
-        weight = response.total_weight / factor
-        over_weight = axes.secondary_yaxis(
+    """Draw the curve of a response, with words at its events where it is a file of its own."""
+    _Plot(axes, response, events, text).draw(band)
+
+
+class _Plot:
+    """A curve on axes, marked larger and with words where it is a file of its own, in letters so high [points]."""
+
+    def __init__(self, axes: Axes, response: solver.Response, words: bool, text: float) -> None:
+        self.axes, self.response, self.words, self.text = axes, response, words, text
+        self.factor, _ = force_unit(response)
+        self.per_length, _ = parameter_unit(response)
+        #: (n,) arrays in the units of the axes: parameters and values of the path.
+        self.total, self.values = response.parameters * self.per_length, response.values / self.factor
+        self.known = self.values[np.isfinite(self.values)]
+
+    def draw(self, band: ReactionRange | None) -> None:
+        """Draw it all, over the range of the reaction where that is known."""
+        axes, response, text, known = self.axes, self.response, self.text, self.known
+        axes.set_ylabel(value_label(response), fontsize=text)
+        _style(axes, text)
+        axes.margins(x=0.02, y=0.12)
+        if len(known) == 0 and len(response.path) > 1:
+            axes.set_ylim(0.0, 1.0)
+            axes.text(0.5, 0.5, "unbounded everywhere", transform=axes.transAxes, ha="center", fontsize=text)
+        if len(known):
+            low, high = shown_range(self.values, response)
+            if band is not None:
+                low, high = self._band(band, (low, high))
+            axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
+        if not response.parameter.is_path and len(response.path) == 1:
+            self._single()
+            return
+        # Also of what is unbounded.
+        axes.update_datalim(np.column_stack([self.total, self.total]), updatey=False)
+        self._line()
+        axes.set_xlabel(parameter_label(response), fontsize=text)
+        axes.xaxis.set_major_locator(MaxNLocator(8 if self.words else 5, steps=[1, 2, 2.5, 5, 10]))
+        if response.measured.unit != "N·m" and response.measured.is_force and response.total_weight > 0:
+            self._axis_of_weight(response.total_weight / self.factor)
+        if not response.parameter.is_path:
+            self._unproved()
+            self._lowest()
+        if self.words and len(known):
+            self._unbounded()
+        if response.collapse is not None and len(response.path):
+            self._collapse(response.collapse)
+        if response.stop is solver.Status.SOLVER_FAILED:
+            self._failure()
+
+    def _axis_of_weight(self, weight: float) -> None:
+        """Draw an axis of the reaction over the weight, in the unit of the other."""
+        over_weight = self.axes.secondary_yaxis(
             "right", functions=(lambda r: np.asarray(r) / weight, lambda w: np.asarray(w) * weight)
         )
-        over_weight.set_ylabel("reaction / weight W", fontsize=text)
-        over_weight.tick_params(labelsize=0.9 * text)
-    if not response.parameter.is_path:
-        _mark_unproved(axes, response, factor, text if events else None)
-        _mark_lowest(axes, response, text, events)
-    if events and len(known):
-        _mark_unbounded(axes, total, np.isinf([state.measured for state in path]), text)
-    if response.collapse is not None and len(path):
-        _mark_collapse(axes, response, total, values, text, events)
-    if response.stop is solver.Status.SOLVER_FAILED:
-        _mark_failure(axes, response, total, values, text, events)
+        over_weight.set_ylabel("reaction / weight W", fontsize=self.text)
+        over_weight.tick_params(labelsize=0.9 * self.text)
+
+    def _band(self, band: ReactionRange, shown: tuple[float, float]) -> tuple[float, float]:
+        """Draw the range of the reaction; returns the range of the axis in which it is whole."""
+        total, least, most = band.along(self.response)
+        least, most = least / self.factor, most / self.factor
+        # Where it has no height its edge is seen.
+        self.axes.fill_between(
+            total * self.per_length, least, most, facecolor=(BLUE, 0.18), edgecolor=(BLUE, 0.5), linewidth=0.8
+        )
+        return min(shown[0], float(least.min(initial=0.0))), max(shown[1], float(most.max(initial=0.0)))
+
+    def _line(self) -> None:
+        """Draw the path, in a file of its own with dots at few increments."""
+        axes, total, values = self.axes, self.total, self.values
+        first = 1 if drops_at_start(self.response) else 0
+        for start, stop in pairwise([first, *new_motions(self.response), len(total)]):
+            axes.plot(total[start:stop], values[start:stop], "-", color=BLUE, linewidth=2.0, zorder=3)
+        axes.plot(total[: 2 * first], values[: 2 * first], ":", color=BLUE, linewidth=1.2, zorder=3)
+        if not self.words:
+            return
+        if len(total) <= MOST_DOTS:
+            axes.plot(total, values, "o", color=BLUE, markersize=3.0, zorder=3)
+        if first:
+            # On the side that the curve leaves free.
+            above = values[0] > values[1]
+            word, up = "at rest" if self.response.measured.is_force else "rigid", "bottom" if above else "top"
+            offset = -4, 6 if above else -6
+            _word(axes, word, (total[0], values[0]), offset, va=up, fontsize=0.9 * self.text, zorder=4, bbox=PATCH)
+
+    def _failure(self) -> None:
+        """Mark where the solver gave up: the curve ends there, the structure need not."""
+        axes, response = self.axes, self.response
+        axes.plot(self.total[-1:], self.values[-1:], "X", color=RED, markersize=9 if self.words else 6, zorder=5)
+        at = f" at {parameter_text(response.path[-1].parameter, response)}" if len(self.total) else ""
+        told = f"solver failed{at}: the curve is not complete" if self.words else "solver failed"
+        style = {"ha": "right", "va": "bottom", "fontsize": 0.9 * self.text, "color": RED}
+        _word(axes, told, (0.98, 0.03), (0, 0), "axes fraction", **style)
+
+    def _single(self) -> None:
+        """Draw one limit load: rigid up to it, then a mechanism, over displacements as small as first order allows."""
+        axes, text = self.axes, self.text
+        reach = SMALL * float(np.ptp(self.response.assembly.vertices, axis=0).max())
+        factor, unit = (1e3, "mm") if reach < 0.1 else (1.0, "m")
+        reach *= factor
+        axes.set_xlim(0.0, reach)
+        axes.set_xlabel(f"displacement of the fastest block, first order [{unit}]", fontsize=text)
+        if len(self.known) == 0:
+            axes.set_ylim(0.0, 1.0)
+            axes.text(0.5, 0.5, "no finite limit load", transform=axes.transAxes, ha="center", fontsize=text)
+            return
+        alpha = float(self.known[0])
+        ends = [0.0, 0.0, 0.97 * reach], [0.0, alpha, alpha]
+        axes.plot(*ends, "-", color=BLUE, linewidth=2.5, zorder=3, clip_on=False)
+        arrow = {"arrowstyle": "->", "color": BLUE, "linewidth": 2.0}
+        axes.annotate("", (reach, alpha), (0.96 * reach, alpha), arrowprops=arrow)
+        _word(axes, f"α = {alpha:.6g}", (0.5 * reach, alpha), (0, 7), ha="center", fontsize=text)
+
+    def _unbounded(self) -> None:
+        """Shade where no load is too much, as far as the neighbours that have a limit, and say so in each."""
+        total, unbounded = self.total, np.isinf([state.measured for state in self.response.path])
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], unbounded, [False]]).astype(int)))
+        for first, stop in edges.reshape(-1, 2).tolist():
+            low, high = total[max(first - 1, 0)], total[min(stop, len(total) - 1)]
+            self.axes.axvspan(low, high, color=GREY, alpha=0.15, linewidth=0)
+            wide = high - low > WIDE_BAND * (total[-1] - total[0])
+            style: dict[str, Any] = {"ha": "center", "va": "center", "rotation": 0 if wide else 90, "color": GREY}
+            middle = (low + high) / 2.0, 0.5
+            _word(self.axes, "unbounded", middle, (0, 0), AT, fontsize=0.9 * self.text, **style)
+
+    def _unproved(self) -> None:
+        """Mark positions of a load whose value is no limit load."""
+        states = [s for limit, s in self.response.limit_states if limit.status is solver.LimitStatus.NOT_CONVERGED]
+        for number, state in enumerate(state for state in states if np.isfinite(state.measured)):
+            place = (state.parameter, state.measured / self.factor)
+            self.axes.plot(*place, "o", mfc="white", mec=GREY, mew=1.6, markersize=8 if self.words else 5, zorder=5)
+            if number == 0 and self.words:
+                _word(self.axes, "not converged", place, (8, 5), fontsize=0.9 * self.text, color=GREY)
+
+    def _lowest(self) -> None:
+        response, lowest = self.response, self.response.governing
+        if lowest is None or not np.isfinite(lowest.measured):
+            return
+        place = (lowest.parameter, lowest.measured)
+        self.axes.plot(*place, "o", color=RED, markersize=8 if self.words else 5, zorder=4)
+        if self.words:
+            where = f"{response.parameter.symbol} = {place[0]:.4g} {response.parameter.unit}"
+            told = f"lowest {response.measured.symbol} = {place[1]:.5g} at {where}"
+            style = {"ha": "center", "va": "top", "fontsize": self.text, "color": RED}
+            _word(self.axes, told, (0.5, 0.96), (0, 0), "axes fraction", **style)
+
+    def _collapse(self, collapse: solver.Collapse) -> None:
+        axes, total = self.axes, self.total
+        places, phase = collapse_places(self.response), collapse_phase(self.response)
+        assert places is not None
+        assert phase is not None
+        low, middle, high = places.tolist()
+        axes.axvspan(low, high, color=RED, alpha=0.25, linewidth=0)
+        axes.axvline(middle, color=RED, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
+        axes.plot(total[-1:], self.values[-1:], "X", color=RED, markersize=9 if self.words else 6, zorder=4)
+        if not self.words:
+            return
+        lost = lost_text(self.response)
+        what = "no capacity" if collapse.lost == "capacity" else lost.removeprefix("a ").replace(" is", "")
+        # On the side that the curve leaves free.
+        beside = self.values[(total >= middle - WORDS * (total[-1] - total[0])) & np.isfinite(self.values)]
+        foot, head = axes.get_ylim()
+        above = len(beside) > 0 and head - beside.max() > beside.min() - foot
+        # Other runs may go on for long.
+        left = middle >= sum(axes.get_xlim()) / 2.0
+        told = (
+            f"{what} at {collapse.displacement:.5g} {collapse.unit}{in_phase(self.response, phase)}\n"
+            f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(self.response)}"
+        )
+        place, offset = (middle, 0.96 if above else 0.04), (-6 if left else 6, 0)
+        style = {"ha": "right" if left else "left", "va": "top" if above else "bottom", "color": RED, "bbox": PATCH}
+        _word(axes, told, place, offset, AT, fontsize=0.9 * self.text, **style)
 
 
 def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> None:
@@ -229,7 +360,7 @@ def _draw_ties(axes: Axes, response: solver.Response, ties: TieForceCurves) -> N
             axes.plot(total[first], forces[first] / factor, mark, color=colour, markersize=7, zorder=4)
             for k in first.tolist():
                 _word(axes, word, (total[k], forces[k] / factor), (7, 4), fontsize=0.8 * TEXT, color=colour)
-    axes.axhline(0.0, color=palette.hexadecimal(palette.FAINT), linewidth=0.8)
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.set_ylabel(f"force of ties, tension + [{unit}]", fontsize=TEXT)
     axes.set_xlabel(parameter_label(response), fontsize=TEXT)
     _style(axes, TEXT)
@@ -242,10 +373,10 @@ def _mark_phases(axes: Axes, response: solver.Response, letters: int) -> float:
 
     The list leaves the plot to the curve, of whose phases the shortest may be narrower than a word.
     """
-    path, grey, lines = response.path, palette.hexadecimal(palette.FAINT), list[str]()
+    path, lines = response.path, list[str]()
     (per_length, unit), others, height = parameter_unit(response), new_motions(response), 0.85 * TEXT
     total = response.parameters * per_length
-    style: dict[str, Any] = {"va": "bottom", "fontsize": height, "color": grey}
+    style: dict[str, Any] = {"va": "bottom", "fontsize": height, "color": GREY}
     for k in range(1, len(path)):
         if path[k].phase == path[k - 1].phase:
             continue
@@ -257,158 +388,14 @@ def _mark_phases(axes: Axes, response: solver.Response, letters: int) -> float:
         words += [f"'{name}' taken away" for change in changes for name in change.ties]
         words += ["dead load changed"] * any(change.dead is not None for change in changes)
         words += [f"'{tie.name}' installed" for tie in response.ties if tie.phase == path[k].phase + 1]
-        axes.axvline(total[k - 1], color=grey, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1)
-        _word(
-            axes, str(path[k].phase + 1), (total[k - 1], 1.0), (0, 2), ("data", "axes fraction"), ha="center", **style
-        )
+        axes.axvline(total[k - 1], color=GREY, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1)
+        _word(axes, str(path[k].phase + 1), (total[k - 1], 1.0), (0, 2), AT, ha="center", **style)
         where = f"phase {path[k].phase + 1} from {total[k - 1]:.4g} {unit}"
         lines += wrap(f"{where}: {', '.join(words)}" if words else where, letters, subsequent_indent="    ")
     if not lines:
         return 0.0
     _word(axes, "\n".join(lines), (0.0, 1.0), (0.0, 2.0 + 1.4 * height), "axes fraction", ha="left", **style)
     return 1.4 * height * (len(lines) + 1)
-
-
-def _draw_band(
-    axes: Axes, response: solver.Response, band: ReactionRange, factor: float, shown: tuple[float, float]
-) -> tuple[float, float]:
-    """Draw the range of the reaction; returns the range of the axis, in the unit ``factor``, in which it is whole."""
-    per_length, _ = parameter_unit(response)
-    total, least, most = band.along(response)
-    blue = palette.hexadecimal(palette.FORCE)
-    # Where it has no height its edge is seen.
-    axes.fill_between(
-        total * per_length, least / factor, most / factor, facecolor=(blue, 0.18), edgecolor=(blue, 0.5), linewidth=0.8
-    )
-    low, high = shown
-    return min(low, float(least.min(initial=0.0)) / factor), max(high, float(most.max(initial=0.0)) / factor)
-
-
-def _draw_line(
-    axes: Axes, response: solver.Response, total: np.ndarray, values: np.ndarray, text: float | None
-) -> None:
-    """Draw the path, in a file of its own with dots at few increments and words of the size of ``text``."""
-    blue = palette.hexadecimal(palette.FORCE)
-    first = 1 if drops_at_start(response) else 0
-    for start, stop in pairwise([first, *new_motions(response), len(total)]):
-        axes.plot(total[start:stop], values[start:stop], "-", color=blue, linewidth=2.0, zorder=3)
-    axes.plot(total[: 2 * first], values[: 2 * first], ":", color=blue, linewidth=1.2, zorder=3)
-    if text is None:
-        return
-    if len(total) <= MOST_DOTS:
-        axes.plot(total, values, "o", color=blue, markersize=3.0, zorder=3)
-    if first:
-        # On the side that the curve leaves free.
-        above = values[0] > values[1]
-        word, up = "at rest" if response.measured.is_force else "rigid", "bottom" if above else "top"
-        offset = -4, 6 if above else -6
-        _word(axes, word, (total[0], values[0]), offset, va=up, fontsize=0.9 * text, zorder=4, bbox=PATCH)
-
-
-def _mark_failure(
-    axes: Axes, response: solver.Response, total: np.ndarray, values: np.ndarray, text: float, words: bool
-) -> None:
-    """Mark where the solver gave up: the curve ends there, the structure need not."""
-    red = palette.hexadecimal(palette.WARNING)
-    axes.plot(total[-1:], values[-1:], "X", color=red, markersize=9 if words else 6, zorder=5)
-    what = (
-        f"solver failed at {parameter_text(response.path[-1].parameter, response)}" if len(total) else "solver failed"
-    )
-    told = f"{what}: the curve is not complete" if words else "solver failed"
-    _word(axes, told, (0.98, 0.03), (0, 0), "axes fraction", ha="right", va="bottom", fontsize=0.9 * text, color=red)
-
-
-def _draw_single(axes: Axes, response: solver.Response, known: np.ndarray, text: float) -> None:
-    """Draw one limit load: rigid up to it, then a mechanism, over displacements as small as first order allows."""
-    reach = SMALL * float(np.ptp(response.assembly.vertices, axis=0).max())
-    factor, unit = (1e3, "mm") if reach < 0.1 else (1.0, "m")
-    reach *= factor
-    axes.set_xlim(0.0, reach)
-    axes.set_xlabel(f"displacement of the fastest block, first order [{unit}]", fontsize=text)
-    if len(known) == 0:
-        axes.set_ylim(0.0, 1.0)
-        axes.text(0.5, 0.5, "no finite limit load", transform=axes.transAxes, ha="center", fontsize=text)
-        return
-    alpha = float(known[0])
-    blue = palette.hexadecimal(palette.FORCE)
-    ends = [0.0, 0.0, 0.97 * reach], [0.0, alpha, alpha]
-    axes.plot(*ends, "-", color=blue, linewidth=2.5, zorder=3, clip_on=False)
-    arrow = {"arrowstyle": "->", "color": blue, "linewidth": 2.0}
-    axes.annotate("", (reach, alpha), (0.96 * reach, alpha), arrowprops=arrow)
-    _word(axes, f"α = {alpha:.6g}", (0.5 * reach, alpha), (0, 7), ha="center", fontsize=text)
-
-
-def _mark_unbounded(axes: Axes, total: np.ndarray, unbounded: np.ndarray, text: float) -> None:
-    """Shade where no load is too much, as far as the neighbours that have a limit, and say so in each."""
-    grey = palette.hexadecimal(palette.FAINT)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], unbounded, [False]]).astype(int)))
-    for first, stop in edges.reshape(-1, 2).tolist():
-        low, high = total[max(first - 1, 0)], total[min(stop, len(total) - 1)]
-        axes.axvspan(low, high, color=grey, alpha=0.15, linewidth=0)
-        wide = high - low > WIDE_BAND * (total[-1] - total[0])
-        style: dict[str, Any] = {"ha": "center", "va": "center", "rotation": 0 if wide else 90, "color": grey}
-        middle = (low + high) / 2.0, 0.5
-        _word(axes, "unbounded", middle, (0, 0), ("data", "axes fraction"), fontsize=0.9 * text, **style)
-
-
-def _mark_unproved(axes: Axes, response: solver.Response, factor: float, text: float | None) -> None:
-    """Mark positions of a load whose value is no limit load, with words of the size of ``text``."""
-    grey = palette.hexadecimal(palette.FAINT)
-    found = [state for limit, state in response.limit_states if limit.status is solver.LimitStatus.NOT_CONVERGED]
-    for number, state in enumerate(state for state in found if np.isfinite(state.measured)):
-        place = (state.parameter, state.measured / factor)
-        axes.plot(*place, "o", mfc="white", mec=grey, mew=1.6, markersize=5 if text is None else 8, zorder=5)
-        if number == 0 and text is not None:
-            _word(axes, "not converged", place, (8, 5), fontsize=0.9 * text, color=grey)
-
-
-def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool) -> None:
-    lowest = response.governing
-    if lowest is None or not np.isfinite(lowest.measured):
-        return
-    red = palette.hexadecimal(palette.WARNING)
-    place = (lowest.parameter, lowest.measured)
-    axes.plot(*place, "o", color=red, markersize=8 if words else 5, zorder=4)
-    if words:
-        where = f"{response.parameter.symbol} = {place[0]:.4g} {response.parameter.unit}"
-        told = f"lowest {response.measured.symbol} = {place[1]:.5g} at {where}"
-        _word(axes, told, (0.5, 0.96), (0, 0), "axes fraction", ha="center", va="top", fontsize=text, color=red)
-
-
-def _mark_collapse(
-    axes: Axes,
-    response: solver.Response,
-    total: np.ndarray,
-    reactions: np.ndarray,
-    text: float,
-    words: bool,
-) -> None:
-    collapse = response.collapse
-    assert collapse is not None
-    red = palette.hexadecimal(palette.WARNING)
-    lost = lost_text(response)
-    what = "no capacity" if collapse.lost == "capacity" else lost.removeprefix("a ").replace(" is", "")
-    places, phase = collapse_places(response), collapse_phase(response)
-    assert places is not None
-    assert phase is not None
-    low, middle, high = places.tolist()
-    axes.axvspan(low, high, color=red, alpha=0.25, linewidth=0)
-    axes.axvline(middle, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
-    axes.plot(total[-1:], reactions[-1:], "X", color=red, markersize=9 if words else 6, zorder=4)
-    if words:
-        # On the side that the curve leaves free.
-        beside = reactions[(total >= middle - WORDS * (total[-1] - total[0])) & np.isfinite(reactions)]
-        foot, head = axes.get_ylim()
-        above = len(beside) > 0 and head - beside.max() > beside.min() - foot
-        # Other runs may go on for long.
-        left = middle >= sum(axes.get_xlim()) / 2.0
-        told = (
-            f"{what} at {collapse.displacement:.5g} {collapse.unit}{in_phase(response, phase)}\n"
-            f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}"
-        )
-        place, offset = (middle, 0.96 if above else 0.04), (-6 if left else 6, 0)
-        style = {"ha": "right" if left else "left", "va": "top" if above else "bottom", "color": red, "bbox": PATCH}
-        _word(axes, told, place, offset, ("data", "axes fraction"), fontsize=0.9 * text, **style)
 
 
 def _counts(response: solver.Response) -> str:
