@@ -59,6 +59,11 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 #: Distance from the middle of a joint, as a part of its length, within which a width is given at the middle.
 NEAR_MIDDLE = 0.1
 
+#: Rows of :class:`Observations`: place, named, whole, width, uncertainty and label; point, block, displacement and
+#: uncertainty.
+_Width = tuple[np.ndarray, bool, bool, float, float, str]
+_Point = tuple[np.ndarray, str, np.ndarray, float]
+
 
 @dataclass(frozen=True)
 class Observations:
@@ -220,9 +225,7 @@ def _of_rows(
 ) -> Observations:
     columns = _columns(header, where, "xyz"[: assembly.dimension])
     joints = initial_joints(assembly)
-    widths: list[tuple[np.ndarray, bool, bool, float, float, str]] = []
-    points: list[tuple[np.ndarray, str, np.ndarray, float]] = []
-    given: list[_Cells] = []
+    widths, points, given = list[_Width](), list[_Point](), list[_Cells]()
     for number, row in rows:
         given.append(cells := _Cells(row, columns, f"{where}, {counted} {number}"))
         width = cells.length("width")
@@ -256,23 +259,20 @@ def _of_rows(
     return found
 
 
-def _observations(
-    widths: Sequence[tuple[np.ndarray, bool, bool, float, float, str]],
-    points: Sequence[tuple[np.ndarray, str, np.ndarray, float]],
-    where: str,
-    d: int,
-) -> Observations:
+def _observations(widths: Sequence[_Width], points: Sequence[_Point], where: str, d: int) -> Observations:
+    places, named, whole, sizes, uncertainties, labels = zip(*widths, strict=True) if widths else ((),) * 6
+    at, blocks, moved, point_uncertainties = zip(*points, strict=True) if points else ((),) * 4
     found = Observations(
-        places=np.array([place for place, *_ in widths], dtype=float).reshape(-1, d),
-        named=np.array([named for _, named, *_ in widths], dtype=bool),
-        whole=np.array([whole for _, _, whole, *_ in widths], dtype=bool),
-        widths=np.array([width for _, _, _, width, *_ in widths], dtype=float),
-        uncertainties=np.array([sigma for *_, sigma, _ in widths], dtype=float),
-        labels=tuple(label for *_, label in widths),
-        points=np.array([point for point, *_ in points], dtype=float).reshape(-1, d),
-        blocks=tuple(block for _, block, *_ in points),
-        displacements=np.array([moved for _, _, moved, _ in points], dtype=float).reshape(-1, d),
-        point_uncertainties=np.array([sigma for *_, sigma in points], dtype=float),
+        places=np.array(places, dtype=float).reshape(-1, d),
+        named=np.array(named, dtype=bool),
+        whole=np.array(whole, dtype=bool),
+        widths=np.array(sizes, dtype=float),
+        uncertainties=np.array(uncertainties, dtype=float),
+        labels=labels,
+        points=np.array(at, dtype=float).reshape(-1, d),
+        blocks=blocks,
+        displacements=np.array(moved, dtype=float).reshape(-1, d),
+        point_uncertainties=np.array(point_uncertainties, dtype=float),
         source=where,
     )
     if found.largest == 0.0:
@@ -408,7 +408,7 @@ def _blocks(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> li
     return [assembly.index(one) for one in names]
 
 
-def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray, str, np.ndarray, float] | None:
+def _displacement(cells: _Cells, assembly: solver.Assembly) -> _Point | None:
     """Read the displacement of a point."""
     axes = "xyz"[: assembly.dimension]
     there = [cells.length(f"displaced_{axis}") for axis in axes]

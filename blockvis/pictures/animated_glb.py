@@ -189,23 +189,22 @@ def _still(assembly: solver.Assembly, ties: Sequence[solver.Tie]) -> Any:
     else:
         depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
         solids = [prism(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)]
-    colours = palette.block_colours(assembly.materials, assembly.free)
     scene = trimesh.Scene(base_frame=BASE_FRAME)
+
+    def add(name: str, mesh: trimesh.Trimesh, colour: Sequence[int]) -> None:
+        paint = trimesh.visual.material.PBRMaterial(
+            baseColorFactor=[*colour, 255], metallicFactor=0.0, roughnessFactor=0.9
+        )
+        mesh.visual = trimesh.visual.TextureVisuals(material=paint)
+        scene.add_geometry(mesh, node_name=name, geom_name=name)
+
+    colours = palette.block_colours(assembly.materials, assembly.free).tolist()
     rows = zip(assembly.names, solids, rows_of(layout), colours, strict=True)
     for number, (name, (points, faces), row, colour) in enumerate(rows):
         about = points.copy()
         about[:, : assembly.dimension] -= assembly.centroids[number]
         mesh = trimesh.Trimesh(about, triangles_of(points, faces), process=False, metadata={"blockvis": row})
-        paint = trimesh.visual.material.PBRMaterial(
-            baseColorFactor=[*colour.tolist(), 255], metallicFactor=0.0, roughnessFactor=0.9
-        )
-        mesh.visual = trimesh.visual.TextureVisuals(material=paint)
-        scene.add_geometry(mesh, node_name=name, geom_name=name)
+        add(name, mesh, colour)
     for tie in ties:
-        rod = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=12)
-        paint = trimesh.visual.material.PBRMaterial(
-            baseColorFactor=[*palette.TIE, 255], metallicFactor=0.0, roughnessFactor=0.9
-        )
-        rod.visual = trimesh.visual.TextureVisuals(material=paint)
-        scene.add_geometry(rod, node_name=_rod_name(tie), geom_name=_rod_name(tie))
+        add(_rod_name(tie), trimesh.creation.cylinder(radius=1.0, height=1.0, sections=12), palette.TIE)
     return scene

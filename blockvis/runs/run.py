@@ -143,7 +143,8 @@ def run_case(
         except OSError as error:
             raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
         limit = case.increment_seconds if increment_seconds is None else increment_seconds
-        return _followed(case, results, run, outputs, clock, limit)
+        with _writing(results, outputs):
+            return _followed(case, results, run, outputs, clock, limit)
 
 
 def resume_run(
@@ -196,7 +197,8 @@ def resume_run(
         except OSError as error:
             raise _write_error(folder, error) from None
         run = planned(case, results.assembly, checkpoint, tuple(results.increments), results.ties)
-        return _followed(case, results, run, outputs, Clock(), increment_seconds)
+        with _writing(results, outputs):
+            return _followed(case, results, run, outputs, Clock(), increment_seconds)
 
 
 def _finished(folder: Path) -> dict[str, Any] | None:
@@ -237,20 +239,14 @@ def _begun(case: Case, outputs: Sequence[Drawing]) -> Iterator[None]:
             output.close()
 
 
-def _followed(
-    case: Case,
-    results: ResultsFolder,
-    run: AnalysisRun,
-    outputs: Sequence[Drawing],
-    clock: Clock,
-    increment_seconds: float | None,
-) -> Run:
-    """Follow the increments of a run, and make what is wanted beside."""
+@contextmanager
+def _writing(results: ResultsFolder, outputs: Sequence[Drawing]) -> Iterator[None]:
+    """Have the outputs follow a results folder, and say what to do where it is interrupted, full or gone."""
     try:
         with _resumable(results.path):
             for output in outputs:
                 output.follow(results)
-            return _follow(case, results, run, outputs, clock, increment_seconds)
+            yield
     except OSError as error:
         for output in outputs:
             # They may have half-written files, too.
@@ -258,7 +254,7 @@ def _followed(
         raise _write_error(results.path, error) from None
 
 
-def _follow(
+def _followed(
     case: Case,
     results: ResultsFolder,
     run: AnalysisRun,

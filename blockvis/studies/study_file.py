@@ -151,7 +151,7 @@ def run_values(values: Mapping[str, Any], order: Mapping[str, Any], n_seeded: in
 
 
 def read_study(source: str | Path | Mapping[str, Any]) -> Study:
-    """Read and check a study file, or its content, and its runs as cases; the path of a case is relative to the file.
+    """Read and check a study file, or its content, whose paths are relative to the working directory, and its runs.
 
     Raises ``ValueError`` for an unknown path of a parameter, an impossible distribution, a run that is no valid case;
     names the file, the key and the remedy.
