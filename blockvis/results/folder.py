@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import errno
 import importlib
-import io
 import os
 import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -28,7 +26,7 @@ from .joints import LargestMovements
 from .mechanism_arrays import at_last_equilibrium
 from .npz import packed, unpacked
 from .record import RECORD, Record, read_json, read_record, versions, write_json
-from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
+from .tables import COLUMNS, LIMIT_TABLES, csv_text, own_columns, row_of_increment, summary_of
 from .ties import COLUMNS as TIE_COLUMNS
 from .ties import TIES, TieCourses, stored_ties, tie_courses, tie_rows, write_ties
 from .viewer_files import MOVED, ViewerFiles, ViewerFormat, ViewerWriter, restore_grids, write_end, write_lists
@@ -206,10 +204,8 @@ class ResultsFolder:
         if response.path and response.collapse is not None:
             # What follows the last equilibrium is known by now, and with it the states of its joints.
             write_end(self.path, response, self.vtu)
-            self._rows.seek(self._last_row)
-            self._rows.truncate()
             last = at_last_equilibrium(response)
-            self._write_row(len(response.path) - 1, last)
+            self._rows[-1] = row_of_increment(len(response.path) - 1, last, self.assembly, self.parameter)
             if len(response.path) == len(self.increments):
                 # There is no frame of the fall that has the mechanism.
                 write_atomic(self._files.file(len(response.path) - 1), packed_increment(last))
@@ -241,31 +237,26 @@ class ResultsFolder:
         return ViewerFiles(self.path, self.assembly, self.vtu, self.increments)
 
     def _start_table(self) -> None:
-        self._rows = io.StringIO()
-        self._table = csv.writer(self._rows, lineterminator="\n")
-        self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
-        self._tie_rows = io.StringIO()
-        self._tie_table = csv.writer(self._tie_rows, lineterminator="\n")
-        self._tie_table.writerow((*TIE_COLUMNS, *own_columns(self.parameter)))
+        self._rows, self._tie_rows = list[Sequence[Any]](), list[Sequence[Any]]()
         self._courses = TieCourses(self.ties)
         self._movements = LargestMovements(self.assembly, self.parameter)
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
-            self._last_row = self._rows.tell()
-            self._write_row(number, increment)
+            self._rows.append(row_of_increment(number, increment, self.assembly, self.parameter))
             self._movements.add(increment)
             if self.ties:
-                self._tie_table.writerows(tie_rows(self.ties, number, increment, self.parameter))
+                self._tie_rows += tie_rows(self.ties, number, increment, self.parameter)
                 self._courses.add(increment)
 
-    def _write_row(self, number: int, increment: solver.Increment) -> None:
-        self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
-
     def _write_table(self, *, durable: bool = False) -> None:
-        write_atomic(self.path / "response.csv", self._rows.getvalue(), last=False, durable=durable)
-        if self.ties:
-            write_atomic(self.path / "ties.csv", self._tie_rows.getvalue(), last=False, durable=durable)
+        tables = [
+            ("response.csv", COLUMNS, self._rows),
+            *([("ties.csv", TIE_COLUMNS, self._tie_rows)] * bool(self.ties)),
+        ]
+        for name, columns, rows in tables:
+            text = csv_text((*columns, *own_columns(self.parameter)), rows)
+            write_atomic(self.path / name, text, last=False, durable=durable)
 
     def _refuse_gone(self) -> None:
         """Raise ``OSError`` where the folder was moved during the run: made again, it would hold half of the run."""
