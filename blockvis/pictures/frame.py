@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw, ImageFont
 
 import solver
@@ -395,10 +396,15 @@ def framed(
         for bounds, of in ((inner, assembly.free[owner]), (outer, ~assembly.free[owner])):
             if of.any():
                 bounds += [corners[of].min(axis=0), corners[of].max(axis=0)]
+    return frame_around(inner, outer, margin, supports, whole)
+
+
+def frame_around(free: ArrayLike, supported: ArrayLike, margin: float, supports: float, whole: float = 0.0) -> Frame:
+    """Frame around points (n, d) [m] of free blocks, and of supports, with borders as of :func:`framed`."""
+    inner, outer = np.asarray(free), np.asarray(supported)
     # Where no free block is to be seen, or no support.
-    (low, high), (outer_low, outer_high) = (
-        (np.min(bounds, axis=0), np.max(bounds, axis=0)) for bounds in (inner or outer, outer or inner)
-    )
+    inner, outer = inner if len(inner) else outer, outer if len(outer) else inner
+    (low, high), (outer_low, outer_high) = ((of.min(axis=0), of.max(axis=0)) for of in (inner, outer))
     size = float((high - low).max())
     all_of_it = float((np.maximum(high, outer_high) - np.minimum(low, outer_low)).max())
     beyond = np.inf if all_of_it <= whole * size else supports * size

@@ -134,7 +134,7 @@ def draw_mechanism(
     drawer = Drawer(response, look, size, (swing.increment,), extra=extra, underlay=underlay, still=True)
     if swing.moves:
         drawer.show_motion(swing)
-    note = "   ·   ".join([_mechanism_note(response, swing.parts), *phase_words(response, swing.increment)])
+    note = "   ·   ".join([_mechanism_note(response, swing.n_parts), *phase_words(response, swing.increment)])
     moved_on = swing.moves and response.assembly.dimension == 3 and response.stop != solver.Status.SOLVER_FAILED
     badge = MECHANISM_BADGE if moved_on else None
     return _save(drawer.picture(swing.increment, note=note, badge=badge, widths=True), path)
@@ -205,8 +205,7 @@ def animate(
     return film
 
 
-def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
-    n = int(parts.max(initial=-1)) + 1
+def _mechanism_note(response: solver.Response, n: int) -> str:
     bodies = f"{mechanics.counted(n, 'moving part')}{', darker where faster' if n > MOST_PARTS else ''}"
     if response.collapse is None and response.limits:
         friction = f"{response.limits[-1].flow} friction"

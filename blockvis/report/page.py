@@ -358,7 +358,7 @@ def _fill(
 def _tints_text(response: solver.Response, swing: Swing) -> str:
     """Say what the colours of the mechanism mean."""
     whose = "" if response.parameter.is_path else " of the lowest state"
-    if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
+    if swing.n_parts <= MOST_PARTS:
         return f"parts of the mechanism{whose}"
     return f"mechanism{whose}, darker where faster"
 

@@ -10,7 +10,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from types import UnionType
-from typing import IO, Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -67,8 +67,10 @@ def _checked_arrays(data: bytes) -> dict[str, np.ndarray]:
             for name in archive.namelist():
                 with archive.open(name) as entry:
                     version = np.lib.format.read_magic(entry)
-                    reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else _header_2
-                    shape, _, kind = reader(entry)
+                    if version == (1, 0):
+                        shape, _, kind = np.lib.format.read_array_header_1_0(entry)
+                    else:
+                        shape, _, kind = np.lib.format.read_array_header_2_0(entry)
                     if math.prod(shape) * kind.itemsize > MOST_BYTES:
                         raise ValueError(f"it announces an array of shape {shape}")
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
@@ -77,10 +79,6 @@ def _checked_arrays(data: bytes) -> dict[str, np.ndarray]:
         raise ValueError(f"it is not what a run wrote: {error}") from None
     except (zipfile.BadZipFile, zlib.error, OverflowError, MemoryError) as error:
         raise ValueError(f"it is damaged: {error}") from None
-
-
-def _header_2(entry: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
-    return np.lib.format.read_array_header_2_0(entry)
 
 
 def _plain(value: Any, arrays: dict[str, np.ndarray]) -> Any:

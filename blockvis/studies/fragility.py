@@ -43,20 +43,15 @@ class Fragility:
         return float(self.settlement[reached[0]]) if len(reached) else None
 
 
-def observations(table: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Last settlement [m or rad] of each run of a table with a result, and whether it collapsed there, (n,) arrays.
+def fragility_of(table: pd.DataFrame) -> Fragility:
+    """Estimate the fragility curve from the table of a study; runs without result are excluded: report their number.
 
-    It is that at collapse, 0 without an initial equilibrium; of a run that did not collapse, its last one.
+    The settlement of a run is that at collapse, 0 without an initial equilibrium, or its last one.
     """
     known = table[~table["status"].isin(NO_RESULT)]
     collapsed = ~known["status"].isin(STOOD).to_numpy(dtype=bool)
     settlement = np.where(collapsed, known["collapse_displacement"], known["last_settlement"])
-    return settlement.astype(float), collapsed
-
-
-def fragility_of(table: pd.DataFrame) -> Fragility:
-    """Estimate the fragility curve from the table of a study; runs without result are excluded: report their number."""
-    return fragility(*observations(table))
+    return fragility(settlement.astype(float), collapsed)
 
 
 def fragility(settlement: ArrayLike, collapsed: ArrayLike) -> Fragility:

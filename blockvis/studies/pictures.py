@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 import solver
 from blockvis.pictures import palette
 from blockvis.pictures.figures import plain_text
+from blockvis.pictures.frame import Frame, frame_around
 from blockvis.pictures.ties import COLOURS
 from blockvis.results.about import LOCAL
 from blockvis.system.atomic_files import atomic_file
@@ -219,13 +220,13 @@ def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path)
     for one in shown:
         with np.load(records.shape_file(one)) as stored:
             shapes.append({name: stored[name] for name in stored.files})
-    low, high = _frame(shapes) if shapes else (np.zeros(2), np.array([1.0, 0.6]))
-    tall = float((high[1] - low[1]) / (high[0] - low[0]))
+    frame = _frame(shapes) if shapes else Frame(np.zeros(2), np.array([1.0, 0.6]))
+    tall = float(frame.size[1] / frame.size[0])
     figure = Figure(figsize=(4.0 * columns, (4.0 * min(max(tall, 0.35), 1.6) + 1.0) * rows + 0.3), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for place, (one, shape) in enumerate(zip(shown, shapes, strict=True)):
         axes = panels[place]
-        _draw_shape(axes, shape, low, high)
+        _draw_shape(axes, shape, frame.low, frame.high)
         median = factor * float(table.loc[table["mechanism_class"] == one, "collapse_displacement"].median())
         number, part = classes[one], 100 * classes[one] / sum(classes.values())
         runs = counted(number, "run") + (f", {part:.3g} %" if is_sample(records.study) else "")
@@ -291,20 +292,14 @@ def _parts_inside(ring: np.ndarray, box: shapely.Polygon) -> list[np.ndarray]:
     return [shapely.get_coordinates(part.exterior) for part in found if isinstance(part, shapely.Polygon)]
 
 
-def _frame(shapes: Sequence[dict[str, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of what all tiles show [m]: the free blocks, the supports as far as ``SUPPORTS`` beyond, and a margin."""
+def _frame(shapes: Sequence[dict[str, np.ndarray]]) -> Frame:
+    """Frame what all tiles show: the free blocks, the supports as far as ``SUPPORTS`` beyond, and a margin."""
     inner, outer = [], []
     for shape in shapes:
         free = np.repeat(shape["free"], np.diff(shape["offsets"]))
         inner += [shape["vertices"][free], shape["at_rest"][free]]
         outer += [shape["vertices"][~free]]
-    points, ground = np.concatenate(inner), np.concatenate(outer)
-    low, high = points.min(axis=0), points.max(axis=0)
-    size = float((high - low).max())
-    if len(ground):
-        low = np.minimum(low, np.maximum(ground.min(axis=0), low - SUPPORTS * size))
-        high = np.maximum(high, np.minimum(ground.max(axis=0), high + SUPPORTS * size))
-    return low - MARGIN * size, high + MARGIN * size
+    return frame_around(np.concatenate(inner), np.concatenate(outer), MARGIN, SUPPORTS)
 
 
 def _axis_end(curve: Fragility) -> float:
