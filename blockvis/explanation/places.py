@@ -16,19 +16,11 @@ def corners_of(joints: InitialJoints) -> np.ndarray:
 
 
 def on_faces(points: np.ndarray, joints: InitialJoints) -> tuple[np.ndarray, np.ndarray]:
-    """Find the place on each face that is nearest to each point.
+    """Find the place on each face that is nearest to each of points (n, d) [m].
 
-    Parameters
-    ----------
-    points : (n, d) array [m]
-
-    Returns
-    -------
-    away : (n, n_joints) array [m]
-        Its distance.
-    weights : (n, n_joints, k) array
-        With sum 1, for the corners of :func:`corners_of`: what is linear over a face, its corners or the gap between
-        two plane faces, has there the mean of its values at the corners with these weights.
+    Gives the distances (n, n_joints) [m], and weights (n, n_joints, k), with sum 1, for the corners of
+    :func:`corners_of`: what is linear over a face, its corners or the gap between two plane faces, has there the mean
+    of its values at the corners with these weights.
     """
     if joints.rings.points.shape[1] == 2:
         return _on_lines(points, joints.ends)

@@ -66,17 +66,10 @@ class Measurement:
 
 
 def ranked(trials: Sequence[Trial], *, apart: bool) -> list[Cause]:
-    """Order causes by their probability.
+    """Order causes by their probability, from the trials of all candidates, some with several frictions.
 
-    Parameters
-    ----------
-    trials : sequence of Trial
-        Of every candidate, some of them with several coefficients of friction.
-    apart : bool
-        Whether movements that differ by a translation of everything are told apart: displaced points do, cracks not.
+    Movements that differ by a translation of everything are told apart by displaced points, not by cracks.
 
-    Notes
-    -----
     The prior weighs causes as their candidates say, usually alike; within a cause its candidates alike (a candidate
     that refines another shares the weight of that one), coefficients of friction alike, and amounts evenly up to the
     largest that is looked at. The probability of a cause is its prior times the mean likelihood over all it leaves

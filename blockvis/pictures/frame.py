@@ -369,23 +369,12 @@ def framed(
     whole: float = 0.0,
     cut: np.ndarray | None = None,
 ) -> Frame:
-    """Frame in which every free block stays over all poses.
+    """Frame in which every free block stays over all poses as drawn, which are gone through once.
 
-    Parameters
-    ----------
-    poses : iterable of solver.Pose
-        As drawn, magnified if they are; gone through once.
-    margin : float
-        Empty border, as a fraction of the larger dimension.
-    supports : float
-        Supports are shown as far as this fraction of the larger dimension beyond the free blocks; layouts have
-        supports of any extent.
-    axes : (2, d) array, optional
-        Unit vectors to the right and up in the picture; the axes of the drawing by default.
-    whole : float
-        Supports are shown whole where the picture is then no larger than this many times the free blocks.
-    cut : (2, 3) array, optional
-        A point [m] of a plane and its normal towards what is kept: what is left out takes no room.
+    The margin is an empty border, as a fraction of the larger dimension. Supports are shown as far as another fraction
+    of it beyond the free blocks, for layouts have supports of any extent, or whole where the picture is then no larger
+    than so many times the free blocks. The axes (2, d) are to the right and up in the picture, those of the drawing by
+    default. What a cut leaves out, a point [m] of a plane and its normal towards what is kept, takes no room.
     """
     inner, outer = list[np.ndarray](), list[np.ndarray]()
     for pose in poses:

@@ -157,13 +157,8 @@ def cracks_between(
 def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Resultant of the contact forces of each pair of blocks, pressed or pulled.
 
-    Returns
-    -------
-    points : (n, d) array [m]
-        Where the resultant crosses the joint, at the increment's pose; by mortar it may be beside it.
-    forces : (n, d) array [N]
-        On ``blocks[:, 0]``.
-    blocks : (n, 2) int array
+    Gives the points (n, d) [m] where they cross the joints, at the increment's pose, by mortar maybe beside them, the
+    forces (n, d) [N] on the first block of each pair, and the pairs (n, 2).
     """
     contacts, carrying = increment.contacts, np.flatnonzero(increment.forces.any(axis=1))
     sense = np.where(contacts.block_a > contacts.block_b, -1.0, 1.0)
@@ -265,14 +260,9 @@ def settlement_arrows(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find where arrows show how supports move in a settlement, of which a picture in the plane shows what is ``seen``.
 
-    Returns
-    -------
-    blocks : (n,) int array
-        The supports, one or a few of many for all; twice where they turn.
-    places : (n, d) array [m]
-        In the plane inside the part of each that is seen, in space where the arrow leaves the support.
-    directions : (n, d) array
-        To the scale of each support, whose longest is a unit vector.
+    Gives the supports (n,), one or a few of many for all, twice where they turn, the places (n, d) [m], in the plane
+    inside the part of each that is seen, in space where the arrow leaves it, and the directions (n, d), to the scale of
+    each support, whose longest is a unit vector.
     """
     d, rate = assembly.dimension, settlement.rate(assembly, solver.Pose.initial(assembly), 0.0)
     blocks = np.flatnonzero(settlement.taking_part(assembly) & rate.any(axis=1))

@@ -155,25 +155,13 @@ def resume_run(
 ) -> Run:
     """Go on with a run that was stopped, from its results folder alone, to the result it would have had.
 
-    Parameters
-    ----------
-    folder : str or Path
-        That a run has written, whatever ended it.
-    outputs : sequence of Drawing, optional
-        As in :func:`run_case`.
-    increment_seconds : float, optional [s]
-        What an increment may take; by default what it takes, whatever the case says.
+    The outputs are as in :func:`run_case`; an increment may take so many seconds, by default what it takes, whatever
+    the case says. Raises ``ValueError`` if the folder holds no run, or one that was made from Python and cannot be
+    followed again.
 
-    Raises
-    ------
-    ValueError
-        If the folder holds no run, or one that was made from Python and cannot be followed again.
-
-    Notes
-    -----
     A settlement and a pushover go on from their last equilibrium, limit loads behind the last that was found; a
-    settlement that comes before them and had not ended starts again. Files of the case that have
-    changed are named in a warning, and not read again. Of a run that has finished, what is not drawn yet is drawn.
+    settlement that comes before them and had not ended starts again. Files of the case that have changed are named in a
+    warning, and not read again. Of a run that has finished, what is not drawn yet is drawn.
     """
     folder = Path(folder)
     record, case = read_record(folder), stored_case(folder)

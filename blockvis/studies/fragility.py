@@ -57,22 +57,15 @@ def fragility_of(table: pd.DataFrame) -> Fragility:
 def fragility(settlement: ArrayLike, collapsed: ArrayLike) -> Fragility:
     """Estimate the fragility curve from runs that collapsed and runs that did not collapse within their limit.
 
-    Parameters
-    ----------
-    settlement : (n,) array [m or rad]
-        Settlement at collapse, or the last one of a run that did not collapse.
-    collapsed : (n,) bool array
+    The settlement (n,) [m or rad] is that at collapse, or the last one of a run that did not collapse.
 
-    Notes
-    -----
     E. L. Kaplan and P. Meier, Nonparametric estimation from incomplete observations, Journal of the American
     Statistical Association 53 (1958) 457-481, https://doi.org/10.1080/01621459.1958.10501452.
 
     The band is Wilson's interval with the effective number of runs p (1 - p) / V from Greenwood's variance V: K. J.
     Rothman, Estimation of confidence limits for the cumulative probability of survival in life table analysis, Journal
-    of Chronic Diseases 31 (1978) 557-560. If every run collapsed or was followed further, this is Wilson's
-    interval of the share of runs. It assumes independent runs; those of a latin hypercube or Sobol' sequence scatter
-    less.
+    of Chronic Diseases 31 (1978) 557-560. If every run collapsed or was followed further, this is Wilson's interval of
+    the share of runs. It assumes independent runs; those of a latin hypercube or Sobol' sequence scatter less.
     """
     end, event = np.asarray(settlement, dtype=float), np.asarray(collapsed, dtype=bool)
     steps, dead = np.unique(end[event], return_counts=True)
@@ -99,21 +92,9 @@ def fragility(settlement: ArrayLike, collapsed: ArrayLike) -> Fragility:
 
 
 def wilson(share: ArrayLike, number: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Compute Wilson's interval of a probability.
+    """Compute Wilson's interval, lower and upper (n,), of a probability.
 
-    Parameters
-    ----------
-    share : (n,) array
-        Fraction of the observations in which the event happened.
-    number : (n,) array
-        Number of observations; need not be whole.
-
-    Returns
-    -------
-    lower, upper : (n,) arrays
-
-    Notes
-    -----
+    It is that of the share (n,) of a number (n,) of observations, which need not be whole, in which the event happened:
     E. B. Wilson, Probable inference, the law of succession, and statistical inference, Journal of the American
     Statistical Association 22 (1927) 209-212, https://doi.org/10.1080/01621459.1927.10502953.
 

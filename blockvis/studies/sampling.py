@@ -32,31 +32,13 @@ class Design:
 
 
 def designed(method: str, runs: int, levels: Sequence[int], repeats: int, seed: int, *, scattered: bool) -> Design:
-    """Choose the runs of a study.
+    """Choose the runs of a study by one of :data:`METHODS`, with so many levels of each parameter in a grid.
 
-    Parameters
-    ----------
-    method : str
-        One of :data:`METHODS`.
-    runs : int
-        For "saltelli" the size N of the two independent samples: the study has N (factors + 2) runs.
-    levels : sequence of int
-        Number of values of each parameter in a grid.
-    repeats : int
-        Runs per point of a grid.
-    scattered : bool
-        Whether there are imperfections.
-
-    Raises
-    ------
-    ValueError
-        For a number of runs of a Sobol' sequence that is no power of 2.
-
-    Notes
-    -----
-    "saltelli": A. Saltelli et al., Variance based sensitivity analysis of model output, Computer Physics
-    Communications 181 (2010) 259-270, https://doi.org/10.1016/j.cpc.2009.09.018: for each point of two independent
-    samples A and B the rows A, A with one column from B for each factor, B. The seed of the imperfections is a column.
+    A grid has ``repeats`` runs per point. For "saltelli" ``runs`` is the size N of its two independent samples: the
+    study has N (factors + 2) runs, and where it is ``scattered``, by imperfections, their seed is a column: A. Saltelli
+    et al., Variance based sensitivity analysis of model output, Computer Physics Communications 181 (2010) 259-270,
+    https://doi.org/10.1016/j.cpc.2009.09.018: for each point of two independent samples A and B the rows A, A with one
+    column from B for each factor, B. Raises ``ValueError`` for a Sobol' sequence of runs that are no power of 2.
 
     Examples
     --------

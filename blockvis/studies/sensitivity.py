@@ -104,19 +104,9 @@ def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
 def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, float]]:
     """Estimate Sobol' indices of first order: the share of each parameter alone in the variance of the outcome.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Its table.
+    Gives the index and half its 95 % interval by name of the parameter, for a "saltelli" study also of all
+    imperfections together; nothing if there are too few runs, none collapsed, or the outcome is the same in nearly all.
 
-    Returns
-    -------
-    dict
-        The index and half its 95 % interval by name of the parameter, for a "saltelli" study also of all imperfections
-        together; empty if there are too few runs, none collapsed, or the outcome is the same in nearly all.
-
-    Notes
-    -----
     For a "saltelli" study: Saltelli et al., Computer Physics Communications 181 (2010) 259-270; for other samples
     RBD-FAST with the correction of its bias: J.-Y. Tissot and C. Prieur, Reliability Engineering and System Safety 107
     (2012) 205-213, https://doi.org/10.1016/j.ress.2012.06.010; both by SALib. For a grid, with equal numbers of runs
