@@ -45,6 +45,12 @@ SHOWN = 0.07
 #: Height of text [points], width of a panel and height of the words above it [inch].
 TEXT, PANEL, HEAD = 12.0, 5.4, 0.7
 
+#: Colours as matplotlib takes them.
+INK, FAINT, OPEN, OUTLINE, FORCE, WARNING, SETTLEMENT = (
+    palette.hexadecimal(getattr(palette, name))
+    for name in ("INK", "FAINT", "OPEN", "OUTLINE", "FORCE", "WARNING", "SETTLEMENT")
+)
+
 #: Structures wider than this for their height have their panels below each other.
 WIDE = 4.0
 
@@ -185,25 +191,22 @@ class _Canvas:
 
         Returns what is seen of the edges of joints.
         """
-        colour, fill = (
-            palette.hexadecimal(palette.OPEN),
-            palette.block_colours(self.assembly.materials, self.assembly.free),
-        )
         if self.view is not None:
-            return self._solid_blocks(pose, lines, thick, filled, joints)
+            return self._solid_blocks(self.view, pose, lines, thick, filled, joints)
+        fill = palette.block_colours(self.assembly.materials, self.assembly.free)
         corners = mechanics.moved_vertices(self.assembly, pose)
         self.panel.add_collection(
             PolyCollection(
                 np.split(corners, self.assembly.offsets[1:-1]),
                 facecolors=[tuple(one) for one in (fill / 255.0).tolist()],
-                edgecolors=palette.hexadecimal(palette.OUTLINE),
+                edgecolors=OUTLINE,
                 linewidths=0.6,
                 zorder=2,
             )
         )
-        self.panel.add_collection(LineCollection(lines, colors=[colour], linewidths=thick, zorder=3))
+        self.panel.add_collection(LineCollection(lines, colors=[OPEN], linewidths=thick, zorder=3))
         self.panel.add_collection(
-            PolyCollection(list(filled), facecolors=[colour], edgecolors=[colour], linewidths=0.8, zorder=3)
+            PolyCollection(list(filled), facecolors=[OPEN], edgecolors=[OPEN], linewidths=0.8, zorder=3)
         )
         return _Sights(self, joints)
 
@@ -219,25 +222,27 @@ class _Canvas:
             if np.hypot(*arm) < 0.1 * np.hypot(*arms.T).max():
                 # Straight to the eye or away from it.
                 continue
-            arrow = {"arrowstyle": "-|>", "color": palette.hexadecimal(palette.FAINT)}
+            arrow = {"arrowstyle": "-|>", "color": FAINT}
             self.panel.annotate("", centre + arm, xytext=centre, arrowprops=arrow)
             x, y = centre + 1.35 * arm
-            self.panel.text(
-                x, y, word, ha="center", va="center", fontsize=TEXT - 3, color=palette.hexadecimal(palette.FAINT)
-            )
+            self.panel.text(x, y, word, ha="center", va="center", fontsize=TEXT - 3, color=FAINT)
 
     def _solid_blocks(
-        self, pose: solver.Pose, lines: Sequence[np.ndarray], thick: Sequence[float], filled: Any, joints: Rings
+        self,
+        view: View,
+        pose: solver.Pose,
+        lines: Sequence[np.ndarray],
+        thick: Sequence[float],
+        filled: Any,
+        joints: Rings,
     ) -> _Sights:
-        assert self.view is not None
         # VTK takes seconds to import, and pictures in the plane need none.
         from blockvis.pictures.solid_scene import SolidScene
 
         across, high = self.frame.size
         size = (round(PANEL * FINE), round(PANEL * FINE * float(high / across)))
-        outlined = hiding_supports(self.assembly, self.view)
-        colours = palette.role_colours(self.assembly)
-        scene = SolidScene(self.assembly, self.view, self.frame, size, colours, outlined=outlined)
+        outlined, colours = hiding_supports(self.assembly, view), palette.role_colours(self.assembly)
+        scene = SolidScene(self.assembly, view, self.frame, size, colours, outlined=outlined)
         scene.pose(pose)
         for k, (line, points) in enumerate(zip(lines, thick, strict=True)):
             scene.lines(f"crack {k}", line[None], palette.OPEN, points * FINE / 72.0)
@@ -293,23 +298,17 @@ def _observed(canvas: _Canvas, found: Explanation) -> list[_Label]:
     canvas.compass()
     spots, seen = sights.of(given.places, found.comparison.own)
     places, closed = np.array([each[0] for each in spots]).reshape(-1, 2), ~opened & seen
-    panel.plot(*places[closed].T, "o", ms=4.5, mfc="white", mec=palette.hexadecimal(palette.FAINT), zorder=4)
+    panel.plot(*places[closed].T, "o", ms=4.5, mfc="white", mec=FAINT, zorder=4)
     labels = _labels(panel, spots, given.widths, found, seen, sizes=given.widths)
     points = canvas.placed(given.points)
     strange = np.concatenate([places[list(found.unexplained)], points[list(found.unexplained_points)]])
-    panel.plot(*strange.T, "o", ms=17, mfc="none", mec=palette.hexadecimal(palette.WARNING), mew=1.6, zorder=6)
+    panel.plot(*strange.T, "o", ms=17, mfc="none", mec=WARNING, mew=1.6, zorder=6)
     if len(given.points):
         _arrows(panel, points, canvas.placed(given.displacements), assembly)
     what = "Observed" + (": open joints [mm], ○ closed" if len(given.widths) else ": displaced points")
     _title(panel, what)
     if len(strange):
-        panel.annotate(
-            "○ unexplained",
-            (0.0, 0.0),
-            xycoords="axes fraction",
-            fontsize=TEXT,
-            color=palette.hexadecimal(palette.WARNING),
-        )
+        panel.annotate("○ unexplained", (0.0, 0.0), xycoords="axes fraction", fontsize=TEXT, color=WARNING)
     return labels
 
 
@@ -352,17 +351,9 @@ def _computed(
     if measurement is not None:
         spots, _ = sights.of(between.middles()[[measurement.joint]], np.array([measurement.joint]))
         x, y = spots[0][0]
-        panel.plot(x, y, "D", ms=8, mfc="white", mec=palette.hexadecimal(palette.FORCE), mew=1.8, zorder=7)
-        here = panel.annotate(
-            f"measure here: {width_text(float(opening[measurement.joint]))}",
-            (x, y),
-            xytext=(7, 7),
-            textcoords="offset points",
-            fontsize=TEXT - 1,
-            color=palette.hexadecimal(palette.FORCE),
-            bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none"},
-            zorder=8,
-        )
+        panel.plot(x, y, "D", ms=8, mfc="white", mec=FORCE, mew=1.8, zorder=7)
+        words = f"measure here: {width_text(float(opening[measurement.joint]))}"
+        here = _boxed(panel, words, spots[0][0], (7, 7), FORCE, {"ec": "none"}, zorder=8)
         labels.insert(0, _Label(here, np.array([[x, y]])))
     moving = [assembly.index(name) for name in cause.best.candidate.motions]
     moved = canvas.placed((pose.positions - assembly.centroids)[moving])
@@ -378,7 +369,7 @@ def _computed(
 
 
 def _title(panel: Axes, words: str) -> None:
-    panel.set_title(words, loc="left", fontsize=TEXT + 1, color=palette.hexadecimal(palette.INK))
+    panel.set_title(words, loc="left", fontsize=TEXT + 1, color=INK)
 
 
 def _tops(assembly: solver.Assembly, blocks: Sequence[int], pose: solver.Pose) -> np.ndarray:
@@ -402,14 +393,8 @@ def _arrows(
             tip = tail + vector
             if within is not None:
                 tip = np.clip(tip, within.low, within.high)
-            panel.annotate(
-                "",
-                tip,
-                xytext=tip - vector,
-                annotation_clip=False,
-                arrowprops={"arrowstyle": "-|>", "color": palette.hexadecimal(palette.SETTLEMENT), "lw": 2.0},
-                zorder=7,
-            )
+            arrow = {"arrowstyle": "-|>", "color": SETTLEMENT, "lw": 2.0}
+            panel.annotate("", tip, xytext=tip - vector, annotation_clip=False, arrowprops=arrow, zorder=7)
 
 
 @dataclass(frozen=True)
@@ -435,33 +420,25 @@ def _labels(
     """
     least = 0.05 * found.observations.largest
     order = np.argsort(-np.maximum(sizes, widths), kind="stable")
-    return [
-        _Label(
-            panel.annotate(
-                width_text(float(widths[k])),
-                places[k][0],
-                xytext=(0, 9),
-                textcoords="offset points",
-                ha="center",
-                va="center",
-                fontsize=TEXT - 1,
-                color=palette.hexadecimal(palette.INK),
-                bbox={
-                    "boxstyle": "round,pad=0.15",
-                    "fc": "white",
-                    "ec": palette.hexadecimal(palette.OPEN),
-                    "lw": 0.7 if seen[k] else 1.1,
-                    "ls": "-" if seen[k] else DASHED,
-                },
-                gid="" if seen[k] else HIDDEN,
-                zorder=5,
-            ),
-            places[k],
-        )
-        # Each is laid out before those that cover others are removed.
-        for k in order[: 4 * MOST_LABELS].tolist()
-        if max(sizes[k], widths[k]) > least
-    ]
+    style = {"ha": "center", "va": "center", "zorder": 5}
+    labels = []
+    # Each is laid out before those that cover others are removed.
+    for k in order[: 4 * MOST_LABELS].tolist():
+        if max(sizes[k], widths[k]) > least:
+            rim = {"ec": OPEN, "lw": 0.7, "ls": "-"} if seen[k] else {"ec": OPEN, "lw": 1.1, "ls": DASHED}
+            words, gid = width_text(float(widths[k])), "" if seen[k] else HIDDEN
+            labels.append(_Label(_boxed(panel, words, places[k][0], (0, 9), INK, rim, gid=gid, **style), places[k]))
+    return labels
+
+
+def _boxed(
+    panel: Axes, words: str, place: Any, offset: tuple[int, int], colour: str, rim: dict[str, Any], **style: Any
+) -> Annotation:
+    """Write words in a white box so many points beside a place."""
+    box = {"boxstyle": "round,pad=0.15", "fc": "white", **rim}
+    return panel.annotate(
+        words, place, offset, textcoords="offset points", fontsize=TEXT - 1, color=colour, bbox=box, **style
+    )
 
 
 def _uncover(labels: Sequence[_Label]) -> list[Annotation]:
