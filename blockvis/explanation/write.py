@@ -115,8 +115,13 @@ def _observations(found: Explanation) -> str:
         computed = [width_text(cause.best.widths[cause.at][k]) for cause in best]
         strange = _strange(k in found.unexplained, k in found.made_by_none)
         rows.append((given.labels[k], width, f"{1e3 * given.uncertainties[k]:.2g}", *computed, strange))
-    header = ("joint or place", "observed, mm", "± mm", *(f"cause {n}, mm" for n in range(1, len(best) + 1)), "")
-    return "<h2>Widths</h2>" + _table(header, rows)
+    return _compared("Widths", ("joint or place", "observed, mm", "± mm"), rows, len(best))
+
+
+def _compared(title: str, header: Sequence[str], rows: Sequence[Sequence[str]], causes: int) -> str:
+    """Write a table of what was observed beside what so many causes make, and what is strange."""
+    computed = (f"cause {n}, mm" for n in range(1, causes + 1))
+    return f"<h2>{title}</h2>" + _table((*header, *computed, ""), rows)
 
 
 def _points(found: Explanation) -> str:
@@ -133,8 +138,7 @@ def _points(found: Explanation) -> str:
         )
         for k in range(min(len(given.points), MOST_OBSERVATIONS))
     ]
-    header = ("point", "observed, mm", *(f"cause {n}, mm" for n in range(1, len(best) + 1)), "")
-    return "<h2>Displaced points</h2>" + _table(header, rows)
+    return _compared("Displaced points", ("point", "observed, mm"), rows, len(best))
 
 
 def _strange(unexplained: bool, by_none: bool) -> str:

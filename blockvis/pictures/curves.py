@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image, ImageDraw
 
 import solver
-from blockvis.results.about import about, collapse_mechanism, collapse_phase, counts_text, in_phase
+from blockvis.results.about import about, collapse_phase, counts_text, in_phase, losing
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.results.ties import TieForceCurves, tie_force_curves
 from blockvis.system.atomic_files import atomic_file
@@ -400,10 +400,8 @@ def _mark_phases(axes: Axes, response: solver.Response, letters: int) -> float:
 
 def _counts(response: solver.Response) -> str:
     """Count the parts, hinges and sliding joints of the collapse mechanism, on a line of their own."""
-    mechanism = collapse_mechanism(response)
-    if mechanism is None or response.collapse is None or response.collapse.lost != "equilibrium":
-        return ""
-    return f"\n{counts_text(mechanism)}"
+    begins = losing(response)
+    return "" if begins is None else f"\n{counts_text(mechanics.mechanism_of(response.assembly, begins))}"
 
 
 def _word(

@@ -185,7 +185,7 @@ def report_html(
         script=_script(response.assembly.dimension),
         turning=TURNING if response.assembly.dimension == 3 else "Shift with the arrows moves the picture",
         summary=html_rows(summary_rows(response, fall)),
-        cracks=_cracks(response) + _ties(response),
+        cracks=_cracks(response) + _table("Ties and props", "ties", tie_rows(response)),
         certificate=html_rows(certificate_rows(response)),
         error=_error(error) + html_rows(range_rows(band)),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
@@ -219,14 +219,13 @@ def _cracks(response: solver.Response) -> str:
     if not response.path:
         return ""
     last = response.path[-1]
-    rows = crack_rows(cracks_of(response.assembly, last.pose, last.fallen), LISTED_CRACKS)
-    return f'<h2>Cracks at the last equilibrium</h2><table id="crack-lines">{html_rows(rows)}</table>' if rows else ""
+    cracks = cracks_of(response.assembly, last.pose, last.fallen)
+    return _table("Cracks at the last equilibrium", "crack-lines", crack_rows(cracks, LISTED_CRACKS))
 
 
-def _ties(response: solver.Response) -> str:
-    """List the ties with their largest forces and what became of them."""
-    rows = tie_rows(response)
-    return f'<h2>Ties and props</h2><table id="ties">{html_rows(rows)}</table>' if rows else ""
+def _table(title: str, name: str, rows: Sequence[Sequence[str]]) -> str:
+    """Write a table under a title; nothing where it has no rows."""
+    return f'<h2>{title}</h2><table id="{name}">{html_rows(rows)}</table>' if rows else ""
 
 
 def tie_rows(response: solver.Response) -> list[tuple[str, str, str]]:

@@ -155,9 +155,13 @@ def loss_in(assembly: solver.Assembly, falling: solver.Increment) -> Loss:
     return Loss(weight, weight / mechanics.total_weight(assembly))
 
 
+def losing(response: solver.Response) -> solver.Increment | None:
+    """Find the increment from which the collapse mechanism takes blocks; None where a response loses no equilibrium."""
+    lost = response.collapse is not None and response.collapse.lost == "equilibrium"
+    return with_mechanism(response) if lost else None
+
+
 def loss_of(response: solver.Response) -> Loss | None:
     """Weigh what the collapse mechanism of a response takes with it; None where nothing collapses."""
-    collapse, begins = response.collapse, with_mechanism(response)
-    if collapse is None or collapse.lost != "equilibrium" or begins is None:
-        return None
-    return loss_in(response.assembly, begins)
+    begins = losing(response)
+    return None if begins is None else loss_in(response.assembly, begins)

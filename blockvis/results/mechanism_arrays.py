@@ -8,6 +8,7 @@ import solver
 from blockvis.dynamics.fall import falls_from, with_mechanism
 from solver import mechanics
 
+from .about import losing
 from .swinging import swing_factors
 
 #: How far the fastest corner goes by the point array ``mechanism``, in extents of the free blocks: to be seen at once.
@@ -55,11 +56,9 @@ def part_of_friction(forces: np.ndarray, friction: np.ndarray) -> np.ndarray:
 
 def falling_in(response: solver.Response) -> np.ndarray:
     """(n_blocks,) bool array: blocks that have fallen by the last equilibrium, or that the collapse takes."""
-    last, begins = response.path[-1], with_mechanism(response)
+    last, begins = response.path[-1], losing(response)
     falls = last.fallen & ~last.removed
-    if begins is not None and response.collapse is not None and response.collapse.lost == "equilibrium":
-        falls = falls | (mechanics.rigid_parts(response.assembly, begins) >= 0)
-    return falls
+    return falls if begins is None else falls | (mechanics.rigid_parts(response.assembly, begins) >= 0)
 
 
 def at_last_equilibrium(response: solver.Response) -> solver.Increment:
