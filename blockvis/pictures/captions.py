@@ -276,10 +276,11 @@ def _state(response: solver.Response, increment: solver.Increment) -> str:
             return "no equilibrium: the mechanism, followed to first order and out of scale"
         return "no equilibrium: the mechanism followed step by step"
     if response.limits:
-        lowest = len(response.path) > 1 and not response.parameter.is_path and _decides(response, increment)
+        lowest, several = response.governing, len(response.path) > 1 and not response.parameter.is_path
+        decides = several and lowest is not None and lowest.parameter == increment.parameter
         state = "limit state" if np.isfinite(increment.measured) else "equilibrium under the dead load"
         words = f"{state}, {response.limits[0].flow} friction"
-        return words + (f"   ·   the lowest of {len(response.path)} positions" if lowest else "")
+        return words + (f"   ·   the lowest of {len(response.path)} positions" if decides else "")
     last = response.path[-1]
     if (increment.phase, increment.parameter) == (last.phase, last.parameter):
         if response.stop == solver.Status.COLLAPSED:
@@ -287,8 +288,3 @@ def _state(response: solver.Response, increment: solver.Increment) -> str:
         if response.stop == solver.Status.SOLVER_FAILED:
             return "last equilibrium found before the solver failed"
     return "equilibrium"
-
-
-def _decides(response: solver.Response, increment: solver.Increment) -> bool:
-    lowest = response.governing
-    return lowest is not None and lowest.parameter == increment.parameter

@@ -341,7 +341,9 @@ class Drawer:
             dots = self._draw_joints(increment, shown)
             self._draw_forces(increment, shown)
             self._draw_bearings(shown)
-            self._draw_settlement(increment, shown)
+            if self.response.settlements:
+                seen = self.scene.frame if self._flat else None
+                self._draw_arrows("arrow", *self._settlement_arrows(increment, shown, seen), palette.SETTLEMENT)
             self._draw_live_load(increment, shown, dots)
             if self.response.loads.fills:
                 self.scene.backfill(fill_bodies(self.response, shown, increment.fallen))
@@ -651,11 +653,6 @@ class Drawer:
             back = clear * at_dot[:, None] * along
             tails, tips = tails - back, tips - back
         self._draw_arrows("live", tails, tips, palette.LIVE)
-
-    def _draw_settlement(self, increment: solver.Increment, shown: solver.Pose) -> None:
-        if self.response.settlements:
-            seen = self.scene.frame if self._flat else None
-            self._draw_arrows("arrow", *self._settlement_arrows(increment, shown, seen), palette.SETTLEMENT)
 
     def _draw_arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
         self._along_arrows[layer] = _along(tails, tips)

@@ -83,7 +83,7 @@ def _open_for_writing(path: Path) -> None:
 
 def _write_pictures(frames: Iterable[Image.Image], folder: Path) -> Path:
     """Write frames as pictures into a folder of their own, all or none; those of a film before go."""
-    if folder.exists() and not (folder.is_dir() and all(map(_is_frame, folder.iterdir()))):
+    if folder.exists() and not (folder.is_dir() and all(path.match("frame_*.png") for path in folder.iterdir())):
         raise ValueError(f"'{folder}' holds what is no frame of a film; choose another name for the folder of pictures")
     partial = partial_of(folder)
     shutil.rmtree(partial, ignore_errors=True)
@@ -96,10 +96,6 @@ def _write_pictures(frames: Iterable[Image.Image], folder: Path) -> Path:
     finally:
         shutil.rmtree(partial, ignore_errors=True)
     return folder
-
-
-def _is_frame(path: Path) -> bool:
-    return path.name.startswith("frame_") and path.suffix == ".png"
 
 
 def find_encoder() -> str:

@@ -70,12 +70,10 @@ def refuse_ties(case: Case) -> None:
             raise ValueError(
                 f'{who}: increments = "{case.controls.increments}" knows no ties; leave increments out, or [[ties]]'
             )
-        if tie.phase > max(len(case.settlements), 1):
+        count = len(case.settlements)
+        if tie.phase > max(count, 1):
+            there = "is one settlement" if count == 1 else f"are {count} settlements"
             raise ValueError(
-                f"{who}: phase is {tie.phase}, and there {_are(len(case.settlements))}; give the settlement, counted "
-                "from 1, before which it is installed"
+                f"{who}: phase is {tie.phase}, and there {there}; give the settlement, counted from 1, before which it "
+                "is installed"
             )
-
-
-def _are(settlements: int) -> str:
-    return "is one settlement" if settlements == 1 else f"are {settlements} settlements"

@@ -176,7 +176,8 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
     if not parameters and not imperfections:
         raise ValueError(f"{where}nothing is varied; give [parameters] or [[imperfections]]")
     # Paths of parameters count those of the case.
-    scattered = [*_as_list(values.get("imperfections", [])), *imperfections]
+    own = values.get("imperfections", [])
+    scattered = [*(own if isinstance(own, list | tuple) else [own]), *imperfections]
     if scattered:
         values["imperfections"] = scattered
     method = asked["method"]
@@ -332,10 +333,6 @@ def _imperfections(top: Table) -> list[dict[str, Any]]:
         read_imperfection(table, keys.IMPERFECTIONS)
         found.append(dict(table.values))
     return found
-
-
-def _as_list(given: Any) -> list[Any]:
-    return list(given) if isinstance(given, (list, tuple)) else [given]
 
 
 def _sorted(part: Any) -> Any:
