@@ -9,7 +9,7 @@ from pathlib import Path
 import solver
 from blockvis.system.atomic_files import write_atomic
 
-from .npz import packed, unpacked
+from .npz import packed, read_stored
 
 #: File of them, of a run whose case was made or changed in Python.
 GIVEN = "laws_and_loads.npz"
@@ -46,10 +46,7 @@ def with_given(folder: Path, response: solver.Response) -> solver.Response:
         missing = "laws, loads and changes; friction 0.6 and self-weight are taken for them"
         warnings.warn(f"'{folder}' was written from Python and does not hold its {missing}", stacklevel=3)
         return response
-    try:
-        given = unpacked(file.read_bytes(), _Given)[0]
-    except ValueError as error:
-        raise ValueError(f"'{file}' cannot be read ({error}); run the case again") from None
+    given = read_stored(file, _Given)
     if given.scatters:
         missing = "scatter of friction from joint to joint; the friction of its laws is taken for all joints"
         warnings.warn(f"'{folder}' was written from Python and does not hold the {missing}", stacklevel=3)

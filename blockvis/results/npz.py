@@ -9,6 +9,7 @@ import math
 import zipfile
 import zlib
 from collections.abc import Mapping
+from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -48,6 +49,14 @@ def unpacked(data: bytes, kind: type[T]) -> tuple[T, dict[str, Any]]:
         return _built(tree["value"], kind, arrays), dict(tree["extra"])
     except (KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"no stored {kind.__name__}: {error}") from None
+
+
+def read_stored(file: Path, kind: type[T]) -> T:
+    """Read a dataclass of the given kind from its file; raises ``ValueError`` for one that no run has written."""
+    try:
+        return unpacked(file.read_bytes(), kind)[0]
+    except ValueError as error:
+        raise ValueError(f"'{file}' cannot be read ({error}); run the case again") from None
 
 
 def size_of(value: Any) -> int:

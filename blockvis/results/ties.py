@@ -14,8 +14,8 @@ from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text
 from solver import mechanics
 
-from .about import in_phase, unit_in
-from .npz import packed, unpacked
+from .about import certified, in_phase, unit_in
+from .npz import packed, read_stored
 from .tables import own_columns
 
 #: File of the ties of a results folder, which is there where it has any.
@@ -54,12 +54,8 @@ def stored_ties(folder: Path, increments: Sequence[solver.Increment] = ()) -> tu
 
     Raises ``ValueError`` for a file that no run has written, and where increments have other ties than the file.
     """
-    file, ties = folder / TIES, tuple[solver.Tie, ...]()
-    try:
-        if file.is_file():
-            ties = unpacked(file.read_bytes(), _Members)[0].ties
-    except ValueError as error:
-        raise ValueError(f"'{file}' cannot be read ({error}); run the case again") from None
+    file = folder / TIES
+    ties = read_stored(file, _Members).ties if file.is_file() else ()
     told = len(increments[-1].ties.forces) if increments else 0
     if told not in (0, len(ties)):
         what = "is missing" if not file.is_file() else f"has {len(ties)}"
@@ -110,55 +106,52 @@ class TieCourse:
 
 
 class TieCourses:
-    """The courses of ties over the increments in equilibrium so far."""
+    """The courses of ties over the increments in equilibrium so far: one per tie, none before the first increment."""
 
     def __init__(self, ties: Sequence[solver.Tie]) -> None:
         self.ties = tuple(ties)
-        self._found: list[TieCourse] = []
+        self.courses: tuple[TieCourse, ...] = ()
 
     def add(self, increment: solver.Increment) -> None:
         """Take an increment into account."""
         if not self.ties or increment.status != solver.Status.EQUILIBRIUM:
             return
         found, at, phase = increment.ties, float(increment.parameter), increment.phase + 1
-        largest = float(np.abs(increment.forces).max(initial=0.0))
-        if not self._found:
-            self._found = [TieCourse(tie.name, tie.kind, 0.0, at, phase) for tie in self.ties]
-        for k, (before, force, state) in enumerate(zip(self._found, found.forces, found.states, strict=True)):
-            tie = self.ties[k]
-            if state == mechanics.BROKEN and before.breaks_at is None:
-                # It has carried its strength since the last increment.
-                force = -tie.strength if tie.kind == mechanics.PROP else tie.strength
-            elif abs(force) < NEGLIGIBLE * largest:
-                force = 0.0
-            # A tie that yields has carried the same, up to rounding, since it began to.
-            larger = abs(force) - abs(before.largest_force) > NEGLIGIBLE * largest
-            # One that never carries is told where it begins to be there.
-            here = larger or (before.last_state == STATE_WORDS[mechanics.ABSENT] and state != mechanics.ABSENT)
-            found_here: dict[str, Any] = {}
-            if larger:
-                found_here["largest_force"] = float(force)
-            if here:
-                found_here |= {"largest_force_at": at, "phase": phase}
-            for word, when in (("yields", mechanics.YIELDING), ("breaks", mechanics.BROKEN)):
-                if state == when and getattr(before, f"{word}_at") is None:
-                    found_here |= {f"{word}_at": at, f"{word}_in_phase": phase}
-            last = 0.0 if state == mechanics.BROKEN else float(force)
-            self._found[k] = replace(before, **found_here, last_force=last, last_state=STATE_WORDS[state])
+        least = NEGLIGIBLE * float(np.abs(increment.forces).max(initial=0.0))
+        courses = self.courses or [TieCourse(tie.name, tie.kind, 0.0, at, phase) for tie in self.ties]
+        self.courses = tuple(
+            _after(before, tie, float(force), int(state), at, phase, least)
+            for before, tie, force, state in zip(courses, self.ties, found.forces, found.states, strict=True)
+        )
 
-    @property
-    def courses(self) -> tuple[TieCourse, ...]:
-        """One per tie; empty before the first increment."""
-        return tuple(self._found)
+
+def _after(
+    before: TieCourse, tie: solver.Tie, force: float, state: int, at: float, phase: int, least: float
+) -> TieCourse:
+    """Take a force [N], above the least that is no rounding, and a state of a tie at a settlement into account."""
+    if state == mechanics.BROKEN and before.breaks_at is None:
+        # It has carried its strength since the last increment.
+        force = -tie.strength if tie.kind == mechanics.PROP else tie.strength
+    elif abs(force) < least:
+        force = 0.0
+    found: dict[str, Any] = {}
+    # A tie that yields has carried the same, up to rounding, since it began to.
+    if larger := abs(force) - abs(before.largest_force) > least:
+        found["largest_force"] = float(force)
+    # One that never carries is told where it begins to be there.
+    if larger or (before.last_state == STATE_WORDS[mechanics.ABSENT] and state != mechanics.ABSENT):
+        found |= {"largest_force_at": at, "phase": phase}
+    for word, when in (("yields", mechanics.YIELDING), ("breaks", mechanics.BROKEN)):
+        if state == when and getattr(before, f"{word}_at") is None:
+            found |= {f"{word}_at": at, f"{word}_in_phase": phase}
+    last = 0.0 if state == mechanics.BROKEN else float(force)
+    return replace(before, **found, last_force=last, last_state=STATE_WORDS[state])
 
 
 def tie_courses(response: solver.Response) -> tuple[TieCourse, ...]:
     """Work out what each tie of a response does along its path, gone through once, or at the state that governs."""
-    courses, governing = TieCourses(response.ties), response.governing
-    if not response.parameter.is_path and governing is not None:
-        courses.add(governing)
-        return courses.courses
-    for increment in response.path if courses.ties else ():
+    courses = TieCourses(response.ties)
+    for increment in certified(response):
         courses.add(increment)
     return courses.courses
 
