@@ -140,10 +140,15 @@ def heights_over(plane: np.ndarray | None, points: np.ndarray) -> np.ndarray:
     return np.full(len(points), np.inf) if plane is None else np.asarray((points - plane[0]) @ plane[1])
 
 
+def _size(assembly: solver.Assembly) -> np.ndarray:
+    """(3,) array [m]: extents of the free blocks, or of all where there are none."""
+    corners = assembly.vertices[assembly.free[assembly.block_of_vertex]]
+    return np.asarray(np.ptp(corners if len(corners) else assembly.vertices, axis=0))
+
+
 def _above(assembly: solver.Assembly) -> float:
     """Degrees above the level from which a structure is seen by default."""
-    corners = assembly.vertices[assembly.free[assembly.block_of_vertex]]
-    size = np.ptp(corners if len(corners) else assembly.vertices, axis=0)
+    size = _size(assembly)
     return ABOVE_LOW if size[2] < LOW * min(size[:2]) else ABOVE
 
 
@@ -153,17 +158,14 @@ def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View]
     ``motion`` (n_blocks, 3) is that of the centroids in the mechanism, in any scale; three-quarter views are tried by
     default.
     """
-    assembly = response.assembly
-    corners = assembly.vertices[assembly.free[assembly.block_of_vertex]]
-    size = np.ptp(corners if len(corners) else assembly.vertices, axis=0)
-    weights = assembly.shapes.volumes * np.linalg.norm(motion, axis=1)
-    path = response.path
+    assembly, path = response.assembly, response.path
+    volumes, n = assembly.shapes.volumes, assembly.n_blocks
+    weights = volumes * np.linalg.norm(motion, axis=1)
     if path:
         # What supports do before counts like the mechanism.
         moved = path[-1].pose.positions - assembly.centroids
-        own = assembly.shapes.volumes * np.linalg.norm(moved, axis=1)
-        motion = _scaled(motion, weights) + _scaled(moved, own)
-        weights = assembly.shapes.volumes * np.linalg.norm(motion, axis=1)
+        motion = _scaled(motion, weights) + _scaled(moved, volumes * np.linalg.norm(moved, axis=1))
+        weights = volumes * np.linalg.norm(motion, axis=1)
     views = views or [View(around, _above(assembly)) for around in AROUND]
     if not weights.any():
         return views[0]
@@ -171,10 +173,9 @@ def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View]
     centre = weights @ assembly.centroids / weights.sum()
     states = path or response.increments
     lines = SightLines(assembly, states[-1 if path else 0].pose if states else solver.Pose.initial(assembly), weights)
-    volumes, n = assembly.shapes.volumes, assembly.n_blocks
     seen = [
         float((volumes * lines.seen(view.axes, n)) @ np.linalg.norm(motion @ view.axes[:2].T, axis=1) / weights.sum())
-        + IN_FRONT * float(view.depth((centre - middle)[None])[0]) / float(size.max())
+        + IN_FRONT * float(view.depth((centre - middle)[None])[0]) / float(_size(assembly).max())
         - FROM_THE_FRONT * float(view.axes[2, 1])
         for view in views
     ]

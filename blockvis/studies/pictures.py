@@ -14,7 +14,6 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-import solver
 from blockvis.pictures import palette
 from blockvis.pictures.figures import plain_text
 from blockvis.pictures.frame import Frame, frame_around
@@ -29,7 +28,7 @@ from .fragility import CONFIDENCE, Fragility, fragility_of
 from .sensitivity import Swing, first_order, outcome, stood_as_far, swings
 from .study_file import Study
 from .study_folder import NO_RESULT, StudyFolder
-from .summary import classes_of, curve_name, independent_rows, is_sample, is_single
+from .summary import classes_of, curve_name, ends_counted, independent_rows, is_sample, is_single
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -311,14 +310,11 @@ def _axis_end(curve: Fragility) -> float:
 
 def runs_counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:
     """Count the runs, rows that the curve is made of, by how they ended: the title of the fragility curve."""
-    status = table["status"]
-    collapsed = status == str(solver.Status.COLLAPSED)
-    local = int((collapsed & (table["falling_share"] < LOCAL)).sum())
+    collapsed, local, never = ends_counted(table).values()
     words = [
-        f"{counted(curve.n_runs, 'run')}",
-        f"{int(collapsed.sum())} collapsed" + f" ({local} of a few blocks only)" * (local > 0),
+        counted(curve.n_runs, "run"),
+        f"{collapsed} collapsed" + f" ({local} of a few blocks only)" * (local > 0),
     ]
-    never = int((status == str(solver.Status.NO_INITIAL_EQUILIBRIUM)).sum())
     if never:
         words.append(f"{never} never stood")
     if curve.n_stood:

@@ -62,17 +62,13 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     """Summarise a study by its table, for its summary.json; lengths in m, angles in rad."""
     curve = fragility_of(independent_rows(study, table))
     units = [u for u in table["unit"].unique().tolist() if u]
-    failed = table[table["status"].isin(NO_RESULT)]
-    collapsed = table["status"] == str(solver.Status.COLLAPSED)
     return {
         "n_runs": study.n_runs,
         "n_finished": len(table),
-        "n_collapsed": int(collapsed.sum()),
-        "n_local": int((collapsed & (table["falling_share"] < LOCAL)).sum()),
-        "n_never_stood": int((table["status"] == str(solver.Status.NO_INITIAL_EQUILIBRIUM)).sum()),
+        **ends_counted(table),
         "n_stood": curve.n_stood,
-        "n_without_result": len(failed),
-        "reasons": _reasons(failed["message"].tolist()),
+        "n_without_result": int(table["status"].isin(NO_RESULT).sum()),
+        "reasons": _reasons(table.loc[table["status"].isin(NO_RESULT), "message"].tolist()),
         "status": {str(k): int(v) for k, v in table["status"].value_counts().items()},
         "curve": curve_name(study),
         "parameter": study.parameters[0].name if len(study.parameters) == 1 else "",
@@ -93,6 +89,16 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
         "mechanism_classes": classes_of(table),
         "line": _line(study.parameters[0].name, table) if is_single(study) else [],
         "run_seconds": float(np.nansum(table["seconds"].to_numpy(dtype=float))),
+    }
+
+
+def ends_counted(table: pd.DataFrame) -> dict[str, int]:
+    """Count the runs that collapsed, those of them of a few blocks only, and those that never stood."""
+    collapsed = table["status"] == str(solver.Status.COLLAPSED)
+    return {
+        "n_collapsed": int(collapsed.sum()),
+        "n_local": int((collapsed & (table["falling_share"] < LOCAL)).sum()),
+        "n_never_stood": int((table["status"] == str(solver.Status.NO_INITIAL_EQUILIBRIUM)).sum()),
     }
 
 
