@@ -104,7 +104,7 @@ def draw_curve(
     else:
         figure = Figure(figsize=(size[0], 1.5 * size[1]), layout="constrained")
         axes, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.2))
-    _draw(axes, response, events=True, band=band)
+    _Plot(axes, response, words=True).draw(band)
     if ties is not None:
         _draw_ties(below, response, ties)
         axes.set_xlabel("")
@@ -126,7 +126,7 @@ class CurvePanel:
         figure = Figure(figsize=(size[0] / 100.0, size[1] / 100.0), dpi=100, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        _draw(axes, response, events=False, text=text * 0.62)
+        _Plot(axes, response, words=False, text=text * 0.62).draw()
         canvas.draw()
         self._picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
         per_length, _ = parameter_unit(response)
@@ -160,17 +160,10 @@ class CurvePanel:
         return picture
 
 
-def _draw(
-    axes: Axes, response: solver.Response, *, events: bool, text: float = TEXT, band: ReactionRange | None = None
-) -> None:
-    """Draw the curve of a response, with words at its events where it is a file of its own."""
-    _Plot(axes, response, events, text).draw(band)
-
-
 class _Plot:
     """A curve on axes, marked larger and with words where it is a file of its own, in letters so high [points]."""
 
-    def __init__(self, axes: Axes, response: solver.Response, words: bool, text: float) -> None:
+    def __init__(self, axes: Axes, response: solver.Response, words: bool, text: float = TEXT) -> None:
         self.axes, self.response, self.words, self.text = axes, response, words, text
         self.factor, _ = force_unit(response)
         self.per_length, _ = parameter_unit(response)
@@ -178,7 +171,7 @@ class _Plot:
         self.total, self.values = response.parameters * self.per_length, response.values / self.factor
         self.known = self.values[np.isfinite(self.values)]
 
-    def draw(self, band: ReactionRange | None) -> None:
+    def draw(self, band: ReactionRange | None = None) -> None:
         """Draw it all, over the range of the reaction where that is known."""
         axes, response, text, known = self.axes, self.response, self.text, self.known
         axes.set_ylabel(value_label(response), fontsize=text)

@@ -33,7 +33,35 @@ def draw_inspection(
     The file is .png, .svg or .pdf. ``ground`` are supports beside the blocks of the drawing, with their roles,
     ``falling`` the numbers of blocks that do not stand.
     """
-    return draw_contents(_contents(inspection, ground, set(falling)), path)
+    layout, kept = inspection.layout, inspection.kept.tolist()
+    deep = [pair for pair in inspection.overlapping if pair[2] > inspection.overlap_tolerance]
+    sorted_out: dict[int, str] = dict.fromkeys((k for pair in inspection.twins for k in pair), "twice")
+    sorted_out |= dict.fromkeys(falling, "falls") | dict.fromkeys((k for pair in deep for k in pair[:2]), "overlap")
+    wrong = tuple(kept[k] for k in no_blocks(inspection.facing.solids)) if inspection.refused else ()
+    sorted_out |= dict.fromkeys(wrong, "refused")
+    walls = walls_to_fill(layout)
+    own = {k: sorted_out.get(k) or inspection.roles[k] for k in kept}
+    kinds = _kinds(own, "opening, or block" if walls else "free")
+    # What lies in an outline without stones is an opening: no ground goes under it.
+    if ground is not None and not walls:
+        kinds += _kinds_of_ground(ground, layout.n_blocks)
+        layout = layout.with_more(ground.blocks, names=ground.names, roles=ground.roles)
+    middles = [_overlap(layout, i, j) for i, j, _ in deep[:MOST_NAMED]]
+    crossings = crossings_left_out(layout) if layout.dimension == 2 else np.zeros((0, 3))
+    counted = (("deepest overlaps", len(middles)), ("crosses itself", len(crossings)))
+    in_space = " in space" if layout.dimension == 3 else ""
+    contents = Contents(
+        layout=layout,
+        title=f"{_name(layout)}: {mechanics.counted(len(kept), 'block')}{in_space}, read in {layout.unit}",
+        findings=(*_findings(inspection, deep), *walls.values()),
+        kinds=tuple(kinds),
+        named=tuple(kept),
+        marked=wrong[:MOST_NAMED],
+        rings=np.concatenate([np.array(middles).reshape(-1, layout.dimension), crossings]),
+        rings_are=", ".join(f"{what}: {n}" for what, n in counted if n),
+        joints=inspection.joints,
+    )
+    return draw_contents(contents, path)
 
 
 def draw_refusal(refused: Refused, path: str | Path) -> Path | None:
@@ -62,38 +90,6 @@ def draw_refusal(refused: Refused, path: str | Path) -> Path | None:
         unit=refused.unit,
     )
     return draw_contents(contents, path)
-
-
-def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) -> Contents:
-    """Sort the blocks of an inspection, and what is laid under them, into kinds; say what was found."""
-    layout, kept = inspection.layout, inspection.kept.tolist()
-    deep = [pair for pair in inspection.overlapping if pair[2] > inspection.overlap_tolerance]
-    sorted_out: dict[int, str] = dict.fromkeys((k for pair in inspection.twins for k in pair), "twice")
-    sorted_out |= dict.fromkeys(falling, "falls") | dict.fromkeys((k for pair in deep for k in pair[:2]), "overlap")
-    wrong = tuple(kept[k] for k in no_blocks(inspection.facing.solids)) if inspection.refused else ()
-    sorted_out |= dict.fromkeys(wrong, "refused")
-    walls = walls_to_fill(layout)
-    own = {k: sorted_out.get(k) or inspection.roles[k] for k in kept}
-    kinds = _kinds(own, "opening, or block" if walls else "free")
-    # What lies in an outline without stones is an opening: no ground goes under it.
-    if ground is not None and not walls:
-        kinds += _kinds_of_ground(ground, layout.n_blocks)
-        layout = layout.with_more(ground.blocks, names=ground.names, roles=ground.roles)
-    middles = [_overlap(layout, i, j) for i, j, _ in deep[:MOST_NAMED]]
-    crossings = crossings_left_out(layout) if layout.dimension == 2 else np.zeros((0, 3))
-    counted = (("deepest overlaps", len(middles)), ("crosses itself", len(crossings)))
-    in_space = " in space" if layout.dimension == 3 else ""
-    return Contents(
-        layout=layout,
-        title=f"{_name(layout)}: {mechanics.counted(len(kept), 'block')}{in_space}, read in {layout.unit}",
-        findings=(*_findings(inspection, deep), *walls.values()),
-        kinds=tuple(kinds),
-        named=tuple(kept),
-        marked=wrong[:MOST_NAMED],
-        rings=np.concatenate([np.array(middles).reshape(-1, layout.dimension), crossings]),
-        rings_are=", ".join(f"{what}: {n}" for what, n in counted if n),
-        joints=inspection.joints,
-    )
 
 
 def _kinds(own: Mapping[int, str], free: str) -> list[Kind]:

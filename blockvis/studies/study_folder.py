@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import time
@@ -60,7 +61,7 @@ class StudyFolder:
         self.folder, self.study = Path(folder), study
         self.rows: dict[int, dict[str, Any]] = {}
         # Number of the run whose shape represents each class of mechanism, by the file of the shape.
-        self._first: dict[Path, int | None] = {}
+        self._first: dict[Path, int] = {}
         self._whole = True
         record, definition = self.folder / "study.json", study.definition()
         if self.folder.exists() and not self.folder.is_dir():
@@ -124,10 +125,10 @@ class StudyFolder:
 
     def _add_shape(self, row: Mapping[str, Any], shape: bytes) -> None:
         file = self.shape_file(row["mechanism_class"])
-        if file not in self._first:
-            self._first[file] = _first_run(file)
-        first = self._first[file]
-        if first is None or row["run"] < first:
+        if file not in self._first and file.is_file():
+            with np.load(file) as stored:
+                self._first[file] = int(stored["run"])
+        if row["run"] < self._first.get(file, math.inf):
             self._first[file] = row["run"]
             write_atomic(file, shape)
 
@@ -205,13 +206,6 @@ def _rows(file: Path) -> tuple[dict[int, dict[str, Any]], bool]:
 def _plain(value: Any) -> Any:
     """Turn a list or table into text, because a column holds numbers or texts."""
     return json.dumps(value) if isinstance(value, (list, dict)) else value
-
-
-def _first_run(file: Path) -> int | None:
-    if not file.is_file():
-        return None
-    with np.load(file) as stored:
-        return int(stored["run"])
 
 
 def _json(value: Any) -> bytes:

@@ -15,7 +15,7 @@ from test_step_check import CASE, LIMIT_LOAD, SHORT, run_here
 import blockvis
 import solver
 from blockvis.cli import _say_range, main
-from blockvis.pictures.curves import _draw
+from blockvis.pictures.curves import _Plot
 from blockvis.results.folder import stored_assembly
 from blockvis.results.reaction_range import ReactionRange, stored_range
 from blockvis.runs import path_range
@@ -153,7 +153,7 @@ def test_the_band_of_a_later_phase_lies_behind_those_before():
     total, _, _ = band.along(response)
     assert total[-1] == pytest.approx(0.1)
     axes = Figure().add_subplot()
-    _draw(axes, response, events=True, band=band)
+    _Plot(axes, response, words=True).draw(band)
     (drawn,) = axes.collections
     assert drawn.get_paths()[0].get_extents().x1 == pytest.approx(100.0)
     assert axes.get_ylim()[1] > drawn.get_paths()[0].get_extents().y1
@@ -168,7 +168,7 @@ def test_words_of_a_collapse_lie_where_other_runs_leave_room():
     band = ReactionRange(np.zeros(2, dtype=int), np.array([0.0, 0.45]), reaction, reaction, np.array([9, 2]))
     figure = Figure()
     axes = figure.add_subplot()
-    _draw(axes, arch_response(), events=True, band=band)
+    _Plot(axes, arch_response(), words=True).draw(band)
     figure.draw_without_rendering()
     (words,) = [text for text in axes.texts if "collapse" in text.get_text()]
     assert words.get_window_extent().x0 > axes.bbox.x0
