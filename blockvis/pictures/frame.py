@@ -119,7 +119,8 @@ class Sheet:
         self._legend(draw, keys, places, end + 2 * self.pad)
         if self.colour_bar is not None:
             self._colour_bar(page, draw, self.colour_bar)
-        self._detail(draw, detail)
+        font = fitting_font(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
+        draw.text((self.pad, self.pad + 2.15 * self.text), detail, palette.FAINT, font, anchor="lm")
         if badge:
             self._badge(draw, badge)
         return page
@@ -128,10 +129,6 @@ class Sheet:
         room = (self._badge_box(badge)[0] if badge else self.size[0]) - 2 * self.pad
         font = fitting_font(title, round(1.15 * self.text), room, bold=True)
         draw.text((self.pad, self.pad + 0.72 * self.text), title, palette.INK, font, anchor="lm")
-
-    def _detail(self, draw: ImageDraw.ImageDraw, detail: str) -> None:
-        font = fitting_font(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
-        draw.text((self.pad, self.pad + 2.15 * self.text), detail, palette.FAINT, font, anchor="lm")
 
     def _badge(self, draw: ImageDraw.ImageDraw, badge: str) -> None:
         box, half = self._badge_box(badge), 0.75 * self.text

@@ -44,7 +44,8 @@ def draw_inspection(
     kinds = _kinds(own, "opening, or block" if walls else "free")
     # What lies in an outline without stones is an opening: no ground goes under it.
     if ground is not None and not walls:
-        kinds += _kinds_of_ground(ground, layout.n_blocks)
+        laid = _kinds(dict(enumerate(ground.roles, start=layout.n_blocks)), "free")
+        kinds += [replace(kind, label=f"ground of blockvis new, {kind.label}") for kind in laid]
         layout = layout.with_more(ground.blocks, names=ground.names, roles=ground.roles)
     middles = [_overlap(layout, i, j) for i, j, _ in deep[:MOST_NAMED]]
     crossings = crossings_left_out(layout) if layout.dimension == 2 else np.zeros((0, 3))
@@ -105,12 +106,6 @@ def _kinds(own: Mapping[int, str], free: str) -> list[Kind]:
     }
     blocks = {key: tuple(k for k, what in own.items() if what == key) for key in looks}
     return [Kind(label, colour, blocks[key], hatch) for key, (label, colour, hatch) in looks.items() if blocks[key]]
-
-
-def _kinds_of_ground(ground: Layout, first: int) -> list[Kind]:
-    """List the kinds of blocks that would be laid as ground, numbered from the first."""
-    kinds = _kinds(dict(enumerate(ground.roles, start=first)), "free")
-    return [replace(kind, label=f"ground of blockvis new, {kind.label}") for kind in kinds]
 
 
 def _findings(inspection: Inspection, deep: Sequence[tuple[int, int, float]]) -> tuple[str, ...]:

@@ -65,14 +65,12 @@ class _Series(VTKPythonAlgorithmBase):
         time = about.Get(asked) if about.Has(asked) else self._times[0]
         number = int(np.abs(np.array(self._times) - time).argmin())
         together = vtkMultiBlockDataSet.GetData(about)
-        for k, (name, grid) in enumerate(self._grids(number).items()):
+        increment, falls = as_shown(self._response, self._response.path[number])
+        grids = grids_of(self._response.assembly, increment, self._response.ties, falls=falls)
+        for k, (name, grid) in enumerate(grids.items()):
             together.SetBlock(k, _without_strings(grid))
             together.GetMetaData(k).Set(vtkCompositeDataSet.NAME(), name)
         return 1
-
-    def _grids(self, number: int) -> dict[str, vtkUnstructuredGrid]:
-        increment, falls = as_shown(self._response, self._response.path[number])
-        return grids_of(self._response.assembly, increment, self._response.ties, falls=falls)
 
 
 def _without_strings(grid: vtkUnstructuredGrid) -> vtkUnstructuredGrid:

@@ -96,7 +96,9 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
             va="top", fontsize=0.9 * TEXT, color="#4a4a4a",
         )  # fmt: skip
     axes.set_ylim(0.0, 1.02)
-    axes.set_xlim(0.0, 1.03 * factor * max(_axis_end(curve), 1e-12))
+    # Where all runs collapsed nothing is to be seen beyond the last.
+    all_fell = curve.n_stood == 0 and len(curve.settlement) > 0
+    axes.set_xlim(0.0, 1.03 * factor * max(float(curve.settlement[-1]) if all_fell else curve.furthest, 1e-12))
     axes.set_xlabel(f"settlement of the support [{unit}]", fontsize=TEXT)
     axes.set_ylabel(curve_name(study), fontsize=TEXT)
     _plain_frame(axes)
@@ -299,13 +301,6 @@ def _frame(shapes: Sequence[dict[str, np.ndarray]]) -> Frame:
         inner += [shape["vertices"][free], shape["at_rest"][free]]
         outer += [shape["vertices"][~free]]
     return frame_around(np.concatenate(inner), np.concatenate(outer), MARGIN, SUPPORTS)
-
-
-def _axis_end(curve: Fragility) -> float:
-    """End of the axis [m or rad]: the last collapse if all runs collapsed, else the largest settlement of a run."""
-    if curve.n_stood == 0 and len(curve.settlement):
-        return float(curve.settlement[-1])
-    return curve.furthest
 
 
 def runs_counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:

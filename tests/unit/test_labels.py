@@ -282,9 +282,9 @@ def test_tiles_of_studies_hold_supports_and_their_arrow():
     place = shape["arrows"][0, 0]
     assert (support.min(axis=0) < place).all()
     assert (place < support.max(axis=0)).all()
-    low, high = pictures._frame([shape])
-    assert (low < shape["vertices"].min(axis=0)).all()
-    assert (shape["vertices"].max(axis=0) < high).all()
+    frame = pictures._frame([shape])
+    assert (frame.low < shape["vertices"].min(axis=0)).all()
+    assert (shape["vertices"].max(axis=0) < frame.high).all()
 
 
 def test_labels_lie_apart_and_tell_by_leaders_where_they_belong():
