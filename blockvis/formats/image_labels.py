@@ -45,8 +45,11 @@ WIDE = 3.0
 #: Pixels so near to the background may be of its border [pixels].
 BORDER = 3.0
 
-#: What of a mask is nowhere wider than this fraction of the image's smaller side is lines.
+#: Lines are nowhere wider than this fraction of the image's smaller side ...
 WIDEST_LINE = 0.02
+
+#: ... and so many times as long as wide where they enclose little: stones may be as narrow, and are not so long.
+LONG_LINE = 8.0
 
 #: Value that stands for what is transparent.
 TRANSPARENT = -1
@@ -101,7 +104,7 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
         raise ValueError(f"has no background {background!r}; its values are {', '.join(called[:8])}")
     mask = len(known) == 2
     outer: int | None
-    lines = 1 if found.is_of_lines else _lines_of_mask(numbers) if mask else None
+    lines = _lines_of_mask(numbers) if mask else None
     if wanted is not None:
         outer = known.index(wanted)
     elif lines is not None:
@@ -138,7 +141,6 @@ class _Found:
     colours: np.ndarray
     shown: np.ndarray
     pieces: np.ndarray
-    is_of_lines: bool = False
 
 
 def _filled(numbers: np.ndarray, found: _Found, outer: int | None, reach: float) -> tuple[np.ndarray, Any]:
@@ -170,7 +172,7 @@ def _opaque(image: Image.Image) -> tuple[np.ndarray, Image.Image]:
     if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
         drawn = image.convert("RGBA")
         seen, image = np.asarray(drawn)[..., 3] >= 128, image.convert("RGB")
-        if seen.any() and not _is_wide(seen):
+        if seen.any() and _are_lines(seen, ~seen):
             is_dark = np.median(np.asarray(image)[seen]) < 128
             paper = Image.new("RGBA", drawn.size, "white" if is_dark else "black")
             seen, image = np.ones_like(seen), Image.alpha_composite(paper, drawn).convert("RGB")
@@ -289,14 +291,14 @@ def _of_values(values: np.ndarray, image: Image.Image, wanted: int | None) -> _F
 
 
 def _lines_on_paper(shown: np.ndarray, flat: np.ndarray) -> _Found | None:
-    """Find lines on what is flat, which is paper; None where there are next to none. Shown are 1 or 3 channels."""
+    """Find lines, none of them flat, on what is flat, which is paper; None where what differs from it is no lines."""
     paper = np.median(shown[flat], axis=0)
     ink = np.abs(shown - paper).max(axis=2) > FLAT
-    if ink.mean() < THIN:
+    if not _are_lines(ink, ~ink):
         return None
     colours = np.stack([paper, np.median(shown[ink], axis=0)])
     values = [int(np.round(colour) @ [65536, 256, 1][-len(colour) :]) for colour in colours]
-    return _Found(ink.astype(np.int32), (values[0], values[1]), colours, shown, np.zeros((0, 0), dtype=int), True)
+    return _Found(ink.astype(np.int32), (values[0], values[1]), colours, shown, np.zeros((0, 0), dtype=int))
 
 
 def _half_covered(place: np.ndarray, label: np.ndarray, shown: np.ndarray) -> np.ndarray:
@@ -344,8 +346,7 @@ def _of_noise(image: Image.Image) -> _Found:
     if two is not None:
         away = np.stack([np.abs(rgb - one).max(axis=2) for one in two])
         numbers = np.where(away.min(axis=0) <= 3 * FLAT, away.argmin(axis=0), -1)
-        is_of_lines = bool(np.abs(colour - two[1]).max(axis=1).min() > 2 * FLAT)
-        return _Found(numbers, (0, 1), two, rgb, np.zeros((0, 0), dtype=int), is_of_lines)
+        return _Found(numbers, (0, 1), two, rgb, np.zeros((0, 0), dtype=int))
     alike = _alike_colours(colour, weight)
     order, piece = np.full((2, n + 1), -1, dtype=np.int32)
     order[large], piece[large] = alike, np.arange(1, len(large) + 1)
@@ -403,16 +404,29 @@ def _shades_of_paper(rgb: np.ndarray, colours: np.ndarray) -> bool:
 
 
 def _lines_of_mask(numbers: np.ndarray) -> int | None:
-    """Choose which of two values is that of lines: it is nowhere wide, and the other is; None where neither is so."""
-    wide = [_is_wide(numbers == k) for k in (0, 1)]
-    return wide.index(False) if sum(wide) == 1 else None
+    """Choose which of two values is that of lines; None where neither is so, or both are."""
+    lines = [_are_lines(numbers == k, numbers == 1 - k) for k in (0, 1)]
+    return lines.index(True) if sum(lines) == 1 else None
 
 
-def _is_wide(mask: np.ndarray) -> bool:
-    """Whether what a mask holds is anywhere wider than lines are."""
+def _are_lines(mask: np.ndarray, paper: np.ndarray) -> bool:
+    """Whether what a mask holds is lines: narrow, and more of the paper is enclosed than covered, or mostly long.
+
+    Small stones are as narrow as lines are. Both arrays are (height, width), of bools; some pixels may be in neither.
+    """
     from scipy import ndimage
 
-    return bool(ndimage.minimum_filter(mask, max(3, round(WIDEST_LINE * min(mask.shape)))).any())
+    # Nothing lies beyond the rim.
+    size = max(3, round(WIDEST_LINE * min(mask.shape)))
+    if not mask.any() or ndimage.minimum_filter(mask, size, mode="constant").any():
+        return False
+    sheets = np.bincount(ndimage.label(paper)[0].ravel())[1:]
+    if sheets.sum() - sheets.max(initial=0) > mask.sum():
+        return True
+    pieces, n = ndimage.label(mask)
+    areas = np.bincount(pieces.ravel())[1:]
+    widths = 2.0 * ndimage.maximum(ndimage.distance_transform_edt(mask), pieces, np.arange(1, n + 1)) - 1.0
+    return bool(areas[areas > LONG_LINE * widths**2].sum() > 0.5 * areas.sum())
 
 
 def _background_of_mask(numbers: np.ndarray) -> int:

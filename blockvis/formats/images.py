@@ -132,7 +132,9 @@ def _check_stones(path: Path, labels: Labels, regions: Regions, placement: Place
         why = "in a mask stones that touch are one; leave a joint of at least a pixel between them, or give each stone "
         why += "a value of its own"
         if labels.is_of_lines:
-            why = "lines on paper enclose no stone; close them"
+            size = regions.smallest * placement.pixel
+            why = f"lines on paper enclose no stone of {size:.3g} m across or more (smallest); close them, or, if they "
+            why += "are the stones, give the value of what is around them as background"
         raise ValueError(f"'{path}' shows one region of {regions.areas[0] * placement.pixel**2:.4g} m²: {why}")
     if labels.moved > MOST_MOVED * labels.numbers.size:
         share = f"{100.0 * labels.moved / labels.numbers.size:.2g} %"

@@ -305,6 +305,32 @@ def test_thick_outlines_of_stones_in_mortar_are_lines_too(tmp_path, form):
     assert any(note.startswith("a drawing of lines") for note in layout.notes)
 
 
+@pytest.mark.parametrize("form", ["png", "jpg", "transparent"])
+@pytest.mark.parametrize("stone", [255, 0])
+def test_stones_may_be_as_narrow_as_lines_are(tmp_path, form, stone):
+    """A facade of many courses, or a slender arch, with a margin: what is around is in one piece, and wide."""
+    wall, arch = (Image.new("L", (400, 400), 255 - stone) for _ in range(2))
+    draw, n = ImageDraw.Draw(wall), 0
+    for course, y in enumerate(range(30, 361, 9)):
+        for x in range(30, 340, 20):
+            hole = 100 < x < 200 and 100 < y < 200
+            n += not hole
+            draw.rectangle(
+                (x + 9 * (course % 2), y, x + 9 * (course % 2) + 16, y + 6), fill=255 - stone if hole else stone
+            )
+    y, x = np.mgrid[:400, :400]
+    ring, turn = np.abs(np.hypot(x - 200, y - 380) - 160.0) < 3.5, np.degrees(np.arctan2(380 - y, x - 200))
+    arch.paste(stone, mask=Image.fromarray(ring & (turn > 0.0) & (turn % 10.0 > 1.0)))
+    for image, stones in ((wall, n), (arch, 18)):
+        if form == "transparent":
+            image.putalpha(image.point(lambda value: 255 * (value == stone)))
+        path = tmp_path / ("a.jpg" if form == "jpg" else "a.png")
+        image.save(path)
+        layout = read_layout(path, width=4.0)
+        assert layout.n_blocks == stones
+        assert not any("lines" in note for note in layout.notes)
+
+
 def test_specks_go_to_what_is_around_them_and_are_told(tmp_path, capsys):
     image, n = drawn_wall()
     draw = ImageDraw.Draw(image)
@@ -436,11 +462,11 @@ def test_charts_and_shaded_drawings_are_refused_unless_their_specks_are_said(tmp
     pixels[::5, ::5] = (250, 9, 9)
     page.paste((255, 255, 255), (0, 0, 300, 160))
     page.paste((254, 254, 253), (20, 20, 280, 140))
-    ImageDraw.Draw(page).rectangle((50, 50, 90, 90), outline=(90, 80, 200))
+    ImageDraw.Draw(page).line([(50, 50), (90, 50), (90, 90), (50, 90), (50, 60)], fill=(90, 80, 200))
     says = {
         "28 of its 56 regions hold": letters,
         "specks beside": Image.fromarray(pixels),
-        "shows one region of 3.12 m²": page,
+        "lines on paper enclose no stone of 0.109 m across or more (smallest); close them, or": page,
     }
     for word, image in says.items():
         image.save(tmp_path / "chart.png")
@@ -448,6 +474,10 @@ def test_charts_and_shaded_drawings_are_refused_unless_their_specks_are_said(tmp
         assert (code, word in error, error.count("\n")) == (2, True, 1), error
     letters.save(tmp_path / "chart.png")
     assert read_layout(tmp_path / "chart.png", width=3.0, smallest=0.1).n_blocks == n
+    ImageDraw.Draw(page).line([(50, 60), (50, 50)], fill=(90, 80, 200))
+    page.save(tmp_path / "sheet.png")
+    layout = read_layout(tmp_path / "sheet.png", width=3.0)
+    assert (layout.n_blocks, len(layout.left_out)) == (1, 1)
 
 
 def test_of_a_drawing_of_lines_the_largest_regions_may_be_openings(tmp_path):
