@@ -14,15 +14,16 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.notes import LEFT_OUT, Note
+from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
 from blockvis.layout.outlines import is_flat, spread_of
 from blockvis.layout.solids import BASE_FRAME, Solid, area_vectors, fans, prism, triangles_of
 from blockvis.system.extras import MissingExtra
+from blockvis.text import listed
 from solver import mechanics
 from solver.mechanics import counted
 
 from . import dae
-from .bodies import Bodies, Body, drawn_row
+from .bodies import Bodies, Body, drawn_row, with_role
 from .cells import layout_of_cells, merged
 from .closed_surfaces import OpenSurface, enclosed
 from .reading import Reading, json_object
@@ -82,31 +83,46 @@ def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> tu
 
 @dataclass
 class _Object:
-    """Faces of an object of an .obj file, by the numbers of their points, and their groups and materials."""
+    """Faces of an object of an .obj file, by the numbers of their points.
+
+    ``words`` are those of their groups and materials by "g" and "usemtl", of which those in ``own`` are said for it.
+    """
 
     faces: list[list[int]] = field(default_factory=list)
-    groups: set[str] = field(default_factory=set)
-    materials: set[str] = field(default_factory=set)
+    words: dict[str, set[str]] = field(default_factory=lambda: {"g": set(), "usemtl": set()})
+    own: set[str] = field(default_factory=set)
+
+    def inherited(self, key: str) -> set[str]:
+        """Words that hold still, as those said before other objects do in the format."""
+        return set() if key in self.own else self.words[key] - {""}
+
+    def roles(self, key: str) -> set[str]:
+        """Words of others that are roles, which it does not take over: it would be fixed by its place in the file."""
+        return {word for word in self.inherited(key) if with_role({"name": word}).get("role")}
 
     def row(self, name: str, named_by: str) -> dict[str, Any]:
         """Say its group, which it has if all its faces are in one, and does not name it; and its material."""
-        return drawn_row(name, [*self.groups] if len(self.groups) == 1 and named_by == "o" else (), self.materials)
+        groups, materials = (words - self.roles(key) for key, words in self.words.items())
+        return drawn_row(name, [*groups] if len(groups) == 1 and named_by == "o" else (), materials)
 
 
 def _obj(path: Path) -> dae.Drawn:
     """Read the objects of an .obj file, or, where it has none, its groups, or else its materials, in their order."""
     text = _obj_text(path)
-    there = {*re.findall(r"^[ \t]*(o|g|usemtl)[ \t]", text, re.MULTILINE)}
+    there = re.findall(r"^[ \t]*(o|g|usemtl)[ \t]", text, re.MULTILINE)
     word = next((word for word in _WORDS if word in there), "o")
     said, points, objects = dict.fromkeys(_WORDS, ""), list[list[float]](), dict[str, _Object]()
-    since_face = set[str]()
+    # What is said once, before the first object, is said for all.
+    of_all = {key for key in there[: there.index(word)] if there.count(key) == 1} if there else set[str]()
+    since_name, since_face = set[str](), set[str]()
     for line in text.split("\n"):
         first, *rest = line.split() or [""]
         try:
             if first in _WORDS:
-                if first == "o":
-                    # An object without words of its own has not those of the faces before it.
-                    said = {key: words if key in since_face else "" for key, words in said.items()}
+                if first == word:
+                    # Some programs write group and material above the object.
+                    since_name = of_all | since_face
+                since_name.add(first)
                 since_face.add(first)
                 # SketchUp puts a number before the names of a group and of those around it, and "Model" behind.
                 said[first] = re.sub(r"^Mesh\d+ (.+) Model$", r"\1", " ".join(rest))
@@ -118,8 +134,9 @@ def _obj(path: Path) -> dae.Drawn:
                 one = objects.setdefault(said[word] or path.name, _Object())
                 # Negative numbers count back from the last point before the line.
                 one.faces.append([k - 1 if k > 0 else len(points) + k for k in numbers])
-                one.groups.add(said["g"])
-                one.materials.add(said["usemtl"])
+                one.own |= since_name
+                for key, words in one.words.items():
+                    words.add(said[key])
                 since_face.clear()
         except ValueError:
             raise ValueError(f"'{path}' cannot be read as .obj ('{line.strip()[:60]}'); export it again") from None
@@ -136,7 +153,23 @@ def _obj(path: Path) -> dae.Drawn:
     rows = _own_rows(path)
     if word == "o" and _distinct(rows) == [part.name for part in parts]:
         parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
-    return dae.Drawn(parts, grouped=word != "o")
+    return dae.Drawn(parts, grouped=word != "o", notes=_inherited(objects))
+
+
+def _inherited(objects: dict[str, _Object]) -> list[Any]:
+    """Say which objects of an .obj file have the group or material that is said for another, or lack its role."""
+    notes = list[Any]()
+    for key, what in (("g", "group"), ("usemtl", "material")):
+        inherit = {name: one for name, one in objects.items() if one.inherited(key)}
+        free = [f"'{name}' ('{max(one.roles(key))}')" for name, one in inherit.items() if one.roles(key)]
+        have = [f"'{name}' ('{max(one.inherited(key))}')" for name, one in inherit.items() if not one.roles(key)]
+        said = f"of {counted(len(objects), 'object')} without a {what} of their own ({key})"
+        if free:
+            text = f"{len(free)} {said} have not the role that is said for one before: {listed(free)}"
+            notes.append(Note(CHANGED, f"{text}; [roles] can say otherwise"))
+        if have:
+            notes.append(f"{len(have)} {said} have that of one before: {listed(have)}")
+    return notes
 
 
 def _obj_text(path: Path) -> str:

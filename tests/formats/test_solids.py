@@ -326,13 +326,38 @@ def test_groups_and_materials_of_an_obj_file_say_roles(tmp_path, lines, names):
 
 
 @pytest.mark.parametrize("said", ["usemtl fixed", "g fixed"])
-def test_an_object_has_no_group_or_material_of_the_one_before(tmp_path, said):
+def test_an_object_has_no_role_of_the_one_before(tmp_path, said):
     """Blender writes none of what has none; fixed or free it was by the order of the objects."""
     lintel, pier = ("o lintel", 3), (f"o pier\n{said}", 2)
     for objects in ((lintel, pier), (pier, lintel)):
         found = read_layout(wavefront(tmp_path / "a.obj", *objects), dimension=3)
         assert dict(zip(found.names, found.roles, strict=True)) == {"pier": "fixed", "lintel": ""}
         assert found.groups[found.names.index("lintel")] == ""
+        told = [note for note in found.notes if note.startswith("1 of 2 objects without a ")]
+        assert len(told) == (objects[0] == pier)
+        assert all(
+            "have not the role that is said for one before: 'lintel' ('fixed'); [roles]" in note for note in told
+        )
+
+
+@pytest.mark.parametrize(("key", "what"), [("usemtl", "materials"), ("g", "groups")])
+@pytest.mark.parametrize("last", ["", "wood"])
+@pytest.mark.parametrize("line", ["{said}\no a", "o a\n{said}"])
+def test_a_group_or_material_of_an_obj_file_holds_until_the_next(tmp_path, key, what, last, line):
+    lines = (line.format(said=f"{key} stone"), "o b", f"o c\n{key} {last}" if last else "o c")
+    found = read_layout(wavefront(tmp_path / "a.obj", *zip(lines, (3, 2, 1), strict=True)), dimension=3)
+    assert getattr(found, what) == ("stone", "stone", last or "stone")
+    # Said once above the first object it is of all.
+    told = [
+        note for note in found.notes if f"without a {what[:-1]} of their own ({key}) have that of one before" in note
+    ]
+    assert len(told) == (bool(last) or line.startswith("o a"))
+    assert all("'b' ('stone')" in note for note in told)
+
+
+def test_a_role_said_once_above_all_objects_of_an_obj_file_is_of_all(tmp_path):
+    found = read_layout(wavefront(tmp_path / "a.obj", ("usemtl fixed\no a", 3), ("o b", 2)), dimension=3)
+    assert (found.roles, [note for note in found.notes if "without" in note]) == (("fixed", "fixed"), [])
 
 
 def test_groups_of_an_obj_file_are_asked_for_open_surfaces_too(tmp_path):
