@@ -107,10 +107,11 @@ def help_text(name: str) -> str:
     """
     layout = _layout(name)
     purpose = (inspect.getdoc(layout) or "").partition("\n\nParameters\n----------\n")[0]
-    defaults, lines = parameters_of(name), [purpose, "", "parameters:"]
-    for one, (kind, meaning) in described(name).items():
+    words, lines = described(name), [purpose, "", "parameters:"]
+    for one, value in parameters_of(name).items():
+        kind, meaning = words[one]
         kind = _KINDS.get(kind, kind[kind.index("[") :] if "[" in kind else kind)
-        default = "" if defaults[one] is None else f" = {json.dumps(defaults[one], ensure_ascii=False)}"
+        default = "" if value is None else f" = {json.dumps(value, ensure_ascii=False)}"
         lines.append(f"  {one}{default}  {kind}".rstrip())
         lines += textwrap.wrap(meaning, 120, initial_indent=6 * " ", subsequent_indent=6 * " ")
     return _LINK.sub(r"\1", "\n".join(lines)).replace("``", "").replace("`", "")

@@ -182,6 +182,8 @@ def test_what_a_verb_does_not_know_is_refused(capsys):
 def test_help_of_a_layout_lists_its_parameters_with_units_and_defaults(name, capsys):
     code, printed = _printed(capsys, "layout", name.replace(" ", "-"), "--help")
     assert code == 0
+    listed = re.findall(r"^  (\w+)", printed.out.partition("\nparameters:\n")[2], re.MULTILINE)
+    assert listed == list(parameters_of(name))
     for key, default in parameters_of(name).items():
         line = next(line for line in printed.out.splitlines() if re.match(rf"  {key}\b", line))
         if default is not None:
