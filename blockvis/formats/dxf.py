@@ -125,7 +125,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     closed = meshes_of_faces([(one.row["group"], one.row["name"], one.points) for one in found.faces], path)
     if closed:
         found.meshes += closed
-        found.outlines = [one for one in found.outlines if one not in found.faces]
+        faces = {*found.faces}
+        found.outlines = [one for one in found.outlines if one not in faces]
     meshes = _chosen_meshes(found, reading)
     if meshes:
         return layout_of_meshes(meshes, path, reading, stated, _faults(audit) + _skipped(found))
