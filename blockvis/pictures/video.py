@@ -112,19 +112,22 @@ def _encode(frames: Iterable[Image.Image], path: Path, size: tuple[int, int], fp
     with TemporaryFile() as said:
         encoder = Popen(command, stdin=PIPE, stderr=said)
         assert encoder.stdin is not None
+        whole = False
         try:
             with encoder.stdin as entry:
                 for frame in frames:
                     entry.write(frame.tobytes())
-        except BaseException as error:
+            whole = True
+        except BrokenPipeError:
+            # Why the encoder takes no more it says itself, some only after they have closed their entry.
+            pass
+        except BaseException:
             encoder.kill()
-            # Why the encoder takes no more, it says itself.
-            if not isinstance(error, BrokenPipeError):
-                raise
+            raise
         finally:
             encoder.wait()
         said.seek(0)
-        return said.read().decode(errors="replace") if encoder.returncode else None
+        return None if whole and not encoder.returncode else said.read().decode(errors="replace")
 
 
 def _not_written(path: Path, said: str) -> OSError:

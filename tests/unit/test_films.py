@@ -2,9 +2,10 @@
 
 import re
 import subprocess
+import sys
 import weakref
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, repeat
 from types import SimpleNamespace
 
 import imageio_ffmpeg
@@ -367,6 +368,19 @@ def test_what_the_encoder_says_is_told(tmp_path, monkeypatch):
     monkeypatch.setitem(video._ENCODERS, ".mp4", ("no codec", "yuv420p", "-f mp4"))
     with pytest.raises(OSError, match=r"film\.mp4' could not be written: .*codec"):
         write_film(frames(), tmp_path / "film.mp4", size=SMALL, fps=10.0)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("code", [0, 1])
+def test_what_the_encoder_says_after_it_takes_no_more_is_told(tmp_path, monkeypatch, code):
+    program = f"import os, time; os.close(0); time.sleep(0.2); os.write(2, b'no room'); os._exit({code})"
+
+    def refusing(command, **named):
+        return subprocess.Popen([sys.executable, "-S", "-c", program], **named)
+
+    monkeypatch.setattr(video, "Popen", refusing)
+    with pytest.raises(OSError, match=r"film\.mp4' could not be written: no room"):
+        write_film(repeat(Image.new("RGB", SMALL)), tmp_path / "film.mp4", size=SMALL, fps=10.0)
     assert not list(tmp_path.iterdir())
 
 
