@@ -212,6 +212,8 @@ class LimitLoadKind(AnalysisKind):
         if chosen is not None and response.collapse is None:
             moves = chosen.velocity.any()
             summary["mechanism"] = str(mechanics.mechanism_of(response.assembly, chosen)) if moves else None
+            if moves and (share := _effective_mass_share(response, chosen)) is not None:
+                summary["effective_mass_share"] = share
         if not response.parameter.is_path and len(response.limits) > 1:
             found = chosen is not None and np.isfinite(chosen.measured)
             summary["governing_position"] = chosen.parameter if chosen is not None and found else None
@@ -288,6 +290,11 @@ class LimitLoadKind(AnalysisKind):
             lines.append(response.message)
         else:
             lines.append(f"mechanism: {said['mechanism']}")
+        if (mass := said.get("effective_mass_share")) is not None:
+            spectral = state.load_multiplier / mass
+            lines.append(
+                f"effective mass       {mass:12.6g}     of what moves: a spectral acceleration of {spectral:.6g}"
+            )
         return lines
 
     def title(self, response: solver.Response) -> str:
@@ -379,6 +386,25 @@ def _capacity_at_without_settlement(case: Case) -> ValueError:
         f'{case.source}: [analysis] capacity_at asks for limit loads (kind = "limit load") of loads that stand still, '
         "along a [settlement]"
     )
+
+
+def _effective_mass_share(response: solver.Response, state: solver.Increment) -> float | None:
+    """Part e* of the mass of what moves that takes part in the mechanism under an acceleration; None of other loads.
+
+    e* = (Σ P δ)² / (Σ P Σ P δ²) over macro-blocks of weight P whose centroids move by δ along the acceleration: Italian
+    Circolare 7/2019, C8.7.1.2.1.
+    """
+    loads, assembly, d = response.loads_at(state), response.assembly, response.assembly.dimension
+    if loads.live_acceleration is None:
+        return None
+    mechanism = mechanics.mechanism_of(assembly, state)
+    moves = mechanism.parts >= 0
+    pushed = loads.live_at(assembly, state.pose)[:, :d] * moves[:, None]
+    along = pushed.sum(axis=0) / max(float(np.linalg.norm(pushed.sum(axis=0))), 1e-300)
+    weights = np.bincount(mechanism.parts[moves], (pushed @ along)[moves])
+    travel = mechanism.motions[:, :d] @ along
+    spread = float(weights.sum() * (weights * travel**2).sum())
+    return float((weights * travel).sum() ** 2 / spread) if (weights >= 0.0).all() and spread > 0.0 else None
 
 
 def _stored(limit: solver.LimitLoad) -> dict[str, Any]:

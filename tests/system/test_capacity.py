@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import case_from, pixels, report_of, run_command
+from structures import case_from, pixels, rectangle, report_of, run_command
 
 import blockvis
 import solver
@@ -78,6 +78,7 @@ def test_limit_load_of_a_block_from_its_case_file(tmp_path, capsys):
     assert summary["limit_load_status"] == "limit load"
     assert summary["live_load"] == pytest.approx(summary["total_weight"])
     assert "1 macro-block; hinge at" in summary["mechanism"]
+    assert summary["effective_mass_share"] == pytest.approx(1.0)
     assert summary["collapse_displacement"] is None
     printed = capsys.readouterr().out
     assert "load multiplier               0.2     associative friction, static and kinematic bounds" in printed
@@ -583,3 +584,18 @@ def test_what_cannot_be_analysed_is_refused_before_anything_is_written(tmp_path,
     for word in words:
         assert word in message, message
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("courses", [1, 4])
+def test_effective_mass_of_a_portal_however_many_courses_its_columns_have(courses, tmp_path):
+    """Columns turn, their centroids moving half as far as the lintel: e* = (Wc + Wl)² / ((2 Wc + Wl) (Wc / 2 + Wl))."""
+    height = 1.0 / courses
+    shapes = [rectangle(x, k * height, x + 0.2, (k + 1) * height) for x in (0.0, 1.2) for k in range(courses)]
+    shapes += [rectangle(-0.1, 1.0, 1.5, 1.3), rectangle(-1.0, -0.2, 2.0, 0.0)]
+    assembly = solver.Assembly.from_outlines(shapes, roles=["free"] * (2 * courses + 1) + ["fixed"])
+    blockvis.save_layout(assembly, tmp_path / "portal.json")
+    _, summary = solved('[geometry]\nfile = "portal.json"\n[analysis]\nkind = "limit load"\n' + SIDEWAYS, tmp_path)
+    column, lintel = 0.2, 1.6 * 0.3
+    expected = (column + lintel) ** 2 / ((2.0 * column + lintel) * (0.5 * column + lintel))
+    assert summary["effective_mass_share"] == pytest.approx(expected, rel=1e-6)
+    assert summary["limit_load_multiplier"] == pytest.approx(0.2, rel=1e-6)
