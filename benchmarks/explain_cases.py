@@ -26,7 +26,7 @@ import numpy as np
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.cases.profiles import Profile, bearing_points, by_bearing, cut_ground
+from blockvis.cases.profiles import Profile, bearings, by_bearing, cut_ground
 from blockvis.explanation.candidates import (
     IN_PLANE,
     Candidate,
@@ -171,9 +171,9 @@ def movement(structure: Structure, case: Case) -> tuple[solver.Assembly, Mapping
     if isinstance(motions, Profile):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            assembly = cut_ground(assembly, (), chosen=supports)
+            assembly = cut_ground(assembly, chosen=supports)
         supports = np.flatnonzero(~assembly.free).tolist()
-        rows = motions.motions(bearing_points(assembly, supports)[:, 0], (0.0, -1.0)).tolist()
+        rows = motions.motions(bearings(assembly, supports)[:, :, 0], (0.0, -1.0)).tolist()
         motions = {assembly.names[i]: tuple(row) for i, row in zip(supports, rows, strict=True)}
     else:
         if isinstance(motions, tuple):

@@ -195,9 +195,11 @@ class Settlement:
     profile : mapping of str to (n_dof,) sequence, optional [m and rad]
         Instead of one motion for all: how each support, by its name, moves and turns about its own centroid, or
         where its arm ends. Only the proportions count: s is the largest displacement of such a point, or the largest
-        angle where none moves.
+        angle where none moves, unless ``profile_depth`` says which displacement it is.
     profile_arms : mapping of str to (d,) sequence, optional [m]
         From the centroid of a support, as drawn, to the point that moves by the profile, and about which it turns.
+    profile_depth : float, optional
+        Displacement in the proportions of the profile that is s.
 
     Raises
     ------
@@ -217,6 +219,7 @@ class Settlement:
     radial_from: Sequence[float] | None = None
     profile: Mapping[str, Sequence[float]] | None = None
     profile_arms: Mapping[str, Sequence[float]] | None = None
+    profile_depth: float | None = None
 
     def __post_init__(self) -> None:
         """Check the values; make the direction a unit vector, and the rotation without one a sign."""
@@ -267,6 +270,11 @@ class Settlement:
         largest = float(travel.max(initial=0.0)) or float(turn.max(initial=0.0))
         if largest == 0.0:
             raise ValueError("the settlement profile moves no support; give one of them a displacement or a rotation")
+        if self.profile_depth is not None:
+            if not (np.isfinite(self.profile_depth) and self.profile_depth > 0.0):
+                raise ValueError(f"settlement profile_depth is {self.profile_depth:g}; it must be a positive number")
+            largest = self.profile_depth
+            object.__setattr__(self, "profile_depth", 1.0)
         # What is scaled already, as when it is read from a summary, keeps its last digits.
         largest = 1.0 if abs(largest - 1.0) < 1e-12 else largest
         scaled = {name: tuple((motion / largest).tolist()) for name, motion in motions.items()}

@@ -92,7 +92,7 @@ def case_assembly(case: Case) -> solver.Assembly:
     check_coordinates(case, assembly)
     _note_numbers(assembly, case.source)
     _note_units(case, assembly)
-    assembly = cut_ground(assembly, case.profiles)
+    assembly = cut_ground(assembly, case.profiles, case.settlements)
     _refuse_idle_settlements(case, assembly)
     return imperfect(assembly, case.imperfections)
 

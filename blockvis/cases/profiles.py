@@ -27,6 +27,9 @@ NARROWEST = 0.02
 #: Blocks stand on a support that is within this fraction of the block size.
 TOUCHING = 2e-3
 
+#: Upright part of the normal of a joint from which on a block stands on a support.
+UPRIGHT = 1e-3
+
 #: A profile that leaves the chord over a support by less than this fraction of its largest value tilts it as it is.
 STRAIGHT = 1e-3
 
@@ -60,41 +63,51 @@ class Profile:
         places, values = np.array(self.points).T
         return np.interp(x, places, values)
 
-    def slope(self, x: np.ndarray) -> np.ndarray:
-        """(n,) array [1/m]: slope of the profile; at a corner of it the mean of both sides."""
-        x = np.asarray(x, dtype=float)
-        if self.kind == "gaussian":
-            return self.value(x) * (self.centre - x) / self.inflection**2
-        step = 1e-6 * (self.points[-1][0] - self.points[0][0])
-        return np.asarray((self.value(x + step) - self.value(x - step)) / (2.0 * step))
+    @property
+    def largest(self) -> float:
+        """How far the ground goes where it goes farthest."""
+        return float(np.abs(self.value(np.array([self.centre, *(x for x, _ in self.points)]))).max())
 
-    def bends(self, low: float, high: float) -> bool:
-        """Whether the profile leaves the straight line between two places x [m]."""
-        x = np.linspace(low, high, 101)
-        values = self.value(x)
-        scale = float(np.abs(self.value(np.array([self.centre, *(x for x, _ in self.points)]))).max())
-        chord = values[0] + (values[-1] - values[0]) * np.linspace(0.0, 1.0, 101)
-        return bool(np.abs(values - chord).max() > STRAIGHT * scale)
+    def bends(self, low: float, high: float, direction: Sequence[float] = (0.0, -1.0)) -> bool:
+        """Whether ground between two places x [m] that goes along a unit vector is no rigid body.
 
-    def motions(self, x: np.ndarray, direction: Sequence[float]) -> np.ndarray:
-        """(n, 3) array: the motion of ground at places x, (n,) [m]: its value along a unit vector, and its tilt."""
-        value, slope = self.value(x), self.slope(x)
+        Its upright part is that of one where the profile is straight, the part along x where it is level.
+        """
+        values = self.value(np.linspace(low, high, 101))
+        level = np.linspace(values[0], values[-1] if direction[0] == 0.0 else values[0], 101)
+        return bool(np.abs(values - level).max() > STRAIGHT * self.largest)
+
+    def motions(self, bearings: np.ndarray, direction: Sequence[float]) -> np.ndarray:
+        """(n, 3) array: the motion of ground in its middle along a unit vector, and its tilt.
+
+        Both ends, (n, 2) [m], of what bears go by the profile, so that pieces of ground side by side stay together.
+        """
+        low, high = bearings.T
+        start, end = self.value(low), self.value(high)
+        value, slope = (start + end) / 2.0, (end - start) / (high - low)
         return np.stack([value * direction[0], value * direction[1], slope * direction[1]], axis=1) + 0.0
 
 
-def bearing_points(assembly: solver.Assembly, supports: Sequence[int | Sequence[int]]) -> np.ndarray:
-    """(n, d) array [m]: the middle of where free blocks stand on each support, or group, or of its top if none does."""
+def bearings(assembly: solver.Assembly, supports: Sequence[int | Sequence[int]]) -> np.ndarray:
+    """(n, 2, d) array [m]: corners of the box on each support, or group, that bears free blocks, or of its top."""
     contacts = mechanics.find_contacts(assembly, assembly.vertices, 2.0 * TOUCHING * assembly.block_size)
     found = []
     for one in supports:
         on_a, on_b = np.isin(contacts.block_a, one), np.isin(contacts.block_b, one)
-        carrying = on_a & assembly.free[contacts.block_b] | on_b & assembly.free[contacts.block_a]
+        # What touches a support from the side does not stand on it.
+        upright = contacts.frames[:, 0, -1] * np.where(on_a, -1.0, 1.0) > UPRIGHT
+        carrying = upright & (on_a & assembly.free[contacts.block_b] | on_b & assembly.free[contacts.block_a])
         points, corners = contacts.points[carrying], assembly.vertices[np.isin(assembly.block_of_vertex, one)]
-        if not len(points):
+        if not len(points) or np.ptp(points[:, 0]) < NARROWEST * assembly.block_size:
             points = np.stack([corners.min(axis=0), corners.max(axis=0)])
             points[:, -1] = corners[:, -1].max()
-        found.append((points.min(axis=0) + points.max(axis=0)) / 2.0)
-    return np.array(found).reshape(-1, assembly.dimension)
+        found.append([points.min(axis=0), points.max(axis=0)])
+    return np.array(found).reshape(-1, 2, assembly.dimension)
+
+
+def bearing_points(assembly: solver.Assembly, supports: Sequence[int | Sequence[int]]) -> np.ndarray:
+    """(n, d) array [m]: the middle of where free blocks stand on each support, or group, or of its top if none does."""
+    return np.asarray(bearings(assembly, supports).mean(axis=1))
 
 
 def by_bearing(assembly: solver.Assembly, motions: Mapping[str, Sequence[float]]) -> dict[str, Any]:
@@ -109,8 +122,8 @@ def by_bearing(assembly: solver.Assembly, motions: Mapping[str, Sequence[float]]
 
 def _depth(table: Table, key: Key) -> float | None:
     depth: float | None = table.number(key.name)
-    if depth == 0.0:
-        raise table.error(key.name, "is 0; give 1, or -1 for a heave: the settlement scales it")
+    if depth is not None and abs(depth) != 1.0:
+        raise table.error(key.name, f"is {depth:g}; give 1, or -1 for a heave: the limit says how deep it gets")
     return depth
 
 
@@ -145,7 +158,7 @@ def _motions(table: Table, key: Key) -> dict[str, tuple[float, float, float]] | 
     return {name: (dx, dy, rotation) for name, (dx, dy, rotation) in padded.items()}
 
 
-_DEPTH = ValueKind("number other than 0", dict(NUMBER.schema) | {"not": {"const": 0}}, _depth)
+_DEPTH = ValueKind("1 or -1", {"enum": [1, -1]}, _depth)
 _POINTS = ValueKind("list of at least two pairs", {"type": "array", "items": PAIR.schema, "minItems": 2}, _points)
 _MOTIONS = ValueKind(
     "table of two or three numbers by the name of a support",
@@ -223,11 +236,12 @@ def with_profiles(
             found.append(_on_every_support(settlement, assembly, where))
             continue
         blocks = np.flatnonzero(settlement.taking_part(assembly)).tolist()
-        motions = profile.motions(bearing_points(assembly, blocks)[:, 0], settlement.direction or ())
+        motions = profile.motions(bearings(assembly, blocks)[:, :, 0], settlement.direction or ())
         if not motions.any():
             raise ValueError(f"{where} moves none of the {counted(len(blocks), 'support')}; look at its places x")
         by_name = dict(zip([assembly.names[b] for b in blocks], motions.tolist(), strict=True))
-        found.append(replace(settlement, direction=None, blocks=None, **by_bearing(assembly, by_name)))
+        keys = by_bearing(assembly, by_name) | {"profile_depth": profile.largest}
+        found.append(replace(settlement, direction=None, blocks=None, **keys))
     return tuple(found)
 
 
@@ -241,7 +255,14 @@ def _on_every_support(settlement: solver.Settlement, assembly: solver.Assembly, 
     motions |= {name: motion for name, motion in given.items() if name in names or not called[name]}
     for name in motions:
         _check_support(name, assembly, where)
-    return replace(settlement, profile=motions)
+    # Pieces of what was drawn as one turn about its centroid.
+    wholes, arms = uncut_names(assembly), {}
+    for name in motions:
+        pieces = [i for i, whole in enumerate(wholes) if whole == wholes[assembly.index(name)] != name]
+        if pieces:
+            centre = np.average(assembly.centroids[pieces], axis=0, weights=assembly.areas[pieces])
+            arms[name] = (centre - assembly.centroids[assembly.index(name)]).tolist()
+    return replace(settlement, profile=motions, profile_arms=arms or None)
 
 
 def _check_support(name: str, assembly: solver.Assembly, where: str) -> None:
@@ -256,15 +277,20 @@ def _check_support(name: str, assembly: solver.Assembly, where: str) -> None:
 
 
 def cut_ground(
-    assembly: solver.Assembly, profiles: Sequence[Profile | None], *, chosen: Sequence[int] | None = None
+    assembly: solver.Assembly,
+    profiles: Sequence[Profile | None] = (),
+    settlements: Sequence[solver.Settlement] = (),
+    *,
+    chosen: Sequence[int] | None = None,
 ) -> solver.Assembly:
     """Cut supports under the joints between blocks they carry: those chosen, or over which a profile bends.
 
-    The pieces of a support "ground" are named "ground 1", "ground 2" ... from left to right.
+    Profiles are those of the settlements. The pieces of a support "ground" are named "ground 1", "ground 2" ... from
+    left to right; raises ``ValueError`` where a block has such a name.
     """
     if assembly.dimension != 2:
         return assembly
-    chosen = _bent_supports(assembly, profiles) if chosen is None else chosen
+    chosen = _bent_supports(assembly, profiles, settlements) if chosen is None else chosen
     pieces = {i: cut for i in chosen if len(cut := _cut(assembly, i)) > 1}
     if not pieces:
         return assembly
@@ -273,11 +299,18 @@ def cut_ground(
     return _with_pieces(assembly, pieces)
 
 
-def _bent_supports(assembly: solver.Assembly, profiles: Sequence[Profile | None]) -> list[int]:
-    """Choose the moving supports over which a profile bends."""
-    bending = [profile for profile in profiles if profile is not None]
-    extents = {i: assembly.outline(i)[:, 0] for i in np.flatnonzero(assembly.moving).tolist()} if bending else {}
-    return [i for i, x in extents.items() if any(p.bends(float(x.min()), float(x.max())) for p in bending)]
+def _bent_supports(
+    assembly: solver.Assembly, profiles: Sequence[Profile | None], settlements: Sequence[solver.Settlement]
+) -> list[int]:
+    """Choose the moving supports over which a profile bends, or strains the ground."""
+    found = []
+    for i in np.flatnonzero(assembly.moving).tolist() if any(profiles) else []:
+        x = assembly.outline(i)[:, 0]
+        extent = float(x.min()), float(x.max())
+        pairs = zip(profiles, settlements, strict=False)
+        if any(p is not None and p.bends(*extent, one.direction or (0.0, -1.0)) for p, one in pairs):
+            found.append(i)
+    return found
 
 
 def pieces_named(names: Sequence[str], assembly: solver.Assembly) -> tuple[str, ...]:
@@ -307,6 +340,11 @@ def _with_pieces(assembly: solver.Assembly, pieces: Mapping[int, Sequence[np.nda
     for i in range(assembly.n_blocks):
         parts = pieces.get(i, [assembly.outline(i)])
         names = [f"{assembly.names[i]} {k}" for k in range(1, len(parts) + 1)] if i in pieces else [assembly.names[i]]
+        if i in pieces and (taken := set(names) & {*assembly.names, *assembly.drawn_names}):
+            raise ValueError(
+                f"the ground '{assembly.names[i]}' is cut for a profile, and its piece '{min(taken)}' has the name of "
+                "another block; rename one of them"
+            )
         rows += [(outline, i, name) for outline, name in zip(parts, names, strict=True)]
     owner = [i for _, i, _ in rows]
     cut = solver.Assembly.from_outlines(

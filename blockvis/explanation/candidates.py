@@ -11,7 +11,7 @@ import numpy as np
 
 import solver
 from blockvis.cases.explain_settings import DIRECTIONS, ExplainSettings
-from blockvis.cases.profiles import Profile, bearing_points, cut_ground, uncut_names
+from blockvis.cases.profiles import Profile, bearing_points, bearings, cut_ground, uncut_names
 from blockvis.text import nearest
 from solver import mechanics
 
@@ -114,7 +114,7 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
         return Ground(fixed, whole, troughs=False)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
-        cut = cut_ground(fixed, (), chosen=supports)
+        cut = cut_ground(fixed, chosen=supports)
     called = list(zip(cut.names, uncut_names(cut), strict=True))
     pieces = {name: tuple(one for one, uncut in called if uncut == name) for name in whole}
     feet = sum(len(_bearing(cut, names)) for names in pieces.values())
@@ -295,7 +295,7 @@ def trough(ground: Ground, centre: float, inflection: float, refines: str = "") 
 
 def _by_profile(ground: Ground, profile: Profile) -> Motions:
     names = [piece for pieces in ground.pieces.values() for piece in pieces]
-    x = bearing_points(ground.assembly, [ground.assembly.index(name) for name in names])[:, 0]
+    x = bearings(ground.assembly, [ground.assembly.index(name) for name in names])[:, :, 0]
     return dict(zip(names, map(tuple, profile.motions(x, (0.0, -1.0)).tolist()), strict=True))
 
 

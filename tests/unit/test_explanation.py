@@ -375,7 +375,8 @@ def test_the_amount_of_a_trough_is_how_far_it_lowers_one_foot_below_another():
     narrow = next(one for one in found if one.detail.startswith("deepest at x = 1 m, steepest 0.333 m"))
     wide = trough(ground, 1.0, 4.0)
     turned = next(one for one in candidates(ARCH)[1] if one.turns)
-    assert 0.85 < per_amount(ground.assembly, narrow)[0] < 1.0
+    # A foot goes by the mean of its ends.
+    assert 0.7 < per_amount(ground.assembly, narrow)[0] < 0.85
     assert 0.0 < per_amount(ground.assembly, wide)[0] < 0.03
     assert per_amount(ARCH, turned)[1] == "rad"
 

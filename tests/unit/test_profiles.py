@@ -1,6 +1,7 @@
 """Profiles of settlement: each support its own motion, troughs and tables of points, and the ground cut under them."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -115,19 +116,19 @@ def test_profiles_that_are_none_are_refused(keys, words):
         solver.Settlement(**keys)
 
 
-def test_a_trough_goes_down_by_a_bell_and_tilts_by_its_slope():
+def test_a_trough_goes_down_by_a_bell_and_both_ends_of_what_bears_follow_it():
     (trough,) = case_of(PORTAL, '{ kind = "gaussian", centre = 1.0, inflection = 0.5 }').profiles
-    x = np.linspace(-1.0, 3.0, 41)
     assert trough.value(np.array([1.0, 1.5])) == pytest.approx([1.0, np.exp(-0.5)])
-    step = 1e-6
-    by_difference = (trough.value(x + step) - trough.value(x - step)) / (2 * step)
-    np.testing.assert_allclose(trough.slope(x), by_difference, atol=1e-8)
+    ends = np.array([[-1.0, 0.5], [0.5, 0.7], [0.7, 2.0]])
+    along, down, tilt = trough.motions(ends, (0.0, -1.0)).T
+    assert not along.any()
+    for end, sense in ((ends[:, 0], -0.5), (ends[:, 1], 0.5)):
+        np.testing.assert_allclose(-(down + sense * tilt * np.ptp(ends, axis=1)), trough.value(end), atol=1e-12)
 
 
 def test_points_are_joined_by_straight_lines_and_level_beyond():
     (table,) = case_of(PORTAL, "{ points = [[0.0, 0.0], [2.0, 1.0]] }").profiles
     np.testing.assert_allclose(table.value(np.array([-1.0, 0.5, 3.0])), [0.0, 0.25, 1.0])
-    np.testing.assert_allclose(table.slope(np.array([-1.0, 1.0, 2.0])), [0.0, 0.5, 0.25], atol=1e-6)
 
 
 def test_each_support_of_a_case_goes_by_the_trough_at_its_centroid(tmp_path):
@@ -164,14 +165,13 @@ def test_how_deep_the_ground_is_drawn_counts_for_nothing(tmp_path):
         assembly, last = response.assembly, blockvis.open_results(tmp_path / f"{depth}").path[-1]
         under = ~assembly.free[assembly.block_of_vertex] & np.isclose(assembly.vertices[:, 1], 0.0, atol=1e-12)
         found.append((mechanics.moved_vertices(assembly, last.pose)[under], openings(response), last.reaction))
-        # What a brick stands on goes by the bell at its middle.
+        # Both ends of what a brick stands on go by the bell, however wide the ground is drawn.
         settlement, piece = response.settlements[0], assembly.index("earth 2")
-        middle = assembly.outline(piece)[:, 0].mean()
+        ends = assembly.outline(piece)[:, 0].min(), assembly.outline(piece)[:, 0].max()
         drawn = solver.Pose.initial(assembly)
-        after, top = settlement.displaced(assembly, drawn, 0.002), np.array([[middle, 0.0]])
-        goes = mechanics.carried(top, np.array([piece]), drawn, after)[0] - top[0]
-        largest = max(np.exp(-0.5 * ((x - 0.3) / 0.3) ** 2) for x in (0.125, 0.375))
-        np.testing.assert_allclose(goes, [0.0, 0.002 * np.exp(-0.5 * ((middle - 0.3) / 0.3) ** 2) / largest], atol=1e-9)
+        after, top = settlement.displaced(assembly, drawn, 0.002), np.array([[x, 0.0] for x in ends])
+        goes = mechanics.carried(top, np.array([piece, piece]), drawn, after)[:, 1]
+        np.testing.assert_allclose(goes, [0.002 * np.exp(-0.5 * ((x - 0.3) / 0.3) ** 2) for x in ends], atol=1e-6)
     np.testing.assert_allclose(found[0][0], found[1][0], atol=1e-12)
     np.testing.assert_allclose(found[0][1], found[1][1], atol=2e-5)
     assert found[0][2] == pytest.approx(found[1][2], rel=5e-3)
@@ -242,7 +242,8 @@ def test_a_trough_and_its_mirror_open_the_wall_alike(tmp_path):
     np.testing.assert_allclose(found[0], found[1], atol=2e-5)
     stored = json.loads((tmp_path / "0.6" / "summary.json").read_text(encoding="utf-8"))
     assert blockvis.open_results(tmp_path / "0.6").settlements[0].profile.keys() == {f"ground {k}" for k in range(1, 6)}
-    assert stored["settlements"][0]["profile"]["ground 4"][1] == pytest.approx(-1.0)
+    deepest = -0.5 * sum(np.exp(-0.5 * ((x - 0.6) / 0.2) ** 2) for x in (0.5, 0.75))
+    assert stored["settlements"][0]["profile"]["ground 4"][1] == pytest.approx(deepest)
 
 
 @pytest.mark.parametrize(
@@ -257,6 +258,7 @@ def test_a_trough_and_its_mirror_open_the_wall_alike(tmp_path):
             "{ centre = 1, inflection = 1, points = [[0, 1], [1, 0]] }",
             "points is of kind 'points'",
         ),
+        ('{ kind = "gaussian", centre = 1, inflection = 1, depth = 0.02 }', "depth is 0.02; give 1, or -1 for a heave"),
         ("{ points = [[0, 1]] }", "give at least two pairs"),
         ("{ points = [[0, 1], [0, 2]] }", "two values at x = 0"),
         ("{ points = [[0, 0], [1, 0]] }", "are all 0"),
@@ -286,3 +288,102 @@ def test_a_profile_that_names_no_support_says_which_there_are(tmp_path, capsys):
 def test_a_profile_that_moves_a_fixed_support_says_how_to_let_it_move():
     with pytest.raises(ValueError, match="'ground left' is fixed; give it the role \"moving\""):
         assembly_of(case_of(PORTAL, '{ supports = { "ground left" = [0, -1] } }'))
+
+
+def drawn(tmp_path, ground, bricks=8, courses=1, high=0.25):
+    """A wall of bricks half a metre long on pieces of ground that move, {name: (low, high)}, in a file."""
+    shapes, names = [], []
+    for row in range(courses):
+        ends = (
+            np.arange(0, bricks + 1) * 0.5
+            if row % 2 == 0
+            else np.array([0.0, *np.arange(1, bricks + 1) * 0.5 - 0.25, bricks * 0.5])
+        )
+        for k, (low, top) in enumerate(pairwise(ends)):
+            shapes.append(structures.rectangle(low, row * high, top, (row + 1) * high))
+            names.append(f"brick {row} {k}")
+    shapes += [structures.rectangle(low, -0.5, top, 0.0) for low, top in ground.values()]
+    roles = ["free"] * len(names) + ["moving"] * len(ground)
+    assembly = solver.Assembly.from_outlines(shapes, names=[*names, *ground], roles=roles)
+    blockvis.save_layout(assembly, tmp_path / "drawn.json")
+    return '[geometry]\nfile = "drawn.json"\n[settlement]\nincrement = 1e-4\nlimit = 1e-4\n'
+
+
+def profile_of(text, profile, tmp_path, *more):
+    """The assembly of a case with a profile, and the settlement that comes of it."""
+    path = tmp_path / "case.toml"
+    path.write_text(text.replace("[settlement]", "\n".join(["[settlement]", f"profile = {profile}", *more])))
+    response = blockvis.run_case(path, tmp_path / "out", outputs=(), overwrite=True).response
+    return response.assembly, response.settlements[0]
+
+
+def tops(assembly, settlement, s):
+    """How far the upper corners of each support go, {name: (left, right)}, along x and upright."""
+    start = solver.Pose.initial(assembly)
+    goes = mechanics.moved_vertices(assembly, settlement.displaced(assembly, start, s)) - assembly.vertices
+    found = {}
+    for i in np.flatnonzero(~assembly.free):
+        mine = np.flatnonzero((assembly.block_of_vertex == i) & np.isclose(assembly.vertices[:, 1], 0.0))
+        found[assembly.names[i]] = goes[mine[np.argsort(assembly.vertices[mine, 0])]]
+    return found
+
+
+@pytest.mark.filterwarnings("ignore:the ground follows")
+def test_how_wide_the_ground_is_drawn_counts_for_nothing(tmp_path):
+    found = []
+    for width in (4.0, 6.0, 12.0):
+        text = drawn(tmp_path, {"ground": (-1.0, width)})
+        assembly, trough = profile_of(text, '{ kind = "gaussian", centre = 8.0, inflection = 2.0 }', tmp_path)
+        ends = tops(assembly, trough, 1e-3)
+        found.append(ends["ground 9"][:, 1])
+        pieces = [ends[f"ground {k}"][:, 1] for k in range(1, 10)]
+        steps = [right[0] - left[1] for left, right in pairwise(pieces)]
+        np.testing.assert_allclose(steps, 0.0, atol=1e-9)
+    expected = [-1e-3 * np.exp(-0.5 * ((x - 8.0) / 2.0) ** 2) for x in (3.5, 4.0)]
+    np.testing.assert_allclose(found, [expected] * 3, atol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore:the ground follows")
+def test_a_straight_profile_along_x_strains_the_ground(tmp_path):
+    text = drawn(tmp_path, {"ground": (0.0, 4.0)})
+    assembly, strain = profile_of(text, "{ points = [[0.0, -1.0], [4.0, 1.0]] }", tmp_path, "direction = [1.0, 0.0]")
+    ends = tops(assembly, strain, 1e-3)
+    np.testing.assert_allclose(
+        [ends[f"ground {k}"][0, 0] for k in range(1, 9)], 1e-3 * (np.arange(8) - 3.5) / 4.0, atol=1e-12
+    )
+    assert "ground" in profile_of(text, "{ points = [[0.0, 0.0], [4.0, 1.0]] }", tmp_path)[0].names
+
+
+@pytest.mark.filterwarnings("ignore:the ground follows")
+def test_pieces_turn_about_the_centroid_of_what_was_drawn_as_one(tmp_path):
+    text = drawn(tmp_path, {"ground": (0.0, 4.0)})
+    turning = "[[settlement]]\nprofile = { supports = { ground = [0, 0, 1] } }\nincrement = 1e-4\nlimit = 1e-4\n"
+    trough = 'profile = { kind = "gaussian", centre = 2.0, inflection = 0.8 }\n'
+    path = tmp_path / "two.toml"
+    path.write_text(text.replace("[settlement]\n", "[[settlement]]\n" + trough) + turning)
+    response = blockvis.run_case(path, tmp_path / "out", outputs=()).response
+    assembly, (_, second) = response.assembly, response.settlements
+    ends = tops(assembly, second, 1e-3)
+    for name, goes in ends.items():
+        x = np.sort(assembly.outline(assembly.index(name))[:, 0])[[0, -1]]
+        np.testing.assert_allclose(goes[:, 1], 1e-3 * (x - 2.0), atol=2e-6)
+
+
+def test_what_touches_a_support_from_the_side_does_not_stand_on_it(tmp_path):
+    boxes = {"a": (0, 0, 2, 1), "b": (2, 1, 4, 2), "low": (0, -2, 2, 0), "high": (2, -2, 4, 1)}
+    assembly = solver.Assembly.from_outlines(
+        [structures.rectangle(*box) for box in boxes.values()],
+        names=list(boxes),
+        roles=["free", "free", "moving", "moving"],
+    )
+    blockvis.save_layout(assembly, tmp_path / "drawn.json")
+    text = '[geometry]\nfile = "drawn.json"\n[settlement]\nincrement = 1e-4\nlimit = 1e-4\n'
+    _, slope = profile_of(text, "{ points = [[0.0, 1.0], [4.0, 0.0]] }", tmp_path)
+    assert slope.profile["high"] == pytest.approx((0.0, -0.25, 0.25))
+    assert slope.profile_arms["high"] == pytest.approx((0.0, 1.5))
+
+
+def test_a_piece_that_has_the_name_of_another_support_is_refused(tmp_path):
+    text = drawn(tmp_path, {"ground": (0.0, 2.0), "ground 2": (2.0, 4.0)})
+    with pytest.raises(ValueError, match="'ground' is cut for a profile, and its piece 'ground 2' has the name of"):
+        profile_of(text, '{ kind = "gaussian", centre = 2.0, inflection = 0.8 }', tmp_path)
