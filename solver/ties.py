@@ -152,13 +152,6 @@ def tie_lengths(ends: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
 
-def installed_lengths(ties: Sequence[Tie], ends: np.ndarray) -> np.ndarray:
-    """(n_ties, 2) array [m]: lengths of members that are installed between ends (n_ties, 2, d): then, and unloaded."""
-    length = tie_lengths(ends)
-    give = [tie.prestress / tie.stiffness * (-1.0 if tie.kind == PROP else 1.0) for tie in ties]
-    return np.stack([length, length - np.array(give)], axis=1)
-
-
 def is_member(contacts: Contacts) -> np.ndarray:
     """(n,) bool array: which contact points stand for members."""
     return np.asarray(contacts.features[:, 0] == MEMBER)

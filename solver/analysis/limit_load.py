@@ -20,7 +20,7 @@ from solver.path.stepping import Stepper
 from solver.program.model import Model, mean_load
 from solver.program.non_associative import non_associative_limit
 from solver.program.static_program import ProgramState, StaticProgram
-from solver.program.strength import ForceLimits, crushing_forces
+from solver.program.strength import ForceLimits
 from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces
 from solver.programs.problem import Unbounded
 from solver.results.certificate import Certificate, carrying_gap, largest_penetration
@@ -181,10 +181,16 @@ class _Problem:
         gaps = joints.beyond_give(contacts.gaps, -joints.tension)
         gaps = np.where(joints.give[:, 0] > 0.0, np.maximum(gaps, 0.0), gaps)
         gaps[tied] = slack(contacts[tied], len(model.ties))
+        (strength,) = interfaces.values(assembly, contacts.block_a, contacts.block_b, "compressive_strength")
+        crushing = np.multiply(strength, contacts.areas, out=np.full(len(gaps), np.inf), where=np.isfinite(strength))
+        crushing /= model.force
         # Members are plastic.
-        crushing = crushing_forces(assembly, interfaces, contacts) / model.force
         crushing[tied] = members.strength[contacts.features[tied, 1]]
-        number, is_open = _carrying_points(gaps, joints.tension, closed_gap, reach)
+        # As along the path an open joint with a rest of its strength holds, and does not push. Where it may close it is
+        # there twice: as one that holds, and as an open one.
+        apart = gaps > closed_gap
+        once, closing = np.flatnonzero(~apart | (joints.tension > 0.0)), np.flatnonzero(apart & (gaps <= reach))
+        number, is_open = np.append(once, closing), np.repeat([False, True], [len(once), len(closing)])
         contacts, gaps = contacts[number], gaps[number]
         crushing = np.where(is_open | (gaps <= closed_gap), crushing[number], 0.0)
         cohesion, tension = (np.where(is_open, 0.0, of[number]) for of in (joints.cohesion, joints.tension))
@@ -268,19 +274,6 @@ class _Problem:
             ties=plastic_forces(program.contacts, forces, model.ties, self.ties_at),
             crushing=at_strength[between] if np.isfinite(program.limits.most[between]).any() else at_strength[:0],
         )
-
-
-def _carrying_points(
-    gaps: np.ndarray, tension: np.ndarray, closed_gap: float, reach: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the contact points that carry, (m,) int array, and whether they do so only once they have closed.
-
-    As along the path an open joint with a rest of its strength holds, and does not push. Where it may close it is there
-    twice: as one that holds, and as an open one.
-    """
-    apart, holds = gaps > closed_gap, tension > 0.0
-    once, closing = np.flatnonzero(~apart | holds), np.flatnonzero(apart & (gaps <= reach))
-    return np.append(once, closing), np.repeat([False, True], [len(once), len(closing)])
 
 
 def remaining(assembly: Assembly, fallen: np.ndarray | None) -> Assembly:

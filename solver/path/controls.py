@@ -10,8 +10,7 @@ from solver.results.response import Collapse
 from solver.words import make_plain
 
 #: Methods to find increments: the path of Coulomb friction, or the linear programs of the paper.
-COULOMB, LINEAR_PROGRAM = "coulomb", "linear program"
-INCREMENTS = (COULOMB, LINEAR_PROGRAM)
+COULOMB, LINEAR_PROGRAM = INCREMENTS = ("coulomb", "linear program")
 
 
 @dataclass(frozen=True)

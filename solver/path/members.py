@@ -12,9 +12,9 @@ from solver.program.model import Model
 from solver.ties import (
     ABSENT,
     BROKEN,
+    PROP,
     TieForces,
     held_ties,
-    installed_lengths,
     is_member,
     member_contacts,
     member_forces,
@@ -52,7 +52,9 @@ class Members:
             return replace(place, tie_lengths=np.stack([before, told.rest], axis=1))
         lengths = place.tie_lengths if len(place.tie_lengths) else np.full((len(self.ties), 2), np.nan)
         new = np.array([tie.phase == phase + 1 for tie in self.ties])
-        now = installed_lengths(self.ties, tie_ends(self.ties, self.model.assembly, place.pose))
+        length = tie_lengths(tie_ends(self.ties, self.model.assembly, place.pose))
+        give = [tie.prestress / tie.stiffness * (-1.0 if tie.kind == PROP else 1.0) for tie in self.ties]
+        now = np.stack([length, length - np.array(give)], axis=1)
         return replace(place, tie_lengths=np.where(new[:, None], now, lengths))
 
     def beside(self, contacts: Contacts, pose: Pose, lengths: np.ndarray) -> Contacts:

@@ -8,7 +8,6 @@ import numpy as np
 
 from solver.geometry.contacts import Contacts, matched_contacts, successors
 from solver.program.model import Model
-from solver.program.strength import largest_tension
 from solver.results.increment import Bonds, State
 from solver.tolerances import COMPUTED_GAP, DRAWN_GAP
 
@@ -44,10 +43,7 @@ class JointPoints:
         return np.asarray(gaps - self.rest + self.length * (self.give[:, 0] * normal))
 
     def after(self, moved: np.ndarray, before: JointPoints) -> JointPoints:
-        """The points once they have opened and slipped, (n, 2) array in block sizes, in a step from those before.
-
-        Opening counts beyond the give of the joint at its strength, slip from the start of the step.
-        """
+        """The points once they have opened beyond their give and slipped, (n, 2) in block sizes, from those before."""
         opened, slipped = (moved / self.fracture).T
         left = np.minimum(before.left - slipped, 1.0 - opened)
         return replace(self, left=np.clip(left, 0.0, self.left))
@@ -108,7 +104,8 @@ class Mortar:
             np.divide(model.force, k * bonds.areas * model.length, out=np.zeros(n), where=k * bonds.areas > 0.0)
             for k in (np.where(np.isfinite(k), k, 0.0) for k in of_joints[:2])
         )
-        strength = np.column_stack([largest_tension(tension, cohesion, friction), cohesion])
+        # Where friction is scattered tension ends where shear strength does.
+        strength = np.column_stack([np.minimum(tension, cohesion / np.maximum(friction, 1e-300)), cohesion])
         return JointPoints(
             strength=strength * (bonds.areas / model.force)[:, None],
             left=bonds.left,

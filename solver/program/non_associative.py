@@ -125,10 +125,8 @@ def _sliding(
     """
     program.programs += 1
     n, rows, size, plane = len(normal), len(program.dead), program.size, program.size == 2
-    bound, brittle = (
-        program.limits.cohesion + program.friction * normal,
-        np.flatnonzero(np.isfinite(program.limits.beyond_least)),
-    )
+    bound = program.limits.cohesion + program.friction * normal
+    brittle = np.flatnonzero(np.isfinite(program.limits.beyond_least))
     identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
     if plane:
         half = sp.diags_array(np.full(n, 0.5))

@@ -1,4 +1,4 @@
-"""Strength of the contact points of joints with cohesion or crushing, by their tributary areas."""
+"""Limits of the forces of contact points, with friction, cohesion, tension and crushing, as programs state them."""
 
 from __future__ import annotations
 
@@ -7,23 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from solver.assembly import Assembly
 from solver.equilibrium import friction_rays
-from solver.geometry.contacts import Contacts
-from solver.interfaces import Interfaces
 
 from .torsion import Faces
-
-
-def crushing_forces(assembly: Assembly, interfaces: Interfaces, contacts: Contacts) -> np.ndarray:
-    """(n_contacts,) array [N]: largest normal force of each contact point, infinite where nothing crushes."""
-    (strength,) = interfaces.values(assembly, contacts.block_a, contacts.block_b, "compressive_strength")
-    return np.multiply(strength, contacts.areas, out=np.full(len(contacts), np.inf), where=np.isfinite(strength))
-
-
-def largest_tension(tension: np.ndarray, cohesion: np.ndarray, friction: np.ndarray) -> np.ndarray:
-    """(n,) array: tensile strengths, where friction is scattered no more than where shear strength ends."""
-    return np.asarray(np.minimum(tension, cohesion / np.maximum(friction, 1e-300)))
 
 
 @dataclass(frozen=True)

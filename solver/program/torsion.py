@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from solver.assembly import Assembly
 from solver.geometry.contacts import Contacts
 from solver.geometry.outlines import polygon_integrals
+from solver.geometry.portions import alike
 
 #: Laws of torsion of the faces between blocks in space.
 POINTS, UNIFORM = TORSIONS = ("points", "uniform")
@@ -63,14 +64,13 @@ class Faces:
         """Gather contact points of the same two blocks, of a size [m], in the same plane; friction is of each, (n,)."""
         face = _faces(contacts, length)
         count = np.bincount(face)
-        order, first = np.argsort(face, kind="stable"), np.cumsum(count) - count
+        order, starts = np.argsort(face, kind="stable"), np.append(0, np.cumsum(count))
         centres, radii, areas = np.zeros((len(count), 3)), np.zeros(len(count)), np.zeros(len(count))
-        for corners in np.unique(count):
-            chosen = np.flatnonzero(count == corners)
-            members = order[first[chosen][:, None] + np.arange(corners)]
+        for chosen, of_faces in alike((starts, np.arange(len(count)))):
+            members = order[of_faces]
             points, frames = contacts.points[members], contacts.frames[members[:, 0]]
             centres[chosen], radii[chosen], areas[chosen] = _measured(points, frames)
-        of_first = order[first][face]
+        of_first = order[starts[face]]
         # On the block that is the first one of the face's first point, in the tangents of that.
         sign = np.where(contacts.block_a == contacts.block_a[of_first], 1.0, -1.0)
         along = contacts.frames[of_first][:, [1, 2, 0]]
@@ -80,7 +80,7 @@ class Faces:
         parts = np.zeros((len(face), 5, 3))
         parts[:, :3, 1:] = sign[:, None, None] * np.einsum("kix,kjx->kij", along, contacts.frames[:, 1:])
         parts[:, 4, 0] = friction
-        starts, shape = np.append(0, np.cumsum(count)), (5 * len(count), 3 * len(face))
+        shape = 5 * len(count), 3 * len(face)
         return cls(face, centres, radii, areas, sp.csr_array(sp.bsr_array((parts[order], order, starts), shape=shape)))
 
     def refuse_not_convex(self, contacts: Contacts, assembly: Assembly) -> None:
@@ -97,23 +97,22 @@ class Faces:
 def _faces(contacts: Contacts, length: float) -> np.ndarray:
     """(n_contacts,) int array: number of the face of each contact point."""
     n = len(contacts)
-    _, joint = contacts.joints()
-    order, count = np.argsort(joint, kind="stable"), np.bincount(joint)
-    first = np.cumsum(count) - count
+    pairs, joint = contacts.joints()
+    order, starts = np.argsort(joint, kind="stable"), np.append(0, np.cumsum(np.bincount(joint)))
     links = []
-    for points in np.unique(count):
-        members = order[first[count == points][:, None] + np.arange(points)]
-        i, j = np.triu_indices(points, 1)
+    for _, of_joints in alike((starts, np.arange(len(pairs)))):
+        members = order[of_joints]
+        i, j = np.triu_indices(members.shape[1], 1)
         one, other = members[:, i].ravel(), members[:, j].ravel()
         normal = contacts.frames[one, 0]
         distance = np.abs(((contacts.points[one] - contacts.points[other]) * normal).sum(axis=1))
         # Either block may be the first of a contact point.
         sign = np.where(contacts.block_a[one] == contacts.block_a[other], 1.0, -1.0)
         normal_difference = np.linalg.norm(normal - sign[:, None] * contacts.frames[other, 0], axis=1)
-        alike = (distance <= ONE_FACE * length) & (normal_difference <= ONE_FACE)
-        links.append(np.stack([one[alike], other[alike]]))
-    pairs = np.concatenate(links, axis=1)
-    graph = sp.coo_array((np.ones(pairs.shape[1]), (pairs[0], pairs[1])), shape=(n, n))
+        same = (distance <= ONE_FACE * length) & (normal_difference <= ONE_FACE)
+        links.append(np.stack([one[same], other[same]]))
+    first, second = np.concatenate(links, axis=1)
+    graph = sp.coo_array((np.ones(len(first)), (first, second)), shape=(n, n))
     return connected_components(graph, directed=False)[1]
 
 
