@@ -50,11 +50,8 @@ class LinearProgram:
     def raise_if_unbounded(self, ray: np.ndarray) -> None:
         """Raise ``Unbounded`` where the ray, (n,), passes our own check."""
         x = np.maximum(ray, 0.0)
-        size = float(np.abs(x).max(initial=0.0))
-        if size == 0.0:
-            return
-        x /= size
-        if np.abs(self.matrix @ x).max(initial=0.0) <= 1e-9 and self.cost @ x < -1e-9:
+        small = 1e-9 * float(x.max(initial=0.0))
+        if np.abs(self.matrix @ x).max(initial=0.0) <= small and self.cost @ x < -small:
             raise Unbounded(x)
 
 
