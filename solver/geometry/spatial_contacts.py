@@ -32,12 +32,10 @@ SLIVER = 0.005
 def measured_points(placed: PlacedParts, features: np.ndarray, areas: np.ndarray | None = None) -> Contacts:
     """Frames, gaps and slips of given pairs of features, (n, 4) int, where the corners now are.
 
-    Areas, (n,) [m²], are carried on, or zero.
-
     A corner inside a face has the normal of the face. On the boundary of a face its normal is half-way between that of
     the face and that of the edges that cross there, so that the normal of a corner that enters the face changes in two
-    equal steps. A corner on a corner, and edges that are nearly parallel, have the normal half-way
-    between the two faces. An edge across an edge has the normal to both.
+    equal steps. A corner on a corner, and edges that are nearly parallel, have the normal half-way between the two
+    faces. An edge across an edge has the normal to both. Areas, (n,) [m²], are carried on, or zero.
 
     The gap is the distance along the normal of two material points. Tangents ride on the face of ``block_b``: swung
     about the edge there where the normal is not the face's. The slip is the place of the point of ``block_a`` along
@@ -159,7 +157,10 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
     # Where a plane separates parts and points of both are as near as that, no tips or edges touch.
     slack = SAME_PLACE * pairs.width
     others = (pairs.apart < -slack) | (nearest > pairs.apart + slack)
-    single = _single_points(placed, pairs[others & shallow], pairs[others], reach)
+    tips = measured_points(placed, _tips(placed, pairs[others & shallow], reach))
+    crossed = measured_points(placed, _crossed_edges(placed, pairs[others], reach))
+    of_cuts = parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)
+    single = joined_contacts([tips[~parts.made[tips.features[:, 1]]], crossed[~of_cuts]])
     single = single[near(single)]
     contacts = joined_contacts([*found, single])
     label = np.concatenate([*labels, np.tile([-1, -1, 1], (len(single), 1))])
@@ -175,10 +176,7 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
 def _slivers(
     placed: PlacedParts, face_i: np.ndarray, face_j: np.ndarray, corners: ClippedCorners, largest: np.ndarray
 ) -> np.ndarray:
-    """Whether corners are those of a sliver at a cut, (n,) bool, beside the area in which their blocks touch.
-
-    This is the largest, (n_pairs,) [m²], of all polygons in which the same two blocks cover each other.
-    """
+    """(n,) bool array: corners of slivers at cuts, beside the largest polygon, (n_pairs,) [m²], of the same blocks."""
     solids = placed.solids
     area = np.bincount(corners.owner, corners.areas, minlength=len(face_i))
     at_cut = np.bincount(solids.face_of_corner, placed.parts.cut_edges) > 0
@@ -201,15 +199,6 @@ def _without_duplicates(contacts: Contacts, near: float) -> Contacts:
     count, group = connected_components(links, directed=False)
     areas = np.bincount(group, contacts.areas, minlength=count)
     return replace(contacts, areas=areas[group])[np.sort(np.unique(group, return_index=True)[1])]
-
-
-def _single_points(placed: PlacedParts, tipping: FacingParts, crossing: FacingParts, reach: float) -> Contacts:
-    """Points of tips on faces and of edges across edges, but those of cuts."""
-    parts = placed.parts
-    tips = measured_points(placed, _tips(placed, tipping, reach))
-    crossed = measured_points(placed, _crossed_edges(placed, crossing, reach))
-    of_cuts = parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)
-    return joined_contacts([tips[~parts.made[tips.features[:, 1]]], crossed[~of_cuts]])
 
 
 def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
@@ -257,10 +246,8 @@ def entered_points(
 ) -> Contacts:
     """Find the points that would have kept apart blocks that overlap after a movement, measured before it.
 
-    One of two blocks, of widths (n_blocks,) [m], must be of the ``useful``, (n_blocks,) bool; overlaps are of more than
-    the tolerance [m]. Contacts are those that are known.
-
-    Edges touch where they cross. Where that is known and does not help, as one turns, corners are to stay before the
+    Of overlaps of more than the tolerance [m] with ``useful`` blocks, (n_blocks,) bool, those beside known contacts.
+    Edges touch where they cross; where that is known and does not help, as one turns, corners are to stay before the
     plane that separated the two.
     """
     before, after = movement
