@@ -276,7 +276,6 @@ class Assembly(Shown):
 
     @cached_property
     def _numbers(self) -> dict[str, int]:
-        """Number of each block by its name."""
         return {name: k for k, name in enumerate(self.names)}
 
     def listed(self, blocks: np.ndarray, most: int) -> str:

@@ -48,12 +48,9 @@ def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc
 
 
 def friction_rays(friction: np.ndarray) -> sp.csc_array:
-    """(2 n, 2 n) sparse array: normal and shear forces of the two rays of each friction cone in the plane.
-
-    Column 2i is n - μ t and column 2i + 1 is n + μ t of contact i, divided by √(1 + μ²) so that a large coefficient
-    does not unbalance the program.
-    """
+    """(2 n, 2 n) sparse array: the rays n - μ t and n + μ t of contact i in the plane, in columns 2i and 2i + 1."""
     n = len(friction)
+    # As long for every coefficient, so that a large one does not unbalance the program.
     scale = 1.0 / np.hypot(1.0, friction)
     values = np.empty((n, 2, 2))
     values[:, :, 0] = scale[:, None]

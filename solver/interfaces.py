@@ -149,10 +149,7 @@ class JointScatter:
 def _mixed(number: np.ndarray) -> np.ndarray:
     """(n,) uint64 array: numbers that pass for random, each a function of the one it comes from.
 
-    Notes
-    -----
-    The finalizer of SplitMix64: G. L. Steele, D. Lea and C. H. Flood, Fast splittable pseudorandom number generators,
-    OOPSLA 2014, https://doi.org/10.1145/2660193.2660195.
+    The finalizer of SplitMix64: Steele, Lea & Flood (2014), https://doi.org/10.1145/2660193.2660195.
     """
     z = number.astype(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

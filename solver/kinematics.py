@@ -112,8 +112,6 @@ def rotation_matrices(rotations: np.ndarray) -> np.ndarray:
 def composed_rotations(rotations: np.ndarray, then: np.ndarray) -> np.ndarray:
     """(n, n_rot) array: the rotation vectors of one rotation after another; in the plane angles add up.
 
-    Notes
-    -----
     In space through unit quaternions, which lose no digits at small angles nor near half a turn.
     """
     if rotations.shape[1] == 1:

@@ -88,15 +88,11 @@ class _NoEquilibrium(Exception):
 
 @dataclass(frozen=True)
 class ProgramSolution:
-    """Solution of a program; the velocity of its state are the displacements.
-
-    Points ``touching``, (n_contacts,) bool array, have N + g = μ |T + d|, with or without force. Unless the forces are
-    ``balanced`` with the loads, the displacements are those of a fall.
-    """
+    """Solution of a program; the velocity of its state are the displacements."""
 
     state: State
-    touching: np.ndarray
-    balanced: bool
+    touching: np.ndarray  #: (n_contacts,) bool: points with N + g = μ |T + d|, with or without force
+    balanced: bool  #: whether forces balance the loads; otherwise the displacements are those of a fall
     certificate: Certificate
 
 
@@ -111,7 +107,7 @@ def solve_program(
 
     The static form above, and with unbalanced forces r⁺, r⁻ ≥ 0 on every free block: + ρ Σ (r⁺ + r⁻) in the cost and
     A c + f + r⁺ - r⁻ = 0. They are dual to the bound ρ of all displacements and cost too much to be used wherever the
-    loads can be balanced. Equilibrium holds to a tolerance, so that frictionless blocks do not move at no cost.
+    loads can be balanced.
     """
     assembly, interfaces, loads = inputs
     load = loads.dead_at(assembly, pose)
@@ -168,9 +164,8 @@ def solve_program(
 def joint_errors(contacts: Contacts, solution: ProgramSolution) -> tuple[float, np.ndarray]:
     """Measure gaps and drift of the joints at their contacts after the exact motion that follows a program.
 
-    Gives the deepest penetration, largest gap of a point that carried force, or largest drift of one that stuck, too
-    [m]; and both, (n_contacts, 2) [m], for the next program: where slip leaves a part q of a gap g again, the gap is
-    g / (1 - q).
+    Gives the largest penetration, gap of a point that carried force, or drift of one that stuck, too [m]; and both,
+    (n_contacts, 2) [m], for the next program: where slip leaves a part q of a gap g again, the gap is g / (1 - q).
     """
     before, gap = solution.state, contacts.gaps
     place, same = matched_contacts(contacts, before.contacts)
@@ -208,7 +203,6 @@ class _Phase:
         self.tolerance = self.driver.tolerance * (1.0 + 1e-9)
 
     def contacts(self, pose: Pose) -> Contacts:
-        """Find the contact points at a pose."""
         return find_contacts(self.assembly, moved_vertices(self.assembly, pose), self.reach)
 
     def solve(self, pose: Pose, contacts: Contacts, **arguments: Any) -> ProgramSolution:
@@ -237,17 +231,14 @@ class _Phase:
         return _Equilibrium(s, pose, solution, float((solution.state.support_forces * rate).sum()))
 
     def step_to(self, current: _Equilibrium, s: float) -> _Equilibrium:
-        """Step from an equilibrium to the settlement s; raises SupportsLocked and what ``close_joints`` raises."""
+        """Step from an equilibrium to the settlement s; raises what stops it there."""
         supports = self.driver.rate(current.s) * (s - current.s)
         solution = self.solve(current.pose, self.contacts(current.pose), supports=supports)
         pose = moved(current.pose, solution.state.velocity)
         return self.close_joints(s, put_together(self.assembly.free, pose, self.driver.supports(s)), solution)
 
     def close_joints(self, s: float, first: Pose, solution: ProgramSolution) -> _Equilibrium:
-        """Close what a program has left at the pose ``first``, with the supports fixed, until forces balance there.
-
-        Raises _NoEquilibrium, _JointsOpen or SolveError.
-        """
+        """Close what a program has left at the pose ``first``, with the supports fixed, until forces balance there."""
         pose = first
         for number in range(LINEARISATIONS + 1):
             far = motion_size(first.movement_to(pose), self.length).max() > tolerances.FARTHEST_FALL * self.length
@@ -322,7 +313,6 @@ class _Phase:
         return Ending(Status.LIMIT_REACHED, words), current.pose
 
     def increment(self, current: _Equilibrium, step: float, upper_bound: float) -> Increment:
-        """Report an equilibrium with its checkpoint."""
         place, ended = Place.unloaded(current.pose, current.s), current.s >= self.phase.limit
         checkpoint = PathState(self.number, self.start, place, step, upper_bound, ended=ended)
         solution = self.reported(current.solution, current.s, current.reaction, Status.EQUILIBRIUM)
@@ -352,10 +342,7 @@ def linear_program_increments(
     loads: Loads,
     resume: PathState | None = None,
 ) -> Generator[Increment, None, Ending]:
-    """Yield the increments of settlements in the plane by the paper's linear programs; return how they ended.
-
-    From a ``resume``, the checkpoint of an increment with the same other arguments, those after it follow bit for bit.
-    """
+    """Yield the increments of settlements in the plane by the paper's linear programs; return how they ended."""
     if not np.abs(loads.dead[assembly.free, :2]).any():
         raise ValueError("no load acts on any free block; give them a weight")
     first, pose = (0, Pose.initial(assembly)) if resume is None else (resume.phase, resume.start)

@@ -150,7 +150,6 @@ class _Iterate:
         return min(1.0 / steepest, in_cones)
 
     def mean_after(self, change: _Change, part: float) -> float:
-        """Mean product after a part of a change."""
         u = self.u + part * (self.slope * change.forces).T
         reserve = self.reserve - part * self.sense * change.forces[self.limited, 0]
         of_limits = float(reserve @ (self.yielding + part * change.yielding))
@@ -172,7 +171,6 @@ class _Iterate:
         return gain / max(float(np.abs(outside).max()) * size, 1e-300)
 
     def take(self, change: _Change, part: float) -> None:
-        """Add a part of a change."""
         self.forces, self.z = self.forces + part * change.forces, self.z + part * change.z
         self.yielding = self.yielding + part * change.yielding
         self.motion, self.rho = self.motion + part * change.motion, self.rho + part * change.rho
@@ -194,8 +192,7 @@ def nearest_equilibrium(
     """(n, d) array: forces of the closed contact points in equilibrium within friction nearest to the reference f⁰.
 
     Forces are in block weights; ``most`` is M and ``cohesion`` C, (n,) arrays, ``unit_reaction`` r, (n, d), and
-    ``reaction`` R. Of the compliance (n, d) only ratios matter. Raises ``NotSolved`` where there are none, or none were
-    found.
+    ``reaction`` R. Of the compliance (n, d) only ratios matter. Raises ``NotSolved`` where none were found.
     """
     if len(reference) == 0:
         if np.abs(load).max(initial=0.0) > ACCEPTED:

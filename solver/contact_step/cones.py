@@ -50,10 +50,7 @@ def longest_step(a: np.ndarray, change: np.ndarray) -> float:
 
 
 class Scaling:
-    """The scaling W in which forces u and distances z, (d, n) arrays, inside their cones are alike: W u = W⁻¹ z.
-
-    ``scaled_point`` is W u.
-    """
+    """The scaling W in which forces u and distances z, (d, n) arrays, inside their cones are alike: W u = W⁻¹ z."""
 
     def __init__(self, u: np.ndarray, z: np.ndarray) -> None:
         size_u, size_z = np.sqrt(determinant(u)), np.sqrt(determinant(z))

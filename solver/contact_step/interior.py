@@ -101,7 +101,6 @@ class _Iterate:
         return forces
 
     def mean_of(self, point: _Point) -> float:
-        """Mean product at a point."""
         products = (point.normal * point.opening).sum() + (self.reserve(point) * point.yielding).sum()
         return float(products + (point.shear * point.slide).sum()) / self.count
 

@@ -73,10 +73,7 @@ class ContactRows:
         return np.asarray(self.transposed @ forces.ravel())[:-1]
 
     def factorised(self, stiffness: np.ndarray, diagonal: np.ndarray) -> Solve:
-        """Factorise the stiffness (n, d, d) of the contact points and a diagonal (n_dof,); gives what solves with it.
-
-        Raises ``NotSolved``.
-        """
+        """Factorise a stiffness (n, d, d) of the points and a diagonal (n_dof,): what solves; raises ``NotSolved``."""
         weighted = np.matmul(stiffness, self.blocks)
         sums, pairs = _over_pairs(self.key)
         of_pairs = _factorisation(pairs, self.places, self.n_dof // self.dof, self.dof)

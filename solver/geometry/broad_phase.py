@@ -15,9 +15,8 @@ def expand_ranges(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def box_pairs(vertices: np.ndarray, offsets: np.ndarray, reach: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(n_pairs,) int arrays: pairs i < j of polygons or solids whose boxes come within reach [m] along every axis.
 
-    Polygon or solid ``i`` has the corners from entry ``i`` to entry ``i + 1`` of the offsets; a negative reach is for
-    boxes that overlap by as much. Sort and sweep along the axis on which fewer pairs survive; one long block (the
-    ground) costs n pairs, not n².
+    A negative reach is for boxes that overlap by as much. Sort and sweep along the axis on which fewer pairs survive:
+    one long block (the ground) costs n pairs, not n².
     """
     low, high = boxes(vertices, offsets)
     low, high = low - reach / 2.0, high + reach / 2.0

@@ -181,10 +181,7 @@ def _on_face(
 
 
 def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Tributary area of each corner in its convex polygon, (n,) [m²], and widths and lengths of these, (count,) [m].
-
-    Corners (n, 2) [m] in any order, of the polygons (n,) that own them.
-    """
+    """Tributary areas (n,) [m²] of corners (n, 2), in any order, of convex polygons; their widths, lengths (count,)."""
     number = np.bincount(owner, minlength=count)
     total = np.stack([np.bincount(owner, points[:, k], minlength=count) for k in (0, 1)], axis=1)
     middle = total / np.maximum(number, 1)[:, None]

@@ -97,8 +97,7 @@ def successors(
 
     A force that went over to another face of the two blocks would lose there what that one's friction does not hold.
     Of the ``vanished``, (k,) int, those (m,) are given that have any, with the successor of each, (m,) int, and its
-    share, (m,): equally near ones share what one passes, so that their order does not matter. The size is that of the
-    blocks [m].
+    share, (m,): equally near ones, by the size of blocks [m], share what one passes, so that their order is no matter.
     """
     old, new = before.pair_keys()[vanished], contacts.pair_keys()
     order = np.argsort(new, kind="stable")

@@ -130,9 +130,7 @@ class NoParts(ValueError):
 
 
 def convex_parts(solids: Solids) -> ConvexParts:
-    """Cut solids that are not convex into convex parts.
-
-    Raises :class:`NoParts` for a surface that crosses itself, or has more parts than stones have.
+    """Cut solids that are not convex into convex parts; raises :class:`NoParts`.
 
     A solid is convex where no corner is in front of any of its faces by more than a thousandth of its width. Others are
     cut through a re-entrant edge and the third corner that leave two pieces whose convex hulls hold the least volume,
@@ -268,10 +266,7 @@ def _body(points: np.ndarray, triangles: np.ndarray) -> Manifold:
 
 @lru_cache(maxsize=MOST_KEPT)
 def _parts_of(points: bytes, faces: tuple[tuple[int, ...], ...]) -> list[tuple[np.ndarray, list[list[int]], list[int]]]:
-    """Corners and faces of each part of a block, kept of the last blocks.
-
-    And the number of the face of the block in which each face lies, below 0 and its own inside the block.
-    """
+    """Corners and faces of each part of a block; the block's face in which each lies, below 0 and its own inside."""
     vertices, loops = np.frombuffer(points).reshape(-1, 3), [list(face) for face in faces]
     origin, size = vertices[0], float(np.linalg.norm(np.ptp(vertices, axis=0)))
     drawn = Solids.of_surfaces([((vertices - origin) / size, loops)])

@@ -151,10 +151,7 @@ def _ridden(movement: Movement, normals: np.ndarray, other: np.ndarray) -> np.nd
 def _gaps(
     placed: PlacedParts, normals: np.ndarray, own: np.ndarray, other: np.ndarray, corners: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Separations of parts along normals to two edges, (n_pairs, n_axes) [m], minus infinity where there is no normal.
-
-    And whether both edges would be the first to meet, a bool array of this shape.
-    """
+    """Separations of parts along normals to two edges, (n_pairs, n_axes) [m], and whether both would meet first."""
     origin, along = placed.vertices[corners[0][:, :1]], placed.along(own)
     at_own, at_other = (dot(normals, placed.starts(k) - origin) for k in (own, other))
     low = (normals @ (placed.vertices[corners[0]] - origin).transpose(0, 2, 1)).min(axis=2)

@@ -74,10 +74,7 @@ class FacingParts:
 def near_parts(
     placed: PlacedParts, reach: float, useful: np.ndarray, widths: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs of parts of different blocks, one of them useful, whose boxes come within reach; lower block first.
-
-    With the width of the thinner of their blocks, from those of all blocks.
-    """
+    """Pairs of parts of two blocks, one useful, the lower first, whose boxes are within reach; the thinner's width."""
     block_of_part = placed.parts.block_of_part
     i, j = box_pairs(placed.vertices, placed.solids.offsets, reach)
     a, b = block_of_part[i], block_of_part[j]

@@ -95,12 +95,9 @@ class Outlines(Bodies):
 
 
 def polygon_integrals(vertices: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Areas (n,) [m²], positive where corners run counter-clockwise, and centroids (n, 2) [m] of polygons.
-
-    Sums over the edges (Green's theorem) are taken from the first corner of each polygon, so that
-    coordinates far from the origin (UTM) lose no digits.
-    """
+    """Areas (n,) [m²], positive where corners run counter-clockwise, and centroids (n, 2) [m] of polygons."""
     starts = offsets[:-1]
+    # From the first corner of each, so that coordinates far from the origin (UTM) lose no digits.
     origin = vertices[starts]
     x = vertices - np.repeat(origin, np.diff(offsets), axis=0)
     following = next_vertices(offsets)

@@ -17,11 +17,9 @@ SMALLEST_SINE = 0.05
 def face_separations(
     placed: PlacedParts, i: np.ndarray, j: np.ndarray, inner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Largest separations of convex parts i and j, (n,) int arrays, by a face of part i.
+    """How far, (n,) [m], convex parts j are before a face of parts i, the farthest; and that face, (n,) int.
 
-    How far, (n,) [m], part j is in front of the face from which it is farthest, negative behind it; that face, (n,)
-    int; and how far it is in front of one inside the block, by ``inner``, (n_faces,) bool: minus infinity where there
-    is none.
+    And how far before one inside the block, by ``inner``, (n_faces,) bool: minus infinity where there is none.
     """
     solids = placed.solids
     apart, behind, leading = np.empty(len(i)), np.empty(len(i)), np.empty(len(i), dtype=np.int64)

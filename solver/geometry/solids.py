@@ -155,15 +155,12 @@ class Solids(Bodies):
 
     @cached_property
     def _integrals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Volumes, centroids, and the second moments about them.
-
-        Sums over tetrahedra between the triangles that fan out from the first corner of each face and the first vertex
-        of each solid, so that coordinates far from the origin (UTM) lose no digits.
-        """
+        """Volumes, centroids, and the second moments about them."""
         face, position = expand_ranges(np.diff(self.face_offsets) - 2)
         solid, corner = self.block_of_face[face], self.face_offsets[face]
         triangles = self.corners[np.stack([corner, corner + position + 1, corner + position + 2], axis=1)]
         first = np.searchsorted(solid, np.arange(len(self)))
+        # From the first vertex of each solid, so that coordinates far from the origin (UTM) lose no digits.
         origin = self.vertices[self.offsets[:-1]]
         a, b, c = np.moveaxis(self.vertices[triangles] - origin[solid][:, None], 1, 0)
         six = dot(a, cross(b, c))

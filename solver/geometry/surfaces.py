@@ -25,10 +25,7 @@ Surface = tuple[ArrayLike, Sequence[Sequence[int]]]
 
 
 def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
-    """Make polyhedra of the closed surfaces of blocks, with one face in each plane.
-
-    Raises ``ValueError`` that names the block and the place, as :meth:`Assembly.from_solids`.
-    """
+    """Make polyhedra of the closed surfaces of blocks, with one face in each plane; raises as ``from_solids`` says."""
     surfaces = [_checked(solid, name) for solid, name in zip(solids, names, strict=True)]
     joined = Polyhedra.of_surfaces(surfaces)
     for block in _blocks_of_open_edges(joined):

@@ -19,14 +19,12 @@ FAR = 1e3
 
 
 def at_origin(assembly: Assembly) -> np.ndarray:
-    """(d,) array [m]: what to take off the coordinates; zero where the structure is near the origin.
-
-    A multiple of a power of two that is large against the structure, so that taking it off rounds nothing.
-    """
+    """(d,) array [m]: what to take off the coordinates; zero where the structure is near the origin."""
     low, high = assembly.vertices.min(axis=0), assembly.vertices.max(axis=0)
     middle = (low + high) / 2.0
     if float(np.abs(middle).max()) <= FAR * assembly.block_size:
         return np.zeros(assembly.dimension)
+    # Multiples of a power of two that is large against the structure: taking them off rounds nothing.
     unit = 2.0 ** np.ceil(np.log2(max(float((high - low).max()), assembly.block_size)))
     return np.asarray(np.round(middle / unit) * unit)
 

@@ -56,15 +56,11 @@ class PathState:
 
 @dataclass(frozen=True)
 class EquilibriumCheck:
-    """Equilibrium within friction at a place of the path, with the contact points at its pose.
-
-    Forces, (n_contacts, d), are in equilibrium where one exists; otherwise those that come nearest to it. What is
-    measured is the reaction [N or N·m] or the multiplier of the live load.
-    """
+    """Equilibrium within friction at a place of the path, with the contact points at its pose."""
 
     place: Place
     contacts: Contacts
-    friction: np.ndarray
-    forces: np.ndarray
-    measured: float
+    friction: np.ndarray  #: (n_contacts,)
+    forces: np.ndarray  #: (n_contacts, d): in equilibrium where one exists; otherwise those that come nearest to it
+    measured: float  #: reaction [N or N·m], or multiplier of the live load
     bounds: EquilibriumBounds

@@ -23,22 +23,18 @@ def mean_load(assembly: Assembly, loads: Loads) -> float:
 
 @dataclass(frozen=True)
 class Model:
-    """Blocks, joints and loads, which are the same in all increments.
-
-    Programs are written in units of the block size and the mean load of a free block. Compliance and imperfection are
-    times those of :mod:`solver.tolerances`.
-    """
+    """Blocks, joints and loads, which are the same in all increments."""
 
     assembly: Assembly
     interfaces: Interfaces
     loads: Loads
-    length: float  #: [m]
-    force: float  #: [N]
+    length: float  #: [m]: unit of the programs, the block size
+    force: float  #: [N]: likewise, the mean load of a free block
     has_live: bool = False  #: whether the multiplier of the live load is an unknown of every program
     fallen: np.ndarray | None = None  #: (n_blocks,) bool: blocks that have left, without loads and contact points
     ties: tuple[Tie, ...] = ()
-    compliance: float = 1.0
-    imperfection: float = 1.0
+    compliance: float = 1.0  #: times that of :mod:`solver.tolerances`
+    imperfection: float = 1.0  #: likewise
 
     def without(self, fallen: np.ndarray) -> Model:
         """Return the model once blocks, (n_blocks,) bool array, have left it."""

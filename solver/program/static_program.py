@@ -24,19 +24,16 @@ from .torsion import Faces
 
 @dataclass(frozen=True)
 class EquilibriumBounds:
-    """Bounds over all forces in equilibrium within friction at a pose.
-
-    Of the reaction [N or N·m], or of the live loads' multiplier; infinite where friction bounds neither; one whose
-    program was not solved is not a number. Without an equilibrium both are the value of the forces.
-
-    Forces (k, n_contacts, d), in units of the program, are those of the bounds that were found, the least one first; of
-    another equilibrium where none was; nearest to one where none exists.
-    """
+    """Bounds of the reaction [N or N·m], or of the live loads' multiplier, over all equilibria within friction."""
 
     unbalanced: float  #: least sum of unbalanced forces over the total load: zero where an equilibrium exists
+    #: Infinite where friction does not bound it, nan where its program was not solved; without an equilibrium the value
+    #: of the forces.
     low: float
     high: float
     gap: float  #: largest relative difference of the two objectives of the programs
+    #: (k, n_contacts, d), in units of the program: of the bounds that were found, the least one first; of another
+    #: equilibrium where none was; nearest to one where none exists.
     forces: np.ndarray
 
     @property
@@ -64,21 +61,10 @@ class ProgramState:
 class StaticProgram:
     """Rows of the free blocks with a dead and a live load, and n contact points with limits, in units of the program.
 
-    Normal forces are those beyond the least ones, which are loads of the blocks, in ``dead``. The value that is bounded
-    is the multiplier of a live load, or the reaction along a rate of the supports. Methods raise ``SolveError`` where a
-    program is not solved.
-
-    Parameters
-    ----------
-    friction, price : (n,) arrays
-        The price is that of normal forces, in multipliers.
-    senses : tuple of float
-        In which the live load may act, if any.
-    rate : (n_blocks, n_dof) array, optional
-    faces : Faces, optional
-        That resist torsion as under a uniform pressure, and no more.
-    exact : bool
-        Whether a mechanism is sought: in the plane solutions are vertices, then, and balanced to the last digit.
+    Normal forces are those beyond the least ones, which are loads of the blocks, in ``dead``; they have a price, (n,),
+    in multipliers. The value that is bounded is the multiplier of a live load in the given senses, or the reaction
+    along a rate of the supports, (n_blocks, n_dof). Where a mechanism is sought solutions are ``exact``: in the plane
+    they are vertices, then, and balanced to the last digit. Methods raise ``SolveError`` where a program is not solved.
     """
 
     def __init__(
@@ -113,9 +99,8 @@ class StaticProgram:
     def bounds(self) -> EquilibriumBounds:
         """Bound the reaction or the multiplier of all equilibria within friction.
 
-        Linear programs over the multipliers of the friction cones' rays, in space conic programs over the forces in
-        round cones: the least sum of unbalanced forces; where that is none, the least and the largest reaction (or
-        multiplier). The least is that of Portioli & Cascini (2017) at this geometry.
+        First the least sum of unbalanced forces; where that is none, the least and the largest value. The least
+        reaction is that of Portioli & Cascini (2017) at this geometry.
         """
         balanced, unbalanced = self.most_balanced()
         if unbalanced > FALLING_FRACTION:
@@ -177,10 +162,7 @@ class StaticProgram:
         return replace(state, multiplier=state.multiplier * with_live, unbalanced=missing - beyond), left
 
     def kinematic(self, state: ProgramState) -> tuple[float, float]:
-        """Multiplier by the power balance of a state's mechanism, and by how much this leaves the duals of the cones.
-
-        Infinite where the live load has no power.
-        """
+        """Multiplier by the power of a mechanism, infinite without live power; how far it leaves the duals of cones."""
         velocity = state.velocity
         (relative, slip), live_power = self.rates(state), float(self.live @ velocity)
         # Points that are open may close by their gap in a motion whose live power is 1.

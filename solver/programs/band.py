@@ -51,14 +51,12 @@ class _Point:
 
 
 class _Band:
-    """A D Aᵀ for a fixed A beside an identity, in an order that keeps it near the diagonal; and its factor.
-
-    Rows of one column bound that column. They are eliminated, and widen no band.
-    """
+    """A D Aᵀ for a fixed A beside an identity, in an order that keeps it near the diagonal; and its factor."""
 
     def __init__(self, matrix: sp.csc_array, places: np.ndarray | None) -> None:
         rows, columns = matrix.shape
         of_column = np.repeat(np.arange(columns), np.diff(matrix.indptr))
+        # Rows of one column bound that column. They are eliminated, and widen no band.
         alone = np.flatnonzero(np.bincount(matrix.indices)[matrix.indices] == 1)
         alone = alone[np.unique(of_column[alone], return_index=True)[1]]
         self.bounding, self.bounded, self.slope = matrix.indices[alone], of_column[alone], matrix.data[alone]
@@ -237,12 +235,9 @@ def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float
 def run_band(program: LinearProgram) -> tuple[Solution | None, str]:
     """Solve a program whose rows form a narrow band; what comes back is as of :func:`solver.programs.highs.run_highs`.
 
-    Its places are for orders of the rows to try, see :func:`solver.ordering.narrowest`.
-
     A primal-dual method: every iteration factorises A D Aᵀ, whose blocks of 3 × 3 are the blocks of the structure and
-    their neighbours, as a band in the order given or that of Cuthill & McKee (1969). After Mehrotra
-    (1992), https://doi.org/10.1137/0802028, with a proximal term (Friedlander & Orban 2012,
-    https://doi.org/10.1007/s12532-012-0035-2).
+    their neighbours. After Mehrotra (1992), https://doi.org/10.1137/0802028, with a proximal term (Friedlander & Orban
+    2012, https://doi.org/10.1007/s12532-012-0035-2).
     """
     wide = np.flatnonzero(np.diff(program.matrix.indptr) > WIDE)
     try:

@@ -61,7 +61,6 @@ class ConicProgram:
 
     Cone i has the columns ``i * size`` to ``(i + 1) * size - 1``: the first number times its friction is at least the
     length of the others, |T| ≤ μ N.
-
     Its dual: maximise right · y with c - Aᵀ y in the dual cones, N ≥ μ |T|, and at least 0 in the other columns.
     """
 
@@ -78,13 +77,11 @@ class ConicProgram:
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """(n,) array: x is this times a point of cones of slope 1, a reduced cost divided by this one of their duals.
-
-        As long for every friction coefficient, so that a large one does not unbalance the program.
-        """
+        """(n,) array: x is this times a point of cones of slope 1, a reduced cost divided by it one of their duals."""
         scale = np.ones(len(self.cost))
         of_cone = scale[: self.in_cones].reshape(-1, self.size)
         of_cone[:, 1:] = self.friction[:, None]
+        # As long for every friction coefficient, so that a large one does not unbalance the program.
         of_cone /= np.hypot(1.0, self.friction)[:, None]
         return scale
 

@@ -34,8 +34,7 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, v
 
     Routes are ``BAND`` or names out of ``ROUTES``, chosen by size by default; with ``vertex`` those that find one, up
     to ``CROSSOVER_ROWS`` rows: it is one mechanism, while an interior point, a mean of several, lets fixed-point
-    iterations drift. Raises ``Unbounded`` where a ray proves that there is no minimum, and where no solution
-    passes ``SolveError``, which lists what each route ended with.
+    iterations drift. Raises ``Unbounded``, and ``SolveError``, which lists what each route ended with.
     """
     rows, columns = program.matrix.shape
     if routes is None:
@@ -63,9 +62,8 @@ def _first_accepted(runs: Mapping[str, Callable[[], tuple[Solution | None, str]]
 def solve_between(linear: LinearProgram, friction: np.ndarray, size: int, *, vertex: bool = True) -> Solution:
     """Solve a linear program, or with friction, (k,), one whose first columns are in round cones in place of x ≥ 0.
 
-    Cones are those of :class:`ConicProgram`. With cones, the first n numbers of x are those of the program, and the
-    first multipliers those of the equations, where the limits are equal; the slack of the other rows follows. Raises as
-    :func:`solve_lp` does.
+    With cones, the first n numbers of x are those of the program, and the first multipliers those of the equations,
+    where the limits are equal; the slack of the other rows follows. Raises as :func:`solve_lp` does.
     """
     if len(friction) == 0:
         return solve_lp(linear, vertex=vertex)

@@ -18,8 +18,7 @@ def linear_algebra() -> ThreadpoolController:
 def one_thread() -> AbstractContextManager[object]:
     """Keep the linear algebra to one thread, and give it back what it had.
 
-    A band is factorised in hundreds of products of small matrices. Shared among threads, each takes as long as it takes
-    to wake them: four hundred times as long where other processes work on the same cores. And the last bits of a
-    result depend on how many threads there were.
+    A band is factorised in hundreds of products of small matrices, each of which takes as long as threads take to wake:
+    four hundred times as long where other processes work on the same cores. And last bits depend on their number.
     """
     return linear_algebra().limit(limits=1)

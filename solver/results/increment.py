@@ -49,10 +49,8 @@ def used_up(forces: np.ndarray, friction: np.ndarray) -> np.ndarray:
 
 
 def slides(slip: np.ndarray, opening: np.ndarray, friction: np.ndarray, slow: float) -> np.ndarray:
-    """(n,) bool array: which points slide along their joint, and do not only open, by their relative velocities.
-
-    An opening of up to friction times slip is the dilatancy of associative friction.
-    """
+    """(n,) bool array: which points slide along their joint, and do not only open, by their relative velocities."""
+    # Associative friction opens by friction times slip.
     lift = np.maximum(slow, friction * np.abs(slip) * (1.0 + DILATANCY_SLACK))
     return ~at_rest(slip, slow) & (opening <= lift)
 
