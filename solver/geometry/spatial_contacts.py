@@ -225,7 +225,6 @@ def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
 def _crossed_edges(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
     """Features of edges that separate two parts better than any of their faces: one point for a pair."""
     apart, own, other = edge_separations(placed, pairs.i, pairs.j)
-    # By more than rounding, in widths.
     k = np.flatnonzero((apart > pairs.apart + SAME_PLACE * pairs.width) & (apart <= reach))
     own, other = own[k], other[k]
     on_a, on_b = _crossings(placed, own, other)
