@@ -208,7 +208,9 @@ def _vertex_edge_candidates(
     a_block, b_block = shapes.block_of_vertex[vertex], shapes.block_of_vertex[edge]
     deepest = PENETRATION_FRACTION * np.minimum(width[a_block], width[b_block])
     end = end_zone(shapes, vertex, edge)
-    chosen = (gap >= -deepest) & (along >= -end) & (along <= length[edge] + end)
+    # Past a re-entrant corner is still the block.
+    before, behind = (np.where(shapes.convex_vertex[corner], end, deepest) for corner in (edge, following[edge]))
+    chosen = (gap >= -deepest) & (along >= -before) & (along <= length[edge] + behind)
     chosen[chosen] = _is_behind_face(shapes, vertices, vertex[chosen], edge[chosen], gap[chosen], end[chosen])
     vertex, edge = vertex[chosen], edge[chosen]
 

@@ -297,6 +297,7 @@ class Path:
             wider = self.checks.check(place, reaction, CLOSING_GAP)
             check = wider if wider.measured == reaction else check
         resting = place if carries else self.fall.relaxed(place)
+        resting = resting and (self.stepper.standing(resting) or resting)
         is_far = resting is not None and self.fall.movements(place, resting).max() > JUMP
         # Blocks that rest far away may have left an equilibrium in a step that was too long.
         if resting is None or (is_far and state.refine_until < place.s):
@@ -314,7 +315,10 @@ class Path:
         for place in (self.highest.place, *self.highest.history[::-1]):
             if place.s <= self.reported or (1.0 - DROP) * place.multiplier <= state.peak:
                 return
-            check = self._check(place)
+            standing = self.stepper.standing(place)
+            if standing is None:
+                continue
+            check = self._check(standing)
             if check.bounds.in_equilibrium and check.measured > state.peak:
                 self.state = replace(state, peak=check.measured)
                 yield self._report(check, place)

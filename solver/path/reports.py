@@ -14,6 +14,7 @@ from solver.loads import GRAVITY
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Increment, State, Status
 from solver.ties import is_member
+from solver.tolerances import OVERLAP
 from solver.words import REMEDY, counted
 
 from .controls import Ending
@@ -30,6 +31,7 @@ class Reports:
         # Events on the path: parameter [m or rad], and words.
         self.notes: list[tuple[float, str]] = []
         self.fell_at = fell_at
+        self.overlapping: set[tuple[int, int]] = set()
 
     def increment(
         self, check: EquilibriumCheck, velocity: np.ndarray, works: tuple[float, float, float, float]
@@ -52,7 +54,7 @@ class Reports:
             equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
             friction_excess=excess / model.total_load,
             carrying_gap=carrying_gap(in_place, check.forces[between]),
-            largest_penetration=largest_penetration(in_place),
+            largest_penetration=max(largest_penetration(in_place), self._overlap(place)),
             duality_gap=bounds.gap,
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
@@ -62,6 +64,22 @@ class Reports:
         state = self.stepper.mortar.told(state, place)
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
         return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
+
+    def _overlap(self, place: Place) -> float:
+        """Deepest overlap [m] of blocks that no contact point keeps apart; told of each two once."""
+        assembly, fallen = self.model.assembly, self.model.fallen
+        if self.model.interfaces.elastic:
+            return 0.0
+        found = assembly.shapes.overlaps(moved_vertices(assembly, place.pose), OVERLAP * float(assembly.widths.min()))
+        left, deepest = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else fallen, 0.0
+        for a, b, depth in zip(*found, strict=True):
+            if (assembly.free[a] or assembly.free[b]) and not (left[a] or left[b]):
+                deepest = max(deepest, float(depth))
+                if (a, b) not in self.overlapping:
+                    words = f"'{assembly.names[a]}' and '{assembly.names[b]}' are {depth:.3g} m in each other"
+                    self.notes.append((place.s, f"{words}: no contact was found that keeps them apart"))
+                    self.overlapping.add((a, b))
+        return deepest
 
     def falling_increment(self, place: Place, velocity: np.ndarray) -> Increment:
         """The increment of a place that is not in equilibrium."""

@@ -69,7 +69,7 @@ OPEN = 1e-6
 
 #: Times, in units of √(block size / g), in which what viscosity retards comes to rest at once, and in which what falls
 #: hardly moves; movement, in block sizes, in which it has come to rest; and steps after which it does not.
-STANDSTILL, SHORT, STANDING, STANDSTILLS = 1e3, 1e-3, 1e-7, 100
+STANDSTILL, SHORT, STANDING, STANDSTILLS = 1e3, 1e-3, 1e-7, 300
 
 #: Damping of steps in time, in units of mass · √(g / block size): critical for a block that rocks.
 DAMPING = 2.0

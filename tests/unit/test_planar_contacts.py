@@ -341,3 +341,13 @@ def test_a_stone_whose_tenon_is_under_a_lip_does_not_rest_on_it(under, lip, belo
     assembly = solver.Assembly.from_outlines(outlines, roles=["fixed", "free", "fixed"])
     found = solver.Structure(assembly, friction_coefficient=0.6).limit_load(acceleration=(flip, 0))
     assert found.status is solver.LimitStatus.NO_EQUILIBRIUM
+
+
+@pytest.mark.parametrize("inside", [0.0, 5e-6, 2e-5, 4e-4])
+def test_a_stone_in_a_re_entrant_corner_stands_on_both_faces_however_far_it_is_in_one(inside):
+    """The corner is past the end of the bed, where there is still the block."""
+    angle = [[inside, 0], [3, 0], [3, -1], [-1, -1], [-1, 2], [inside, 2]]
+    assembly = solver.Assembly.from_outlines([angle, SQUARE], roles=["fixed", "free"])
+    for way, expected in ((1, 0.6), (-1, np.inf)):
+        found = solver.Structure(assembly, friction_coefficient=0.6).limit_load(acceleration=(way, 0))
+        assert found.multiplier == pytest.approx(expected)
