@@ -10,7 +10,7 @@ import numpy as np
 
 import solver
 from blockvis.layout.left_out import matches
-from blockvis.text import nearest
+from blockvis.text import listed, nearest
 
 from .extrados import SLIVER, extrados
 from .key import NOT_NEGATIVE, NUMBER, POSITIVE, TEXTS, Key, Section
@@ -123,7 +123,7 @@ def lay_backfill(
         raise ValueError(f"{where} surface is {surface:g} m; give the height of its top, a finite number")
     pieces, block = extrados(assembly, _chosen(names, assembly, where), surface)
     if not len(pieces):
-        raise ValueError(f"{where} over: none of {_listed(names)} looks up to the surface; name the topmost blocks")
+        raise ValueError(f"{where} over: none of '{listed(names)}' looks up to the surface; name the topmost blocks")
     heights = pieces[:, :, -1].max(axis=1)
     highest = int(heights.argmax())
     if heights[highest] > surface + SLIVER * assembly.block_size:
@@ -147,13 +147,9 @@ def _chosen(over: Sequence[str], assembly: solver.Assembly, where: str) -> np.nd
             known = [*names, *sorted(set(assembly.materials) - {""})]
             raise ValueError(
                 f"{where} over: no block and no material is named '{pattern}'{nearest(pattern, known)}; the blocks "
-                f"are {', '.join(names[:12])}{' ...' if len(names) > 12 else ''}"
+                f"are {listed(names, 12)}"
             )
         chosen |= meant
     if not (chosen & assembly.free).any():
-        raise ValueError(f"{where} over: {_listed(over)} are supports only; fill loads free blocks: name one")
+        raise ValueError(f"{where} over: '{listed(over)}' are supports only; fill loads free blocks: name one")
     return chosen & assembly.free
-
-
-def _listed(words: Sequence[str]) -> str:
-    return ", ".join(f"'{word}'" for word in words[:6])

@@ -20,7 +20,7 @@ from blockvis.layout.inspect import DENSITY
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.units import doubt, units_instead
-from blockvis.text import nearest
+from blockvis.text import listed, nearest
 from solver import mechanics
 from solver.mechanics import counted, steep_note
 
@@ -120,12 +120,12 @@ def _refuse_idle_settlements(case: Case, assembly: solver.Assembly) -> None:
         if unknown:
             raise ValueError(
                 f"{where}: no block is named '{unknown[0]}'{nearest(unknown[0], moving)}; "
-                f"the moving supports are {', '.join(moving[:12])}"
+                f"the moving supports are {listed(moving, 12)}"
             )
         if not set(moving) & set(named):
             raise ValueError(
-                f"{where} ({', '.join(named[:6]) or 'none'}) are no moving supports, so that nothing would move; "
-                f"those of the case are {', '.join(moving[:12])}"
+                f"{where} ({listed(named) or 'none'}) are no moving supports, so that nothing would move; "
+                f"those of the case are {listed(moving, 12)}"
             )
 
 
@@ -157,10 +157,9 @@ def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
     weight = np.where(assembly.free, assembly.masses, 0.0)
     light = np.flatnonzero(assembly.free & (weight < LIGHTEST * weight.sum()))
     if len(light):
-        shown = ", ".join(f"'{assembly.names[i]}'" for i in light[:6].tolist()) + (" ..." if len(light) > 6 else "")
         warnings.warn(
             f"{source}: {counted(len(light), 'block weighs', 'blocks weigh')} less than {LIGHTEST:g} of the whole "
-            f"({shown}), less than rounding errors of the others, and may stay in the air; "
+            f"({assembly.listed(light, 6)}), less than rounding errors of the others, and may stay in the air; "
             "remove what is so light, or check size and density",
             stacklevel=3,
         )

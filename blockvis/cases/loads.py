@@ -11,7 +11,7 @@ import numpy as np
 
 import solver
 from blockvis.layout.names import blocks_matching
-from blockvis.text import force_text, nearest
+from blockvis.text import force_text, listed, nearest
 
 from .block_at import block_at, note_outside
 from .topmost import force_on_top_in_space
@@ -167,7 +167,7 @@ def _named(load: LoadCase, assembly: solver.Assembly, gone: np.ndarray, where: s
         names = [name for name, free in zip(assembly.names, assembly.free, strict=True) if free]
         raise ValueError(
             f"{where} '{load.blocks}' matches no free block{nearest(load.blocks, names)}; "
-            f"the layout has {', '.join(names[:12])}"
+            f"the layout has {listed(names, 12)}"
         )
     if gone[chosen].all():
         raise ValueError(

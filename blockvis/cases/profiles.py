@@ -14,7 +14,7 @@ import shapely
 
 import solver
 from blockvis.layout.names import blocks_called
-from blockvis.text import nearest
+from blockvis.text import listed, nearest
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -270,7 +270,7 @@ def _check_support(name: str, assembly: solver.Assembly, where: str) -> None:
     if name not in supports:
         kind = "a free block" if name in assembly.names else "no block"
         raise ValueError(
-            f"{where}: '{name}' is {kind}{nearest(name, supports)}; supports are {', '.join(supports[:12]) or 'none'}"
+            f"{where}: '{name}' is {kind}{nearest(name, supports)}; supports are {listed(supports, 12) or 'none'}"
         )
     if not assembly.moving[assembly.index(name)]:
         raise ValueError(f"{where}: '{name}' is fixed; give it the role \"moving\" under [roles]")

@@ -9,7 +9,7 @@ import numpy as np
 
 import solver
 from blockvis.layout.names import blocks_matching, named_like
-from blockvis.text import nearest
+from blockvis.text import listed, nearest
 
 from .key import TEXTS, Key, Section, whole
 from .toml_table import Table
@@ -80,8 +80,7 @@ def _matching(found: Mapping[str, list[int]], names: Sequence[str], where: str, 
     chosen = []
     for pattern, numbers in found.items():
         if not numbers:
-            listed = f"the {what}s are {', '.join(names[:12])}" if names else f"the case has no {what}s"
-            more = " ..." if len(names) > 12 else ""
-            raise ValueError(f"{where}: no {what} is named '{pattern}'{nearest(pattern, names)}; {listed}{more}")
+            known = f"the {what}s are {listed(names, 12)}" if names else f"the case has no {what}s"
+            raise ValueError(f"{where}: no {what} is named '{pattern}'{nearest(pattern, names)}; {known}")
         chosen += [names[i] for i in numbers]
     return chosen

@@ -12,7 +12,7 @@ import solver
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, in_words, matches
 from blockvis.layout.names import blocks_called
-from blockvis.text import nearest, place_text
+from blockvis.text import listed, nearest, place_text
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -331,7 +331,7 @@ def _holding(
         if not len(meant):
             near = nearest(end.block, assembly.names)
             raise ValueError(
-                f"{where}: no block is called '{end.block}'{near}; the layout has {', '.join(assembly.names[:12])}"
+                f"{where}: no block is called '{end.block}'{near}; the layout has {listed(assembly.names, 12)}"
             )
         block = int(meant[0]) if len(meant) == 1 else block_at(assembly, point, meant, away.tolist(), where, gone)
         if gone[block]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from blockvis.text import listed
 from solver import mechanics
 
 from .layout import Layout
@@ -99,27 +100,22 @@ def on_layer(row: Mapping[str, Any], layer: str) -> dict[str, Any]:
 
 def moved_notes(moved: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> list[str]:
     """Say which blocks lie on other layers than their rows say; ``moved`` has each row as written, and as it holds."""
-
-    def listed(some: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> str:
-        words = [f"'{row.get('name', '')}' on '{row['group']}'" for _, row in some[:6]]
-        return ", ".join(words) + (f" and {len(some) - 6} more" if len(some) > 6 else "")
-
-    held = [(old, row) for old, row in moved if row.get("role") in (mechanics.FIXED, mechanics.MOVING)]
-    notes: list[str] = [f"moved to another layer since blockvis wrote the drawing: {listed(moved)}"] if moved else []
+    places = [f"'{row.get('name', '')}' on '{row['group']}'" for _, row in moved]
+    supports = (mechanics.FIXED, mechanics.MOVING)
+    held = [at for at, (_, row) in zip(places, moved, strict=True) if row.get("role") in supports]
+    notes: list[str] = [f"moved to another layer since blockvis wrote the drawing: {listed(places)}"] if moved else []
     if held:
         says = "they are fixed or moving still, as blockvis wrote with them"
         notes.append(
             Note(CHANGED, f"layers of supports were changed ({listed(held)}): {says}; [roles] can say otherwise")
         )
     lost = [
-        f"'{row.get('name', '')}' on '{row['group']}' was {old[key]}"
-        for old, row in moved
+        f"{at} was {old[key]}"
+        for at, (old, row) in zip(places, moved, strict=True)
         for key in ("role", "material")
         if old.get(key) not in (None, "", row.get(key), mechanics.FREE)
     ]
     if lost:
-        words = ", ".join(lost[:6]) + (f" and {len(lost) - 6} more" if len(lost) > 6 else "")
-        notes.append(
-            Note(CHANGED, f"layers were changed, and with them roles or materials ({words}); [roles] gives roles")
-        )
+        words = f"layers were changed, and with them roles or materials ({listed(lost)}); [roles] gives roles"
+        notes.append(Note(CHANGED, words))
     return notes

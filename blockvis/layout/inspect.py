@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.text import listed
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -136,9 +137,8 @@ class Inspection:
         return "\n".join([layout.source, *(f"{title:15} {text}" for title, text in rows)])
 
     def _counted(self, words: Sequence[str]) -> str:
-        counted = Counter(words[i] for i in self.kept)
-        listed = [f"'{word}' {n}" if word else f"none {n}" for word, n in counted.most_common(12)]
-        return ", ".join(listed) + (f", {len(counted) - 12} more" if len(counted) > 12 else "")
+        counts = Counter(words[i] for i in self.kept).most_common()
+        return listed([f"'{word}' {n}" if word else f"none {n}" for word, n in counts], 12)
 
     def _number_rows(self) -> list[Row]:
         """Thickness and density of the blocks, where the file says them."""
@@ -274,9 +274,8 @@ def _in_space(layout: Layout, free: np.ndarray) -> dict[str, Any]:
     thickness = rounded_up(1.01 * gaps[0][2]) if gaps else 0.0
     joint_rows = [("joints", facing.note or "faces in contact lie in one plane")]
     if gaps:
-        worst = ", ".join(f"{layout.names[i]} | {layout.names[j]} {by:.3g} m" for i, j, by in gaps[:4])
-        more = f" and {len(gaps) - 4} more" if len(gaps) > 4 else ""
-        joint_rows.append(("open joints", f"{len(gaps)}: {worst}{more}; joint_thickness = {thickness:g} closes them"))
+        worst = listed([f"{layout.names[i]} | {layout.names[j]} {by:.3g} m" for i, j, by in gaps], 4)
+        joint_rows.append(("open joints", f"{len(gaps)}: {worst}; joint_thickness = {thickness:g} closes them"))
     return {
         "sizes": layout.volumes,
         "overlapping": overlapping,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from blockvis.text import by_similarity
+from blockvis.text import by_similarity, listed
 from solver import mechanics
 
 from .layout import Layout
@@ -70,10 +70,9 @@ def twins_note(layout: Layout, twins: Sequence[tuple[int, int]], kept: np.ndarra
     """Say which blocks were dropped, and in favour of which."""
     stays = set(kept.tolist())
     pairs = [(first, copy) if copy in stays else (copy, first) for first, copy in twins]
-    listed = ", ".join(f"'{layout.names[gone]}' = '{layout.names[kept]}'" for gone, kept in pairs[:20])
-    more = f" and {len(twins) - 20} more" if len(twins) > 20 else ""
+    names = [f"'{layout.names[gone]}' = '{layout.names[kept]}'" for gone, kept in pairs]
     said = "is drawn twice and was dropped" if len(twins) == 1 else "are drawn twice and were dropped"
-    return f"{len(twins)} of {layout.n_blocks} blocks {said}: {listed}{more}"
+    return f"{len(twins)} of {layout.n_blocks} blocks {said}: {listed(names, 20)}"
 
 
 def _unmatched(key: str, layout: Layout) -> str:
@@ -82,7 +81,7 @@ def _unmatched(key: str, layout: Layout) -> str:
     # Layers are few, and names of blocks that no one gave would hide them.
     nearest_ones = by_similarity(key, labels[:2000])
     shown = [*dict.fromkeys((*nearest_ones[:1], *by_similarity(key, groups[:2000])[:6], *nearest_ones))][:12]
-    listed = ", ".join(f"'{label}'" for label in shown)
+    labelled = ", ".join(f"'{label}'" for label in shown)
     more = f" and {len(labels) - 12} more" if len(labels) > 12 else ""
     where = layout.source or "the drawing"
-    return f"roles: '{key}' matches no block, group or layer of {where}; it has {listed}{more}; correct the name"
+    return f"roles: '{key}' matches no block, group or layer of {where}; it has {labelled}{more}; correct the name"
