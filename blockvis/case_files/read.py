@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -149,7 +148,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         bonds=_bonds(top, geometry["file"]),
         roles=_roles(top.table("roles")),
         role_places=read_places(top.table("roles")),
-        supports=tuple(_support(table) for table in top.tables("supports")),
+        supports=tuple(_given(keys.SUPPORTS.read(table)) for table in top.tables("supports")),
         **_material(top.table("material")),
         densities=_densities(top.table("materials")),
         interfaces=_interfaces(top),
@@ -277,14 +276,13 @@ def refuse_increment_seconds(case: Case, seconds: float | None) -> None:
         )
 
 
-def _law(values: dict[str, Any]) -> dict[str, Any]:
-    """Take the compressive strength and the stiffness that are not given for infinite."""
-    infinite = ("compressive_strength", "normal_stiffness", "shear_stiffness")
-    return values | {name: math.inf for name in infinite if values[name] is None}
+def _given(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Leave out what is not given, and is then as a class has it."""
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def _material(table: Table) -> dict[str, Any]:
-    values = _law(keys.MATERIAL.read(table))
+    values = _given(keys.MATERIAL.read(table))
     _checked_law(table, {name: value for name, value in values.items() if name != "density"})
     return values
 
@@ -306,17 +304,10 @@ def _checked_law(table: Table, values: Mapping[str, Any]) -> solver.InterfaceLaw
         raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 
 
-def _support(table: Table) -> Mapping[str, Any]:
-    values = keys.SUPPORTS.read(table)
-    if values["levels"] is not None:
-        values["levels"] = list(values["levels"])
-    return {key: value for key, value in values.items() if value is not None}
-
-
 def _interfaces(top: Table) -> dict[tuple[str, str], solver.InterfaceLaw]:
     found: dict[tuple[str, str], solver.InterfaceLaw] = {}
     for entry in top.tables("interfaces"):
-        values = _law(keys.INTERFACES.read(entry))
+        values = _given(keys.INTERFACES.read(entry))
         one, other = values.pop("materials")
         if (one, other) in found or (other, one) in found:
             raise entry.error("materials", f"'{one}' and '{other}' are there twice; give each pair one table")
