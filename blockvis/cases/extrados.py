@@ -96,7 +96,7 @@ def _triangles(
             if cover is not None:
                 left = left.difference(cover)
         for polygon in shapely.get_parts(left):
-            if polygon.geom_type != "Polygon" or polygon.area <= small * assembly.block_size:
+            if polygon.area <= small * assembly.block_size:
                 continue
             for triangle in _filling(polygon):
                 rise = -((triangle - middle[:2]) @ normal[:2]) / normal[2]

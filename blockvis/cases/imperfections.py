@@ -11,7 +11,7 @@ import shapely
 from scipy.sparse.linalg import spsolve
 
 import solver
-from blockvis.layout.linked import linked
+from blockvis.layout.linked import within_reach
 
 from .distributions import DISTRIBUTION_KEYS, FORMS, Distribution, distribution_of
 from .key import Key, Section, one_of, whole
@@ -128,7 +128,7 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
     """
     vertices, owner = assembly.vertices, assembly.block_of_vertex
     near = SAME_PLACE * float(assembly.widths.min())
-    place = _places(vertices, near)
+    place = within_reach(vertices, near)
     n = int(place.max()) + 1
     count = np.bincount(place)
     positions = np.column_stack([np.bincount(place, weights=vertices[:, k]) / count for k in (0, 1)])
@@ -171,14 +171,6 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
         return replace(assembly, shapes=moved.shapes)
     except ValueError as error:
         raise ValueError(f"with imperfections of kind 'vertices' {error}; give smaller ones") from None
-
-
-def _places(vertices: np.ndarray, near: float) -> np.ndarray:
-    """(n_vertices,) int array: number of the place of each corner; corners at one place share it."""
-    from scipy.spatial import cKDTree
-
-    one, other = cKDTree(vertices).query_pairs(near, output_type="ndarray").T
-    return linked(one, other, len(vertices))
 
 
 def _rails(assembly: solver.Assembly, positions: np.ndarray, place: np.ndarray, near: float) -> dict[int, int]:

@@ -14,6 +14,7 @@ import shapely
 
 import solver
 from blockvis.layout.names import blocks_called
+from blockvis.layout.outlines import pieces_of
 from blockvis.text import listed, nearest
 from solver import mechanics
 from solver.mechanics import counted
@@ -377,7 +378,6 @@ def _cut(assembly: solver.Assembly, support: int) -> list[np.ndarray]:
     edges = [float(low[0]), *cuts, float(high[0])]
     polygon, found = shapely.Polygon(outline), []
     for left, right in pairwise(edges):
-        for part in shapely.get_parts(shapely.intersection(polygon, shapely.box(left, low[1], right, high[1]))):
-            if part.geom_type == "Polygon" and part.area > 0.0:
-                found.append(shapely.get_coordinates(part)[:-1])
+        parts = pieces_of(shapely.intersection(polygon, shapely.box(left, low[1], right, high[1])))
+        found += [shapely.get_coordinates(part)[:-1] for part in parts]
     return found

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from blockvis.layout.outlines import without_collinear
+from blockvis.layout.outlines import pieces_of, without_collinear
 
 from .bonds import SHORTEST_BRICK
 from .patterns import coursed
@@ -70,7 +70,7 @@ def cut_bricks(
                 pieces.append((shape, course))
                 continue
             rest = shapely.set_precision(shape.difference(hole), grid)
-            pieces += [(part, course) for part in shapely.get_parts(rest) if part.area > 0.0]
+            pieces += [(part, course) for part in pieces_of(rest)]
         kept = pieces
     whole = without_slivers([shape for shape, _ in kept], lambda shape, _: _is_sliver(bond, shape), height, grid)
     laid = sorted(((shape, kept[piece][1]) for shape, piece in whole), key=lambda one: (one[1], one[0].bounds[:2]))

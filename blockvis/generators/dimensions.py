@@ -62,13 +62,13 @@ def true_or_false(name: str, value: Any) -> bool:
     return value
 
 
-def pair(name: str, value: Any, unit: str = "m") -> tuple[float, float]:
+def pair(name: str, value: Any) -> tuple[float, float]:
     """Return the value as two floats if both are finite and the first is the smaller."""
     if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != 2:
-        raise ValueError(f"{name} is {value!r}; give two numbers [from, to] in {unit}")
-    first, last = finite(name, value[0], unit), finite(name, value[1], unit)
+        raise ValueError(f"{name} is {value!r}; give two numbers [from, to] in m")
+    first, last = finite(name, value[0]), finite(name, value[1])
     if first >= last:
-        raise ValueError(f"{name} is [{first:g}, {last:g}] {unit}; the first number must be the smaller")
+        raise ValueError(f"{name} is [{first:g}, {last:g}] m; the first number must be the smaller")
     return first, last
 
 

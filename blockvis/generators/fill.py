@@ -11,7 +11,7 @@ import shapely
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import CHANGED, Note
-from blockvis.layout.outlines import largest_piece, without_collinear
+from blockvis.layout.outlines import largest_piece, pieces_of, without_collinear
 from solver.mechanics import counted
 
 from .bonds import BRICKWORK
@@ -267,19 +267,17 @@ def _notches(solid: shapely.Polygon, grid: float) -> list[shapely.Polygon]:
     beside = shapely.difference(shapely.box(left, low, right, high), solid, grid_size=grid)
     near = 1e-6 * (right - left)
     found = []
-    for part in shapely.get_parts(beside):
+    for part in pieces_of(beside):
         a, b, c, d = part.bounds
-        if part.geom_type == "Polygon" and b < low + near and a > left + near and c < right - near and d < high - near:
+        if b < low + near and a > left + near and c < right - near and d < high - near:
             found.append(shapely.Polygon(part.exterior))
     return found
 
 
 def _apart(holes: Sequence[shapely.Polygon]) -> list[shapely.Polygon]:
     """Make one opening of those that overlap or touch, in the order in which they are given."""
-    if not holes:
-        return []
-    parts = [shapely.Polygon(part.exterior) for part in shapely.get_parts(shapely.union_all(holes))]
-    parts = [part for part in shapely.get_parts(shapely.union_all(parts)) if part.area > 0.0]
+    without_holes = [shapely.Polygon(part.exterior) for part in pieces_of(shapely.union_all(holes))]
+    parts = pieces_of(shapely.union_all(without_holes))
     return sorted(parts, key=lambda part: next(k for k, hole in enumerate(holes) if part.intersects(hole)))
 
 
@@ -418,8 +416,8 @@ def _without_tongues(piece: shapely.Polygon, height: float, grid: float) -> list
     half = TONGUE * height / 2.0
     body = piece.buffer(-half, join_style="mitre").buffer(half, join_style="mitre")
     strips = [
-        strip for strip in shapely.get_parts(shapely.difference(piece, body, grid_size=grid))
-        if strip.geom_type == "Polygon" and strip.length > 2.0 * TONGUE * height
+        strip for strip in pieces_of(shapely.difference(piece, body, grid_size=grid))
+        if strip.length > 2.0 * TONGUE * height
         and strip.area > 0.98 * strip.envelope.area
     ]  # fmt: skip
     rest = in_simple_pieces(shapely.difference(piece, shapely.union_all(strips), grid_size=grid), grid)

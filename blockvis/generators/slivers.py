@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import shapely
 
+from blockvis.layout.outlines import pieces_of, touching
+
 #: Pieces are joined along at least this fraction of the brick height, not where they touch at a corner,
 LEAST_SHARED = 0.01
 
@@ -41,10 +43,7 @@ def without_slivers(
     """
     held: dict[int, shapely.Polygon] = dict(enumerate(shapes))
     main = list(range(len(shapes)))
-    beside: list[set[int]] = [set() for _ in shapes]
-    for i, j in shapely.STRtree(list(shapes)).query(list(shapes), "intersects").T.tolist():
-        if i != j:
-            beside[i].add(j)
+    beside = touching(np.array(shapes), 0.0)
     small = [(shape.area, i) for i, shape in held.items() if is_sliver(shape, i)]
     heapq.heapify(small)
     while small:
@@ -89,7 +88,7 @@ def _best_neighbour(
 
 def in_simple_pieces(shape: shapely.Geometry, grid: float) -> list[shapely.Polygon]:
     """Split a shape into polygons without holes: one around a hole is cut in two through the middle of the hole."""
-    pieces = [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon" and part.area > 0.0]
+    pieces = pieces_of(shape)
     simple: list[shapely.Polygon] = []
     while pieces:
         piece = pieces.pop()
@@ -99,6 +98,5 @@ def in_simple_pieces(shape: shapely.Geometry, grid: float) -> list[shapely.Polyg
         left, low, right, high = piece.bounds
         middle = float(np.mean(shapely.Polygon(piece.interiors[0]).bounds[::2]))
         for half in (shapely.box(left, low, middle, high), shapely.box(middle, low, right, high)):
-            parts = shapely.get_parts(shapely.intersection(piece, half, grid_size=grid))
-            pieces += [part for part in parts if part.geom_type == "Polygon" and part.area > 0.0]
+            pieces += pieces_of(shapely.intersection(piece, half, grid_size=grid))
     return simple[::-1]

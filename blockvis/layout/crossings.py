@@ -11,7 +11,7 @@ import numpy as np
 from .layout import Layout
 from .left_out import LeftOut
 from .notes import CHANGED, Note
-from .outlines import around_hole, ring_of, without_collinear
+from .outlines import around_hole, pieces_of, ring_of, without_collinear
 
 #: The largest piece of an outline that crosses itself is the block if it holds at least this share of its area.
 WHOLE = 0.98
@@ -30,9 +30,7 @@ def uncrossed(layout: Layout) -> Layout:
     reduced: dict[int, np.ndarray] = {}
     lost = 0.0
     for i in np.flatnonzero(~shapely.is_valid(shapes)).tolist():
-        # Beside lines, pieces lie in a collection within the collection.
-        parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(shapes[i])))
-        pieces = [part for part in parts if part.area > 0.0]
+        pieces = pieces_of(shapely.make_valid(shapes[i]))
         area = float(sum(part.area for part in pieces))
         if not area > 0.0:
             continue

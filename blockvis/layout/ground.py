@@ -15,9 +15,10 @@ from solver import mechanics
 
 from .inspect import Inspection
 from .layout import Layout
-from .outlines import largest_piece, without_collinear
+from .outlines import largest_piece, ring_of, touching, without_collinear
 from .repair import repaired
 from .simplify import default_tolerance, simplified
+from .solids import size_of
 
 #: Blocks of the lowest course have their bottom within this fraction of the median height of the lowest.
 COURSE = 0.5
@@ -98,7 +99,7 @@ class _Split:
 
 def block_size(found: Inspection) -> float:
     """Find the distance across the median free block [m]."""
-    across = [float(np.linalg.norm(np.ptp(found.layout.corners(i), axis=0))) for i in with_role(found, mechanics.FREE)]
+    across = [size_of(found.layout.corners(i)) for i in with_role(found, mechanics.FREE)]
     return float(np.median(across)) if across else 1.0
 
 
@@ -211,8 +212,9 @@ def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> lis
     low = np.array([ring.min(axis=0) for ring in outlines])
     high = np.array([ring.max(axis=0) for ring in outlines])
     height = float(np.median(high[:, 1] - low[:, 1]))
-    touching = _touching(np.array([shapely.Polygon(ring) for ring in outlines]), 1e-3 * height + _opening(found))
-    arch = _springers_of_arch(touching, low[:, 1])
+    near = 1e-3 * height + _opening(found)
+    beside = touching(np.array([shapely.Polygon(ring) for ring in outlines]), near)
+    arch = _springers_of_arch(beside, low[:, 1])
     feet: list[_Foot] = []
     springers: set[int] = set()
     for k in arch or np.argsort(low[:, 1], kind="stable").tolist():
@@ -220,7 +222,7 @@ def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> lis
             break
         edges = _lower_edges(outlines[k])
         steep = _slope(edges, float(high[k, 0] - low[k, 0])) > (LEVEL if arch else SLOPE)
-        lower = [j for j in touching[k] if low[j, 1] < low[k, 1]]
+        lower = [j for j in beside[k] if low[j, 1] < low[k, 1]]
         if steep and springers.intersection(lower):
             # It rests on a springer, or on a voussoir that does.
             springers.add(k)
@@ -264,15 +266,15 @@ def _as_simplified(found: Inspection) -> list[np.ndarray]:
     return simplified(outlines, default_tolerance(outlines))[0]
 
 
-def _springers_of_arch(touching: Sequence[set[int]], bottoms: np.ndarray) -> list[int]:
+def _springers_of_arch(beside: Sequence[set[int]], bottoms: np.ndarray) -> list[int]:
     """Find the ends of a chain of blocks, if that is all there is and it rises from both of them."""
-    ends = [k for k, others in enumerate(touching) if len(others) == 1]
-    if len(ends) != 2 or len(touching) < 4 or max(map(len, touching)) > 2:
+    ends = [k for k, others in enumerate(beside) if len(others) == 1]
+    if len(ends) != 2 or len(beside) < 4 or max(map(len, beside)) > 2:
         return []
-    chain = [ends[0], *touching[ends[0]]]
-    while following := touching[chain[-1]].difference(chain[-2:]):
+    chain = [ends[0], *beside[ends[0]]]
+    while following := beside[chain[-1]].difference(chain[-2:]):
         chain += following
-    if len(chain) < len(touching):
+    if len(chain) < len(beside):
         return []
     rise = np.diff(bottoms[chain])
     top = int(bottoms[chain].argmax())
@@ -280,32 +282,14 @@ def _springers_of_arch(touching: Sequence[set[int]], bottoms: np.ndarray) -> lis
     return ends if rises and rise[0] > 0.0 > rise[-1] else []
 
 
-def _touching(shapes: np.ndarray, near: float) -> list[set[int]]:
-    """List the blocks that each touches across at most a gap [m]."""
-    tree = shapely.STRtree(shapes)
-    others: list[set[int]] = [set() for _ in shapes]
-    for i, j in tree.query(shapes, predicate="dwithin", distance=near).T.tolist():
-        if i != j:
-            others[i].add(j)
-    return others
-
-
 def _lower_edges(points: np.ndarray) -> np.ndarray:
     """(n, 2) array [m]: from left to right, the corners between the edges of the lower hull that are not too steep."""
-    hull: list[np.ndarray] = []
-    for point in points[np.lexsort((points[:, 1], points[:, 0]))]:
-        while len(hull) > 1 and _turn(hull[-2], hull[-1], point) <= 0.0:
-            hull.pop()
-        hull.append(point)
-    chain = np.array(hull)
+    hull = ring_of(shapely.MultiPoint(points).convex_hull)
+    order = np.lexsort((hull[:, 1], hull[:, 0]))
+    chain = np.roll(hull, -order[0], axis=0)[: (order[-1] - order[0]) % len(hull) + 1]
     run, rise = np.diff(chain, axis=0).T
     gentle = np.flatnonzero((np.abs(rise) <= STEEPEST * run) & (run > 0.0))
     return chain[gentle[0] : gentle[-1] + 2] if len(gentle) else chain[[chain[:, 1].argmin()]]
-
-
-def _turn(first: np.ndarray, second: np.ndarray, third: np.ndarray) -> float:
-    (ax, ay), (bx, by) = second - first, third - first
-    return float(ax * by - ay * bx)
 
 
 def _slope(bed: np.ndarray, width: float) -> float:
@@ -359,17 +343,11 @@ def _bedded(
         half = largest_piece(ground.intersection(shapely.box(left, floor - depth, right, floor + 1e3 * depth)))
         if not half.is_empty:
             # Rounding, and the zero that is no negative one, make a file that people read.
-            corners = np.round(shapely.get_coordinates(half.exterior)[:-1], 10 - int(np.floor(np.log10(depth)))) + 0.0
-            corners = _from_lowest_left(corners)
+            corners = np.round(ring_of(half), 10 - int(np.floor(np.log10(depth)))) + 0.0
+            corners = without_collinear(corners)
+            corners = np.roll(corners, -int(np.lexsort((corners[:, 0], corners[:, 1]))[0]), axis=0)
             halves.append({"name": name, "role": role, "outline": corners.tolist()})
     return halves
-
-
-def _from_lowest_left(ring: np.ndarray) -> np.ndarray:
-    """Turn a ring counter-clockwise, and begin it at its lowest corner on the left, without collinear corners."""
-    ring = ring if shapely.Polygon(ring).exterior.is_ccw else ring[::-1]
-    ring = without_collinear(ring)
-    return np.roll(ring, -int(np.lexsort((ring[:, 0], ring[:, 1]))[0]), axis=0)
 
 
 def _bed(points: np.ndarray, level: float, least: float) -> np.ndarray | None:
@@ -389,10 +367,10 @@ def _feet_in_space(found: Inspection) -> list[_Foot]:
     course = np.flatnonzero(low[:, 2] <= low[:, 2].min() + near)
     plans = np.array([shapely.MultiPoint(points[:, :2]).convex_hull for points in corners])
     boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
-    touching = _touching(boxes, 1e-3 * near + _opening(found))
+    beside = touching(boxes, 1e-3 * near + _opening(found))
     feet: list[_Foot] = []
     for k in course.tolist():
-        lower = [j for j in touching[k] if low[j, 2] < low[k, 2] - 1e-6 * near]
+        lower = [j for j in beside[k] if low[j, 2] < low[k, 2] - 1e-6 * near]
         covered = plans[k].intersection(shapely.union_all(plans[lower])).area if lower else 0.0
         if covered > (1.0 - EXPOSED) * plans[k].area:
             continue

@@ -18,3 +18,11 @@ def linked(one: np.ndarray, other: np.ndarray, n: int) -> np.ndarray:
 
     graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def within_reach(points: np.ndarray, near: float) -> np.ndarray:
+    """(n,) int array: the group of each of (n, d) points, of which those up to ``near`` apart are linked."""
+    from scipy.spatial import cKDTree
+
+    one, other = cKDTree(points).query_pairs(near, output_type="ndarray").reshape(-1, 2).T
+    return linked(one, other, len(points))

@@ -150,13 +150,30 @@ def _upright(points: np.ndarray) -> tuple[np.ndarray, float] | None:
     return (own, reliefs[1]) if reliefs[1] < 0.5 * reliefs[0] else (axis, reliefs[0])
 
 
+def pieces_of(shape: Any) -> list[Any]:
+    """List the polygons with an area of a shape; beside lines they may lie in a collection within the collection."""
+    import shapely
+
+    return [piece for piece in shapely.get_parts(shapely.get_parts(shape)) if piece.area > 0.0]
+
+
 def largest_piece(shape: Any) -> Any:
     """Outer border of the largest piece of a shape, a polygon without holes; an empty one of a shape without area."""
     import shapely
 
-    # Beside lines, pieces may lie in a collection within the collection.
-    pieces = [piece for piece in shapely.get_parts(shapely.get_parts(shape)) if piece.area > 0.0]
+    pieces = pieces_of(shape)
     return shapely.Polygon(max(pieces, key=lambda piece: float(piece.area)).exterior) if pieces else shapely.Polygon()
+
+
+def touching(shapes: np.ndarray, near: float) -> list[set[int]]:
+    """List the shapes that each touches, or from which it is no farther than ``near``."""
+    import shapely
+
+    others: list[set[int]] = [set() for _ in shapes]
+    for i, j in shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=near).T.tolist():
+        if i != j:
+            others[i].add(j)
+    return others
 
 
 def ring_of(polygon: Any) -> np.ndarray:

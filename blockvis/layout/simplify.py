@@ -10,7 +10,7 @@ import numpy as np
 from solver.mechanics import counted
 
 from .joints.trimming import overlapping, with_corners_on_edges
-from .linked import linked
+from .linked import within_reach
 
 #: Outlines of more corners than this in the mean are finer than needed: every corner at a joint is a contact.
 FINE = 24
@@ -105,8 +105,7 @@ def _shared_corners(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np
     index = cKDTree(every)
     rings = [with_corners_on_edges(ring, every, index, same) for ring in outlines]
     corners = np.concatenate(rings)
-    a, b = cKDTree(corners).query_pairs(2.0 * same, output_type="ndarray").reshape(-1, 2).T
-    group = linked(a, b, len(corners))
+    group = within_reach(corners, 2.0 * same)
     first = np.unique(group, return_index=True)[1]
     around = []
     for ids in np.split(group, np.cumsum([len(ring) for ring in rings])[:-1]):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .linked import linked
-from .solids import Solid, outward
+from .linked import linked, within_reach
+from .solids import Solid, outward, size_of
 
 #: Corners of a block nearer to each other than this fraction of its diagonal are one: files of triangles repeat them,
 #: in single precision.
@@ -32,7 +32,7 @@ def cleaned(points: np.ndarray, faces: list[list[int]]) -> Solid:
     >>> cleaned(corners, [[0, 1, 2], [0, 1, 3], [1, 3, 2], [0, 2, 3]])[1]
     [[2, 1, 0], [0, 1, 3], [2, 3, 1], [3, 2, 0]]
     """
-    same = same_points(points, WELDED * float(np.linalg.norm(np.ptp(points, axis=0)))).tolist()
+    same = same_points(points, WELDED * size_of(points)).tolist()
     rings = [_without_repeats([same[corner] for corner in face]) for face in faces]
     rings = [ring for ring in rings if len(ring) > 2]
     used = sorted({corner for ring in rings for corner in ring})
@@ -72,14 +72,9 @@ def _without_repeats(face: list[int]) -> list[int]:
 
 def same_points(points: np.ndarray, near: float) -> np.ndarray:
     """(n,) int array: the point that stands for each, the same for those nearer to each other than ``near``."""
-    from scipy.spatial import cKDTree
-
     # Exact copies first: a million of them would make a million squared pairs.
     unique, index, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
-    pairs = cKDTree(unique).query_pairs(near, output_type="ndarray")
-    if len(pairs) == 0:
-        return np.asarray(index[inverse.ravel()])
-    label = linked(pairs[:, 0], pairs[:, 1], len(unique))
+    label = within_reach(unique, near)
     return np.asarray(index[np.unique(label, return_index=True)[1]][label][inverse.ravel()])
 
 

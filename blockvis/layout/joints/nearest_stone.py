@@ -101,7 +101,7 @@ def share_out(
     # A power of ten, from a round origin: round coordinates stay what they are.
     grid = float(10.0 ** np.floor(np.log10(GRID * scale)))
     origin = np.round(np.concatenate(outlines).mean(axis=0) / (1e6 * grid)) * (1e6 * grid)
-    shapes = np.array([_shape(ring - origin) for ring in outlines])
+    shapes = np.array([largest_piece(shapely.Polygon(ring - origin).buffer(0)) for ring in outlines])
     growing = np.flatnonzero(~anchored)
     gaps = gaps_between(shapes, SPACING * thickness)
     masonry = _with_mortar(shapes, gaps, thickness, growing)
@@ -124,13 +124,6 @@ def share_out(
     return [np.asarray(outlines[i]) if anchored[i] else ring for i, ring in enumerate(found)]
 
 
-def _shape(ring: np.ndarray) -> Any:
-    """Polygon of a ring; of one that touches itself its largest piece."""
-    import shapely
-
-    return max(shapely.get_parts(shapely.Polygon(ring).buffer(0)), key=lambda part: part.area)
-
-
 def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
     """Propose the joint thickness [m] that closes the joints between stones of any shape, 0 without gaps.
 
@@ -139,7 +132,7 @@ def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
     import shapely
 
     origin = np.concatenate(outlines).mean(axis=0)
-    shapes = np.array([_shape(ring - origin) for ring in outlines])
+    shapes = np.array([largest_piece(shapely.Polygon(ring - origin).buffer(0)) for ring in outlines])
     size = float(np.median(np.sqrt(shapely.area(shapes))))
     gaps = gaps_between(shapes, 0.03 * size)
     local = gaps.local
