@@ -12,19 +12,7 @@ COMMA = re.compile(r"^\s*([\w.\"'-]+)\s*=\s*([+-]?\d+),(\d+(?:[eE][+-]?\d+)?)\s*
 
 
 def decimal_comma(text: str, error: str) -> str:
-    """Write how a number is to be written where a parser stopped at its decimal comma.
-
-    Parameters
-    ----------
-    text : str
-        TOML.
-    error : str
-        What the parser said, with line and column.
-
-    Returns
-    -------
-    str
-        Empty where it stopped at something else.
+    """Write how a number is to be written where a parser of TOML stopped at its decimal comma, by its message; else "".
 
     Examples
     --------

@@ -58,26 +58,19 @@ def case_text(
     unit_says: str = "",
     **image: Any,
 ) -> str:
-    """Write the text of a case file for a drawing.
+    """Write the text of a case file, TOML, for a drawing that is inspected; ``file`` is relative to the case file.
+
+    Without supports in the drawing a ground of two halves is added, of which the right one settles; where nothing can
+    settle, the case asks for the horizontal capacity.
 
     Parameters
     ----------
-    found : Inspection
-        Of the drawing.
-    file : str
-        The drawing, relative to the case file.
     view, ignore, only, window, **image
         With which the drawing was read.
     walls : sequence of str
         Layers or names of outlines that are filled with a bond.
     unit_says : str
         Why it was read in another unit than its own; see :func:`unit_instead`.
-
-    Returns
-    -------
-    str
-        TOML. Without supports in the drawing a ground of two halves is added, of which the right one settles; where
-        nothing can settle, the case asks for the horizontal capacity.
     """
     block = block_size(found)
     ground = ground_of(found)
@@ -232,21 +225,9 @@ def _table(
     single: bool = False,
     beside: Mapping[str, str] | None = None,
 ) -> str:
-    """Write a table: the keys that have a value, the others as comments.
+    """Write a table: the keys that have a value, the others, but for those left out, as comments.
 
-    Parameters
-    ----------
-    section : Section
-    values : mapping
-        By the names of keys; None for a key that is not given.
-    says : str
-        Comment beside the meaning of the table.
-    leaving : sequence of str
-        Keys that are not written at all.
-    single : bool
-        Whether the table is written as the only one of its kind.
-    beside : mapping, optional
-        Comments on keys beside their meaning.
+    It may be written as the ``single`` one of its kind, with what it ``says`` and, of keys, ``beside`` their meaning.
     """
     lines = [_comment(f"{section.meaning}. {says}".strip()), f"[{section.name}]" if single else section.header]
     for key in section.keys:

@@ -81,19 +81,9 @@ def utf8_text(path: Path) -> str:
 def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
     """Change values in the text of a case file; what is not changed stays as it is, comments included.
 
-    Parameters
-    ----------
-    text : str
-    source : Path
-        The case file.
-    changes : sequence of str
-        ``key=value`` each: a dotted key, with ``[n]`` for entries of a list, from 0, and a value as TOML writes it, or
-        a plain word. Tables that the file does not have are made.
-
-    Raises
-    ------
-    ValueError
-        For broken TOML, a change without "=", and a key that leads nowhere; names the key.
+    Changes are ``key=value`` each: a dotted key, with ``[n]`` for entries of a list, from 0, and a value as TOML writes
+    it, or a plain word. Tables that the file does not have are made. ValueError for broken TOML, a change without "=",
+    and a key that leads nowhere; names the key.
     """
     import tomlkit
 
@@ -220,14 +210,7 @@ def _bonds(top: Table, file: str | None) -> tuple[Bonding, ...]:
 
 
 def _checked(case: Case, settings: Mapping[str, Any]) -> Case:
-    """Check that the keys of a case fit its kind of analysis.
-
-    Parameters
-    ----------
-    case : Case
-    settings : mapping
-        What each kind has read from its keys, by its name.
-    """
+    """Check that the keys of a case fit its kind of analysis; ``settings`` are what each kind has read, by its name."""
     moving = [k for k, load in enumerate(case.loads, start=1) if load.positions]
     if len(moving) > 1:
         raise ValueError(
@@ -259,13 +242,7 @@ def _check_phases(case: Case) -> None:
 
 
 def refuse_increment_seconds(case: Case, seconds: float | None) -> None:
-    """Raise ValueError for no time above 0, and where nothing looks at it: where there are no steps.
-
-    Parameters
-    ----------
-    case : Case
-    seconds : float or None [s]
-    """
+    """Raise ValueError for no time [s] above 0, and where nothing looks at it: where there are no steps."""
     if seconds is not None and not seconds > 0.0:
         raise ValueError(f"increment_seconds is {seconds:g}; give seconds above 0")
     has_steps = bool(KINDS[case.analysis].course(case).drivers)

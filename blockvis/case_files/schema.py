@@ -18,13 +18,7 @@ _TYPES = {"int": "integer", "float": "number", "str": "string", "bool": "boolean
 
 
 def case_schema() -> dict[str, Any]:
-    """Make the JSON schema of the case file.
-
-    Returns
-    -------
-    dict
-        What the file's keys and the kinds of their values are; whether they fit together, the run says.
-    """
+    """Make the JSON schema of the case file: its keys and the kinds of their values; the run says whether they fit."""
     return {"$schema": DRAFT, "title": "blockvis case file"} | case_values()
 
 

@@ -18,10 +18,7 @@ _DRAWINGS = "../assets/"
 def shipped_cases() -> dict[str, Path]:
     """Return the case files that come with blockvis by their names; those to explain begin with ``explain/``.
 
-    Raises
-    ------
-    FileNotFoundError
-        Where the installation has none.
+    FileNotFoundError where the installation has none.
     """
     # The wheel has them inside the package; a clone, also one installed for editing, beside it.
     for root in (_PACKAGE / "shipped", _PACKAGE.parent):
@@ -42,24 +39,8 @@ def first_sentence(case: Path) -> str:
 def copy_case(name: str, *, overwrite: bool = False) -> list[Path]:
     """Copy a shipped case, and the drawing or the table of cracks that it names, into the working directory.
 
-    Parameters
-    ----------
-    name : str
-        With or without ``.toml``.
-    overwrite : bool
-        Whether files that are there may be replaced.
-
-    Returns
-    -------
-    list of Path
-        The case first.
-
-    Raises
-    ------
-    ValueError
-        Where there is no such case.
-    FileExistsError
-        Where a file is there already; nothing is written then.
+    The name is with or without ``.toml``; the case comes first. ValueError where there is no such case,
+    FileExistsError, before anything is written, where a file is there that may not be replaced (``overwrite``).
     """
     cases = shipped_cases()
     stem = name.removesuffix(".toml")

@@ -80,23 +80,11 @@ def read_bond(table: Table) -> Bonding:
 def bonded(
     layout: Layout, bondings: Sequence[Bonding], where: str, roles: Mapping[str, str] | None = None, *, mortar: bool
 ) -> Layout:
-    """Fill walls of a drawing with the stones of their bonds.
+    """Fill walls of a drawing with the stones of their bonds, each on the layer of its wall, after what else is drawn.
 
-    ValueError for an outline that is missing or open, an opening outside of its wall, a brick longer than its wall.
-
-    Parameters
-    ----------
-    layout : Layout
-        Of all outlines of the drawing, as :func:`blockvis.formats.read.read_outlines` gives it.
-    roles : mapping of str to str, optional
-        Supports are not filled.
-    mortar : bool
-        Whether joints are left open; a run closes them to their middle.
-
-    Returns
-    -------
-    Layout
-        The stones, each on the layer of its wall, after what else is drawn.
+    The layout is of all outlines, as :func:`blockvis.formats.read.read_outlines` gives it; supports, by ``roles``, are
+    not filled. Joints are left open for ``mortar``; a run closes them to their middle. ValueError for an outline that
+    is missing or open, an opening outside of its wall, a brick longer than its wall.
     """
     if layout.dimension == 3:
         raise ValueError(f"{where}: bond: '{layout.source}' draws blocks in space; a bond fills outlines in the plane")

@@ -51,27 +51,16 @@ LEAST_INSIDE = 1e-6
 
 @dataclass(frozen=True)
 class Distribution:
-    """A distribution with its numbers; made by :func:`distribution_of`, which checks them.
+    """A distribution of one of :data:`KINDS` with its numbers; made by :func:`distribution_of`, which checks them.
 
-    Attributes
-    ----------
-    kind : str
-        A key of :data:`KINDS`.
-    numbers : mapping of str to float
-        Mean and deviation are those of the variable itself before truncation, also for "lognormal".
+    Mean and deviation are those of the variable itself before truncation, also for "lognormal".
     """
 
     kind: str
     numbers: Mapping[str, float]
 
     def quantile(self, probability: np.ndarray) -> np.ndarray:
-        """(n,) array: the values that the variable does not exceed with the given (n,) probabilities.
-
-        Examples
-        --------
-        >>> Distribution("uniform", {"lower": 2.0, "upper": 4.0}).quantile([0.25, 0.5])
-        array([2.5, 3. ])
-        """
+        """(n,) array: the values that the variable does not exceed with the given (n,) probabilities."""
         p, n = np.asarray(probability, dtype=float), self.numbers
         if self.kind in CUT_OFF:
             below, inside = self._inside()

@@ -17,15 +17,10 @@ UPRIGHT = 1e-9
 
 
 def extrados(assembly: solver.Assembly, chosen: np.ndarray, surface: float) -> tuple[np.ndarray, np.ndarray]:
-    """Find the pieces of chosen blocks that look upwards and see a level surface [m], under whatever other blocks hide.
+    """Find the pieces of chosen blocks that look upwards and see a level surface [m], and the block of each.
 
-    What stands above the surface hides nothing.
-
-    Returns
-    -------
-    pieces : (n, d, d) array [m]
-        Segments in the plane, triangles in space.
-    block : (n,) int array
+    They are (n, d, d) [m]: segments in the plane, triangles in space. What other blocks hide is left out; what stands
+    above the surface hides nothing.
     """
     small = SLIVER * assembly.block_size
     pieces, block = (_segments if assembly.dimension == 2 else _triangles)(assembly, chosen, surface, small)

@@ -112,14 +112,9 @@ def _uniform(imperfection: Imperfection, *shape: int) -> np.ndarray:
 
 
 def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solver.Assembly:
-    """Move the corners of an assembly at random; faces stay plane and joints closed.
+    """Move the corners of an assembly at random, by an imperfection of kind "vertices".
 
-    ValueError for displacements that are too large for the blocks.
-
-    Parameters
-    ----------
-    imperfection : Imperfection
-        Of kind "vertices".
+    Faces stay plane and joints closed. ValueError for displacements that are too large for the blocks.
 
     Notes
     -----

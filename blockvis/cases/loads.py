@@ -52,22 +52,11 @@ class LoadCase:
 def loads_of(
     entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path, gone: np.ndarray, phase: int | None = None
 ) -> solver.Loads:
-    """Sum self-weight and the loads that do not move and act from the start.
+    """Sum self-weight and the loads [N, N·m] that do not move and act from the start, or with a settlement.
 
-    ValueError for a pattern that matches no free block that is left, a point in none of those it matches, and for an
-    edge that a block does not have.
-
-    Parameters
-    ----------
-    gone : (n_blocks,) bool array
-        Blocks that have been taken away before the loads begin to act: they neither carry them nor shield others.
-    phase : int, optional
-        Instead of those all loads, without self-weight, that begin to act with this settlement, counted from 1.
-
-    Returns
-    -------
-    solver.Loads
-        [N, N·m]
+    Of a ``phase``, counted from 1, all loads that begin to act with it, without self-weight. Blocks that are ``gone``
+    by then, (n_blocks,) bool array, neither carry loads nor shield others. ValueError for a pattern that matches no
+    free block that is left, a point in none of those it matches, and for an edge that a block does not have.
     """
     loads = solver.self_weight(assembly)
     # Loads of the drawing act on it before anything is taken away, but for a pressure, which meets what is left.

@@ -196,22 +196,10 @@ def _tie(table: Table) -> TieCase:
 
 
 def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tuple[Layout, tuple[LeftOut, ...]]:
-    """Take the lines that are ties out of what a drawing leaves out.
+    """Take the lines that are ties, by layers or patterns of them, out of what a drawing leaves out, which was ignored.
 
-    ValueError where a layer has no line, or has something else.
-
-    Parameters
-    ----------
-    sketch : Layout
-        Read with the layers ignored.
-    layers : sequence of str
-        Or patterns of them.
-
-    Returns
-    -------
-    sketch : Layout
-        With one note on its ties instead of those on lines left out.
-    lines : tuple of LeftOut
+    One note on ties takes the place of those on lines left out. ValueError where a layer has no line, or something
+    else.
     """
     if not layers:
         return sketch, ()

@@ -13,20 +13,10 @@ from blockvis.text import nearest, refuse_magnitude
 
 
 class Table:
-    """A table of the case file; it keeps the keys that were read, so that the others can be refused.
+    """A table of a TOML file; it keeps the keys that were read, so that the others can be refused.
 
-    Parameters
-    ----------
-    values : mapping
-    where : str
-        Name of the table in messages, "" for the whole file.
-    source : Path
-        The file.
-
-    Raises
-    ------
-    ValueError
-        From every method, for a value of the wrong kind; names the file, the table, the key and the remedy.
+    ``where`` is its name in messages, "" for the whole file. Every method raises ValueError for a value of the wrong
+    kind, which names the file, the table, the key and the remedy.
     """
 
     def __init__(self, values: Mapping[str, Any], where: str, source: Path) -> None:

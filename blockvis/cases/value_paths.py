@@ -13,14 +13,9 @@ _STEP = re.compile(r'\.?(?:([A-Za-z0-9_-]+)|"([^"]*)"|\[(\d+)\])')
 
 
 def parse_path(text: str) -> tuple[str | int, ...]:
-    """Split a path, in dotted keys as of TOML, with ``[n]`` for the entries of a list, from 0.
+    """Split a path, in dotted keys as of TOML, with ``[n]`` for the entries of a list, from 0, into keys and numbers.
 
     ValueError for a text that is no path.
-
-    Returns
-    -------
-    tuple of str and int
-        Keys and numbers of entries.
 
     Examples
     --------
@@ -47,14 +42,9 @@ def parse_path(text: str) -> tuple[str | int, ...]:
 
 
 def put(values: dict[str, Any], path: Sequence[str | int], value: Any) -> None:
-    """Put a value at the end of a path, in place; missing tables on the path are made.
+    """Put a value at the end of a path into parsed TOML, in place; missing tables on the path are made.
 
     ValueError for a path to a missing entry of a list, or into something that is neither table nor list.
-
-    Parameters
-    ----------
-    values : dict
-        Tables, lists and numbers, as of parsed TOML.
 
     Examples
     --------

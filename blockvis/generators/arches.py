@@ -232,11 +232,7 @@ def radial_joints(inner: float, outer: float, angles: np.ndarray) -> np.ndarray:
 def segmental_joints(span: float, rise: float, thickness: float, voussoirs: int) -> tuple[np.ndarray, np.ndarray]:
     """Lay out the joints of a segmental arch by span and rise of its intrados [m], which springs at y = 0 around x = 0.
 
-    Returns
-    -------
-    joints : (voussoirs + 1, 2, 2) array [m]
-        From left to right.
-    angles : (voussoirs + 1,) array [rad]
+    They are (voussoirs + 1, 2, 2) [m], from left to right, and come with their (voussoirs + 1,) angles [rad].
     """
     span, rise, thickness = above_zero("span", span), above_zero("rise", rise), above_zero("thickness", thickness)
     n = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)

@@ -19,18 +19,9 @@ def assembled(
     depth: float | None = None,
     material: str | Sequence[str] = "stone",
 ) -> solver.Assembly:
-    """Make an assembly of named blocks on their supports.
+    """Make an assembly of named blocks, of one material or one for each, on their supports, which are "ground".
 
-    Parameters
-    ----------
-    free : sequence of (name, shape)
-        Shapes are (n, 2) arrays [m] in the plane, Solids in space.
-    supports : sequence of (name, role, shape)
-    density : float [kg/m³]
-    depth : float, optional [m]
-        Out of plane.
-    material : str, or one per block
-        Of the free blocks; supports are "ground".
+    In the plane shapes are (n, 2) arrays [m] and have a depth [m], in space they are Solids. The density is in kg/m³.
     """
     shapes = [shape for _, shape in free] + [shape for _, _, shape in supports]
     materials = [material] * len(free) if isinstance(material, str) else list(material)

@@ -16,22 +16,13 @@ SHORTEST_BRICK = 0.2
 
 
 def head_joints(bond: str, course: int, width: float, brick_length: float) -> np.ndarray:
-    """Position the head joints of one course of a wall, both ends included.
+    """Position the head joints of one course of a wall, (n,) array [m] from 0 to its width.
 
-    Parameters
-    ----------
-    bond : {"running", "stack", "english", "flemish", "header"}
-    course : int
-        From 0 at the bottom. Even courses are whole bricks (stretchers); odd ones are shifted by half a brick in
-        running bond, and in English bond are headers with a queen closer next to each end. In Flemish bond each course
-        is a stretcher and a header in turn, each header over the middle of a stretcher, with a queen closer at the left
-        of odd courses; in header bond all are headers, and odd courses begin with three quarters of a brick.
-    width, brick_length : float [m]
-
-    Returns
-    -------
-    (n,) array [m]
-        From 0 to the width; a brick too short at either end is joined to its neighbour.
+    Even courses, from 0 at the bottom, are whole bricks (stretchers); odd ones are shifted by half a brick in running
+    bond, and in English bond are headers with a queen closer next to each end. In Flemish bond each course is a
+    stretcher and a header in turn, each header over the middle of a stretcher, with a queen closer at the left of odd
+    courses; in header bond all are headers, and odd courses begin with three quarters of a brick. A brick too short at
+    either end is joined to its neighbour.
 
     Examples
     --------

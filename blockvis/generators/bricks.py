@@ -27,13 +27,7 @@ NARROWEST = 0.25
 
 @dataclass(frozen=True)
 class Bond:
-    """Bond of a wall and size of its bricks.
-
-    Attributes
-    ----------
-    kind : {"running", "stack", "english"}
-    brick_length, brick_height : float [m]
-    """
+    """Bond of a wall, one of :data:`BONDS`, and size of its bricks [m]."""
 
     kind: str
     brick_length: float
@@ -43,20 +37,11 @@ class Bond:
 def cut_bricks(
     bond: Bond, width: float, courses: int, rings: Sequence[np.ndarray]
 ) -> tuple[list[np.ndarray], list[int]]:
-    """Lay the bricks of a wall and cut them along rings, inside of which there are none.
+    """Lay the bricks of a wall of a width [m] and cut them along (n, 2) rings [m], inside of which there are none.
 
-    Parameters
-    ----------
-    width : float [m]
-    rings : sequence of (n, 2) arrays [m]
-
-    Returns
-    -------
-    outlines : list of (n, 2) arrays [m]
-        Course by course from the left; the lower left corner of the wall is (0, 0). A sliver is joined to the neighbour
-        with which it makes the most convex block.
-    course : list of int
-        Of each, from 0 at the bottom.
+    Outlines, (n, 2) arrays [m], come course by course from the left, with the course of each from 0 at the bottom; the
+    lower left corner of the wall is (0, 0). A sliver is joined to the neighbour with which it makes the most convex
+    block.
     """
     height, grid = bond.brick_height, GRID * bond.brick_height
     boxes = coursed(bond.kind, width, courses * height, (bond.brick_length, height), 0)

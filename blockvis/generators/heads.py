@@ -45,18 +45,9 @@ OUTSIDE = 1e-7
 
 @dataclass(frozen=True)
 class Units:
-    """Sizes of the stones of heads.
+    """Sizes of the stones of heads [m]: the length of a stone, as deep as a ring may be, and the bearing of lintels.
 
-    Attributes
-    ----------
-    length : float [m]
-        Of a stone; a ring is at most as deep.
-    height : float [m]
-        Of a course, and width of a voussoir along the intrados.
-    bearing : float [m]
-        Of a lintel on either side.
-    grid : float [m]
-        Spacing of the grid on which corners lie.
+    The height of a course is the width of a voussoir along the intrados, too. Corners lie on a grid.
     """
 
     length: float
@@ -75,12 +66,7 @@ class Units:
 
 @dataclass(frozen=True)
 class Top:
-    """Upper edge of an opening, from the left springing to the right one.
-
-    Attributes
-    ----------
-    chain : (n, 2) array [m]
-    """
+    """Upper edge of an opening, an (n, 2) array [m] from the left springing to the right one."""
 
     chain: np.ndarray
 
@@ -139,18 +125,10 @@ def top_of(opening: shapely.Polygon) -> Top:
 def head_of(
     opening: shapely.Polygon, kind: str, room: shapely.Geometry, near: float, units: Units
 ) -> tuple[str, list[shapely.Polygon], str] | None:
-    """Build the head of an opening.
+    """Build the head of an opening [m], where there is room [m]: wall and no other head.
 
-    Parameters
-    ----------
-    opening : shapely.Polygon [m]
-    kind : {"auto", "lintel", "flat arch", "arch"}
-        A curved top gets a ring of voussoirs, a lintel is cut to it; a straight top a lintel ("auto", "lintel"), wedges
-        or a relieving arch ("arch") over a stone.
-    room : shapely geometry [m]
-        Where there is wall and no other head.
-    near : float [m]
-        Distance to the next opening beside it.
+    A curved top gets a ring of voussoirs, a lintel is cut to it; a straight top a lintel ("auto", "lintel"), wedges
+    ("flat arch") or a relieving arch ("arch") over a stone. ``near`` is the distance to the next opening beside it [m].
 
     Returns
     -------

@@ -64,13 +64,7 @@ def _random_joints(random: np.random.Generator, width: float, length: float, bel
 def rubble(width: float, height: float, stone: float, flatness: float, seed: int) -> list[shapely.Polygon]:
     """Lay stones of random outline over a rectangle from (0, 0), which they fill.
 
-    Parameters
-    ----------
-    width, height : float [m]
-    stone : float [m]
-        Length of a stone in the mean.
-    flatness : float
-        Length over height of a stone in the mean.
+    Stones are ``stone`` [m] long in the mean, and ``flatness`` times as long as high.
 
     Notes
     -----

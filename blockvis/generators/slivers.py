@@ -25,21 +25,9 @@ def without_slivers(
 ) -> list[tuple[shapely.Polygon, int]]:
     """Join slivers to the neighbours with which they make the most convex blocks, the smallest first.
 
-    ``is_sliver`` is asked of a shape and the number of the piece it is, or is mainly made of.
-
-    Parameters
-    ----------
-    shapes : sequence of shapely.Polygon [m]
-        Side by side.
-    height : float [m]
-        Of a brick.
-    grid : float [m]
-        Corners of joined pieces lie on a grid of this spacing.
-
-    Returns
-    -------
-    list of (shapely.Polygon, int)
-        What is left, in the order of the pieces, and which of them is the largest part of each.
+    ``is_sliver`` is asked of a shape and the number of the piece it is, or is mainly made of. Lengths are in m: shapes
+    lie side by side, bricks have a height, and corners of joined pieces lie on a grid. What is left comes in the order
+    of the pieces, with the one that is the largest part of each.
     """
     held: dict[int, shapely.Polygon] = dict(enumerate(shapes))
     main = list(range(len(shapes)))

@@ -32,14 +32,9 @@ def look_of(word: str) -> str:
 
 
 class Choice:
-    """Patterns of names, and kinds and colours where no name is meant.
+    """Patterns, as a caller gives them: of names, and kinds and colours where no name is meant.
 
-    Parameters
-    ----------
-    patterns : sequence of str
-        As the caller gives them.
-    names : iterable of str
-        All layers, groups, materials and names of the drawing: a pattern that fits one of them means names only.
+    A pattern that fits one of the names, those of all layers, groups, materials and blocks, means names only.
     """
 
     def __init__(self, patterns: Sequence[str], names: Iterable[str]) -> None:

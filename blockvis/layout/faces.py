@@ -100,14 +100,9 @@ def moved_to_planes(
 ) -> np.ndarray:
     """Move the corners of a block to where the planes of their faces meet, as little as that takes.
 
-    Where more than three planes meet nearly in a point, to the point nearest to them, and first to the planes of
-    the faces that are ``first``, (n_faces,) bool array.
-
-    Parameters
-    ----------
-    points : (n, 3) array
-    planes : (n_faces, 4) array
-        Unit normals and distances from the origin.
+    ``planes`` are unit normals and distances from the origin, (n_faces, 4). Where more than three meet nearly in a
+    point, corners go to the point nearest to them, and first to the planes of the faces that are ``first``, (n_faces,)
+    bool array.
     """
     before = np.zeros(len(planes), dtype=bool) if first is None else first
     around: list[list[int]] = [[] for _ in points]

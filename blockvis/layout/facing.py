@@ -37,14 +37,7 @@ COVERS = 1e-3
 
 @dataclass(frozen=True)
 class Facing:
-    """Blocks in space with one plane per joint.
-
-    Attributes
-    ----------
-    solids : tuple of Solid
-    note : str
-        What was done; "" where every joint was plane.
-    """
+    """Blocks in space with one plane per joint, and a note on what was done; "" where every joint was plane."""
 
     solids: tuple[Solid, ...]
     note: str = ""

@@ -120,23 +120,11 @@ def in_words(left_out: Sequence[LeftOut]) -> list[Note]:
 
 
 def passed_over(counts: Mapping[str, int], words: str = "skipped") -> list[Note]:
-    """Say what a reader passes over, by its kind: one note for all, none where there is nothing.
-
-    Examples
-    --------
-    >>> passed_over({"TEXT": 2, "POINT": 1})
-    ['skipped: 2 TEXT, 1 POINT']
-    """
+    """Say what a reader passes over, by its kind: one note for all, none where there is nothing."""
     listed = ", ".join(f"{n} {kind}" for kind, n in counts.items() if n)
     return [Note(LEFT_OUT, f"{words}: {listed}")] if listed else []
 
 
 def matches(labels: Iterable[str], patterns: Sequence[str]) -> bool:
-    """Whether a label is one of the patterns, or fits one.
-
-    Examples
-    --------
-    >>> matches(["stone 3"], ["mortar", "stone *"])
-    True
-    """
+    """Whether a label is one of the patterns, or fits one."""
     return any(label == pattern or fnmatch.fnmatchcase(label, pattern) for label in labels for pattern in patterns)

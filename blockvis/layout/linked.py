@@ -6,13 +6,7 @@ import numpy as np
 
 
 def linked(one: np.ndarray, other: np.ndarray, n: int) -> np.ndarray:
-    """(n,) int array: the group of each of ``n`` things, of which pairs are linked; numbered by their first members.
-
-    Examples
-    --------
-    >>> linked(np.array([0, 3]), np.array([2, 1]), 5)
-    array([0, 1, 0, 1, 2], dtype=int32)
-    """
+    """(n,) int array: the group of each of ``n`` things, of which pairs are linked; numbered by their first members."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

@@ -16,19 +16,7 @@ REPORTED = (LEFT_OUT, CHANGED, UNIT, UNIT_CLASH)
 
 
 class Note(str):
-    """A sentence with its kind; a sentence without one, a plain ``str``, is a remark.
-
-    Parameters
-    ----------
-    kind : str
-        One of the constants of this module.
-    text : str
-
-    Examples
-    --------
-    >>> Note(CHANGED, "elevations were ignored")
-    'elevations were ignored'
-    """
+    """A sentence with its kind, a constant of this module; one without, a plain ``str``, is a remark."""
 
     kind: str
 

@@ -58,22 +58,10 @@ def is_flat(points: np.ndarray) -> bool:
 
 
 def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[np.ndarray, str]:
-    """Take the two coordinates in which a flat drawing extends.
+    """Take the two coordinates in which a flat drawing extends, or those of a view; note whether it stands upright.
 
-    ValueError for coordinates that are not finite, and for points that are not in a plane, or not in that of the view.
-
-    Parameters
-    ----------
-    points : (n, 2) or (n, 3) array
-    view : {"xy", "xz", "yz"}, optional
-        The coordinates to take; by default those in which the drawing extends.
-
-    Returns
-    -------
-    flat : (n, 2) array
-        (x, y); of a drawing that stands upright (x, z) or (y, z).
-    note : str
-        "" if the drawing lies in the plane of x and y.
+    Of (n, 2) or (n, 3) points these are (x, y), of upright ones (x, z) or (y, z). ValueError for coordinates that are
+    not finite, and for points that are not in a plane, or not in that of the view.
     """
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
@@ -91,21 +79,10 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
 def drawing_plane(lines: Sequence[np.ndarray], where: str, view: str | None = None) -> tuple[np.ndarray, list[str]]:
     """Find the plane of a drawing of lines, which may have a relief: walls are traced on scans, at any angle.
 
-    ValueError for coordinates that are not finite, and for a drawing without area in the view.
-
-    Parameters
-    ----------
-    lines : sequence of (n, 3) arrays
-        Outlines and lines: where each is level, they lie in x and y, one above the other.
-    view : {"xy", "xz", "yz"}, optional
-        The coordinates to take of a drawing that lies in no plane, by default x and y; those of one that does.
-
-    Returns
-    -------
-    turn : (3, 3) array
-        Its rows: the directions of x, y and across the drawing.
-    notes : list of str
-        What that changes.
+    Lines are (n, 3) arrays; where each is level, they lie in x and y, one above the other. Returned are the directions
+    of x, y and across the drawing, as rows of a (3, 3) array, and notes on what that changes. The view chooses the
+    coordinates of a drawing in no plane, by default x and y. ValueError for coordinates that are not finite, and a view
+    without area.
     """
     points = np.concatenate(lines)
     spread, flat = _flat_views(points, where, view)
@@ -240,10 +217,10 @@ def outlines_of_cells(
     names: Sequence[str],
     unusable: dict[int, LeftOut] | None = None,
 ) -> list[np.ndarray]:
-    """Find the outline of each block: the edges that belong to one of its cells only.
+    """Find the outline of each block, (n, 2) array counter-clockwise: the edges that belong to one of its cells only.
 
-    ValueError for a block with a hole, in several pieces, with an outline that meets itself, or with no outline, unless
-    ``unusable`` takes it up.
+    ValueError for a block that is not one piece with one outline, unless ``unusable`` takes it up, by the number of the
+    block; its outline is that of its largest piece then.
 
     Parameters
     ----------
@@ -251,16 +228,9 @@ def outlines_of_cells(
     cells : sequence of sequences of int
         Points around each cell, curved sides with the points on them.
     owner : (n_cells,) int array
-        Block of each cell, 0 to n_blocks - 1.
+        Block of each cell.
     names : sequence of str
         One per block, for messages.
-    unusable : dict, optional
-        Takes up the blocks that are not one piece with one outline; their outlines are those of their largest piece.
-
-    Returns
-    -------
-    list of (n, 2) arrays
-        Counter-clockwise, without collinear points.
     """
     counts = np.array([len(cell) for cell in cells])
     flat = np.concatenate([np.asarray(cell, dtype=np.int64) for cell in cells])
@@ -346,13 +316,7 @@ def _loops(edges: list[tuple[int, int]]) -> tuple[list[list[int]], int | None]:
 
 
 def without_collinear(ring: np.ndarray, tolerance: float = COLLINEAR) -> np.ndarray:
-    """Drop the points of a ring that lie on the line between their neighbours.
-
-    Parameters
-    ----------
-    ring : (n, 2) array
-    tolerance : float
-        Largest distance of a dropped point from the edge that replaces it, as a fraction of the ring's extent.
+    """Drop the points of a (n, 2) ring that are within a fraction of its extent of the edge that replaces them.
 
     Examples
     --------

@@ -9,22 +9,11 @@ from .layout import Layout
 
 
 class Refused(ValueError):
-    """A drawing that no blocks can be made of.
+    """A drawing that no blocks can be made of: one line on what is wrong, where, and what to do.
 
-    Parameters
-    ----------
-    message : str
-        One line: what is wrong, where, and what to do.
-    layout : Layout, optional
-        What was read, as far as that went: outlines may cross themselves, surfaces may be open, and there may be lines
-        only.
-    blocks : sequence of int
-        Blocks of the layout that are at fault, where that is known.
-
-    Attributes
-    ----------
-    unit : str
-        Of the coordinates: m, or that of the file where it was refused as it was read.
+    Its layout is what was read, as far as that went: outlines may cross themselves, surfaces may be open, and there may
+    be lines only. ``blocks`` are those at fault, where that is known; coordinates are in the ``unit``, m, or that of
+    the file where it was refused as it was read.
     """
 
     def __init__(self, message: str, layout: Layout | None = None, blocks: Sequence[int] = ()) -> None:

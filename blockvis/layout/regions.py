@@ -55,14 +55,9 @@ class Region:
 
 @dataclass(frozen=True)
 class Choice:
-    """What of a drawing is filled with one bond.
+    """What of a drawing is filled with one bond: layers, groups, materials and names of outlines, or patterns of them.
 
-    Attributes
-    ----------
-    walls : tuple of str
-        Layers, groups, materials and names of outlines, or patterns of them.
-    openings : tuple of str
-        Likewise; empty for all outlines in the walls.
+    Without openings these are all outlines in the walls.
     """
 
     walls: tuple[str, ...]
@@ -83,24 +78,10 @@ class _Drawn:
 def regions_of(
     layout: Layout, choices: Sequence[Choice], roles: Mapping[str, str] | None = None
 ) -> tuple[list[list[Region]], Layout]:
-    """Find the walls that are to be filled.
+    """Find the walls that are to be filled, for each choice, and what else is drawn.
 
-    ValueError where no closed outline is on a layer, and for an opening outside of the walls; names the drawing, layer
-    and place.
-
-    Parameters
-    ----------
-    layout : Layout
-        Of all outlines of a drawing.
-    roles : mapping of str to str, optional
-        Supports are neither walls nor openings.
-
-    Returns
-    -------
-    list of list of Region
-        For each choice.
-    Layout
-        What else is drawn.
+    Supports, by ``roles``, are neither walls nor openings. ValueError where no closed outline is on a layer, and for an
+    opening outside of the walls; names the drawing, layer and place.
     """
     drawn = _drawn(layout)
     role = roles_of(layout, roles or {}, all_match=False)

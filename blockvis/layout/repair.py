@@ -86,28 +86,17 @@ def repaired(
     mortar: Sequence[LeftOut] = (),
     laid: np.ndarray | None = None,
 ) -> tuple[list[np.ndarray], list[str]]:
-    """Resolve the overlaps of the outlines of an assembly and close its joints.
+    """Resolve the overlaps of the outlines of an assembly without duplicates, close its joints, and tell the changes.
 
     ValueError for an overlap deeper than the tolerance, naming both blocks, and for an outline that cannot be closed.
 
     Parameters
     ----------
-    assembly : Assembly
-        Without duplicates.
     joint_thickness : float [m] or "auto"
     overlap_tolerance : float, optional [m]
-        Deeper overlaps are an error; by default 0.04 of the width of a typical block (twice its area over its
-        perimeter).
-    closing : {"auto", "faces", "voronoi"}
-        How joints are closed; see :func:`blockvis.layout.joints.close.close_joints`.
-    mortar : sequence of LeftOut
-        Surfaces of mortar as drawn, with the stones as their holes.
-
-    Returns
-    -------
-    outlines : list of (n, 2) arrays [m]
-    notes : list of str
-        What was changed.
+        By default 0.04 of the width of a typical block (twice its area over its perimeter).
+    closing, mortar
+        As of :func:`blockvis.layout.joints.close.close_joints`.
     """
     outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
     free = ~anchored if not anchored.all() else anchored

@@ -68,18 +68,11 @@ def _words(layout: Layout, block: int) -> tuple[str, ...]:
 def sorted_out(
     layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] = (), window: Sequence[float] = ()
 ) -> Layout:
-    """Leave out what is no block, with a note per kind and layer, and doubt the unit.
+    """Leave out what is no block of a drawing in m, with a note per kind and layer, and doubt the unit.
 
-    ValueError if a pattern of ``only`` matches nothing, no block is left, or something cannot be left out unasked.
-
-    Parameters
-    ----------
-    layout : Layout
-        As a format's reader gives it, lengths in m.
-    ignore, only : sequences of str
-        Layers, groups, materials and names of blocks, or patterns of them; kinds of entities and colours.
-    window : sequence of float
-        x0, y0, x1, y1 [m] of what is read, or none.
+    ``ignore`` and ``only`` are layers, groups, materials and names of blocks, or patterns of them; kinds of entities
+    and colours. The window is x0, y0, x1, y1 [m], or empty. ValueError if a pattern of ``only`` matches nothing, no
+    block is left, or something cannot be left out unasked.
     """
     where = f"'{layout.source}'" if layout.source else "the drawing"
     layout = within_window(without_ignored(layout, ignore, only), window)
@@ -194,12 +187,7 @@ def without_debris(layout: Layout) -> Layout:
 
 
 def without_surroundings(layout: Layout, only: Sequence[str] = ()) -> Layout:
-    """Leave out what by its name or place is no block: annotations, frames, backgrounds, title blocks, mortar.
-
-    Parameters
-    ----------
-    only : sequence of str
-        What the caller asks for by name stays.
+    """Leave out what by its name or place is no block, and not asked for: annotations, frames, title blocks, mortar.
 
     Notes
     -----

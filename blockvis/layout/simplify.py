@@ -29,18 +29,9 @@ def default_tolerance(outlines: Sequence[np.ndarray]) -> float:
 
 
 def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[np.ndarray], str]:
-    """Drop corners of outlines, (n, 2) arrays [m]; edges that blocks share stay shared.
+    """Drop corners of outlines, (n, 2) arrays [m], within a tolerance [m]; edges that blocks share stay shared.
 
-    Parameters
-    ----------
-    tolerance : float [m]
-        Farthest that a dropped corner may lie from the outline that is left.
-
-    Returns
-    -------
-    outlines : list of (n, 2) arrays [m]
-    note : str
-        What was dropped, and which blocks could not be simplified; "" for nothing.
+    And say what was dropped, and which blocks could not be simplified; "" for nothing.
 
     Notes
     -----

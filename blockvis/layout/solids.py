@@ -72,14 +72,7 @@ def off_planes(points: np.ndarray, faces: Sequence[Sequence[int]], planes: np.nd
 
 
 def outward(points: np.ndarray, faces: list[list[int]]) -> Solid:
-    """Turn all faces of a block so that they are seen counter-clockwise from outside.
-
-    Examples
-    --------
-    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> outward(corners, [[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]])[1][0]
-    [2, 1, 0]
-    """
+    """Turn all faces of a block so that they are seen counter-clockwise from outside."""
     return points, faces if volume(points, faces) > 0.0 else [face[::-1] for face in faces]
 
 
@@ -102,17 +95,9 @@ def size_of(points: np.ndarray) -> float:
 
 
 def between(first: ArrayLike, second: ArrayLike) -> Solid:
-    """Close the block between two faces with the same number of corners, in the same order.
+    """Close the block between two faces, (n, 3) arrays [m], with as many corners, in the same order.
 
-    Parameters
-    ----------
-    first, second : (n, 3) arrays [m]
-        Corners around both faces. Where two of them coincide, the side between them is a triangle or vanishes.
-
-    Examples
-    --------
-    >>> len(between([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 1]])[1])
-    5
+    Where two of these coincide, the side between them is a triangle or vanishes.
     """
     near, far = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     n = len(near)

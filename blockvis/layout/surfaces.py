@@ -15,16 +15,7 @@ WELDED = 1e-6
 def cleaned(points: np.ndarray, faces: list[list[int]]) -> Solid:
     """Weld the corners of a block, and turn its faces counter-clockwise seen from outside, as the solver takes it.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-    faces : list of lists of int
-        Corners around each face, in either sense.
-
-    Returns
-    -------
-    Solid
-        Without corners of no face and faces without an area. What is not closed stays so, for the solver to refuse.
+    Corners of no face and faces without an area go. What is not closed stays so, for the solver to refuse.
 
     Examples
     --------
@@ -81,14 +72,8 @@ def same_points(points: np.ndarray, near: float) -> np.ndarray:
 def turned_faces(edges: np.ndarray, edge: np.ndarray, face: np.ndarray) -> np.ndarray:
     """(m,) bool array: the faces to turn round so that neighbours run the opposite ways along their edge.
 
-    Parameters
-    ----------
-    edges : (n, 2) int array
-        First and last corner of the edges of all faces, one face after another.
-    edge : (n,) int array
-        Which edge each is, whatever its sense; each is that of two faces.
-    face : (n,) int array
-        0 to m - 1, ascending.
+    ``edges`` are the first and last corners, (n, 2) ints, of the edges of all faces, one face after another; ``edge``
+    says which each is, whatever its sense, and is that of two faces; ``face`` are ascending numbers of faces.
 
     Notes
     -----

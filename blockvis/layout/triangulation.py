@@ -14,12 +14,7 @@ def cells_of_ring(ring: np.ndarray) -> list[tuple[int, ...]]:
 
 
 def triangles_of_ring(ring: np.ndarray) -> np.ndarray:
-    """(n - 2, 3) int array: triangles that fill a simple ring, by cutting its ears off.
-
-    Parameters
-    ----------
-    ring : (n, 2) array
-        Either sense of rotation; the triangles turn as the ring does.
+    """(n - 2, 3) int array: triangles that fill a simple (n, 2) ring, and turn as it does, by cutting its ears off.
 
     Notes
     -----

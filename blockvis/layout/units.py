@@ -76,12 +76,8 @@ def metres_per(unit: str) -> float:
 def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str, str]:
     """Choose the unit in which a file is read, and say why; "" if the stated unit is taken.
 
-    The unit that is ``given`` by the caller always holds; ``stated`` is that of the file, "" for none.
-
-    Parameters
-    ----------
-    sizes : (n_blocks,) array
-        Root of the area of each block, in the unit of the file.
+    The unit that is ``given`` by the caller always holds; ``stated`` is that of the file, "" for none; ``sizes`` are
+    roots of the areas of the blocks, in the unit of the file.
     """
     median = float(np.median(sizes)) if len(sizes) else 1.0
     if given is not None:
@@ -138,11 +134,6 @@ def units_instead(unit: str, size: float) -> list[str]:
     """List the units that make blocks masonry whose unit is doubted, the likeliest first; none without doubt.
 
     The size [m] is the root of the area of the median block, as read in the unit.
-
-    Examples
-    --------
-    >>> units_instead("m", 130.0)
-    ['mm', 'cm']
     """
     doubted = size > 0.0 and not DOUBTED[0] <= size <= DOUBTED[1]
     return _masonry_units(size / metres_per(unit), (*RARE, "km")) if doubted else []

@@ -25,13 +25,7 @@ def checked_dimension(dimension: int | str | None) -> int | None:
 
 
 def axis_across(view: str) -> int:
-    """Give the number of the coordinate along which a view looks.
-
-    Examples
-    --------
-    >>> axis_across("xz")
-    1
-    """
+    """Give the number of the coordinate along which a view looks."""
     return 3 - sum(VIEWS[view])
 
 

@@ -137,20 +137,14 @@ def close_joints(
 ) -> Closing:
     """Move facing edges onto the line midway between them, or give the mortar to the nearest stone.
 
-    ValueError with the number of the outline, if "faces" would fold one.
+    Gaps up to ``thickness`` [m] are joints, and overlaps up to ``overlap`` [m] are resolved in the same way.
+    FoldedOutline if "faces" would fold an outline.
 
     Parameters
     ----------
-    thickness : float [m]
-        Widest gap that is a joint.
-    overlap : float [m]
-        Deepest overlap that is resolved in the same way.
-    anchored : (n_blocks,) bool array, optional
-        Blocks that keep their outline; edges that face them move across the whole gap.
     method : {"auto", "faces", "voronoi"}
-        Whether edges move to the midline between faces, or mortar goes to the nearest stone. "auto" takes the second
-        where faces are not straight, where corners are so blunt that pockets would stay open between them, and where
-        edges that move would fold an outline.
+        "auto" gives the mortar to the nearest stone where faces are not straight, where corners are so blunt that
+        pockets would stay open between them, and where edges that move would fold an outline.
     mortar : sequence of LeftOut
         Surfaces of mortar as drawn, with the stones as their holes; the nearest stone takes all of it, however wide.
     """

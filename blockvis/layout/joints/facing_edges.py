@@ -65,14 +65,9 @@ class Facing:
 
 @dataclass(frozen=True)
 class Edges:
-    """All edges of all outlines, counter-clockwise, block after block.
+    """All edges of all outlines, counter-clockwise, block after block: (n_edges, 2) ends [m], and the block of each.
 
-    Attributes
-    ----------
-    start, end : (n_edges, 2) arrays [m]
-    block : (n_edges,) int array
-    offsets : (n_blocks + 1,) int array
-        First edge of each block.
+    ``offsets``, (n_blocks + 1,), are the first edges of the blocks.
     """
 
     start: np.ndarray
@@ -100,14 +95,7 @@ def edges_of(outlines: Sequence[np.ndarray]) -> Edges:
 def facing_edges(
     outlines: Sequence[np.ndarray], reach: float, overlap: float = 0.0, laid: np.ndarray | None = None
 ) -> Facing:
-    """Find the stretches along which edges of different blocks face each other.
-
-    Parameters
-    ----------
-    reach : float [m]
-        Widest gap.
-    overlap : float [m]
-        Deepest overlap.
+    """Find where edges of different blocks face each other: stretches with gaps, and overlaps, up to so much [m].
 
     Notes
     -----
@@ -193,14 +181,7 @@ def _nearest(found: Facing, edges: Edges) -> Facing:
 
 
 def proposed_thickness(outlines: Sequence[np.ndarray], laid: np.ndarray | None = None) -> tuple[float, Facing]:
-    """Propose the joint thickness that closes the mortar joints of a drawing.
-
-    Returns
-    -------
-    thickness : float [m]
-        0 if there are no gaps.
-    open_stretches : Facing
-        The stretches with a gap.
+    """Propose the thickness [m] that closes the joints of a drawing, 0 without gaps; and give the stretches with gaps.
 
     Notes
     -----

@@ -37,18 +37,9 @@ class Line:
 
 
 def common_lines(found: Facing, edges: Edges, anchored: np.ndarray, closed: float) -> tuple[dict[int, Line], list[int]]:
-    """Find a line for every edge that moves, shared by as many facing edges as one line fits.
+    """Find a line for every edge that moves, by the edge, and the stretches whose two edges have different lines.
 
-    Parameters
-    ----------
-    closed : float [m]
-        Gap that is a rounding error.
-
-    Returns
-    -------
-    lines : {edge: line}
-    uncommon : list of int
-        Stretches whose two edges have different lines.
+    A gap up to ``closed`` [m] is a rounding error.
 
     Notes
     -----

@@ -92,19 +92,8 @@ def _extended_edges(
 
 
 def separated(rings: list[np.ndarray], anchored: np.ndarray, thickness: float, closed: float) -> list[np.ndarray]:
-    """Remove the overlaps that closing joints leaves at the junctions of several joints.
+    """Remove the overlaps beyond ``closed`` [m] that closing joints of a thickness [m] leaves where several meet.
 
-    Parameters
-    ----------
-    rings : list of (n, 2) arrays [m]
-        Counter-clockwise.
-    thickness : float [m]
-        Of the joints.
-    closed : float [m]
-        Overlap that is a rounding error.
-
-    Notes
-    -----
     Where the joints of a crossing miss each other a little, its corners are merged; where blocks still overlap
     afterwards, the smaller one is cut, or the one that may change its outline.
     """
@@ -164,22 +153,12 @@ def _strip(edges: Edges, edge: int, stretch: np.ndarray, thickness: float, dista
 def merge_close_corners(
     rings: list[np.ndarray], involved: list[int], anchored: np.ndarray, reach: float, closed: float
 ) -> list[np.ndarray]:
-    """Merge corners that cutting leaves close together, in all blocks that share them.
-
-    Parameters
-    ----------
-    rings : list of (n, 2) arrays [m]
-    involved : list of int
-        Blocks whose corners may move.
-    reach : float [m]
-        Corners closer than this are merged.
-    closed : float [m]
-        A corner closer than this to an edge lies on it.
+    """Merge corners closer than ``reach`` [m] that cutting leaves in the blocks involved, and in all that share them.
 
     Notes
     -----
-    Steps far smaller than a block are artefacts of cutting and mislead the search for contacts. Every corner that lies
-    on an edge of a neighbour is added to that neighbour first, so that both sides move alike.
+    Steps far smaller than a block are artefacts of cutting and mislead the search for contacts. Every corner within
+    ``closed`` [m] of an edge of a neighbour is added to that neighbour first, so that both sides move alike.
     """
     import shapely
     from scipy.cluster.hierarchy import fcluster, linkage
