@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 import shapely
 from scipy.sparse.linalg import spsolve
+from scipy.spatial import cKDTree
 
 import solver
 from blockvis.layout.linked import within_reach
@@ -132,8 +133,6 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
     share = np.full(n, np.inf)
     np.minimum.at(share, place, assembly.widths[owner])
     if n > 1:
-        from scipy.spatial import cKDTree
-
         share = np.minimum(share, cKDTree(positions).query(positions, k=2)[0][:, 1])
     drawn = imperfection.distribution.quantile(_uniform(imperfection, n, 2))
     held = np.zeros(n, dtype=bool)

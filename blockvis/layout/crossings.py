@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import shapely
 
 from .layout import Layout
 from .left_out import LeftOut
@@ -22,8 +23,6 @@ def uncrossed(layout: Layout) -> Layout:
 
     An outline without area stays: it is no crossing.
     """
-    import shapely
-
     rings = [ring if len(ring) > 2 else np.zeros((3, 2)) for ring in layout.outlines]
     shapes = np.array([shapely.Polygon(ring) for ring in rings])
     reasons: dict[int, LeftOut] = {}
@@ -60,8 +59,6 @@ def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:
 
     Or it goes in along a line ``around`` a hole and back: this polygon then.
     """
-    import shapely
-
     if around is None:
         x, y = _crossing(shapely.Polygon(ring))
         message = (
@@ -75,7 +72,5 @@ def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:
 
 def _crossing(shape: object) -> np.ndarray:
     """(2,) array [m]: where an invalid polygon crosses itself; its first corner where that is not known."""
-    import shapely
-
     found = re.findall(r"-?\d+\.?\d*(?:[eE][-+]?\d+)?", str(shapely.is_valid_reason(shape)))
     return np.array([float(x) for x in found[-2:]]) if len(found) > 1 else shapely.get_coordinates(shape)[0]

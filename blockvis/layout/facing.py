@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 import solver
 from solver.mechanics import counted
@@ -166,8 +167,6 @@ def _joints(faces: _Faces, near: float, exact: float) -> tuple[np.ndarray, np.nd
 
 def _near_boxes(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray]:
     """Find pairs of faces of different blocks whose boxes are no farther apart than ``near``."""
-    import shapely
-
     low = np.array([ring.min(axis=0) for ring in faces.rings]) - near
     high = np.array([ring.max(axis=0) for ring in faces.rings]) + near
     boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
@@ -224,8 +223,6 @@ def _in_line(faces: _Faces, chosen: np.ndarray, near: float) -> tuple[np.ndarray
 
 def _gap(faces: _Faces, a: int, b: int) -> float:
     """Measure the gap of two faces where they cover each other, the largest by amount; NaN where they do not."""
-    import shapely
-
     normal = faces.planes[a, :3] - faces.planes[b, :3]
     normal /= np.linalg.norm(normal)
     first = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import shapely
 
 import solver
 
@@ -79,8 +80,6 @@ def crossings_left_out(layout: Layout) -> np.ndarray:
 
 def _crossings(ring: np.ndarray) -> np.ndarray:
     """(n, 2) array: where an outline meets itself."""
-    import shapely
-
     if len(ring) < 3 or not np.isfinite(ring).all():
         return np.zeros((0, 2))
     lines = shapely.get_parts(shapely.node(shapely.LinearRing(ring)))
@@ -93,8 +92,6 @@ def _crossings(ring: np.ndarray) -> np.ndarray:
 
 def _open_ends(layout: Layout) -> np.ndarray:
     """(n, 2) array [m]: ends of lines that close nothing, where no other line is near."""
-    import shapely
-
     lines = [item.points for item in layout.left_out if item.kind == "open" and len(item.points) > 1]
     if not lines:
         return np.zeros((0, 2))

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 
 def linked(one: np.ndarray, other: np.ndarray, n: int) -> np.ndarray:
     """(n,) int array: the group of each of ``n`` things, of which pairs are linked; numbered by their first members."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def within_reach(points: np.ndarray, near: float) -> np.ndarray:
     """(n,) int array: the group of each of (n, d) points, of which those up to ``near`` apart are linked."""
-    from scipy.spatial import cKDTree
-
     one, other = cKDTree(points).query_pairs(near, output_type="ndarray").reshape(-1, 2).T
     return linked(one, other, len(points))

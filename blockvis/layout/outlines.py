@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import shapely
 
 from .left_out import LeftOut
 from .notes import CHANGED, UPRIGHT, Note
@@ -129,23 +130,17 @@ def _upright(points: np.ndarray) -> tuple[np.ndarray, float] | None:
 
 def pieces_of(shape: Any) -> list[Any]:
     """List the polygons with an area of a shape; beside lines they may lie in a collection within the collection."""
-    import shapely
-
     return [piece for piece in shapely.get_parts(shapely.get_parts(shape)) if piece.area > 0.0]
 
 
 def largest_piece(shape: Any) -> Any:
     """Outer border of the largest piece of a shape, a polygon without holes; an empty one of a shape without area."""
-    import shapely
-
     pieces = pieces_of(shape)
     return shapely.Polygon(max(pieces, key=lambda piece: float(piece.area)).exterior) if pieces else shapely.Polygon()
 
 
 def touching(shapes: np.ndarray, near: float) -> list[set[int]]:
     """List the shapes that each touches, or from which it is no farther than ``near``."""
-    import shapely
-
     others: list[set[int]] = [set() for _ in shapes]
     for i, j in shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=near).T.tolist():
         if i != j:
@@ -155,8 +150,6 @@ def touching(shapes: np.ndarray, near: float) -> list[set[int]]:
 
 def ring_of(polygon: Any) -> np.ndarray:
     """(n, 2) array: the corners around a polygon, counter-clockwise."""
-    import shapely
-
     return np.array(shapely.orient_polygons(polygon).exterior.coords)[:-1]
 
 
@@ -179,8 +172,6 @@ def filled(rings: Sequence[np.ndarray]) -> list[tuple[int, list[int]]]:
 
     Of outlines that lie in each other every second is filled; one that crosses itself lies in none and holds none.
     """
-    import shapely
-
     if len(rings) < 2:
         return [(k, []) for k in range(len(rings))]
     spread = np.ptp(np.concatenate(rings), axis=0)

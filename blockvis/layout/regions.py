@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import shapely
 
 from blockvis.text import by_similarity
 from solver import mechanics
@@ -161,8 +162,6 @@ def _opened_by(
 
 
 def _drawn(layout: Layout) -> list[_Drawn]:
-    import shapely
-
     found = []
     for i, ring in enumerate(layout.outlines):
         shape = _polygon(ring)
@@ -179,8 +178,6 @@ def _drawn(layout: Layout) -> list[_Drawn]:
 
 def _polygon(ring: np.ndarray) -> Any:
     """Make a polygon of an outline, of one that touches itself its largest part; None where it has no area."""
-    import shapely
-
     if len(ring) < 3:
         return None
     shape = shapely.Polygon(ring)

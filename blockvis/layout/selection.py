@@ -9,6 +9,7 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
+import shapely
 
 from blockvis.text import by_similarity
 
@@ -220,8 +221,6 @@ def drawn_mortar(layout: Layout) -> list[LeftOut]:
 
 def _around_others(layout: Layout) -> dict[int, LeftOut]:
     """Frames and backgrounds around other blocks, title blocks on a frame, inner lines of blocks."""
-    import shapely
-
     n, (beside, of_outlines) = layout.n_blocks, _unread(layout)
     if n + len(beside) < 2 or n == 0:
         return {}
@@ -258,8 +257,6 @@ def _around_others(layout: Layout) -> dict[int, LeftOut]:
 
 def _unread(layout: Layout) -> tuple[Any, np.ndarray]:
     """Shapes that could not be read as blocks, and (n,) int array: of how many outlines each was drawn."""
-    import shapely
-
     items = [item for item in layout.left_out if item.kind in UNREAD and len(item.points) > 2]
     shapes = np.array([shapely.Polygon(item.points).convex_hull for item in items], dtype=object)
     return shapes, np.array([1 + len(item.holes) for item in items], dtype=int)
@@ -267,8 +264,6 @@ def _unread(layout: Layout) -> tuple[Any, np.ndarray]:
 
 def _title_cells(layout: Layout, shapes: Any, frames: list[int]) -> dict[int, LeftOut]:
     """Upright rectangles that hang together, reach the frame of a sheet and are not the main part of the drawing."""
-    import shapely
-
     others = np.array([i for i in range(len(shapes)) if i not in frames])
     if not frames or len(others) == 0:
         return {}

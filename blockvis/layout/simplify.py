@@ -6,6 +6,8 @@ import itertools
 from collections.abc import Collection, Sequence
 
 import numpy as np
+import shapely
+from scipy.spatial import cKDTree
 
 from solver.mechanics import counted
 
@@ -23,8 +25,6 @@ def default_tolerance(outlines: Sequence[np.ndarray]) -> float:
     """Find the tolerance [m] within which outlines are simplified by default; 0 where they are not fine."""
     if sum(map(len, outlines)) <= FINE * len(outlines):
         return 0.0
-    import shapely
-
     return TOLERANCE * float(np.sqrt(np.median(shapely.area(np.array([shapely.Polygon(ring) for ring in outlines])))))
 
 
@@ -66,8 +66,6 @@ def _shortened(
     chains: Sequence[Sequence[tuple[int, ...]]], kept: Collection[int], points: np.ndarray, tolerance: float
 ) -> list[np.ndarray]:
     """Put outlines together again of their chains, those of kept blocks as they are, the others simplified."""
-    import shapely
-
     whole = {_key(chain) for block in kept for chain in chains[block]}
     keys = list({_key(chain) for parts in chains for chain in parts})
     lines = [shapely.LineString(points[list(key)]) for key in keys]
@@ -89,8 +87,6 @@ def _shared_corners(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np
 
     Neighbours share an edge only between corners that both have.
     """
-    from scipy.spatial import cKDTree
-
     every = np.concatenate(outlines)
     same = 1e-9 * float(np.ptp(every, axis=0).max())
     index = cKDTree(every)
@@ -132,8 +128,6 @@ def _key(chain: tuple[int, ...]) -> tuple[int, ...]:
 
 def _spoilt(found: list[np.ndarray], drawn: Sequence[np.ndarray], tolerance: float) -> set[int]:
     """Find the blocks that simplifying folds, or pushes into another."""
-    import shapely
-
     shapes = np.array([shapely.Polygon(ring) if len(ring) > 2 else shapely.Polygon() for ring in found])
     before = shapely.area(np.array([shapely.Polygon(ring) for ring in drawn]))
     bad = set(np.flatnonzero(~shapely.is_valid(shapes) | (shapely.area(shapes) < 0.8 * before)).tolist())

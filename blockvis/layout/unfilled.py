@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
 
 from .left_out import LeftOut
 from .outlines import share_in
@@ -35,8 +36,6 @@ def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
     """
     if layout.dimension == 3 or layout.n_blocks > MOST:
         return {}
-    import shapely
-
     # Of two points a hatch has an outline, too.
     blocks = [shapely.Polygon(ring if len(ring) > 2 else None) for ring in layout.outlines]
     blocks = [shape if shape.is_valid else shapely.Polygon() for shape in blocks]
@@ -64,8 +63,6 @@ def _may_be_wall(item: LeftOut) -> bool:
 
 def _possible_walls(layout: Layout, blocks: list[Any]) -> list[tuple[Any, str, tuple[Any, ...], bool]]:
     """List shape, layer or name, holes, and whether it is black, of whatever may be a wall, the smallest first."""
-    import shapely
-
     around: list[tuple[Any, str, tuple[Any, ...], bool]] = [
         (shapely.Polygon(item.points), item.layer or item.name, tuple(map(shapely.Polygon, item.holes)),
          BLACK in item.looks)
@@ -82,8 +79,6 @@ def _lies_in(shape: Any, wall: Any) -> bool:
 
 def _are_openings(wall: Any, shapes: list[Any], holes: Iterable[Any]) -> bool:
     """Whether outlines in a wall lie apart, as openings do and stones do not."""
-    import shapely
-
     every = [*shapes, *holes]
     if not every or not all(hole.is_valid for hole in every):
         return False
@@ -96,8 +91,6 @@ def _are_openings(wall: Any, shapes: list[Any], holes: Iterable[Any]) -> bool:
 
 
 def _words(source: str, label: str, wall: Any, openings: Any) -> str:
-    import shapely
-
     number = len(shapely.get_parts(openings))
     rest = wall.difference(openings).area
     command = shlex.join(["blockvis", "bond", source or "DRAWING", "-o", "bricks.dxf", f"walls={label}"])

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from blockvis.layout.left_out import LeftOut
 
@@ -180,8 +181,6 @@ class FoldedOutline(ValueError):
 
 def _folded(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray]) -> int | None:
     """Find the first outline that crosses itself, or loses much area, by closing; None if all are whole."""
-    import shapely
-
     before = shapely.area(np.array([shapely.Polygon(ring) for ring in drawn]))
     after = np.array([shapely.Polygon(ring) if len(ring) > 2 else shapely.Polygon() for ring in closed])
     folded = np.flatnonzero(~shapely.is_valid(after) | (shapely.area(after) < (1.0 - LOST) * before))
@@ -190,8 +189,6 @@ def _folded(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray]) -> int | 
 
 def _pockets(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray], thickness: float) -> float:
     """Area of the pockets that stay open between blunt corners, as a fraction of that of the joints closed."""
-    import shapely
-
     union = shapely.union_all(np.array([shapely.Polygon(ring) for ring in closed]))
     holes = [shapely.Polygon(ring) for part in shapely.get_parts(union) for ring in part.interiors]
     # An opening holds a disc of the radius of a joint and a half.

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from blockvis.layout.outlines import ring_width
 
@@ -102,8 +103,6 @@ def facing_edges(
     The gap between two edges is measured across the bisector of their lines, so that both have the same midline. Of
     stretches that lie behind one another only the nearest counts.
     """
-    import shapely
-
     edges = edges_of(outlines)
     margin = max(reach, overlap) * 1.0001
     low, high = np.minimum(edges.start, edges.end) - margin / 2, np.maximum(edges.start, edges.end) + margin / 2

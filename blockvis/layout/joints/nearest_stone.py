@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
+from scipy.spatial import Delaunay, Voronoi, cKDTree
 
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.linked import linked
@@ -93,8 +95,6 @@ def share_out(
 
     And surfaces of mortar as drawn, with the stones as their holes; holes without a stone are openings.
     """
-    import shapely
-
     if anchored.all():
         return list(outlines)
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
@@ -129,8 +129,6 @@ def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
 
     And say how far [m] was looked: a thickness near it is the limit of the search, not a measurement.
     """
-    import shapely
-
     origin = np.concatenate(outlines).mean(axis=0)
     shapes = np.array([largest_piece(shapely.Polygon(ring - origin).buffer(0)) for ring in outlines])
     size = float(np.median(np.sqrt(shapely.area(shapes))))
@@ -145,9 +143,6 @@ def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
 
 def gaps_between(shapes: np.ndarray, spacing: float) -> Gaps:
     """Triangulate the gaps between shapes from points along their outlines ``spacing`` [m] apart."""
-    import shapely
-    from scipy.spatial import Delaunay
-
     spacing = max(spacing, float(shapely.length(shapes).sum()) / MOST_POINTS)
     points, owner, before, after = [], [], [], []
     for i, shape in enumerate(shapes):
@@ -179,8 +174,6 @@ def gaps_between(shapes: np.ndarray, spacing: float) -> Gaps:
 
 def _with_mortar(shapes: np.ndarray, gaps: Gaps, thickness: float, growing: np.ndarray) -> Any:
     """All stones with the gaps between them up to a width, and the pockets where such gaps meet."""
-    import shapely
-
     # The sides of triangles across a gap run from point to point, not quite square to it.
     widest = 1.001 * float(np.hypot(thickness, SPACING * thickness))
     narrow = (gaps.widths <= widest) & np.isin(gaps.owner[gaps.triangles], growing).any(axis=1)
@@ -198,8 +191,6 @@ def _with_mortar(shapes: np.ndarray, gaps: Gaps, thickness: float, growing: np.n
 
 def _surface(mortar: LeftOut, origin: np.ndarray, shapes: np.ndarray) -> Any:
     """Fill the holes in a surface of mortar that hold a stone."""
-    import shapely
-
     holes = [shapely.Polygon(ring - origin).buffer(0) for ring in mortar.holes]
     inside = shapely.STRtree(shapely.point_on_surface(shapes))
     openings = [hole for hole in holes if len(inside.query(hole, "contains")) == 0]
@@ -208,9 +199,6 @@ def _surface(mortar: LeftOut, origin: np.ndarray, shapes: np.ndarray) -> Any:
 
 def _borders(points: np.ndarray, owner: np.ndarray, scale: float) -> Any:
     """Lines between the cells of points of different blocks."""
-    import shapely
-    from scipy.spatial import Voronoi
-
     # Points far around the drawing make every border finite.
     angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     far = points.mean(axis=0) + 4.0 * scale * np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -226,9 +214,6 @@ def _holders(
     faces: np.ndarray, shapes: np.ndarray, masonry: Any, points: np.ndarray, owner: np.ndarray, anchored: np.ndarray
 ) -> np.ndarray:
     """(n_faces,) int array: block of each face; -1 for none."""
-    import shapely
-    from scipy.spatial import cKDTree
-
     inside = shapely.point_on_surface(faces)
     places = shapely.get_coordinates(inside)
     nearest = owner[cKDTree(points).query(places)[1]]
@@ -244,8 +229,6 @@ def _holders(
 
 def _joined_faces(faces: np.ndarray, drawn: Any, grid: float) -> Any:
     """Join the faces of a block: the largest piece, without holes."""
-    import shapely
-
     union = shapely.union_all(faces, grid_size=grid) if len(faces) else drawn
     piece = largest_piece(union)
     return drawn if piece.is_empty else piece
@@ -253,8 +236,6 @@ def _joined_faces(faces: np.ndarray, drawn: Any, grid: float) -> Any:
 
 def _along_anchored(simple: np.ndarray, cells: np.ndarray, anchored: np.ndarray, grid: float) -> np.ndarray:
     """Take back what simplifying did to borders with blocks that keep their outline: others end where these begin."""
-    import shapely
-
     kept, found = shapely.union_all(cells[anchored]), simple.copy()
     found[anchored] = cells[anchored]
     covered = shapely.union_all(found)
@@ -273,8 +254,6 @@ def _without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.nda
 
     Outlines that are neighbours share their corners to the last digit.
     """
-    import shapely
-
     corners, which = np.unique(np.concatenate(rings), axis=0, return_inverse=True)
     around = np.split(which.ravel(), np.cumsum([len(ring) for ring in rings])[:-1])
     ends = np.concatenate([np.stack([w, np.roll(w, -1)], axis=1) for w in around])

@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import shapely
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial import cKDTree
 
 from blockvis.layout.outlines import largest_piece, ring_of, without_collinear
 from solver import mechanics
@@ -33,8 +36,6 @@ def extended_to_lines(
 
     ``base`` are outlines with the common lines applied, ``uncommon`` the stretches, ``thickness`` that of joints [m].
     """
-    import shapely
-
     overshoot, strips = _extended_edges(edges, found, uncommon, lines, anchored, thickness)
     if not overshoot:
         return base
@@ -97,8 +98,6 @@ def separated(rings: list[np.ndarray], anchored: np.ndarray, thickness: float, c
     Where the joints of a crossing miss each other a little, its corners are merged; where blocks still overlap
     afterwards, the smaller one is cut, or the one that may change its outline.
     """
-    import shapely
-
     first, second, _ = overlapping(rings, closed)
     if len(first) == 0:
         return rings
@@ -133,8 +132,6 @@ def _outward_form(edges: Edges, lines: dict[int, Line], edge: int) -> tuple[np.n
 
 def _strip(edges: Edges, edge: int, stretch: np.ndarray, thickness: float, distance: float) -> Any:
     """Bound the area that an extended edge may take: in front of its stretch, and up to its ends if these are near."""
-    import shapely
-
     start, along = edges.start[edge], edges.end[edge] - edges.start[edge]
     size = float(np.hypot(*along))
     along = along / size
@@ -160,10 +157,6 @@ def merge_close_corners(
     Steps far smaller than a block are artefacts of cutting and mislead the search for contacts. Every corner within
     ``closed`` [m] of an edge of a neighbour is added to that neighbour first, so that both sides move alike.
     """
-    import shapely
-    from scipy.cluster.hierarchy import fcluster, linkage
-    from scipy.spatial import cKDTree
-
     tree = shapely.STRtree([shapely.Polygon(ring) for ring in rings])
     near = sorted({int(j) for i in involved for j in tree.query(shapely.Polygon(rings[i]).buffer(2 * reach))})
     points = np.concatenate([rings[i] for i in near])
@@ -191,8 +184,6 @@ def merge_close_corners(
 
 def _merged(moved: np.ndarray, ring: np.ndarray, closed: float) -> np.ndarray:
     """Return an outline with its corners moved, those at one place once, or as it was where that leaves none."""
-    import shapely
-
     apart = np.hypot(*(moved - np.roll(moved, 1, axis=0)).T) > closed
     extent = float(np.ptp(moved, axis=0).max())
     if extent <= closed:
