@@ -12,7 +12,7 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
 import solver
-from blockvis.layout.linked import within_reach
+from blockvis.layout.linked import middles, within_reach
 
 from .distributions import DISTRIBUTION_KEYS, FORMS, Distribution, distribution_of
 from .key import Key, Section, one_of, whole
@@ -126,8 +126,7 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
     near = SAME_PLACE * float(assembly.widths.min())
     place = within_reach(vertices, near)
     n = int(place.max()) + 1
-    count = np.bincount(place)
-    positions = np.column_stack([np.bincount(place, weights=vertices[:, k]) / count for k in (0, 1)])
+    positions = middles(vertices, place)
     rails = _rails(assembly, positions, place, near)
 
     share = np.full(n, np.inf)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +27,6 @@ DRAWN_IN = (".dxf", ".svg")
 
 #: A line is straight where its corners lie within this part of its length of the line between its ends.
 STRAIGHT = 1e-3
-
-#: Factors of units in which somebody may have written a place.
-UNITS = {"mm": 1e-3, "cm": 1e-2}
 
 
 @dataclass(frozen=True)
@@ -170,21 +169,14 @@ def _tie(table: Table) -> TieCase:
         table.where += f" '{table.values['name']}'"
     values = TIES.read(table)
     layer = values["layer"] or ""
-    if layer:
-        for key in ("from", "to"):
-            if values[key] is not None:
-                raise table.error(key, "does not go with layer, whose lines say where its ties begin and end")
-    elif values["name"] is None:
+    if not layer and values["name"] is None:
         raise table.error("name", 'is missing; name the tie, as name = "tie at the springing"')
-    for key in () if layer else ("from", "to"):
-        if values[key] is None:
+    for key in ("from", "to"):
+        if layer and values[key] is not None:
+            raise table.error(key, "does not go with layer, whose lines say where its ties begin and end")
+        if not layer and values[key] is None:
             raise table.error(key, "is missing; give a point [x, y]")
-    by_section = values["area"] is not None or values["modulus"] is not None
-    if values["stiffness"] is not None and by_section:
-        raise table.error("stiffness", "and area or modulus are both given; give stiffness, or area and modulus")
-    if values["stiffness"] is None and (values["area"] is None or values["modulus"] is None):
-        lacks = "modulus" if values["area"] is not None else "area" if values["modulus"] is not None else "stiffness"
-        raise table.error(lacks, "is missing; give stiffness [N/m], or area [m²] and modulus [Pa]")
+    _check_stiffness(values, table)
     strength = np.inf if values["strength"] is None else values["strength"]
     if values["prestress"] >= strength:
         raise table.error("prestress", f"is {values['prestress']:g} N, not below the strength of {strength:g} N")
@@ -193,6 +185,17 @@ def _tie(table: Table) -> TieCase:
     ends = () if layer else (values["from"], values["to"])
     own = {key: values[key] for key in ("kind", "stiffness", "area", "modulus", "brittle", "prestress", "phase")}
     return TieCase(values["name"] or layer, ends, layer, strength=strength, where=where, **own)
+
+
+def _check_stiffness(values: Mapping[str, Any], table: Table) -> None:
+    """Refuse a stiffness beside area or modulus, and one of these without the other."""
+    given = {key for key in ("stiffness", "area", "modulus") if values[key] is not None}
+    if given in ({"stiffness"}, {"area", "modulus"}):
+        return
+    if "stiffness" in given:
+        raise table.error("stiffness", "and area or modulus are both given; give stiffness, or area and modulus")
+    lacks = {"area": "modulus", "modulus": "area"}[given.pop()] if given else "stiffness"
+    raise table.error(lacks, "is missing; give stiffness [N/m], or area [m²] and modulus [Pa]")
 
 
 def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tuple[Layout, tuple[LeftOut, ...]]:
@@ -204,14 +207,26 @@ def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tu
     if not layers:
         return sketch, ()
     lines = tuple(item for item in sketch.left_out if matches([item.layer], layers))
-    for layer in layers:
-        if not any(matches([item.layer], [layer]) for item in lines):
-            known = sorted({item.layer for item in sketch.left_out} | set(sketch.groups))
-            listed = ", ".join(f"'{name}'" for name in known if name)
-            raise ValueError(
-                f"{source}: [geometry] ties: no line lies on the layer '{layer}'{nearest(layer, known)}; the drawing "
-                f"has {listed or 'no layers'}"
-            )
+    _check_lines(lines, layers, sketch, source)
+    said = in_words(lines)
+    drawn = Counter(item.layer for item in lines)
+    words = [f"ties: {counted(n, 'line')} on layer '{layer}'" for layer, n in drawn.items()]
+    notes = (*(note for note in sketch.notes if note not in said), *words)
+    others = tuple(item for item in sketch.left_out if not matches([item.layer], layers))
+    return replace(sketch, left_out=others, notes=notes), lines
+
+
+def _check_lines(lines: Sequence[LeftOut], layers: Sequence[str], sketch: Layout, source: Path) -> None:
+    """Refuse a layer of ties without a line, and an outline on one."""
+    drawn = [item.layer for item in lines]
+    empty = next((layer for layer in layers if not matches(drawn, [layer])), None)
+    if empty is not None:
+        known = sorted(filter(None, {*sketch.groups, *(item.layer for item in sketch.left_out)}))
+        names = listed([f"'{name}'" for name in known], 12)
+        raise ValueError(
+            f"{source}: [geometry] ties: no line lies on the layer '{empty}'{nearest(empty, known)}; the drawing has "
+            f"{names or 'no layers'}"
+        )
     closed = next((item for item in lines if item.closed), None)
     if closed is not None:
         x, y = closed.place
@@ -219,14 +234,6 @@ def without_tie_lines(sketch: Layout, layers: Sequence[str], source: Path) -> tu
             f"{source}: [geometry] ties: '{closed.name}' on layer '{closed.layer}' at ({x:.6g}, {y:.6g}) is an "
             "outline, no line; move it to another layer"
         )
-    said = in_words(lines)
-    words = [
-        f"ties: {counted(sum(item.layer == layer for item in lines), 'line')} on layer '{layer}'"
-        for layer in dict.fromkeys(item.layer for item in lines)
-    ]
-    notes = (*(note for note in sketch.notes if note not in said), *words)
-    others = tuple(item for item in sketch.left_out if not matches([item.layer], layers))
-    return replace(sketch, left_out=others, notes=notes), lines
 
 
 def drawn_ties(entries: Sequence[TieCase], lines: Sequence[LeftOut]) -> list[TieCase]:
@@ -342,18 +349,10 @@ def _holding(
                 "move it there in the drawing, or hold it by the ground: leave layer out and write "
                 f"{where.rpartition(' ')[2]} = {fixed} and {other}; the line itself goes to another layer"
             )
+        doubt = " (is it in m?)" if apart.min() > assembly.block_size else ""
         raise ValueError(
             f"{where} {place_text(point, 6)} m lies in no block; the nearest is '{near}', {apart.min():.3g} m away"
-            f"{_in_metres(point, assembly)}; {remedy}"
+            f"{doubt}; {remedy}"
         )
     # Where several blocks meet, it is the one behind the anchor.
     return block_at(assembly, point, every, away.tolist(), where, gone)
-
-
-def _in_metres(point: tuple[float, ...], assembly: solver.Assembly) -> str:
-    """Say that a point lies in a block if it is in another unit of length."""
-    for unit, factor in UNITS.items():
-        scaled = tuple(factor * x for x in point)
-        if distances_to(assembly, scaled).min() <= ON_EDGE * assembly.block_size:
-            return f" (if it is in {unit}, write {place_text(scaled, 6)}: coordinates of a case are in m)"
-    return ""

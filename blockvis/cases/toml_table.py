@@ -46,13 +46,14 @@ class Table:
     def vector(
         self, key: str, lengths: Sequence[int] = (2, 3), words: str = "two numbers [x, y], or in space three [x, y, z]"
     ) -> Any:
-        """Read as many finite numbers as are in ``lengths``; ``words`` says in the error what they are."""
+        """Read as many finite numbers as are in ``lengths``, or any; ``words`` says in the error what they are."""
         value = self.take(key)
         if value is None:
             return None
-        if not isinstance(value, (list, tuple)) or len(value) not in lengths or not all(map(is_number, value)):
+        numbers = value if isinstance(value, (list, tuple)) else ()
+        if not numbers or (lengths and len(numbers) not in lengths) or not all(map(is_number, numbers)):
             raise self.error(key, f"is {shortened(value)}; give {words}")
-        return tuple(map(float, value))
+        return tuple(map(float, numbers))
 
     def text(self, key: str, default: str | None = None, *, among: Sequence[str] = ()) -> Any:
         """Read a text, one of ``among`` if there are any."""
@@ -74,13 +75,8 @@ class Table:
 
     def numbers(self, key: str) -> tuple[float, ...] | None:
         """Read a list of finite numbers."""
-        value = self.take(key)
-        if value is None:
-            return None
-        right = isinstance(value, Sequence) and not isinstance(value, str) and len(value) > 0
-        if not right or not all(map(is_number, value)):
-            raise self.error(key, f"is {value!r}; give a list of numbers")
-        return tuple(float(v) for v in value)
+        found: tuple[float, ...] | None = self.vector(key, (), "a list of numbers")
+        return found
 
     def texts(self, key: str) -> tuple[str, ...] | None:
         """Read a text, or a list of texts; None if it is missing."""

@@ -101,6 +101,16 @@ class Pattern:
             return stone, stone / self.flatness
         return self.brick
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the values is not used."""
+        if self.bond != "rubble" or self.brick == Pattern.brick:
+            return ()
+        length, height = self.module
+        said = f"bond: stones of rubble are {length:g} m long and {height:.3g} m high in the mean, by flatness"
+        remedy = f"give stone = {length:g} and flatness = {length / self.brick[1]:.3g} for this height"
+        return (Note(CHANGED, f"{said}; the height of brick, {self.brick[1]:g} m, is not used: {remedy}"),)
+
 
 def bond(
     outline: Any,
@@ -193,12 +203,7 @@ def filled(
     corner = np.array(wall.bounds[:2])
     wall, *holes = [_shifted(shape, -corner) for shape in (wall, *openings)]
     _check_size(wall, pattern)
-    outside = next((k for k, hole in enumerate(holes) if hole.intersection(wall).area <= DUST * hole.area), None)
-    if outside is not None:
-        x, y = openings[outside].centroid.coords[0]
-        raise ValueError(
-            f"opening {outside + 1} around ({x:.6g}, {y:.6g}) lies outside its wall; move it, or leave it out"
-        )
+    _check_inside(wall, holes, corner)
     length, height = pattern.module
     grid = max(GRID * max(*wall.bounds[2:], length), float(np.spacing(np.abs(corner)).max()))
     solid = shapely.Polygon(wall.exterior)
@@ -220,21 +225,17 @@ def filled(
         )
     if pattern.joint and mortar:
         stones = _with_mortar(stones, pattern.joint)
-    notes = tuple(_note(what, shapes, corner) for what, shapes in lacking.items())
+    notes = [_note(what, shapes, corner) for what, shapes in lacking.items()]
     if pattern.quoins and not quoins:
         x, y = corner + wall.centroid.coords[0]
         ends = f"upright, to {1e3 * LEANS:g} mm in a metre, {2.0 * pattern.quoins[1]:g} m high and free of openings"
         said = f"bond: the wall around ({x:.6g}, {y:.6g}) has no quoins: no end is {ends}; give smaller ones"
-        notes += (Note(CHANGED, said),)
-    if pattern.bond == "rubble" and pattern.brick != Pattern.brick:
-        said = f"bond: stones of rubble are {length:g} m long and {height:.3g} m high in the mean, by flatness"
-        remedy = f"give stone = {length:g} and flatness = {length / pattern.brick[1]:.3g} for this height"
-        notes += (Note(CHANGED, f"{said}; the height of brick, {pattern.brick[1]:g} m, is not used: {remedy}"),)
+        notes.append(Note(CHANGED, said))
     return Layout(
         blocks=tuple(without_collinear(np.array(shape.exterior.coords)[:-1], 1e-9) + corner for _, shape in stones),
         names=tuple(name for name, _ in stones),
         materials=tuple("brick" if name.startswith("brick") else "stone" for name, _ in stones),
-        notes=notes,
+        notes=(*notes, *pattern.notes),
     )
 
 
@@ -259,6 +260,16 @@ def _check_size(wall: shapely.Polygon, pattern: Pattern) -> None:
             f"{word} of {length:g} × {height:.3g} m makes {number:.3g} blocks of a wall of {wall.area:.4g} m²; at most "
             f"{MOST_BLOCKS} can be laid: give a larger {word}, or the unit of the drawing"
         )
+
+
+def _check_inside(wall: shapely.Polygon, holes: Sequence[shapely.Polygon], corner: np.ndarray) -> None:
+    """Refuse an opening outside of its wall; both are as seen from a corner."""
+    for number, hole in enumerate(holes, start=1):
+        if hole.intersection(wall).area <= DUST * hole.area:
+            x, y = corner + hole.centroid.coords[0]
+            raise ValueError(
+                f"opening {number} around ({x:.6g}, {y:.6g}) lies outside its wall; move it, or leave it out"
+            )
 
 
 def _notches(solid: shapely.Polygon, grid: float) -> list[shapely.Polygon]:

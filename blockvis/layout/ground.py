@@ -15,7 +15,7 @@ from solver import mechanics
 
 from .inspect import Inspection
 from .layout import Layout
-from .outlines import largest_piece, ring_of, touching, without_collinear
+from .outlines import largest_piece, rectangle, ring_of, touching, without_collinear
 from .repair import repaired
 from .simplify import default_tolerance, simplified
 from .solids import size_of
@@ -202,8 +202,8 @@ def _on_a_level(found: Inspection) -> _Foot:
     level = float(found.layout.corners(block)[:, -1].min())
     low, high = _plan_box(found.layout, block)
     flat = [[low[0], level], [high[0], level]]
-    plan = [[low[0], low[-1]], [high[0], low[-1]], [high[0], high[-1]], [low[0], high[-1]]]
-    return _Foot(block, low, high, np.array(flat if len(low) == 1 else plan), level)
+    bed = np.array(flat) if len(low) == 1 else rectangle(*low, *high)
+    return _Foot(block, low, high, bed, level)
 
 
 def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> list[_Foot]:
@@ -400,8 +400,7 @@ def _slab(found: Inspection, beds: Sequence[_Foot], split: _Split, depth: float)
     for name, role, side in (("ground left", mechanics.FIXED, high), ("ground right", mechanics.MOVING, low)):
         near, far = low.copy(), high.copy()
         (far if side is high else near)[split.axis] = split.at
-        plan = [[near[0], near[1]], [far[0], near[1]], [far[0], far[1]], [near[0], far[1]]]
-        plan = [[float(x), float(y)] for x, y in plan]
+        plan = rectangle(*near, *far).tolist()
         halves.append({"name": name, "role": role, "outline": plan, "levels": [level - depth, level]})
     return halves
 

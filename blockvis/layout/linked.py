@@ -14,6 +14,12 @@ def linked(one: np.ndarray, other: np.ndarray, n: int) -> np.ndarray:
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
+def middles(points: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """(n_groups, d) array: the mean of the (n, d) points of each group."""
+    count = np.maximum(np.bincount(group), 1)
+    return np.stack([np.bincount(group, column) / count for column in points.T], axis=1)
+
+
 def within_reach(points: np.ndarray, near: float) -> np.ndarray:
     """(n,) int array: the group of each of (n, d) points, of which those up to ``near`` apart are linked."""
     one, other = cKDTree(points).query_pairs(near, output_type="ndarray").reshape(-1, 2).T

@@ -46,9 +46,8 @@ def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
         if not wall.is_valid or wall.area == 0.0 or any(share_in(one, wall) > 0.99 for one in walls):
             continue
         inside = [i for i in np.flatnonzero(~counted).tolist() if _lies_in(blocks[i], wall)]
-        if not _are_openings(wall, [blocks[i] for i in inside], holes):
-            continue
-        if black and not pages and inside and all(WHITE in layout.looks[i] for i in inside):
+        is_page = black and inside and all(WHITE in layout.looks[i] for i in inside)
+        if not _are_openings(wall, [blocks[i] for i in inside], holes) or (is_page and not pages):
             continue
         counted[inside] = True
         walls.append(wall)

@@ -75,7 +75,7 @@ def test_area_and_modulus_give_the_stiffness(tmp_path):
     ("change", "words"),
     [
         ({"to": [1.5, 1.5]}, "to (1.5, 1.5) m lies in no block; the nearest is 'left', 1 m away"),
-        ({"to": [2750, 1500]}, "(if it is in mm, write (2.75, 1.5): coordinates of a case are in m)"),
+        ({"to": [2750, 1500]}, "m away (is it in m?); move it there"),
         ({"to": [0.25, 0.5]}, "both ends are in the block 'left'"),
         ({"to": {"block": "rihgt", "point": [0, 0]}}, "no block is called 'rihgt'"),
         ({"from": {"fixed": [0, 1]}, "to": {"fixed": [1, 1]}}, "both ends are in the ground"),

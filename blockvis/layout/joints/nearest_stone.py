@@ -16,7 +16,7 @@ import shapely
 from scipy.spatial import Delaunay, Voronoi, cKDTree
 
 from blockvis.layout.left_out import LeftOut
-from blockvis.layout.linked import linked
+from blockvis.layout.linked import linked, middles
 from blockvis.layout.outlines import largest_piece, ring_of
 
 from .facing_edges import common_width
@@ -270,7 +270,7 @@ def _without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.nda
         torn = np.bincount(group, staying)[group] > 1
         group[torn] = group.max() + 1 + np.arange(np.count_nonzero(torn))
         count = np.bincount(group)
-        place = np.stack([np.bincount(group, corners[:, axis]) / np.maximum(count, 1) for axis in (0, 1)], axis=1)
+        place = middles(corners, group)
         for k, corner in enumerate(corners):
             if count[group[k]] == 1 or staying[k]:
                 place[group[k]] = corner

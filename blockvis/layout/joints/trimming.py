@@ -10,6 +10,7 @@ import shapely
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial import cKDTree
 
+from blockvis.layout.linked import middles
 from blockvis.layout.outlines import largest_piece, ring_of, without_collinear
 from solver import mechanics
 
@@ -60,9 +61,9 @@ def extended_to_lines(
         if not piece.is_empty:
             shapes[block] = piece
             final[block] = ring_of(piece)
-    involved = {int(edges.block[edge]) for k in uncommon for edge in (found.edge_a[k], found.edge_b[k])}
+    involved = np.unique(edges.block[np.append(found.edge_a[uncommon], found.edge_b[uncommon])])
     return merge_close_corners(
-        final, sorted(involved), anchored, MERGED * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max())
+        final, involved.tolist(), anchored, MERGED * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max())
     )
 
 
@@ -167,8 +168,7 @@ def merge_close_corners(
     if len(movable) < 2:
         return rings
     group = fcluster(linkage(movable, "complete"), reach, "distance")
-    count = np.bincount(group)
-    centre = np.stack([np.bincount(group, movable[:, axis]) / np.maximum(count, 1) for axis in (0, 1)], axis=1)
+    centre = middles(movable, group)
     anchors = [shared[i] for i in near if anchored[i]]
     if anchors:
         distance, nearest = cKDTree(np.concatenate(anchors)).query(centre)
