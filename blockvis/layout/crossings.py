@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +12,10 @@ from .layout import Layout
 from .left_out import LeftOut
 from .notes import CHANGED, Note
 from .outlines import around_hole, pieces_of, ring_of, without_collinear
+from .surfaces import same_points
+
+#: Points nearer to each other than this fraction of the size of what they belong to are one.
+SAME = 1e-6
 
 #: The largest piece of an outline that crosses itself is the block if it holds at least this share of its area.
 WHOLE = 0.98
@@ -43,7 +46,7 @@ def uncrossed(layout: Layout) -> Layout:
         lost = max(lost, 1.0 - share)
     if reduced:
         first = next(iter(reduced))
-        x, y = _crossing(shapes[first])
+        x, y = _crossing(layout.outlines[first])
         words, the = "1 outline crosses or touches itself, ", ""
         if len(reduced) > 1:
             words, the = f"{len(reduced)} outlines cross or touch themselves, ", "the first "
@@ -60,7 +63,7 @@ def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:
     Or it goes in along a line ``around`` a hole and back: this polygon then.
     """
     if around is None:
-        x, y = _crossing(shapely.Polygon(ring))
+        x, y = _crossing(ring)
         message = (
             f"block '{name}' crosses itself at ({x:.6g}, {y:.6g}), and its largest piece has only "
             f"{100.0 * share:.3g} % of its area; redraw it as one outline, or as several"
@@ -70,7 +73,18 @@ def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:
     return around_hole(name, border, holes)
 
 
-def _crossing(shape: object) -> np.ndarray:
-    """(2,) array [m]: where an invalid polygon crosses itself; its first corner where that is not known."""
-    found = re.findall(r"-?\d+\.?\d*(?:[eE][-+]?\d+)?", str(shapely.is_valid_reason(shape)))
-    return np.array([float(x) for x in found[-2:]]) if len(found) > 1 else shapely.get_coordinates(shape)[0]
+def _crossing(ring: np.ndarray) -> np.ndarray:
+    """(2,) array [m]: where an outline crosses itself first; its first corner where that is not known."""
+    return next(iter(crossings_of(ring)), ring[0])
+
+
+def crossings_of(ring: np.ndarray) -> np.ndarray:
+    """(n, 2) array: where an outline meets itself."""
+    if len(ring) < 3 or not np.isfinite(ring).all():
+        return np.zeros((0, 2))
+    lines = shapely.get_parts(shapely.node(shapely.LinearRing(ring)))
+    ends = np.array([line.coords[k] for line in lines for k in (0, -1)])
+    same = same_points(ends, SAME * float(np.ptp(ring, axis=0).max()))
+    # A ring that is cut where it meets nothing has two ends there.
+    places, counts = np.unique(same, return_counts=True)
+    return np.asarray(ends[places[counts > 2]])

@@ -10,12 +10,10 @@ import shapely
 
 import solver
 
+from .crossings import SAME, crossings_of
 from .layout import Layout, Outline
 from .solids import Solid
 from .surfaces import same_points
-
-#: Points nearer to each other than this fraction of the size of what they belong to are one.
-SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ def faults_of(layout: Layout, known: Sequence[int] = ()) -> Faults:
         blocks = {k for k, edges in enumerate(open_edges) if len(edges)} | set(known)
         return Faults(tuple(sorted(blocks)), edges=np.concatenate([np.zeros((0, 2, 3)), *open_edges]))
     # Debris has no area, and is no reason to refuse anything: what crosses itself is.
-    crossings = {k: _crossings(layout.outlines[k]) for k in no_blocks(layout.outlines)}
+    crossings = {k: crossings_of(layout.outlines[k]) for k in no_blocks(layout.outlines)}
     blocks = {k for k, places in crossings.items() if len(places)} | set(known)
     return Faults(
         tuple(sorted(blocks)),
@@ -75,19 +73,7 @@ def crossings_left_out(layout: Layout) -> np.ndarray:
     # A line that is drawn there and back is no crossing.
     other = ("asked", "no area", "sliver")
     rings = [item.points for item in layout.left_out if item.closed and item.kind not in other]
-    return np.concatenate([np.zeros((0, 2)), *map(_crossings, rings)])
-
-
-def _crossings(ring: np.ndarray) -> np.ndarray:
-    """(n, 2) array: where an outline meets itself."""
-    if len(ring) < 3 or not np.isfinite(ring).all():
-        return np.zeros((0, 2))
-    lines = shapely.get_parts(shapely.node(shapely.LinearRing(ring)))
-    ends = np.array([line.coords[k] for line in lines for k in (0, -1)])
-    same = same_points(ends, SAME * float(np.ptp(ring, axis=0).max()))
-    # A ring that is cut where it meets nothing has two ends there.
-    places, counts = np.unique(same, return_counts=True)
-    return np.asarray(ends[places[counts > 2]])
+    return np.concatenate([np.zeros((0, 2)), *map(crossings_of, rings)])
 
 
 def _open_ends(layout: Layout) -> np.ndarray:

@@ -167,10 +167,11 @@ def share_in(inner: Any, outer: Any) -> float:
     return float(inner.intersection(outer).area / inner.area) if inner.intersects(outer) else 0.0
 
 
-def filled(rings: Sequence[np.ndarray]) -> list[tuple[int, list[int]]]:
+def filled(rings: Sequence[np.ndarray], out: float = WITHIN) -> list[tuple[int, list[int]]]:
     """Numbers of the (n, d) outlines of one shape in a plane that are filled, each with those of its holes.
 
-    Of outlines that lie in each other every second is filled; one that crosses itself lies in none and holds none.
+    Of outlines that lie in each other every second is filled; one that crosses itself lies in none and holds none. The
+    part ``out`` of an outline may stick out of another in which it lies.
     """
     if len(rings) < 2:
         return [(k, []) for k in range(len(rings))]
@@ -180,10 +181,10 @@ def filled(rings: Sequence[np.ndarray]) -> list[tuple[int, list[int]]]:
     areas = shapely.area(shapes)
     sound = np.flatnonzero(shapely.is_valid(shapes) & (areas > 0.0))
     inner, outer = sound[shapely.STRtree(shapes[sound]).query(shapes[sound])]
-    smaller = areas[inner] < (1.0 - WITHIN) * areas[outer]
+    smaller = areas[inner] < (1.0 - out) * areas[outer]
     inner, outer = inner[smaller], outer[smaller]
     shared = shapely.area(shapely.intersection(shapes[inner], shapes[outer]))
-    within = shared >= (1.0 - WITHIN) * areas[inner]
+    within = shared >= (1.0 - out) * areas[inner]
     inner, outer = inner[within], outer[within]
     depth = np.bincount(inner, minlength=len(rings))
     holes: dict[int, list[int]] = {k: [] for k in np.flatnonzero(depth % 2 == 0).tolist()}

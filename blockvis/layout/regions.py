@@ -16,7 +16,7 @@ from solver import mechanics
 from .layout import Layout
 from .left_out import LeftOut, matches
 from .notes import CHANGED, Note
-from .outlines import largest_piece, share_in
+from .outlines import filled, largest_piece, ring_of, share_in
 from .roles import roles_of
 from .selection import ANNOTATIONS, labels_of
 
@@ -201,14 +201,9 @@ def _nested(drawn: Sequence[_Drawn]) -> list[Region]:
             # An outline and the hatch in it.
             unlike[twin] = replace(unlike[twin], holes=(*unlike[twin].holes, *one.holes))
     regions: list[Region] = []
-    around: list[list[int]] = []
-    for k, one in enumerate(unlike):
-        around.append([j for j in range(k) if share_in(one.shape, unlike[j].shape) > 1.0 - SAME])
-        if len(around[k]) % 2:
-            parent = next(region for region in reversed(regions) if share_in(one.shape, region.wall) > 1.0 - SAME)
-            parent.openings.append(one.shape)
-        else:
-            regions.append(Region(one.shape, one.labels[0], one.labels[-1], openings=list(one.holes)))
+    for k, inner in filled([ring_of(one.shape) for one in unlike], SAME):
+        one, openings = unlike[k], [unlike[hole].shape for hole in inner]
+        regions.append(Region(one.shape, one.labels[0], one.labels[-1], openings=[*one.holes, *openings]))
     return regions
 
 
