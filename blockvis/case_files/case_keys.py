@@ -32,6 +32,7 @@ from blockvis.cases.key import (
     Key,
     Section,
     ValueKind,
+    list_of,
     one_of,
     pair_of,
     whole,
@@ -164,23 +165,13 @@ _FILM = ValueKind(
 _DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]}, _read_by(checked_dimension))
 _BACKGROUND = ValueKind("whole number or colour", {"anyOf": [{"type": "integer"}, {"type": "string"}]}, _background)
 _MOMENT = ValueKind("number, in space three", {"anyOf": [NUMBER.schema, TRIPLE.schema]}, _moment)
-_TWO_NAMES = ValueKind(
-    "two texts", {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}, _two_names
-)
-_PLACES = ValueKind(
-    "three numbers: from, to, number of places",
-    {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
-    _places,
-)
+_TWO_NAMES = ValueKind("two texts", list_of(TEXT.schema, 2, 2), _two_names)
+_PLACES = ValueKind("three numbers: from, to, number of places", list_of(NUMBER.schema, 3, 3), _places)
 _LEVELS = pair_of("[bottom, top]")
 # Of the kinds that there are when a case is read.
 _KIND = replace(one_of(tuple(KINDS)), read=lambda table, key: table.text(key.name, among=tuple(KINDS)))
 _PUSHES = replace(PAIR, read=_direction_of_pressure)
-_WINDOW = ValueKind(
-    "four numbers",
-    {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4},
-    _read_by(checked_window, Table.numbers),
-)
+_WINDOW = ValueKind("four numbers", list_of(NUMBER.schema, 4, 4), _read_by(checked_window, Table.numbers))
 _SIGHT = ValueKind(
     "a word, or table: azimuth, elevation",
     {

@@ -1,8 +1,6 @@
 """What a key of a TOML file is: its kind of value, unit, default, meaning and an example.
 
-Whatever is known of a key is said once: files are read by it, and the JSON schema, the reference pages and the comments
-of new case files are written from it. The tables of keys are :data:`blockvis.case_files.case_keys.SECTIONS`, those of a
-kind of analysis in :attr:`blockvis.kinds.kind.AnalysisKind.keys`, and :data:`blockvis.studies.study_keys.SECTIONS`.
+Files are read by it, and the JSON schema, the reference pages and the comments of new case files are written from it.
 """
 
 from __future__ import annotations
@@ -20,24 +18,15 @@ def _as_it_is(table: Table, key: Key) -> Any:
 
 @dataclass(frozen=True)
 class ValueKind:
-    """A kind of value.
-
-    Attributes
-    ----------
-    words : str
-        For people.
-    schema : mapping
-        For programs, as JSON schema has it.
-    read : function of Table and Key
-        Reads and checks the value; None where the key is missing.
-    """
+    """A kind of value: in words for people, as JSON schema has it, and the function that reads and checks one."""
 
     words: str
     schema: Mapping[str, Any]
     read: Callable[[Table, Key], Any] = _as_it_is
 
 
-def _list_of(item: Mapping[str, Any], least: int, most: int | None = None) -> dict[str, Any]:
+def list_of(item: Mapping[str, Any], least: int, most: int | None = None) -> dict[str, Any]:
+    """Say, as JSON schema has it, that a value is a list of so many items."""
     return {"type": "array", "items": item, "minItems": least} | ({} if most is None else {"maxItems": most})
 
 
@@ -70,7 +59,7 @@ def _number(words: str, schema: Mapping[str, Any], fits: Callable[[float], bool]
 
 def pair_of(words: str) -> ValueKind:
     """Make the kind of two numbers; ``words`` says in the error what they are."""
-    numbers = _list_of({"type": "number"}, 2, 2)
+    numbers = list_of({"type": "number"}, 2, 2)
     return ValueKind("two numbers", numbers, lambda table, key: table.vector(key.name, (2,), f"two numbers {words}"))
 
 
@@ -91,16 +80,16 @@ TEXTS = ValueKind(
 PAIR = pair_of("[x, y]")
 VECTOR = ValueKind(
     "two numbers, in space three",
-    _list_of({"type": "number"}, 2, 3),
+    list_of({"type": "number"}, 2, 3),
     lambda table, key: table.vector(key.name),
 )
 TRIPLE = ValueKind(
     "three numbers",
-    _list_of({"type": "number"}, 3, 3),
+    list_of({"type": "number"}, 3, 3),
     lambda table, key: table.vector(key.name, (3,), "three numbers [x, y, z]"),
 )
-NUMBERS = ValueKind("list of numbers", _list_of({"type": "number"}, 1), lambda table, key: table.numbers(key.name))
-OUTLINE = ValueKind("list of at least three corners", _list_of(_list_of({"type": "number"}, 2, 2), 3), _outline)
+NUMBERS = ValueKind("list of numbers", list_of({"type": "number"}, 1), lambda table, key: table.numbers(key.name))
+OUTLINE = ValueKind("list of at least three corners", list_of(list_of({"type": "number"}, 2, 2), 3), _outline)
 
 
 def whole(least: int, most: int | None = None) -> ValueKind:

@@ -19,7 +19,7 @@ from blockvis.text import listed, nearest
 from solver import mechanics
 from solver.mechanics import counted
 
-from .key import NUMBER, PAIR, POSITIVE, Forms, Key, Section, ValueKind, one_of
+from .key import NUMBER, PAIR, POSITIVE, VECTOR, Forms, Key, Section, ValueKind, list_of, one_of
 from .toml_table import Table, is_number, shortened
 
 #: Pieces of a support narrower than this fraction of the block size are not cut off.
@@ -160,14 +160,10 @@ def _motions(table: Table, key: Key) -> dict[str, tuple[float, float, float]] | 
 
 
 _DEPTH = ValueKind("1 or -1", {"enum": [1, -1]}, _depth)
-_POINTS = ValueKind("list of at least two pairs", {"type": "array", "items": PAIR.schema, "minItems": 2}, _points)
+_POINTS = ValueKind("list of at least two pairs", list_of(PAIR.schema, 2), _points)
 _MOTIONS = ValueKind(
     "table of two or three numbers by the name of a support",
-    {
-        "type": "object",
-        "additionalProperties": {"type": "array", "items": NUMBER.schema, "minItems": 2, "maxItems": 3},
-        "minProperties": 1,
-    },
+    {"type": "object", "additionalProperties": VECTOR.schema, "minProperties": 1},
     _motions,
 )
 
