@@ -31,15 +31,9 @@ STRAIGHT = 1e-3
 
 @dataclass(frozen=True)
 class TieEnd:
-    """An end of a tie, as a case has it.
+    """An end of a tie, as a case has it: a point [m], and the name of the block that holds it, or that the ground does.
 
-    Attributes
-    ----------
-    point : (2,) or (3,) tuple of float [m]
-    block : str
-        Name of the block that holds it; "" for the one that is found at the point.
-    fixed : bool
-        Whether the ground holds it.
+    Without either it is the block that is found at the point.
     """
 
     point: tuple[float, ...]

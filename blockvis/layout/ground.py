@@ -44,19 +44,7 @@ SUPPORT_WORDS = ("springer", "support", "ground", "foundation", "footing", "abut
 
 @dataclass(frozen=True)
 class Ground:
-    """What stands and what settles.
-
-    Attributes
-    ----------
-    says : str
-        How it was found.
-    roles : mapping of str to str
-        To write under [roles].
-    supports : tuple of mappings
-        To write as [[supports]].
-    settles : bool
-        Whether there is a moving support.
-    """
+    """What stands and what settles, if anything: how it was found, and what to write as [roles] and [[supports]]."""
 
     says: str
     roles: Mapping[str, str] = field(default_factory=dict)

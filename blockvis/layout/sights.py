@@ -18,16 +18,10 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Sight:
-    """From where blocks in space are looked at.
+    """From where blocks in space are looked at, in degrees, both chosen by default; or whether from below as well.
 
-    Attributes
-    ----------
-    azimuth : float, optional [degrees]
-        Of the direction to the eye, counter-clockwise from x; chosen by the motion by default.
-    elevation : float, optional [degrees]
-        Of the eye above the level, from -90 (straight from below) to 90; a little above by default.
-    both : bool
-        Whether the view from below stands beside it.
+    The azimuth is that of the direction to the eye, counter-clockwise from x; the elevation is from -90, straight from
+    below, to 90.
     """
 
     azimuth: float | None = None
@@ -39,12 +33,7 @@ class Sight:
 class Cut:
     """A plane that cuts blocks open; what lies between it and the eye is left out.
 
-    Attributes
-    ----------
-    normal : (float, float, float)
-        Unit vector, of either sense.
-    point : (float, float, float), optional [m]
-        On the plane; the middle of the structure by default.
+    The normal is a unit vector of either sense, the point [m] by default the middle of the structure.
     """
 
     normal: tuple[float, float, float]

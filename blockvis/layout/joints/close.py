@@ -1,10 +1,7 @@
-"""Mortar joints closed to the midlines between facing edges, so that faces meet.
+"""Mortar joints closed, so that faces meet: edges that face each other move onto one line midway between them.
 
-A joint is a set of edges that face each other across a gap: one head joint, a whole bed joint, the wedge between two
-voussoirs. Where one straight line runs midway between all of them, each moves onto that line, and the new corners
-are where the moved edges meet; so facing edges coincide, T-junctions included, and outer edges keep their line.
-Where no single line fits all of them (the back of an arch under cut bricks), the less covered edge stays straight on
-its own midline, and the blocks that face it are extended to it and cut along it.
+Where none fits all of them (the back of an arch under cut bricks), the less covered edge stays straight on its own
+midline, and the blocks that face it are extended to it and cut along it.
 """
 
 from __future__ import annotations
@@ -49,18 +46,9 @@ LIMIT = 0.95
 
 @dataclass(frozen=True)
 class Proposal:
-    """How the joints of a drawing can be closed.
+    """How the joints of a drawing can be closed: a thickness [m], 0 without gaps, and "faces" or "voronoi".
 
-    Attributes
-    ----------
-    thickness : float [m]
-        0 if there are no gaps.
-    method : str
-        "faces" or "voronoi".
-    reach : float [m]
-        How far gaps were looked for.
-    stretches : Facing
-        Stretches of edges that face each other across a gap.
+    The stretches are of edges that face each other across a gap; gaps were looked for up to a reach [m].
     """
 
     thickness: float
@@ -104,19 +92,10 @@ def chosen_method(outlines: Sequence[np.ndarray], found: Facing) -> str:
 
 @dataclass(frozen=True)
 class Closing:
-    """Outlines with their joints closed.
+    """Outlines, (n, 2) arrays [m], with their joints closed by "faces" or "voronoi".
 
-    Attributes
-    ----------
-    outlines : tuple of (n, 2) arrays [m]
-    n_joints : int
-        Stretches that were open or overlapping.
-    n_cut : int
-        Stretches that no common line fits; one side was extended to the other and cut along it.
-    largest_gap : float [m]
-        Widest gap that was closed.
-    method : str
-        "faces" or "voronoi".
+    Of ``n_joints`` stretches that were open or overlapping, up to a largest gap [m], no common line fitted ``n_cut``:
+    one side was extended to the other and cut along it.
     """
 
     outlines: tuple[np.ndarray, ...]

@@ -1,8 +1,7 @@
 """Mortar shared out to the nearest stone, for rubble, whose faces are not parallel.
 
-The border between two stones is where both are equally near: the edges of the Voronoi diagram of points along their
-outlines. All borders are cut from one drawing of lines, and simplified as one, so that neighbours share their edges to
-the last digit.
+Borders are edges of the Voronoi diagram of points along outlines; all are cut from one drawing of lines, and simplified
+as one, so that neighbours share their edges to the last digit.
 """
 
 from __future__ import annotations
@@ -51,19 +50,10 @@ JOINTS, WIDER = 0.8, 1.5
 
 @dataclass(frozen=True)
 class Gaps:
-    """Points along outlines, and the triangles between them.
+    """Points along outlines, (n, 2) [m], and the Delaunay triangles between them with corners on two or three blocks.
 
-    Attributes
-    ----------
-    points : (n, 2) array [m]
-    owner : (n,) int array
-        Block of each point.
-    weights : (n,) array [m]
-        Length of outline that each point stands for.
-    triangles : (n_triangles, 3) int array
-        Delaunay triangles with corners on two or three blocks.
-    widths : (n_triangles,) array [m]
-        Longest side between two blocks; infinite where a side is between points that do not face each other.
+    A point has an owner, its block, and stands for a length of outline, its weight [m]. The width of a triangle [m] is
+    its longest side between two blocks, infinite where a side is between points that do not face each other.
     """
 
     points: np.ndarray
