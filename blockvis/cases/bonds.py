@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
-import numpy as np
 import shapely
 
 from blockvis.generators.fill import Pattern, filled
@@ -101,11 +99,10 @@ def bonded(
                 *(note for note in stones.notes if note not in notes),
                 _told(region, len(openings), stones, bonding.pattern),
             ]
-            more: dict[str, Any] = {"thickness": [bonding.thickness or np.nan] * stones.n_blocks}
-            more["laid"] = [True] * stones.n_blocks
-            layers = [region.layer] * stones.n_blocks
-            rest = rest.with_more(stones.blocks, names=names, groups=layers, materials=stones.materials, **more)
-    return sorted_out(_without_nan(rest, notes))
+            every = {"groups": region.layer, "laid": True, "thickness": bonding.thickness}
+            more = {key: [value] * stones.n_blocks for key, value in every.items() if value is not None}
+            rest = rest.with_more(stones.blocks, names=names, materials=stones.materials, **more)
+    return sorted_out(replace(rest, notes=tuple(notes)))
 
 
 def _filled(region: Region, openings: Sequence[shapely.Polygon], pattern: Pattern, where: str, mortar: bool) -> Layout:
@@ -121,18 +118,9 @@ def _told(region: Region, openings: int, stones: Layout, pattern: Pattern) -> No
     """Say what was filled."""
     wall = sum(float(shapely.Polygon(ring).area) for ring in stones.outlines)
     where = f"on layer '{region.layer}'" if region.layer else f"called '{region.name}'"
+    opened = f" with {counted(openings, 'opening')}" if openings else ""
     return Note(
         CHANGED,
-        f"bond: an outline of {region.wall.area:.4g} m² {where}{_openings(openings)} was "
+        f"bond: an outline of {region.wall.area:.4g} m² {where}{opened} was "
         f"filled with {counted(stones.n_blocks, 'stone')} of {wall:.4g} m², {pattern.bond}",
     )
-
-
-def _openings(number: int) -> str:
-    return f" with {number} opening{'s' if number > 1 else ''}" if number else ""
-
-
-def _without_nan(layout: Layout, notes: Sequence[str]) -> Layout:
-    """Leave density and thickness to the case where no block has them."""
-    density, thickness = (None if of is None or np.isnan(of).all() else of for of in (layout.density, layout.thickness))
-    return replace(layout, notes=tuple(notes), density=density, thickness=thickness)

@@ -175,9 +175,10 @@ class Layout:
         for kind in _WORDS:
             taken[kind] = getattr(self, kind) + tuple(of_blocks.get(kind, ("",) * len(blocks)))
         for kind in ("density",) if self.dimension == 3 else ("density", "thickness"):
-            known = getattr(self, kind)
-            own = np.full(self.n_blocks, np.nan) if known is None else known
-            taken[kind] = np.append(own, of_blocks.get(kind, np.full(len(blocks), np.nan)))
+            known, more = getattr(self, kind), of_blocks.get(kind)
+            if known is not None or more is not None:
+                own = np.full(self.n_blocks, np.nan) if known is None else known
+                taken[kind] = np.append(own, np.full(len(blocks), np.nan) if more is None else more)
         return replace(self, **taken)
 
     def leaving_out(self, reasons: Mapping[int, LeftOut]) -> Layout:
