@@ -207,27 +207,25 @@ _CUT = ValueKind(
 )
 
 
-def _strength() -> tuple[Key, ...]:
-    return (
-        Key("cohesion", NOT_NEGATIVE, "Cohesion of the joints; a point that has slipped or opened has lost it",
-            1e5, "Pa", solver.InterfaceLaw.cohesion),
-        Key("tensile_strength", NOT_NEGATIVE, "Tensile strength of the joints, at most cohesion over friction; "
-            "lost with the cohesion", 5e4, "Pa", solver.InterfaceLaw.tensile_strength),
-        Key("compressive_strength", POSITIVE, "Compressive strength of the joints, in limit loads without a settlement",
-            5e6, "Pa", otherwise="infinite"),
-        Key("normal_stiffness", POSITIVE, "Stiffness of the joints across, along a path", 5e9, "Pa/m",
-            otherwise="rigid"),
-        Key("shear_stiffness", POSITIVE, "Stiffness of the joints along, along a path", 2e9, "Pa/m",
-            otherwise="rigid"),
-        Key("fracture_opening", NOT_NEGATIVE, "Opening over which a point loses its strength", 1e-4, "m",
-            solver.InterfaceLaw.fracture_opening),
-        Key("fracture_slip", NOT_NEGATIVE, "Slip over which a point loses its strength", 5e-4, "m",
-            solver.InterfaceLaw.fracture_slip),
-    )  # fmt: skip
-
+_STRENGTH = (
+    Key("cohesion", NOT_NEGATIVE, "Cohesion of the joints; a point that has slipped or opened has lost it",
+        1e5, "Pa", solver.InterfaceLaw.cohesion),
+    Key("tensile_strength", NOT_NEGATIVE, "Tensile strength of the joints, at most cohesion over friction; "
+        "lost with the cohesion", 5e4, "Pa", solver.InterfaceLaw.tensile_strength),
+    Key("compressive_strength", POSITIVE, "Compressive strength of the joints, in limit loads without a settlement",
+        5e6, "Pa", otherwise="infinite"),
+    Key("normal_stiffness", POSITIVE, "Stiffness of the joints across, along a path", 5e9, "Pa/m",
+        otherwise="rigid"),
+    Key("shear_stiffness", POSITIVE, "Stiffness of the joints along, along a path", 2e9, "Pa/m",
+        otherwise="rigid"),
+    Key("fracture_opening", NOT_NEGATIVE, "Opening over which a point loses its strength", 1e-4, "m",
+        solver.InterfaceLaw.fracture_opening),
+    Key("fracture_slip", NOT_NEGATIVE, "Slip over which a point loses its strength", 5e-4, "m",
+        solver.InterfaceLaw.fracture_slip),
+)  # fmt: skip
 
 #: Keys of the strength and the stiffness of joints.
-OF_MORTAR = tuple(key.name for key in _strength())
+OF_MORTAR = tuple(key.name for key in _STRENGTH)
 
 PARAMETERS = Section(
     "geometry.parameters",
@@ -355,7 +353,7 @@ MATERIAL = Section(
             2000.0, "kg/m³", DENSITY, elsewhere=True),
         Key("friction_coefficient", NOT_NEGATIVE, "Coefficient of friction, the tangent of the angle of friction",
             0.6, default=_FRICTION),
-        *_strength(),
+        *_STRENGTH,
     ),
 )  # fmt: skip
 
@@ -373,7 +371,7 @@ INTERFACES = Section(
         Key("materials", _TWO_NAMES, "The two materials; the same one twice for joints within it", ["stone", "brick"],
             required=True),
         Key("friction_coefficient", NOT_NEGATIVE, "Coefficient of friction of these joints", 0.4, required=True),
-        *_strength(),
+        *_STRENGTH,
     ),
     several=True,
 )  # fmt: skip
