@@ -171,16 +171,9 @@ class Key:
 
 @dataclass(frozen=True)
 class Forms:
-    """The forms of a table: which keys it has beside those that every form has.
+    """The forms of a table, by their names: which keys it must have, and may, beside those that every form has.
 
-    Attributes
-    ----------
-    by : str
-        The key that names the form; where it is missing and not required, the keys that are there tell.
-    needed : mapping of str to tuple of str
-        Keys that each form must have, by its name.
-    possible : mapping of str to tuple of str
-        Keys that it may have beside these.
+    The key ``by`` names the form; where it is missing and not required, the keys that are there tell.
     """
 
     by: str

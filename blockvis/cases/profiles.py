@@ -37,17 +37,10 @@ STRAIGHT = 1e-3
 
 @dataclass(frozen=True)
 class Profile:
-    """How far the ground goes at each x, in proportion.
+    """How far the ground goes at each x [m], in proportion, by a kind of profile, "gaussian" or "points".
 
-    Attributes
-    ----------
-    kind : {"gaussian", "points"}
-    centre, inflection : float [m]
-        Of a Gaussian trough: where it is deepest, and how far from there it is steepest.
-    depth : float
-        Of a Gaussian trough at its centre; negative for a heave.
-    points : tuple of (float, float) [m, any]
-        Places x and how far the ground goes there, straight between them and level beyond.
+    A Gaussian trough has a depth, negative for a heave, at its centre, and is steepest at its inflection from there.
+    Points, (x, value), have straight lines between them and level ones beyond.
     """
 
     kind: str

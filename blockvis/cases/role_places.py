@@ -24,15 +24,9 @@ INTO_SPACE = "or take the blocks into space by dimension = 3 under [geometry]"
 
 @dataclass(frozen=True)
 class RolePlace:
-    """A role of the blocks in some place.
+    """A role of the blocks in some place, one of :data:`PLACES`, with limits of coordinates [m].
 
-    Attributes
-    ----------
-    kind : {"below", "touching", "box"}
-        Whether the middle of a block has to lie below or in the box, or a block has to reach a plane.
-    ranges : tuple of (str, float, float)
-        Coordinates "x", "y", "z" with their least and largest values [m].
-    role : str
+    The middle of a block has to lie below or in the box, or a block has to reach a plane.
     """
 
     kind: str

@@ -213,16 +213,10 @@ def _supports(name: str, solid: Solid) -> list[tuple[str, str, Solid]]:
 
 @dataclass(frozen=True)
 class _Arc:
-    """Half of the section of a barrel, at positive x.
+    """Half of the section of a barrel, at positive x: (4, 2) arrays [m] of corners x, z.
 
-    Attributes
-    ----------
-    sections : list of (4, 2) arrays [m]
-        Corners x, z of each course from the springing to the crown.
-    crown : (4, 2) array [m] or None
-        Of the course in the middle; None for an even number of courses.
-    bearing : (4, 2) array [m]
-        Of the support, which is half a thickness wider to each side.
+    Its sections are those of each course from the springing to the crown, which is the course in the middle, None for
+    an even number of them. The bearing is that of the support, half a thickness wider to each side.
     """
 
     sections: list[np.ndarray]

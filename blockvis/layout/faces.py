@@ -30,15 +30,9 @@ UNDETERMINED = 0.05
 
 @dataclass(frozen=True)
 class PlaneSolid:
-    """A block with plane faces.
+    """A block with plane faces, and how far a corner was from the plane of a face, in the unit of its corners.
 
-    Attributes
-    ----------
-    solid : Solid
-    warp : float
-        How far a corner was from the plane of a face, in the unit of the corners.
-    place : (3,) array
-        The corner that was farthest.
+    The place is that of the corner that was farthest.
     """
 
     solid: Solid

@@ -18,18 +18,10 @@ from .surfaces import same_points
 
 @dataclass(frozen=True)
 class Faults:
-    """Places to look at in a drawing that is refused.
+    """Places to look at in a drawing that is refused, and blocks that are none by themselves.
 
-    Attributes
-    ----------
-    blocks : tuple of int
-        Blocks that are none by themselves.
-    crossings : (n, 2) array [m]
-        Where outlines cross themselves.
-    ends : (n, 2) array [m]
-        Ends of lines at which no other line begins.
-    edges : (n, 2, 3) array [m]
-        Edges of surfaces that do not belong to two faces.
+    Outlines cross themselves at (n, 2) crossings [m]; at (n, 2) ends of lines [m] no other begins; (n, 2, 3) edges of
+    surfaces [m] do not belong to two faces.
     """
 
     blocks: tuple[int, ...] = ()

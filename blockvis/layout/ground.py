@@ -54,17 +54,9 @@ class Ground:
 
 @dataclass(frozen=True)
 class _Foot:
-    """A block of the lowest course.
+    """A block of the lowest course, with its box in plan and the level of its bottom [m].
 
-    Attributes
-    ----------
-    block : int
-    low, high : (d - 1,) arrays [m]
-        Box of the block in plan.
-    bed : (n, 2) array [m] or None
-        On which it lies, in the plane from left to right, in space in plan; None for one that becomes a support.
-    level : float [m]
-        Of its bottom.
+    On its bed, (n, 2) [m], it lies, in the plane from left to right, in space in plan; one without becomes a support.
     """
 
     block: int
@@ -166,7 +158,8 @@ def _laid(found: Inspection) -> Ground:
         roles |= dict.fromkeys(_names_of(layout, blocks, side), role)
     supports: list[Mapping[str, Any]] = []
     if beds and layout.dimension == 3:
-        supports = _pads(beds, split) if springers or not _is_level(beds, depth) else _slab(found, beds, split, depth)
+        is_level = np.ptp([foot.level for foot in beds]) < 1e-3 * depth
+        supports = _slab(found, beds, split, depth) if is_level and not springers else _pads(beds, split)
     elif beds:
         # Closing simplifies what it closes: as drawn, a stone may reach lower.
         supports = _bedded([*outlines, *_as_simplified(found)], feet, split, depth)
@@ -371,11 +364,6 @@ def _feet_in_space(found: Inspection) -> list[_Foot]:
         # Corner pieces of a vault end flat by chance.
         feet = [replace(foot, bed=None) if _can_be_named(found, foot.block) else foot for foot in feet]
     return feet
-
-
-def _is_level(beds: Sequence[_Foot], depth: float) -> bool:
-    levels = [foot.level for foot in beds]
-    return max(levels) - min(levels) < 1e-3 * depth
 
 
 def _slab(found: Inspection, beds: Sequence[_Foot], split: _Split, depth: float) -> list[Mapping[str, Any]]:

@@ -35,16 +35,9 @@ _OUTLINES = ("hole", "background", "across")
 
 @dataclass(frozen=True)
 class Region:
-    """A wall drawn as an outline.
+    """A wall drawn as an outline: polygons [m] of it, without holes, and of its openings.
 
-    Attributes
-    ----------
-    wall : shapely.Polygon [m]
-        Without holes.
-    openings : list of shapely.Polygon [m]
-    taken : list of shapely.Polygon [m]
-        Other blocks, and walls of another bond, in it.
-    layer, name : str
+    ``taken`` are other blocks, and walls of another bond, in it.
     """
 
     wall: Any

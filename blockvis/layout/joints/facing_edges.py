@@ -31,16 +31,9 @@ CLOSED = 1e-9
 class Facing:
     """Stretches along which an edge of one block faces an edge of another.
 
-    The number of an edge is that of the corner at which it starts, counted over all blocks.
-
-    Attributes
-    ----------
-    edge_a, edge_b : (n,) int arrays
-    gaps : (n, 2) array [m]
-        Distance at both ends of the stretch, across its midline; negative where the blocks overlap.
-    midline : (n, 2, 2) array [m]
-        Both ends of the midline.
-    lengths : (n,) array [m]
+    The number of an edge is that of the corner at which it starts, counted over all blocks. Gaps, (n, 2) [m], are at
+    both ends of the stretch, across its midline, (n, 2, 2) [m], and negative where the blocks overlap; lengths are (n,)
+    [m].
     """
 
     edge_a: np.ndarray
