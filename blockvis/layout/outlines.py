@@ -148,6 +148,13 @@ def touching(shapes: np.ndarray, near: float) -> list[set[int]]:
     return others
 
 
+def folded(drawn: Sequence[np.ndarray], changed: Sequence[np.ndarray], lost: float) -> np.ndarray:
+    """(n,) int array: outlines that cross themselves, or lose more than a part of their area, when they are changed."""
+    before = shapely.area(np.array([shapely.Polygon(ring) for ring in drawn]))
+    after = np.array([shapely.Polygon(ring) if len(ring) > 2 else shapely.Polygon() for ring in changed])
+    return np.flatnonzero(~shapely.is_valid(after) | (shapely.area(after) < (1.0 - lost) * before))
+
+
 def ring_of(polygon: Any) -> np.ndarray:
     """(n, 2) array: the corners around a polygon, counter-clockwise."""
     return np.array(shapely.orient_polygons(polygon).exterior.coords)[:-1]

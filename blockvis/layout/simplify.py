@@ -13,12 +13,16 @@ from solver.mechanics import counted
 
 from .joints.trimming import overlapping, with_corners_on_edges
 from .linked import within_reach
+from .outlines import folded
 
 #: Outlines of more corners than this in the mean are finer than needed: every corner at a joint is a contact.
 FINE = 24
 
 #: Corners go within this fraction of the size of the median block (the root of its area).
 TOLERANCE = 0.01
+
+#: A block that loses more of its area than this has not been simplified but folded.
+LOST = 0.2
 
 
 def default_tolerance(outlines: Sequence[np.ndarray]) -> float:
@@ -128,9 +132,7 @@ def _key(chain: tuple[int, ...]) -> tuple[int, ...]:
 
 def _spoilt(found: list[np.ndarray], drawn: Sequence[np.ndarray], tolerance: float) -> set[int]:
     """Find the blocks that simplifying folds, or pushes into another."""
-    shapes = np.array([shapely.Polygon(ring) if len(ring) > 2 else shapely.Polygon() for ring in found])
-    before = shapely.area(np.array([shapely.Polygon(ring) for ring in drawn]))
-    bad = set(np.flatnonzero(~shapely.is_valid(shapes) | (shapely.area(shapes) < 0.8 * before)).tolist())
+    bad = set(folded(drawn, found, LOST).tolist())
     if bad:
         return bad
     after, already = (

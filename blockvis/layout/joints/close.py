@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from blockvis.layout.left_out import LeftOut
+from blockvis.layout.outlines import folded
 
 from .facing_edges import (
     CLOSED,
@@ -135,7 +136,7 @@ def close_joints(
         method = chosen_method(outlines, facing_edges(outlines, reach, laid=laid)) if thickness else "faces"
         if method == "faces":
             closing = _between_faces(outlines, thickness, overlap, anchored, laid)
-            whole = _folded(outlines, closing.outlines) is None
+            whole = not len(folded(outlines, closing.outlines, LOST))
             if whole and (not thickness or _pockets(outlines, closing.outlines, thickness) <= POCKETS):
                 return closing
         # Without gaps there is nothing to share out.
@@ -144,9 +145,9 @@ def close_joints(
         # Pockets between stones of a bond are none of mortar.
         return _to_nearest_stone(outlines, thickness, overlap, anchored if laid is None else anchored | laid, mortar)
     closing = _between_faces(outlines, thickness, overlap, anchored, laid)
-    folded = _folded(outlines, closing.outlines)
-    if folded is not None:
-        raise FoldedOutline(folded)
+    blocks = folded(outlines, closing.outlines, LOST)
+    if len(blocks):
+        raise FoldedOutline(int(blocks[0]))
     return closing
 
 
@@ -156,14 +157,6 @@ class FoldedOutline(ValueError):
     def __init__(self, block: int) -> None:
         super().__init__(f"moving the edges of outline {block} to the midlines of its joints folds it")
         self.block = block
-
-
-def _folded(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray]) -> int | None:
-    """Find the first outline that crosses itself, or loses much area, by closing; None if all are whole."""
-    before = shapely.area(np.array([shapely.Polygon(ring) for ring in drawn]))
-    after = np.array([shapely.Polygon(ring) if len(ring) > 2 else shapely.Polygon() for ring in closed])
-    folded = np.flatnonzero(~shapely.is_valid(after) | (shapely.area(after) < (1.0 - LOST) * before))
-    return int(folded[0]) if len(folded) else None
 
 
 def _pockets(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray], thickness: float) -> float:
