@@ -25,6 +25,6 @@ def decimal_comma(text: str, error: str) -> str:
     found = COMMA.match(line)
     if found is None:
         return ""
-    key, whole, part = found[1], found[2], found[3]
+    key, whole, part, _ = found.groups()
     where = f"line {place[1] if place else 1}: {key} = {whole},{part}"
     return f"{where} has a decimal comma; numbers have a point: {key} = {whole}.{part}"

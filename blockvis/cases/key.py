@@ -109,24 +109,18 @@ def one_of(choices: Sequence[str]) -> ValueKind:
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a TOML file.
+    """A key of a TOML file, required or not.
 
     Attributes
     ----------
-    name : str
-    kind : ValueKind
     meaning : str
         In words of the field, beginning with a capital letter, without a full stop at its end.
     example : Any
         A value as Python has it.
-    unit : str
-        "" for none.
     default : Any
         The value that holds where the key is missing; None where there is none.
     otherwise : str
         What holds where the key is missing, in words, if that is no value.
-    required : bool
-        Whether the key must be there.
     elsewhere : bool
         Whether the value may stand elsewhere, as in the layout file: a missing key is read as None, and the default
         holds where nothing says otherwise.
@@ -234,24 +228,16 @@ class Forms:
 
 @dataclass(frozen=True)
 class Section:
-    """A table of a TOML file.
+    """A table of a TOML file, required or not; there may be ``several``, ``[[name]]``.
 
     Attributes
     ----------
     name : str
         With dots, as its header has it; "*" for a name that the user chooses.
-    meaning : str
-    keys : tuple of Key
-    several : bool
-        Whether there may be several, ``[[name]]``.
     names : ValueKind, optional
-        Of the values, where the user chooses the names of the keys.
-    required : bool
-        Whether the table must be there.
+        Of the values, where the user chooses the names of the keys; ``example`` holds such keys.
     forms : Forms, optional
         Which of the keys a table has, where this depends on one of them.
-    example : mapping
-        Keys of the user's choice, where there are such.
     """
 
     name: str

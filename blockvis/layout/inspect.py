@@ -46,20 +46,13 @@ Row = tuple[str, str]
 
 @dataclass(frozen=True)
 class Inspection:
-    """Measurements of a layout.
+    """Measurements of a layout, as read, duplicates included.
 
     Attributes
     ----------
-    layout : Layout
-        As read, duplicates included.
     kept : (n_kept,) int array
-        Numbers of the blocks that are no duplicates.
-    twins : tuple of (int, int)
-        Blocks drawn twice: the first and the later copy.
-    roles : tuple of str
-        Role of each block, as a run takes it from roles, groups and names.
+        Blocks that are no duplicates; ``twins`` are the others, the first and the later copy of each.
     sizes : (n_kept,) array [m²], in space [m³]
-        Areas, in space volumes.
     low, high : (d,) arrays [m]
         Corners of the box around all blocks.
     overlapping : tuple of (int, int, float)
@@ -67,21 +60,17 @@ class Inspection:
     overlap_tolerance : float [m]
         Deepest overlap that is resolved by default.
     joint_thickness : float [m]
-        Joint thickness that closes the joints; 0 if there are none, and if most of their length touches.
-    rows : tuple of (str, str)
-        Titles and texts of the report on weights and corners.
-    joint_rows : tuple of (str, str)
-        Titles and texts of the report on joints.
+        That closes the joints; 0 if there are none, and if most of their length touches.
+    rows, joint_rows : tuples of (str, str)
+        Titles and texts of the report on weights and corners, and on joints.
     joints : joints.facing_edges.Facing
         In the plane, stretches where edges face each other across a gap; block numbers count the kept blocks.
     facing : facing.Facing
         In space, joints whose faces do not lie in one plane, as a run closes them; block numbers count the kept blocks.
     open_joints : tuple of (int, int, float)
         In space, pairs of blocks of which faces cover each other across a gap, and the gap [m], widest first.
-    refused : str
-        Why a run would refuse the blocks, or "".
-    remedy : str
-        What to leave out where blocks overlap, or "".
+    refused, remedy : str
+        Why a run would refuse the blocks, and what to leave out where they overlap, or "".
     """
 
     layout: Layout

@@ -37,23 +37,14 @@ NEARLY = 0.01
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Something drawn that is no block.
+    """Something drawn that is no block, of a kind in :data:`KINDS`.
 
     Attributes
     ----------
-    kind : str
-        One of :data:`KINDS`.
     points : (n, 2) array [m]
-        Its outline or line; inside a format's reader in the unit of the file.
+        Its outline if it is closed, else line; inside a format's reader in the unit of the file, as its holes.
     message : str
-        Refuses the file where no block is left.
-    layer, name : str
-    closed : bool
-        Whether the points are an outline.
-    serious : bool
-        Whether it refuses the file unless the caller asks to leave it out.
-    holes : tuple of (n, 2) arrays [m]
-        Outlines of its holes.
+        Refuses the file where no block is left, and if ``serious`` unless the caller asks to leave it out.
     looks : tuple of str
         Kind of entity and colour; see :mod:`blockvis.layout.choice`.
     """

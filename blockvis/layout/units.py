@@ -56,10 +56,8 @@ def metres_per(unit: str) -> float:
 
     Examples
     --------
-    >>> metres_per("inches")
-    0.0254
-    >>> metres_per("20 mm")
-    0.02
+    >>> metres_per("inches"), metres_per("20 mm")
+    (0.0254, 0.02)
     """
     number, name = _NUMBER_OF.fullmatch(unit).groups()  # type: ignore[union-attr]
     name = _OTHER_NAMES.get(name.lower(), name if name in UNITS else name.lower())
