@@ -108,17 +108,10 @@ def _moment(table: Table, key: Key) -> float | tuple[float, float, float] | None
     return found
 
 
-def _direction_of_pressure(table: Table, key: Key) -> tuple[float, ...] | None:
-    given: tuple[float, ...] | None = table.vector(key.name)
-    if given is not None and len(given) != 2:
-        raise table.error(key.name, "has three numbers; pressure is of blocks in the plane: in space give force")
-    return given
-
-
 def _two_names(table: Table, key: Key) -> tuple[str, str]:
-    pair = table.take(key.name)
-    if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(name, str) for name in pair)):
-        raise table.error(key.name, f'is {pair!r}; name two materials ["stone", "brick"]')
+    pair = table.texts(key.name) or ()
+    if len(pair) != 2:
+        raise table.error(key.name, f'is {list(pair)}; name two materials ["stone", "brick"]')
     return pair[0], pair[1]
 
 
@@ -170,7 +163,7 @@ _PLACES = ValueKind("three numbers: from, to, number of places", list_of(NUMBER.
 _LEVELS = pair_of("[bottom, top]")
 # Of the kinds that there are when a case is read.
 _KIND = replace(one_of(tuple(KINDS)), read=lambda table, key: table.text(key.name, among=tuple(KINDS)))
-_PUSHES = replace(PAIR, read=_direction_of_pressure)
+_PUSHES = pair_of("[x, y]: pressure is of blocks in the plane, in space give force")
 _WINDOW = ValueKind("four numbers", list_of(NUMBER.schema, 4, 4), _read_by(checked_window, Table.numbers))
 _SIGHT = ValueKind(
     "a word, or table: azimuth, elevation",

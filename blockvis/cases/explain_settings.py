@@ -38,13 +38,10 @@ _EXPLAIN = ExplainSettings()
 
 
 def _directions(table: Table, key: Key) -> tuple[str, ...] | None:
-    given = table.take(key.name)
-    words = [given] if isinstance(given, str) else given
-    if words is None:
-        return None
-    if not isinstance(words, list) or not words or not all(word in DIRECTIONS for word in words):
-        raise table.error(key.name, f"is {shortened(words)}; choose from {', '.join(DIRECTIONS)}")
-    return tuple(words)
+    words = table.texts(key.name)
+    if words is not None and (not words or not set(words).issubset(DIRECTIONS)):
+        raise table.error(key.name, f"is {shortened(list(words))}; choose from {', '.join(DIRECTIONS)}")
+    return words
 
 
 def _groups(table: Table, key: Key) -> tuple[tuple[str, ...], ...]:

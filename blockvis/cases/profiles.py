@@ -144,12 +144,9 @@ def _motions(table: Table, key: Key) -> dict[str, tuple[float, float, float]] | 
     if not isinstance(given, dict) or not given:
         raise table.error(key.name, f'is {shortened(given)}; give {{ "name" = [dx, dy, rotation], ... }}')
     supports = table.table(key.name)
-    for name in given:
-        motion = supports.take(name)
-        if not isinstance(motion, list) or len(motion) not in (2, 3) or not all(map(is_number, motion)):
-            raise table.error(key.name, f'"{name}" is {shortened(motion)}; give [dx, dy] or [dx, dy, rotation]')
-    padded = {str(name): (*map(float, motion), 0.0)[:3] for name, motion in given.items()}
-    return {name: (dx, dy, rotation) for name, (dx, dy, rotation) in padded.items()}
+    motions = {name: supports.vector(name, words="[dx, dy] or [dx, dy, rotation]") for name in given}
+    padded = {str(name): (*motion, 0.0) for name, motion in motions.items()}
+    return {name: (dx, dy, rotation) for name, (dx, dy, rotation, *_) in padded.items()}
 
 
 _DEPTH = ValueKind("1 or -1", {"enum": [1, -1]}, _depth)
