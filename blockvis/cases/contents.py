@@ -29,37 +29,23 @@ class Case:
     Attributes
     ----------
     source : Path
-        The case file; paths in it are relative to its folder.
+        The case file; paths in it, as that of the underlay, are relative to its folder.
     text : str
         The case file as it was read.
     role_places : tuple of RolePlace
         Roles by place, under those by name.
     tie_layers : tuple of str
         Layers of the drawing whose lines are ties.
-    bonds : tuple of Bonding
-        Walls of the drawing that are filled with stones.
-    analysis : str
-        Name of the kind of analysis.
     settings : optional
-        What that kind has read from its own keys; see :meth:`blockvis.kinds.kind.AnalysisKind.read`.
+        What the kind of analysis has read from its own keys; see :meth:`blockvis.kinds.kind.AnalysisKind.read`.
     profiles : tuple of Profile or None
         Of the settlements along x; :func:`blockvis.cases.profiles.with_profiles` makes motions of supports of them.
     increment_seconds : float or None [s]
         What an increment of a path may take.
     explain : ExplainSettings
         What ``blockvis explain`` looks for; other analyses leave it alone.
-    image : ImageKeys
-        Scale and labels of a layout file that is an image.
-    vtu : {"moved", "undeformed"}
-        Shape of the blocks in the VTU files.
-    vtu_strings : bool
-        Whether names are arrays of strings in the VTU files.
-    underlay : str or None
-        Photograph under the pictures, relative to the case file.
-    sight : Sight or None
-        From where blocks in space are drawn.
-    cut : Cut or None
-        The plane that cuts them open.
+    sight, cut : Sight or None, Cut or None
+        From where blocks in space are drawn, and the plane that cuts them open.
     """
 
     source: Path

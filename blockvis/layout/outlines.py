@@ -218,18 +218,9 @@ def outlines_of_cells(
 ) -> list[np.ndarray]:
     """Find the outline of each block, (n, 2) array counter-clockwise: the edges that belong to one of its cells only.
 
-    ValueError for a block that is not one piece with one outline, unless ``unusable`` takes it up, by the number of the
-    block; its outline is that of its largest piece then.
-
-    Parameters
-    ----------
-    points : (n_points, 2) array
-    cells : sequence of sequences of int
-        Points around each cell, curved sides with the points on them.
-    owner : (n_cells,) int array
-        Block of each cell.
-    names : sequence of str
-        One per block, for messages.
+    A cell is given by the (n, 2) points around it, those on curved sides included, and is that of the block it has for
+    its owner, which names are of. ValueError for a block that is not one piece with one outline, unless ``unusable``
+    takes it up, by the number of the block; its outline is that of its largest piece then.
     """
     counts = np.array([len(cell) for cell in cells])
     flat = np.concatenate([np.asarray(cell, dtype=np.int64) for cell in cells])

@@ -88,15 +88,9 @@ def repaired(
 ) -> tuple[list[np.ndarray], list[str]]:
     """Resolve the overlaps of the outlines of an assembly without duplicates, close its joints, and tell the changes.
 
-    ValueError for an overlap deeper than the tolerance, naming both blocks, and for an outline that cannot be closed.
-
-    Parameters
-    ----------
-    joint_thickness : float [m] or "auto"
-    overlap_tolerance : float, optional [m]
-        By default 0.04 of the width of a typical block (twice its area over its perimeter).
-    closing, mortar
-        As of :func:`blockvis.layout.joints.close.close_joints`.
+    Overlaps are resolved up to a tolerance [m], by default 0.04 of the width of a typical block (twice its area over
+    its perimeter); joints are closed as by :func:`blockvis.layout.joints.close.close_joints`. ValueError for a deeper
+    overlap, naming both blocks, and for an outline that cannot be closed.
     """
     outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
     free = ~anchored if not anchored.all() else anchored

@@ -262,7 +262,7 @@ def test_a_trough_and_its_mirror_open_the_wall_alike(tmp_path):
         ("{ points = [[0, 1]] }", "give at least two pairs"),
         ("{ points = [[0, 1], [0, 2]] }", "two values at x = 0"),
         ("{ points = [[0, 0], [1, 0]] }", "are all 0"),
-        ("{ supports = { a = 1 } }", r'supports\] a is 1; give \[dx, dy\]'),
+        ("{ supports = { a = 1 } }", r"supports\] a is 1; give \[dx, dy\]"),
         ("{ supports = {} }", "give {"),
         (
             "{ points = [[0, 1], [1, 2]], supports = { a = [1, 0] } }",

@@ -15,16 +15,7 @@ SHARED_LINE = 0.3
 
 @dataclass(frozen=True)
 class Line:
-    """The line normal·x = level that the edges of some stretches share.
-
-    Attributes
-    ----------
-    stretches : list of int
-    normal : (2,) array
-    level : float [m]
-    anchored : bool
-        Whether it is the line of an edge that stays.
-    """
+    """The line normal·x = level [m] that edges of some stretches share; anchored, that of an edge that stays."""
 
     stretches: list[int]
     normal: np.ndarray
