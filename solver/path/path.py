@@ -315,10 +315,11 @@ class Path:
         for place in (self.highest.place, *self.highest.history[::-1]):
             if place.s <= self.reported or (1.0 - DROP) * place.multiplier <= state.peak:
                 return
-            standing = self.stepper.standing(place)
-            if standing is None:
-                continue
-            check = self._check(standing)
+            standing = self.stepper.standing(place) or place
+            # What breaks as the control stands still has carried until then.
+            lost = standing.bonds.left.sum() < place.bonds.left.sum()
+            lost |= np.isnan(standing.tie_lengths).sum() > np.isnan(place.tie_lengths).sum()
+            check = self._check(place if lost else standing)
             if check.bounds.in_equilibrium and check.measured > state.peak:
                 self.state = replace(state, peak=check.measured)
                 yield self._report(check, place)
