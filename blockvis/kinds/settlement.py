@@ -128,6 +128,7 @@ class SettlementKind(AnalysisKind):
                 )
             if path[0].reaction < -NOTABLE * _size(response, path[0].phase):
                 lines[-1] += "   against the movement: by itself the structure would push these supports the other way"
+            lines += _held_down(response)
             if _is_idle(response):
                 lines.append("no free block touches the supports that move: nothing follows them")
         if response.collapse is not None:
@@ -233,6 +234,20 @@ def _rests_elsewhere(response: solver.Response) -> bool:
     """Whether the reaction at rest is notably above the least that equilibrium allows there."""
     first = response.path[0]
     return abs(first.reaction - least_reaction(first)) > NOTABLE * _size(response, first.phase)
+
+
+def _held_down(response: solver.Response) -> list[str]:
+    """Doubt supports that bear the structure at rest, and go straight down, where they could or do pull it down."""
+    motion, path = response.settlements[0], response.path
+    if len(response.settlements) > 1 or motion.direction is None or motion.rotation:
+        return []
+    *level, rise = motion.direction
+    notable = NOTABLE * _size(response, 0)
+    least = min(least_reaction(path[0]), *(increment.reaction for increment in path))
+    if rise >= 0.0 or any(level) or path[0].reaction < notable or least > -notable:
+        return []
+    doubt = "doubt faces of theirs that are steep or overhang, unless ties or bond do so"
+    return [f"below 0 these supports, which sink, hold the structure down: {doubt}"]
 
 
 def _is_idle(response: solver.Response) -> bool:

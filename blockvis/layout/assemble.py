@@ -93,7 +93,7 @@ def assemble(
         warnings.warn(note, stacklevel=2)
     n_drawn = layout.n_blocks
     if layout.dimension == 2:
-        layout, note = _simplified(layout, outline_tolerance)
+        layout, note = as_simplified(layout, outline_tolerance)
         if note:
             warnings.warn(f"{where}: {note}", stacklevel=2)
     layout = _with_supports(layout, supports)
@@ -196,8 +196,8 @@ def _crossings(assembly: solver.Assembly) -> str:
     )
 
 
-def _simplified(layout: Layout, tolerance: float | None) -> tuple[Layout, str]:
-    """Drop corners of outlines that are finer than needed, and say so."""
+def as_simplified(layout: Layout, tolerance: float | None = None) -> tuple[Layout, str]:
+    """Drop the corners of outlines that a run does not need, within a tolerance [m], and say so; "" for none."""
     tolerance = default_tolerance(layout.outlines) if tolerance is None else float(tolerance)
     if not tolerance:
         return layout, ""

@@ -13,11 +13,11 @@ import solver
 from blockvis.text import rounded_length
 from solver import mechanics
 
+from .assemble import as_simplified
 from .inspect import Inspection
 from .layout import Layout
 from .outlines import largest_piece, rectangle, ring_of, touching, without_collinear
 from .repair import repaired
-from .simplify import default_tolerance, simplified
 from .solids import size_of
 
 #: Blocks of the lowest course have their bottom within this fraction of the median height of the lowest.
@@ -243,8 +243,7 @@ def _as_in_a_run(found: Inspection) -> list[np.ndarray]:
 
 
 def _as_simplified(found: Inspection) -> list[np.ndarray]:
-    outlines = [found.layout.corners(i) for i in found.kept]
-    return simplified(outlines, default_tolerance(outlines))[0]
+    return list(as_simplified(found.layout.chosen(found.kept))[0].outlines)
 
 
 def _springers_of_arch(beside: Sequence[set[int]], bottoms: np.ndarray) -> list[int]:
@@ -311,11 +310,11 @@ def _bedded(
     (start, _), (end, _) = top[0], top[-1]
     line = shapely.simplify(shapely.LineString(top), STRAIGHT * depth)
     ground = shapely.Polygon([[start, floor], [end, floor], *shapely.get_coordinates(line)[::-1]])
-    # What leans over its neighbour's bed, and a springer between, keep their place.
-    above = [shapely.Polygon(ring) for ring in outlines]
-    reach = [shape for shape in above if shape.intersection(ground).area > (STRAIGHT * depth) ** 2]
-    if reach:
-        ground = ground.difference(shapely.union_all(reach))
+    # What leans over its neighbour's bed, and a springer between, keep their place. Ground above them, or as steep
+    # beside them as friction holds, would hold them down.
+    level = max(float(ring[:, 1].max()) for ring in outlines) + depth
+    reach = [ring for ring in outlines if shapely.Polygon(ring).intersection(ground).area > (STRAIGHT * depth) ** 2]
+    ground = ground.difference(shapely.union_all([_above(ring, level) for ring in reach]))
     halves: list[Mapping[str, Any]] = []
     for name, role, left, right in (
         ("ground left", mechanics.FIXED, start, split.at),
@@ -329,6 +328,14 @@ def _bedded(
             corners = np.roll(corners, -int(np.lexsort((corners[:, 0], corners[:, 1]))[0]), axis=0)
             halves.append({"name": name, "role": role, "outline": corners.tolist()})
     return halves
+
+
+def _above(ring: np.ndarray, level: float) -> shapely.Geometry:
+    """Fill all that lies above an outline, up to a level [m], and beside it what would be steeper than ground is."""
+    ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
+    x, reach = ends[..., 0], (level - ends[..., 1]) / STEEPEST
+    raised = np.stack([np.hstack([x - reach, x + reach]), np.full((len(ring), 4), level)], axis=2)
+    return shapely.union_all(shapely.convex_hull(shapely.multipoints(np.concatenate([ends, raised], axis=1))))
 
 
 def _bed(points: np.ndarray, level: float, least: float) -> np.ndarray | None:

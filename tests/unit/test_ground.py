@@ -91,6 +91,65 @@ def test_a_course_off_level_is_bedded_from_end_to_end(tmp_path, capsys):
     assert ran(drawing) == 0
 
 
+#: A stone whose toe sticks out by 5 mm under its neighbour, which ends lower on its other side.
+TOED = (
+    [[0, 0], [1, 0], [1, 0.5], [0, 0.5]],
+    [[1, 0], [1.995, 0.0085], [2, 0.01], [2, 0.5], [1, 0.5]],
+    [[1.995, 0.001], [3, 0.002], [3, 0.5], [2, 0.5], [2, 0.01]],
+    [[0, 0.5], [3, 0.5], [3, 1], [0, 1]],
+)
+
+
+def test_the_ground_does_not_close_over_a_toe(tmp_path, capsys):
+    """A tongue over it would hold the stone down: the least reaction was -0.295 W."""
+    drawing = drawn(tmp_path / "wall.json", TOED)
+    values, _ = told(drawing, capsys)
+    for support in values["supports"]:
+        ring = np.array(support["outline"])
+        across, up = np.diff(ring[ring[:, 1] > ring[:, 1].min()], axis=0).T
+        assert (across < 0.0).all()
+        assert (np.abs(up) <= 1.000001 * np.abs(across)).all()
+    assert ran(drawing) == 0
+    first = re.search(r"first reaction .*", capsys.readouterr().out).group()
+    assert float(first.split()[4]) == pytest.approx(0.1223, abs=1e-3)
+    assert "below 0" not in first
+
+
+def test_supports_that_hold_down_what_they_bear_are_doubted(tmp_path, capsys):
+    """As the ground with a tongue that was once laid under a toe."""
+    left = [[-0.5, -0.5], [1.5, -0.5], [1.5, 0.00427135678], [1, 0], [-0.5, 0]]
+    right = [[1.5, -0.5], [3.5, -0.5], [3.5, 0.002], [3, 0.002], [1.995, 0.001]]
+    right += [[2, 0.01], [1.995, 0.0085], [1.5, 0.00427135678]]
+    blocks = [
+        *({"outline": ring} for ring in TOED),
+        {"name": "left", "role": "fixed", "outline": left},
+        {"name": "right", "role": "moving", "outline": right},
+    ]
+    (tmp_path / "wall.json").write_text(json.dumps({"unit": "m", "blocks": blocks}), encoding="utf-8")
+    case = tmp_path / "wall.toml"
+    case.write_text(
+        '[geometry]\nfile = "wall.json"\n[settlement]\ndirection = [0, -1]\nincrement = 0.01\nlimit = 0.01\n'
+        "[material]\nfriction_coefficient = 0.6\n",
+        encoding="utf-8",
+    )
+    assert run_command(case, "-o", tmp_path / "out") == 0
+    out = capsys.readouterr().out
+    assert re.search(r"first reaction +-17\d\d\d", out)
+    assert "below 0 these supports, which sink, hold the structure down: doubt faces" in out
+
+
+def test_outlines_that_turn_clockwise_lie_on_their_ground(tmp_path, capsys):
+    """Finer than needed, they are simplified as in a run, which drops other corners from another one on."""
+    rng = np.random.default_rng(21)
+    rings = []
+    for ring in np.array(wall([(0.0, 0.0)] * STONES, courses=1)):
+        (left, low), (right, top) = ring.min(axis=0), ring.max(axis=0)
+        x = np.repeat(np.linspace(left, right, 33), 2)[1:-1]
+        stairs = np.column_stack([x, np.repeat(low + 0.005 * rng.integers(0, 3, 32), 2)])
+        rings.append(np.vstack([stairs, [[right, top], [left, top]]])[::-1])
+    assert "overlap" not in told(drawn(tmp_path / "wall.json", rings), capsys)[1]
+
+
 @pytest.mark.thorough
 @settings(max_examples=8, deadline=None, derandomize=True, database=None)
 @given(st.lists(st.floats(0.0, 0.99 * HEIGHT / 2), min_size=3 * STONES, max_size=3 * STONES))
