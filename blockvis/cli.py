@@ -601,6 +601,7 @@ def _new(options: argparse.Namespace) -> int:
             factor = metres_per(unit) / metres_per(found.layout.unit or "m")
             choice["window"] = [x * factor for x in choice["window"]]
         found = inspect(drawing, unit=unit, dimension=_dimension(options), **choice)
+    if unit_says:
         print(f"blockvis: note: {unit_says}", file=sys.stderr)
     text = case_text(found, relative_to(target.parent, drawing), unit_says=unit_says, walls=walls, **choice)
     write_atomic(target, text)

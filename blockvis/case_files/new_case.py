@@ -17,7 +17,7 @@ from blockvis.cases.build import DENSITY
 from blockvis.cases.key import Key, Section
 from blockvis.layout.ground import COURSE, Ground, block_size, ground_of, with_role
 from blockvis.layout.inspect import Inspection
-from blockvis.layout.notes import UNIT, UNIT_CLASH, kind_of
+from blockvis.layout.notes import OF_UNITS, UNIT, kind_of
 from blockvis.layout.units import units_instead
 from blockvis.text import as_key, as_toml, rounded_length
 from solver import mechanics
@@ -29,9 +29,6 @@ INCREMENT, LIMIT = 0.05, 1.0
 
 #: Friction of dry masonry joints where nothing is known, and a density that most stones and bricks are near.
 FRICTION = 0.6
-
-#: Kinds of notes that stand above the unit.
-_OF_UNITS = (UNIT, UNIT_CLASH)
 
 #: What a new case says of walls without stones.
 WALLS = "The drawing has no stones but outlines with openings: give the size of yours."
@@ -70,7 +67,7 @@ def case_text(
     walls : sequence of str
         Layers or names of outlines that are filled with a bond.
     unit_says : str
-        Why it was read in another unit than its own; see :func:`unit_instead`.
+        What is said of its unit; see :func:`unit_instead`.
     """
     block = block_size(found)
     ground = ground_of(found)
@@ -92,13 +89,13 @@ def case_text(
     parts = [
         _comment(f"Case of {Path(file).name}, written by blockvis new. Lengths in m, forces in N, angles in rad."),
         _comment(_counted(found)),
-        *(_comment(f"Note: {note}") for note in found.layout.notes if kind_of(note) not in _OF_UNITS),
+        *(_comment(f"Note: {note}") for note in found.layout.notes if kind_of(note) not in OF_UNITS),
         "",
         _table(
             case_keys.GEOMETRY,
             geometry,
             leaving=("layout", "parameters", *hidden),
-            beside={"unit": unit_says or _note(found, *_OF_UNITS)},
+            beside={"unit": unit_says or _notes(found, *OF_UNITS)},
         ),
         *([_table(BOND, {"walls": list(walls), "bond": "running", "brick": [0.25, 0.075]}, WALLS)] if walls else ()),
         _roles(found, ground),
@@ -144,16 +141,22 @@ def relative_to(folder: Path, drawing: str | Path) -> str:
 
 
 def unit_instead(found: Inspection) -> tuple[str, str]:
-    """Find the unit in which a drawing is masonry, where its own is in doubt, and why; both "" where it is not."""
-    unit = next(iter(units_instead(found.layout.unit, float(np.median(found.layout.sizes)))), "")
-    if not unit or found.layout.unit_by:
-        return "", ""
-    doubted = _note(found, UNIT).partition(": say so")[0]
+    """Find the unit in which a drawing is masonry, "" where its own is not in doubt, and what is said of the unit.
+
+    ValueError for a page whose blocks are too small for masonry: its scale cannot be told.
+    """
+    by, page = found.layout.unit_by, found.layout.unit_by == "page"
+    unit = next(iter(units_instead(found.layout.unit, float(np.median(found.layout.sizes)), page=page)), "")
+    if not unit or by in ("layout", "user"):
+        return "", _notes(found, *OF_UNITS)
+    if page:
+        raise ValueError(f"'{found.layout.source}': {_notes(found, UNIT)}")
+    doubted = _notes(found, UNIT).partition(": say so")[0]
     return unit, f"{doubted}; the file is read in {unit} here"
 
 
-def _note(found: Inspection, *kinds: str) -> str:
-    return next((str(note) for note in found.layout.notes if kind_of(note) in kinds), "")
+def _notes(found: Inspection, *kinds: str) -> str:
+    return "; ".join(str(note) for note in found.layout.notes if kind_of(note) in kinds)
 
 
 def _counted(found: Inspection) -> str:

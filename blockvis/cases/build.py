@@ -131,13 +131,14 @@ def _refuse_idle_settlements(case: Case, assembly: solver.Assembly) -> None:
 
 def _refuse_doubted_unit(case: Case, sketch: layout.Layout) -> None:
     """Refuse blocks far from the size of masonry where another unit would make them masonry and nobody gives theirs."""
-    if case.file is None or sketch.unit_by or case.bonds:
+    if case.file is None or sketch.unit_by in ("layout", "user") or case.bonds:
         return
     size = float(np.median(sketch.sizes))
-    better = units_instead(sketch.unit, size)
+    page = sketch.unit_by == "page"
+    better = units_instead(sketch.unit, size, page=page)
     if better:
         remedy = f'give [geometry] unit = "{better[0]}", or unit = "{sketch.unit}" if it is right'
-        raise ValueError(f"{case.source}: '{case.file.name}': {doubt(sketch.unit, size, remedy=remedy)}")
+        raise ValueError(f"{case.source}: '{case.file.name}': {doubt(sketch.unit, size, page=page, remedy=remedy)}")
 
 
 def _refuse_unknown_materials(case: Case, assembly: solver.Assembly) -> None:

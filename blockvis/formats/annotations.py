@@ -86,6 +86,8 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
 
 def _layout_of(found: _Annotated, placement: Placement, reading: Reading) -> Layout:
     """Make a block of each piece of what is annotated."""
+    from .images import maybe_openings
+
     smallest, tolerance = (reading.image.get(key) for key in ("smallest", "outline_tolerance"))
     stairs = STAIRS if tolerance is None else tolerance / placement.pixel
     speck = None if smallest is None else smallest / placement.pixel
@@ -104,7 +106,7 @@ def _layout_of(found: _Annotated, placement: Placement, reading: Reading) -> Lay
             groups.append(label)
     flat = [np.asarray(ring)[::-1] for ring in rings]
     return Layout(tuple(flat), tuple(names), tuple(groups), unit=placement.unit,
-                  notes=_notes(found, placement, several))  # fmt: skip
+                  notes=(*_notes(found, placement, several), *maybe_openings(flat, names, ())))  # fmt: skip
 
 
 def placement_in(path: Path, found: _Annotated, reading: Reading) -> Placement:

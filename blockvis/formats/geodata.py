@@ -21,7 +21,7 @@ import numpy as np
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches, passed_over
-from blockvis.layout.notes import CHANGED, Note
+from blockvis.layout.notes import CHANGED, UNIT, Note
 from blockvis.layout.outlines import ring_area
 from blockvis.layout.units import DOUBTED, UNITS
 from blockvis.system.extras import require
@@ -50,6 +50,9 @@ GEOJSON = (
 #: What a file without a coordinate system draws so many of its widths away from 0 is a park or a country in degrees.
 FAR = 50.0
 
+#: Radius of the earth on the maps of the web [m], and how much they stretch lengths from which on it counts.
+RADIUS, STRETCHED = 6378137.0, 1.001
+
 #: What is counted of features that draw nothing.
 NO_GEOMETRY = "features without geometry"
 
@@ -76,7 +79,8 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     says = name if re.search(r"CRS84|4326$", name) else ""
     known = [one for one in features if one is not None]
     lengths, skipped = "crs" in content and crs is None, {NO_GEOMETRY: len(features) - len(known)}
-    return layout_of_features(known, path, reading, degrees=says, lengths=lengths, skipped=skipped)
+    web = _is_web_mercator(name)
+    return layout_of_features(known, path, reading, degrees=says, lengths=lengths, web=web, skipped=skipped)
 
 
 def _geojson_features(content: Mapping[str, Any], path: Path) -> list[Any]:
@@ -144,7 +148,8 @@ def _read_shapefile(path: Path, reading: Reading) -> Layout:
         raise ValueError(f"'{path}' cannot be read as a shapefile ({reason}); export it again") from None
     text = projection.read_text(encoding="utf-8", errors="replace") if projection else ""
     unit, degrees = _unit_of_system(text)
-    return layout_of_features(features, path, reading, unit=unit, degrees=degrees, skipped=skipped)
+    web = _is_web_mercator(text)
+    return layout_of_features(features, path, reading, unit=unit, degrees=degrees, web=web, skipped=skipped)
 
 
 def _read_geopackage(path: Path, reading: Reading) -> Layout:
@@ -164,11 +169,13 @@ def _read_geopackage(path: Path, reading: Reading) -> Layout:
         raise ValueError(
             f"'{path}' has layers in several coordinate systems: {listed}; leave one out (ignore), or export one"
         )
-    unit, degrees = _unit_of_system(next((layer.description for layer in systems.values()), ""))
+    text = next((layer.description for layer in systems.values()), "")
+    unit, degrees = _unit_of_system(text)
     # What is left out as asked is counted with the rest, but not what lies in another system.
     features = [feature for layer in layers if layer.system in systems for feature in layer.features]
     skipped = {NO_GEOMETRY: sum(layer.empty for layer in layers if layer.system in systems)}
-    found = layout_of_features(features, path, reading, unit=unit, degrees=degrees, skipped=skipped)
+    web = _is_web_mercator(text)
+    found = layout_of_features(features, path, reading, unit=unit, degrees=degrees, web=web, skipped=skipped)
     other = [LeftOut("asked", np.zeros((0, 2)), "", one.name) for one in layers if one.system not in systems]
     return replace(found, left_out=(*found.left_out, *other))
 
@@ -242,6 +249,29 @@ def _unit_of_system(text: str) -> tuple[str, str]:
     return next((unit for unit, size in UNITS.items() if math.isclose(metres, size, rel_tol=1e-5)), other), ""
 
 
+def _is_web_mercator(text: str) -> bool:
+    """Whether a coordinate system, by its words or its number, is that of the maps of the web."""
+    return re.search(r"Pseudo[- _]Mercator|Web[- _]Mercator|EPSG\W+(3857|900913)\b", text) is not None
+
+
+def _true_unit(features: Sequence[Feature]) -> tuple[str, list[Note]]:
+    """Find how long a metre of the maps of the web is where the features lie, with a note; "m" where it is one."""
+    import shapely
+
+    _, south, _, north = shapely.total_bounds([one.geometry for one in features])
+    middle = 0.5 * (south + north) / RADIUS
+    # Beyond is no map.
+    stretch = math.cosh(middle) if abs(middle) <= math.pi else 1.0
+    if stretch < STRETCHED:
+        return "m", []
+    latitude = math.degrees(math.atan(math.sinh(middle)))
+    said = (
+        f"unit: the file is in EPSG:3857, which draws lengths {stretch:.4g} times as long at {abs(latitude):.2f}° "
+        f"{'N' if latitude > 0.0 else 'S'}: a unit of it is {1.0 / stretch:.6g} m, within 0.7 %; reproject it for more"
+    )
+    return f"{1.0 / stretch:.9g} m", [Note(UNIT, said)]
+
+
 def layout_of_features(
     features: Sequence[Feature],
     path: Path,
@@ -250,12 +280,14 @@ def layout_of_features(
     unit: str = "",
     degrees: str = "",
     lengths: bool = False,
+    web: bool = False,
     skipped: Mapping[str, int] | None = None,
 ) -> Layout:
     """Make a layout of polygons, and of the faces between lines.
 
     ``unit`` is "" where the file does not say it, ``degrees`` the name of a system of longitude and latitude;
-    ``lengths`` says whether the file says that it has no system, and ``skipped`` counts by its kind what is no outline.
+    ``lengths`` says whether the file says that it has no system, ``web`` whether it is in that of the maps of the web,
+    and ``skipped`` counts by its kind what is no outline.
     """
     found, rows = Drawing(skipped=Counter(skipped or {})), _rows(features)
     roles = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)
@@ -274,6 +306,9 @@ def layout_of_features(
         listed = ", ".join(f"'{role}'" for role in roles)
         found.notes.append(Note(CHANGED, f"roles were left out ({listed}): roles are {', '.join(mechanics.ROLES)}"))
     _check_degrees(found, path, reading, degrees, far=not (unit or degrees or lengths) and (turn == np.eye(3)).all())
+    if web and reading.unit is None:
+        unit, stretched = _true_unit(features)
+        found.notes += stretched
     found.notes += passed_over(found.skipped)
     with_faces(
         found,

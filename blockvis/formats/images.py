@@ -106,7 +106,7 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
         text = f"pinholes were filled, each less than {100 * PINHOLES:g} % of its stone, of {len(filled)}, the first "
         notes = (*notes, Note(CHANGED, f"{text}'{names[filled[0]]}'"))
     if labels.is_mask and not (reading.ignore or reading.only):
-        notes = (*notes, *_maybe_openings(rings, names, holes))
+        notes = (*notes, *maybe_openings(rings, names, holes))
     layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit, notes=notes)
     if not labels.is_of_lines:
         _check_holes(path, labels, regions, holes)
@@ -179,7 +179,7 @@ def _hole_share(ring: np.ndarray, holes: tuple[np.ndarray, ...]) -> float:
     return sum(abs(ring_area(hole)) for hole in holes) / abs(ring_area(ring))
 
 
-def _maybe_openings(rings: Sequence[np.ndarray], names: Sequence[str], holed: Collection[int]) -> list[str]:
+def maybe_openings(rings: Sequence[np.ndarray], names: Sequence[str], holed: Collection[int]) -> list[str]:
     """Doubt the largest regions of a mask: of a drawing of lines, on its paper, openings are regions as stones are."""
     areas = np.array([abs(ring_area(ring)) for ring in rings])
     stones = np.array([k for k in range(len(rings)) if k not in holed])

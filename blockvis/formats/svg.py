@@ -22,7 +22,7 @@ import numpy as np
 from blockvis.layout.block_table import layer_of, layers_of, on_layer, rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
-from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
+from blockvis.layout.notes import CHANGED, LEFT_OUT, UNIT_TAKEN, Note
 from blockvis.layout.outlines import chords_of, filled
 from blockvis.layout.refusal import Refused
 from blockvis.layout.units import UNITS, metres_per
@@ -144,7 +144,8 @@ def read(path: Path, reading: Reading) -> Layout:
     styled = _styled(root)
     found = _Found(notes=[*doubts, *styled, *_pattern_fills(root)])
     if stated and stated not in UNITS and reading.unit is None:
-        found.notes.append(f"1 unit of the drawing is {stated}, by its width and its viewBox")
+        scale = f"1 unit of the drawing is {stated}, by its width and its viewBox"
+        found.notes.append(Note(UNIT_TAKEN, scale))
     # What sheets that are not read say may paint a shape.
     found.sheets_missed = len(styled) > 0
     _walk(root, _Context(np.eye(3), (), tolerance, path), found)
@@ -158,7 +159,7 @@ def read(path: Path, reading: Reading) -> Layout:
         )
     found.notes += passed_over(found.skipped)
     found.notes += passed_over(found.clipped, "read whole, not clipped")
-    return found.layout(stated, unit_by="layout" if own else "", own=True, factors=(1.0, -1.0))
+    return found.layout(stated, unit_by="layout" if own else "page" if stated else "", own=True, factors=(1.0, -1.0))
 
 
 def _root(path: Path) -> ElementTree.Element:

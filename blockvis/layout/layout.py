@@ -52,9 +52,9 @@ class Layout:
         In which the file has it: "m" of a thickness that is no length of the drawing, "" of one in its unit.
     unit : str
         Unit of length in which the file was read; inside a format's reader the unit that the file states, "" for none.
-    unit_by : {"", "layout", "user"}
+    unit_by : {"", "page", "layout", "user"}
         Whose word the unit is: the size of the blocks casts no doubt on a user's, and a note on that of a layout of
-        our own; any other it may overrule.
+        our own; that of a page, of a drawing at a scale, asks for the user's; any other it may overrule.
     notes : tuple of str
         What the reader assumed or dropped; see :class:`blockvis.layout.notes.Note`.
     source : str

@@ -8,6 +8,12 @@ LEFT_OUT, CHANGED = "left out", "changed"
 #: The unit is in doubt, or clashes with the one that the file states.
 UNIT, UNIT_CLASH = "unit", "unit clash"
 
+#: Which unit was taken, where nothing speaks against it.
+UNIT_TAKEN = "unit taken"
+
+#: Kinds of what is said of the unit.
+OF_UNITS = (UNIT, UNIT_CLASH, UNIT_TAKEN)
+
 #: A drawing that stands upright was turned into the plane of x and y.
 UPRIGHT = "upright"
 

@@ -98,7 +98,7 @@ def sorted_out(
 def noted(layout: Layout) -> Layout:
     """Note what is left out, and the doubts that the sizes of the blocks cast on the unit and on their thickness."""
     size = float(np.median(layout.sizes))
-    doubted = "" if layout.unit_by == "user" else doubt(layout.unit, size)
+    doubted = "" if layout.unit_by == "user" else doubt(layout.unit, size, page=layout.unit_by == "page")
     found = [Note(UNIT, words) for words in (doubted, _thickness_doubt(layout, size)) if words]
     walls = [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]
     return replace(layout, notes=(*layout.notes, *walls, *in_words(layout.left_out), *found))

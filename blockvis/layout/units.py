@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .notes import UNIT, UNIT_CLASH, Note
+from .notes import UNIT, UNIT_CLASH, UNIT_TAKEN, Note
 
 #: Metres per unit.
 UNITS = {
@@ -48,6 +48,9 @@ USUAL = 0.25
 #: Units that templates state whose drawings are metric, those in which these are drawn, and others that are tried last.
 IMPERIAL, METRIC, RARE = ("in", "ft", "yd"), ("mm", "cm", "m"), ("dm", "in", "ft")
 
+#: 1 : these are the scales of drawings of masonry, the commonest first.
+SCALES = (50, 20, 100, 10, 25)
+
 
 def metres_per(unit: str) -> float:
     """Metres per unit of length, or of a number of them, as a drawing at a scale has it.
@@ -74,16 +77,16 @@ def metres_per(unit: str) -> float:
 def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str, str]:
     """Choose the unit in which a file is read, and say why; "" if the stated unit is taken.
 
-    The unit that is ``given`` by the caller always holds; ``stated`` is that of the file, "" for none; ``sizes`` are
-    roots of the areas of the blocks, in the unit of the file.
+    The unit that is ``given`` by the caller, or by a page, always holds; ``stated`` is that of the file, "" for none;
+    ``sizes`` are roots of the areas of the blocks, in the unit of the file.
     """
     median = float(np.median(sizes)) if len(sizes) else 1.0
     if given is not None:
         clash = bool(stated) and metres_per(stated) != metres_per(given)
         note = f"the file says its unit is {stated}; it was read in {given} because that was asked for" if clash else ""
-        return given, note
+        return given, Note(UNIT_TAKEN, note) if note else ""
     if not stated:
-        return "m", "the file does not say its unit; m was assumed"
+        return "m", Note(UNIT_TAKEN, "the file does not say its unit; m was assumed")
     low, high = PLAUSIBLE_SIZE
     in_stated, in_metres = median * metres_per(stated), median
     if low <= in_stated <= high:
@@ -124,20 +127,39 @@ def _masonry_units(size: float, rare: Sequence[str] = RARE) -> list[str]:
 def _would_make(units: Sequence[str], size: float) -> str:
     """Say how large the likeliest of some units makes blocks of a size, and other metric ones that are as possible."""
     first, *others = units
-    said = [f"{first} would make it {size * UNITS[first]:.3g} m"]
-    return ", ".join(said + [f"{unit} {size * UNITS[unit]:.3g} m" for unit in others if unit in METRIC])
+    said = [f"{first} would make it {size * metres_per(first):.3g} m"]
+    return ", ".join(said + [f"{unit} {size * metres_per(unit):.3g} m" for unit in others if unit not in (*RARE, "km")])
 
 
-def units_instead(unit: str, size: float) -> list[str]:
+def units_instead(unit: str, size: float, *, page: bool = False) -> list[str]:
     """List the units that make blocks masonry whose unit is doubted, the likeliest first; none without doubt.
 
-    The size [m] is the root of the area of the median block, as read in the unit.
+    The size [m] is the root of the area of the median block, as read in the unit. What is too small on a ``page``,
+    whose unit is that of the paper, is drawn at a scale.
+
+    Examples
+    --------
+    >>> units_instead("m", 130.0)
+    ['mm', 'cm']
+    >>> units_instead("pt", 0.0076, page=True)
+    ['50 pt', '20 pt', '100 pt', '10 pt', '25 pt']
     """
-    doubted = size > 0.0 and not DOUBTED[0] <= size <= DOUBTED[1]
-    return _masonry_units(size / metres_per(unit), (*RARE, "km")) if doubted else []
+    if size <= 0.0 or DOUBTED[0] <= size <= DOUBTED[1]:
+        return []
+    if page and size < DOUBTED[0]:
+        number, name = _NUMBER_OF.fullmatch(unit).groups()  # type: ignore[union-attr]
+        common = [scale for scale in SCALES if COMMON[0] <= scale * size <= COMMON[1]]
+        return [f"{scale * float(number or 1.0):.9g} {name}" for scale in common]
+    return _masonry_units(size / metres_per(unit), (*RARE, "km"))
 
 
-def doubt(unit: str, size: float, *, remedy: str = 'say so under [geometry] unit = "{}", or by --unit {}') -> str:
+def doubt(
+    unit: str,
+    size: float,
+    *,
+    page: bool = False,
+    remedy: str = 'say so under [geometry] unit = "{0}", or by --unit {1}',
+) -> str:
     """Doubt the unit of a drawing whose blocks are far larger or smaller than those of masonry.
 
     The arguments are those of :func:`units_instead`, and how to give another unit; "" if there is nothing to doubt.
@@ -150,7 +172,9 @@ def doubt(unit: str, size: float, *, remedy: str = 'say so under [geometry] unit
     if DOUBTED[0] <= size <= DOUBTED[1] or size <= 0.0:
         return ""
     doubted = f"unit {unit} in doubt: it makes the median block {size:.3g} m across"
-    others = units_instead(unit, size)
+    others = units_instead(unit, size, page=page)
     if not others:
         return f"{doubted}; no other unit makes it masonry"
-    return f"{doubted}; {_would_make(others, size / metres_per(unit))}: {remedy.format(others[0], others[0])}"
+    quoted = f'"{others[0]}"' if " " in others[0] else others[0]
+    scaled = f"; is it drawn at a scale, as at 1:{SCALES[0]}?" if page and size < DOUBTED[0] else ";"
+    return f"{doubted}{scaled} {_would_make(others, size / metres_per(unit))}: {remedy.format(others[0], quoted)}"

@@ -12,6 +12,7 @@ from solver.mechanics import counted
 from .layout import Layout
 from .left_out import LeftOut
 from .notes import LEFT_OUT, Note
+from .units import doubt
 
 #: What reaches beyond the window by this fraction of its size lies within it.
 BEYOND = 1e-6
@@ -49,13 +50,15 @@ def within_window(layout: Layout, window: Sequence[float]) -> Layout:
     of_blocks = [place(ring) for ring in layout.outlines]
     if "within" not in of_blocks:
         every = np.concatenate([*layout.outlines, np.zeros((0, 2))])
-        extent = "draws no block at all"
+        extent, remedy = "draws no block at all", "correct the window"
         if len(every):
             (x0, y0), (x1, y1) = every.min(axis=0), every.max(axis=0)
             extent = f"goes from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m"
+            if layout.unit_by != "user":
+                remedy = doubt(layout.unit, float(np.median(layout.sizes)), page=layout.unit_by == "page") or remedy
         asked = ", ".join(f"{x:.6g}" for x in window)
         raise ValueError(
-            f"'{layout.source}': no block lies within the window [{asked}] m; the drawing {extent}: correct the window"
+            f"'{layout.source}': no block lies within the window [{asked}] m; the drawing {extent}: {remedy}"
         )
     # Mortar that is drawn as one surface reaches beyond: it says nothing of the joints within.
     beside = [(item, place(item.points)) for item in layout.left_out]

@@ -316,3 +316,20 @@ def test_the_unit_of_heights_is_not_that_of_the_plan(tmp_path, heights):
 def test_a_unit_that_has_no_name_here_is_read_by_its_length(tmp_path):
     path = write_shapefile(tmp_path / "wall.shp", SQUARES, UTM.format("Link", 0.201168))
     np.testing.assert_allclose(blockvis.read_layout(path).sizes ** 2, 0.08 * 0.201168**2)
+
+
+@pytest.mark.parametrize(
+    ("north", "scale", "told"), [(5621521.0, 0.5**0.5, "1.414 times as long at 45.00° N"), (3.0, 1.0, "")]
+)
+def test_metres_of_maps_of_the_web_are_as_long_as_they_are_there(tmp_path, north, scale, told):
+    rings = [np.add(ring, [1378000.0, north]).tolist() for ring in SQUARES]
+    system = {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}}}
+    path = geojson(tmp_path / "plan.geojson", [polygon(ring) for ring in rings], **system)
+    layout = blockvis.read_layout(path)
+    np.testing.assert_allclose(layout.sizes**2, 0.08 * scale**2, rtol=1e-5)
+    assert [note for note in layout.notes if "3857" in note and told in note] or not told
+    assert len([note for note in layout.notes if "3857" in note]) == bool(told)
+    np.testing.assert_allclose(blockvis.read_layout(path, unit="m").sizes ** 2, 0.08, rtol=1e-5)
+    words = 'PROJCS["WGS 84 / Pseudo-Mercator",UNIT["metre",1],AUTHORITY["EPSG","3857"]]'
+    shapes = write_shapefile(tmp_path / "plan.shp", rings, words)
+    np.testing.assert_allclose(blockvis.read_layout(shapes).sizes ** 2, 0.08 * scale**2, rtol=1e-5)

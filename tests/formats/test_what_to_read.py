@@ -82,6 +82,14 @@ def test_a_window_without_blocks_is_refused(tmp_path, capsys, window, says):
     assert says in info(capsys, tmp_path / "wall.dxf", "--window", *window)
 
 
+def test_a_window_beside_a_drawing_whose_unit_is_in_doubt_says_so(tmp_path, capsys):
+    document = drawn(tmp_path / "wall.dxf", [(500.0 * x, 500.0 * y) for x, y in brick(0, 0)])
+    document.header["$INSUNITS"] = 0
+    document.saveas(tmp_path / "wall.dxf")
+    said = info(capsys, tmp_path / "wall.dxf", "--window", -1, -1, -0.5, 1)
+    assert "to (500, 250) m: unit m in doubt: it makes the median block 354 m across; mm would make it 0.354 m" in said
+
+
 def test_a_kind_of_entity_or_a_colour_is_left_out_where_no_layer_is_called_so(tmp_path, capsys):
     document = drawn(tmp_path / "wall.dxf", brick(0, 0), brick(1, 0), brick(2, 0))
     space = document.modelspace()

@@ -4,6 +4,7 @@ import ezdxf
 import pytest
 
 from blockvis import read, read_layout
+from blockvis.cli import main
 
 
 def square(folder, size, stated=""):
@@ -58,3 +59,40 @@ def test_inches_of_a_template_that_make_blocks_too_large_are_doubted(tmp_path, s
     told = [note for note in layout.notes if f"unit {stated} in doubt" in note]
     assert len(told) == bool(metric)
     assert all(f"by --unit {metric}" in note for note in told)
+
+
+def page(folder):
+    """Stones of 0.5 by 0.3 m at 1:50 on a page of points, as of a PDF."""
+    size = 72 / 25.4 * 1000 / 50
+    stones = "".join(
+        f'<rect x="{100 + 0.5 * k * size}" y="9" width="{0.5 * size}" height="{0.3 * size}"/>' for k in range(4)
+    )
+    text = f'<svg xmlns="http://www.w3.org/2000/svg" width="841.89pt" viewBox="0 0 841.89 595.28">{stones}</svg>'
+    (folder / "a.svg").write_text(text, encoding="utf-8")
+    return folder / "a.svg"
+
+
+def test_no_unit_is_made_up_for_a_page_at_a_scale(tmp_path, capsys):
+    drawing = page(tmp_path)
+    layout = read_layout(drawing)
+    assert layout.unit == "pt"
+    (note,) = layout.notes
+    assert "unit pt in doubt: it makes the median block 0.00775 m across; is it drawn at a scale, as at 1:50?" in note
+    assert "50 pt would make it 0.387 m, 20 pt 0.155 m" in note
+    assert 'or by --unit "50 pt"' in note
+    assert main(["new", str(drawing), "-o", str(tmp_path / "a.toml")], outputs=()) == 2
+    assert 'or by --unit "50 pt"' in capsys.readouterr().err
+    case = tmp_path / "b.toml"
+    case.write_text('[geometry]\nfile = "a.svg"\n[settlement]\ndirection = [0, -1]\n', encoding="utf-8")
+    assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 2
+    assert 'give [geometry] unit = "50 pt", or unit = "pt" if it is right' in capsys.readouterr().err
+    assert read(drawing, unit="50 pt").areas == pytest.approx([0.15] * 4)
+
+
+@pytest.mark.parametrize(
+    ("stated", "word"), [("in", "unit clash: the file says its unit is in"), ("", "m was assumed")]
+)
+def test_a_new_case_is_written_with_the_notes_on_its_unit(tmp_path, capsys, stated, word):
+    assert main(["new", str(square(tmp_path, 0.127, stated)), "-o", str(tmp_path / "a.toml")], outputs=()) == 0
+    assert word in capsys.readouterr().err
+    assert f"# Note: {word[:8]}" in (tmp_path / "a.toml").read_text(encoding="utf-8") or not stated
