@@ -323,7 +323,8 @@ class Stepper:
 
     def gives(self, place: Place) -> bool:
         """Whether joints of given stiffness carry at a place: they move where their forces change."""
-        return bool((self.mortar.points(place, self.contacts_at(place)).give > COMPLIANCE).any())
+        elastic = self.model.interfaces.elastic
+        return elastic and bool((self.mortar.points(place, self.contacts_at(place)).give > COMPLIANCE).any())
 
     def standing(self, place: Place) -> Place | None:
         """The place once the supports have stood still, as joints of given stiffness give; None where it moves away."""
