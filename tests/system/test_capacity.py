@@ -586,6 +586,7 @@ def test_what_cannot_be_analysed_is_refused_before_anything_is_written(tmp_path,
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("courses", [1, 4])
 def test_effective_mass_of_a_portal_however_many_courses_its_columns_have(courses, tmp_path):
     """Columns turn, their centroids moving half as far as the lintel: e* = (Wc + Wl)² / ((2 Wc + Wl) (Wc / 2 + Wl))."""

@@ -74,6 +74,7 @@ def test_a_translation_by_a_profile_is_the_ordinary_settlement():
     np.testing.assert_allclose(same.path[-1].pose.positions, plain.path[-1].pose.positions, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_two_springers_that_part_by_half_each_open_the_arch_like_one_that_goes_all_the_way():
     arch = structures.arch_response().assembly
     one = solver.settle(arch, solver.Settlement(direction=(1, 0), increment=0.01, limit=0.04), controls=NO_FALL)

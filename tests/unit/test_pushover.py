@@ -212,6 +212,7 @@ def test_the_peak_at_which_a_tie_or_a_joint_breaks_is_told_however_long_incremen
     assert glued.pushover(control).load_multiplier[1] == pytest.approx(glued.limit_load().multiplier, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_peak_of_a_path_that_hardens_is_told_however_long_increments_are():
     """A tower beside one half as high, of which the largest multiplier was 0.45 with increments of 100 mm."""
     corners = [(x, 0.5 * k) for x, n in ((0.0, 4), (0.6, 2)) for k in range(n)]
