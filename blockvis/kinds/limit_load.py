@@ -210,9 +210,9 @@ class LimitLoadKind(AnalysisKind):
         if limit is not None and limit.caveat:
             summary["limit_load_caveat"] = limit.caveat
         if chosen is not None and response.collapse is None:
-            moves = chosen.velocity.any()
-            summary["mechanism"] = str(mechanics.mechanism_of(response.assembly, chosen)) if moves else None
-            if moves and (share := _effective_mass_share(response, chosen)) is not None:
+            mechanism = mechanics.mechanism_of(response.assembly, chosen) if chosen.velocity.any() else None
+            summary["mechanism"] = None if mechanism is None else str(mechanism)
+            if mechanism is not None and (share := _effective_mass_share(response, chosen, mechanism)) is not None:
                 summary["effective_mass_share"] = share
         if not response.parameter.is_path and len(response.limits) > 1:
             found = chosen is not None and np.isfinite(chosen.measured)
@@ -388,7 +388,9 @@ def _capacity_at_without_settlement(case: Case) -> ValueError:
     )
 
 
-def _effective_mass_share(response: solver.Response, state: solver.Increment) -> float | None:
+def _effective_mass_share(
+    response: solver.Response, state: solver.Increment, mechanism: mechanics.Mechanism
+) -> float | None:
     """Part e* of the mass of what moves that takes part in the mechanism under an acceleration; None of other loads.
 
     e* = (Σ P δ)² / (Σ P Σ P δ²) over macro-blocks of weight P whose centroids move by δ along the acceleration: Italian
@@ -397,7 +399,6 @@ def _effective_mass_share(response: solver.Response, state: solver.Increment) ->
     loads, assembly, d = response.loads_at(state), response.assembly, response.assembly.dimension
     if loads.live_acceleration is None:
         return None
-    mechanism = mechanics.mechanism_of(assembly, state)
     moves = mechanism.parts >= 0
     pushed = loads.live_at(assembly, state.pose)[:, :d] * moves[:, None]
     along = pushed.sum(axis=0) / max(float(np.linalg.norm(pushed.sum(axis=0))), 1e-300)

@@ -297,7 +297,8 @@ class Path:
             wider = self.checks.check(place, reaction, CLOSING_GAP)
             check = wider if wider.measured == reaction else check
         resting = place if carries else self.fall.relaxed(place)
-        resting = resting and (self.stepper.standing(resting) or resting)
+        if resting is not None and not carries:
+            resting = self.stepper.standing(resting) or resting
         is_far = resting is not None and self.fall.movements(place, resting).max() > JUMP
         # Blocks that rest far away may have left an equilibrium in a step that was too long.
         if resting is None or (is_far and state.refine_until < place.s):
