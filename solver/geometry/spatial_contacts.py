@@ -13,7 +13,7 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import expand_ranges
 from .clipping import ClippedCorners, clipped_faces
-from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
+from .contacts import SAME_NORMAL, STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
 from .convex_parts import PlacedParts
 from .cut_points import without_points_of_cuts
 from .entering import Movement, across, entered
@@ -193,7 +193,7 @@ def _without_duplicates(contacts: Contacts, near: float) -> Contacts:
     pairs = contacts.pair_keys()
     sense = np.where(contacts.block_a[first] == contacts.block_a[second], 1.0, -1.0)
     same = pairs[first] == pairs[second]
-    same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > 1.0 - 1e-4
+    same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > SAME_NORMAL
     n = len(contacts)
     links = coo_array((np.ones(np.count_nonzero(same)), (first[same], second[same])), shape=(n, n))
     count, group = connected_components(links, directed=False)

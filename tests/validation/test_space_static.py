@@ -437,3 +437,18 @@ def test_the_thrust_of_a_dome_whose_springers_begin_to_move_out():
     out[stones.moving] /= np.linalg.norm(out[stones.moving], axis=1)[:, None]
     weight = stones.masses[stones.free].sum() * solver.GRAVITY
     assert at_rest(stones, 0.7, out).least / weight == pytest.approx(0.1661226, rel=EXACT)
+
+
+@pytest.mark.parametrize("bend", [-0.75, 0.75])
+@pytest.mark.parametrize("first", range(5))
+def test_a_bed_that_bends_by_less_than_a_degree_bears_on_both_faces(bend, first):
+    rise = np.tan(np.radians(bend))
+    bed = np.roll([(-1.0, -1.0), (1.0, -1.0), (1.0, 0.0), (0.0, 0.0), (-1.0, rise)], first, axis=0)
+    stone = np.roll([(-1.0, rise), (0.0, 0.0), (1.0, 0.0), (1.0, 0.5), (-1.0, 0.5)], first, axis=0)
+    plane = solver.Assembly.from_outlines([stone, bed], roles=["free", "fixed"])
+    space = solver.Assembly.from_solids([along_y(stone, 0.0, 1.0), along_y(bed, 0.0, 1.0)], roles=["free", "fixed"])
+    live = solver.weight_fraction(plane, (1.0, 0.0), np.array([0]))
+    multiplier = limit(plane, live, 0.1).multiplier
+    assert limit(space, push(space, 0.0), 0.1).multiplier == pytest.approx(multiplier, rel=EXACT)
+    if rise > 0.0:
+        assert multiplier == pytest.approx(0.1, rel=EXACT)
