@@ -26,7 +26,17 @@ from .joints import LargestMovements
 from .mechanism_arrays import at_last_equilibrium
 from .npz import packed, unpacked
 from .record import RECORD, Record, read_json, read_record, versions, write_json
-from .tables import COLUMNS, LIMIT_TABLES, csv_text, own_columns, row_of_increment, summary_of
+from .tables import (
+    COLUMNS,
+    FORCES,
+    LIMIT_TABLES,
+    SUPPORT_COLUMNS,
+    csv_text,
+    own_columns,
+    row_of_increment,
+    rows_of_supports,
+    summary_of,
+)
 from .ties import COLUMNS as TIE_COLUMNS
 from .ties import TIES, TieCourses, stored_ties, tie_courses, tie_rows, write_ties
 from .viewer_files import MOVED, ViewerFiles, ViewerFormat, ViewerWriter, restore_grids, write_end, write_lists
@@ -50,7 +60,7 @@ FOLDERS = ("increments", "fall")
 STEP_CHECK, RANGE = "step_check.json", "range.csv"
 _LISTS = (
     *("summary.json", STEP_CHECK, RANGE, "response.csv", "joints.csv", "blocks.pvd", "contacts.pvd", "joints.pvd"),
-    *("ties.csv", "ties.pvd"),
+    *("supports.csv", "ties.csv", "ties.pvd"),
     *LIMIT_TABLES,
 )
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz", TIES, GIVEN)
@@ -237,13 +247,14 @@ class ResultsFolder:
         return ViewerFiles(self.path, self.assembly, self.vtu, self.increments)
 
     def _start_table(self) -> None:
-        self._rows, self._tie_rows = list[Sequence[Any]](), list[Sequence[Any]]()
+        self._rows, self._support_rows, self._tie_rows = (list[Sequence[Any]]() for _ in range(3))
         self._courses = TieCourses(self.ties)
         self._movements = LargestMovements(self.assembly, self.parameter)
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
             self._rows.append(row_of_increment(number, increment, self.assembly, self.parameter))
+            self._support_rows += rows_of_supports(number, increment, self.assembly, self.parameter)
             self._movements.add(increment)
             if self.ties:
                 self._tie_rows += tie_rows(self.ties, number, increment, self.parameter)
@@ -252,6 +263,7 @@ class ResultsFolder:
     def _write_table(self, *, durable: bool = False) -> None:
         tables = [
             ("response.csv", COLUMNS, self._rows),
+            ("supports.csv", (*SUPPORT_COLUMNS, *FORCES[self.assembly.dimension]), self._support_rows),
             *([("ties.csv", TIE_COLUMNS, self._tie_rows)] * bool(self.ties)),
         ]
         for name, columns, rows in tables:

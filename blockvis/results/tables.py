@@ -42,6 +42,13 @@ COLUMNS = (
     "seconds",
 )
 
+#: Columns of supports.csv before those of the forces, and these in the plane and in space.
+SUPPORT_COLUMNS = ("increment", "phase", "settlement", "support", "role")
+FORCES = {
+    2: ("force_x", "force_y", "moment"),
+    3: ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z"),
+}
+
 #: Limit loads over the positions of a load that moves, and over the settlement.
 LIMIT_TABLES = ("envelope.csv", "capacity.csv")
 
@@ -183,3 +190,16 @@ def row_of_increment(
         f"{increment.seconds:.4f}",
         *own,
     )
+
+
+def rows_of_supports(
+    number: int, increment: solver.Increment, assembly: solver.Assembly, parameter: mechanics.Quantity
+) -> list[Sequence[Any]]:
+    """Make the rows of supports.csv for an increment: what acts on each support, about its centroid where it is."""
+    value = repr(float(increment.parameter))
+    place = number, increment.phase, value if parameter.is_path else repr(0.0)
+    own = [value for _ in own_columns(parameter)]
+    return [
+        (*place, assembly.names[k], assembly.roles[k], *map(repr, increment.support_forces[k].tolist()), *own)
+        for k in np.flatnonzero(~assembly.free).tolist()
+    ]

@@ -259,6 +259,20 @@ def test_the_table_and_the_summary_say_what_a_tie_does(run):
     assert (told["yields_at"], told["breaks_at"]) == (first, None)
 
 
+def test_the_loads_on_the_supports_balance_the_weight(run):
+    with (run.folder / "supports.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    path, assembly = run.response.path, run.response.assembly
+    weight = solver.self_weight(assembly).dead[assembly.free, 1].sum()
+    for number, increment in enumerate(path):
+        here = [row for row in rows if row["increment"] == str(number)]
+        assert [row["support"] for row in here] == [assembly.names[k] for k in np.flatnonzero(~assembly.free)]
+        assert sum(float(row["force_y"]) for row in here) == pytest.approx(weight, rel=1e-6)
+        (moving,) = (float(row["force_x"]) for row in here if row["role"] == "moving")
+        assert moving == pytest.approx(increment.reaction, rel=1e-6)
+    assert list(rows[0])[5:] == ["force_x", "force_y", "moment"]
+
+
 def test_a_folder_with_ties_opens_with_them_and_viewers_get_lines(run):
     again = blockvis.open_results(run.folder)
     for one, other in zip(run.response.path, again.path, strict=True):

@@ -124,7 +124,7 @@ def test_states_are_flushed_before_the_checkpoint_and_the_rest_at_the_end(tmp_pa
     results.add(next(_steps(arch)))
     placed = [path.name for what, path in done if what == "replace"]
     files = [f"{kind}_00000.vtu" for kind in ("blocks", "contacts", "joints")]
-    lists = ["blocks.pvd", "contacts.pvd", "joints.pvd", "response.csv"]
+    lists = ["blocks.pvd", "contacts.pvd", "joints.pvd", "response.csv", "supports.csv"]
     assert placed == ["state_00000.npz", *files, *lists, "checkpoint.npz"]
     flushed = [path.name for what, path in done if what == "flush"]
     assert flushed == [".state_00000.part.npz", "increments", ".checkpoint.part.npz", "out"]
