@@ -85,7 +85,6 @@ class Path:
         self.tolerance = controls.step_tolerance
         # What has stood before a phase collapses where it no longer does.
         self.stood = number > 0
-        self.reported = -np.inf
 
     def _remove_blocks(self, fell_at: np.ndarray) -> None:
         """Follow the structure without blocks that have left; (n_blocks,) array as in ``PathState.fell_at``."""
@@ -102,7 +101,7 @@ class Path:
         try:
             return (yield from self.follow(begin() if resume is None else resume, resume is not None))
         except SolveError as error:
-            at = max(self.reported, 0.0)
+            at = max(self.tried.reported, 0.0)
             message = f"beyond a {self.driver.what} of {at:.6g} {self.driver.unit}: {error}"
             return Ending(Status.SOLVER_FAILED, message)
 
@@ -199,17 +198,16 @@ class Path:
         self.state = self.tried = state
         if resumed:
             self._remove_blocks(state.fell_at)
-            self.reported = state.place.s
         else:
             ending = yield from self._report_start(state)
             if ending is not None:
                 return ending
         while not self.state.ended:
             # What blocks that drop come to may be at a stop that has not been reported.
-            state, outcome = self.advance(self.state, self.driver.next_stop(self.reported))
-            self.state = state
+            self.state, outcome = self.advance(self.state, self.driver.next_stop(self.state.reported))
             if outcome.stop in (Status.EQUILIBRIUM, Status.FALLING):
-                yield from self._report_peak(state)
+                yield from self._report_peak(self.state)
+            state = self.state
             if outcome.stop is Status.LIMIT_REACHED:
                 yield from self._report_reached(state)
             if outcome.stop in (Status.EQUILIBRIUM, Status.LIMIT_REACHED):
@@ -314,7 +312,7 @@ class Path:
     def _report_peak(self, state: PathState) -> Iterator[Increment]:
         """Report the highest place, or the last in equilibrium before it; the path goes on from where it is."""
         for place in (self.highest.place, *self.highest.history[::-1]):
-            if place.s <= self.reported or (1.0 - DROP) * place.multiplier <= state.peak:
+            if place.s <= state.reported or (1.0 - DROP) * place.multiplier <= state.peak:
                 return
             standing = self.stepper.standing(place) or place
             # What breaks as the control stands still has carried until then.
@@ -330,12 +328,12 @@ class Path:
         """The increment of an equilibrium, at the state's place or one before, with the state as its checkpoint."""
         place = place or self.state.place
         increment = self.reports.increment(check, self._next_motion(place), place.works)
-        self.reported = self.state.place.s
+        self.state = replace(self.state, reported=place.s)
         return replace(increment, checkpoint=self.state)
 
     def _report_last(self, state: PathState) -> Iterator[Increment]:
         """The increment at the last equilibrium of the path, unless it has been reported."""
-        if state.place.s > self.reported:
+        if state.place.s > state.reported:
             velocity = state.place.velocity
             velocity = self.driver.rate(state.place.s) if velocity is None else velocity
             yield self.reports.increment(self._check(state.place), velocity, state.place.works)
@@ -358,7 +356,7 @@ class Path:
             self.on_step(state)
             last, new, peak = before.place, state.place, self.highest.place
             fallen = (1.0 - DROP) * peak.multiplier > max(state.peak, new.multiplier)
-            if fallen and new.s > peak.s > self.reported >= 0.0:
+            if fallen and new.s > peak.s > state.reported >= 0.0:
                 return state, Ending(Status.EQUILIBRIUM)
             if last.s < self._onset() <= new.s:
                 # From here on a peak is one of the structure, not of its joints' compliance.
