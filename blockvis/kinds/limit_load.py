@@ -212,8 +212,8 @@ class LimitLoadKind(AnalysisKind):
         if chosen is not None and response.collapse is None:
             mechanism = mechanics.mechanism_of(response.assembly, chosen) if chosen.velocity.any() else None
             summary["mechanism"] = None if mechanism is None else str(mechanism)
-            if mechanism is not None and (share := _effective_mass_share(response, chosen, mechanism)) is not None:
-                summary["effective_mass_share"] = share
+            if mechanism is not None:
+                summary |= _effective_mass(response, chosen, mechanism)
         if not response.parameter.is_path and len(response.limits) > 1:
             found = chosen is not None and np.isfinite(chosen.measured)
             summary["governing_position"] = chosen.parameter if chosen is not None and found else None
@@ -291,10 +291,8 @@ class LimitLoadKind(AnalysisKind):
         else:
             lines.append(f"mechanism: {said['mechanism']}")
         if (mass := said.get("effective_mass_share")) is not None:
-            spectral = state.load_multiplier / mass
-            lines.append(
-                f"effective mass       {mass:12.6g}     of what moves: a spectral acceleration of {spectral:.6g}"
-            )
+            spectral = f"a spectral acceleration of {said['spectral_acceleration']:.6g} g"
+            lines.append(f"effective mass       {mass:12.6g}     of what moves: {spectral}")
         return lines
 
     def title(self, response: solver.Response) -> str:
@@ -388,24 +386,33 @@ def _capacity_at_without_settlement(case: Case) -> ValueError:
     )
 
 
-def _effective_mass_share(
+def _effective_mass(
     response: solver.Response, state: solver.Increment, mechanism: mechanics.Mechanism
-) -> float | None:
-    """Part e* of the mass of what moves that takes part in the mechanism under an acceleration; None of other loads.
+) -> dict[str, float]:
+    """Part e* of the mass of what moves that takes part in the mechanism, and α/e* in g, under one acceleration alone.
 
     e* = (Σ P δ)² / (Σ P Σ P δ²) over macro-blocks of weight P whose centroids move by δ along the acceleration: Italian
     Circolare 7/2019, C8.7.1.2.1.
     """
     loads, assembly, d = response.loads_at(state), response.assembly, response.assembly.dimension
     if loads.live_acceleration is None:
-        return None
+        return {}
     moves = mechanism.parts >= 0
-    pushed = loads.live_at(assembly, state.pose)[:, :d] * moves[:, None]
-    along = pushed.sum(axis=0) / max(float(np.linalg.norm(pushed.sum(axis=0))), 1e-300)
-    weights = np.bincount(mechanism.parts[moves], (pushed @ along)[moves])
-    travel = mechanism.motions[:, :d] @ along
+    given = loads.live_acceleration[moves]
+    fastest = given[np.linalg.norm(given, axis=1).argmax()]
+    of_blocks = np.zeros_like(loads.live[moves])
+    of_blocks[:, :d] = given * (assembly.masses[moves] * solver.GRAVITY)[:, None]
+    is_one = (given == fastest).all(axis=1) | ~given.any(axis=1)
+    size = float(np.linalg.norm(fastest))
+    if not (is_one.all() and size > 0.0 and np.allclose(of_blocks, loads.live[moves])):
+        return {}
+    pushed = loads.live_at(assembly, state.pose)[moves, :d] @ fastest / size**2
+    weights, travel = np.bincount(mechanism.parts[moves], pushed), mechanism.motions[:, :d] @ fastest
     spread = float(weights.sum() * (weights * travel**2).sum())
-    return float((weights * travel).sum() ** 2 / spread) if (weights >= 0.0).all() and spread > 0.0 else None
+    if spread == 0.0:
+        return {}
+    share = float((weights * travel).sum() ** 2 / spread)
+    return {"effective_mass_share": share, "spectral_acceleration": state.load_multiplier * size / share}
 
 
 def _stored(limit: solver.LimitLoad) -> dict[str, Any]:

@@ -239,14 +239,15 @@ def _rests_elsewhere(response: solver.Response) -> bool:
 def _held_down(response: solver.Response) -> list[str]:
     """Doubt supports that bear the structure at rest, and go straight down, where they could or do pull it down."""
     motion, path = response.settlements[0], response.path
-    if len(response.settlements) > 1 or motion.direction is None or motion.rotation:
+    pulls = response.ties or not response.interfaces.dry
+    if pulls or len(response.settlements) > 1 or motion.direction is None or motion.rotation:
         return []
     *level, rise = motion.direction
     notable = NOTABLE * _size(response, 0)
     least = min(least_reaction(path[0]), *(increment.reaction for increment in path))
     if rise >= 0.0 or any(level) or path[0].reaction < notable or least > -notable:
         return []
-    doubt = "doubt faces of theirs that are steep or overhang, unless ties or bond do so"
+    doubt = "doubt faces of theirs that are steep or overhang"
     return [f"below 0 these supports, which sink, hold the structure down: {doubt}"]
 
 

@@ -600,3 +600,10 @@ def test_effective_mass_of_a_portal_however_many_courses_its_columns_have(course
     expected = (column + lintel) ** 2 / ((2.0 * column + lintel) * (0.5 * column + lintel))
     assert summary["effective_mass_share"] == pytest.approx(expected, rel=1e-6)
     assert summary["limit_load_multiplier"] == pytest.approx(0.2, rel=1e-6)
+    assert summary["spectral_acceleration"] == pytest.approx(0.2 / expected, rel=1e-6)
+    half = SIDEWAYS.replace("1.0", "0.5")
+    text = '[geometry]\nfile = "portal.json"\n[analysis]\nkind = "limit load"\n' + half
+    _, summary = solved(text, tmp_path)
+    assert summary["limit_load_multiplier"] == pytest.approx(0.4, rel=1e-6)
+    assert summary["spectral_acceleration"] == pytest.approx(0.2 / expected, rel=1e-6)
+    assert "effective_mass_share" not in solved(text + SIDEWAYS.replace("weight_fraction", "force"), tmp_path)[1]

@@ -206,6 +206,10 @@ def test_the_peak_at_which_a_tie_or_a_joint_breaks_is_told_however_long_incremen
     whole = list(mechanics.pushover_increments(assembly, control, loads=loads, **tied))
     resumed = list(mechanics.pushover_increments(assembly, control, loads=loads, resume=whole[1].checkpoint, **tied))
     assert [i.load_multiplier for i in resumed] == [i.load_multiplier for i in whole[2:]]
+    # A softer one breaks in the step to the first increment, which is told all the same.
+    softer = {**tied, "ties": [replace(tie, stiffness=1e5)]}
+    found = solver.Structure(assembly, loads=loads, **softer).pushover(replace(control, increment=0.008))
+    assert [0.0, *found.settlement[2:]] == pytest.approx([0.0, 0.008, 0.016, 0.024, 0.03])
     law = solver.InterfaceLaw(2.0, cohesion=2e5, tensile_strength=1e5, normal_stiffness=1e9, shear_stiffness=5e8)
     glued = solver.Structure(assembly, solver.Interfaces(law), loads)
     # What opens first is the joint at its strength, as the limit load has it.
