@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 import solver
+from blockvis.layout.linked import within_reach
 from solver.mechanics import Contacts
 
 #: Contact points of a block within this of each other along the face, in block sizes, share the area of one end.
@@ -63,6 +61,4 @@ def _ends(assembly: solver.Assembly, contacts: Contacts, support: int) -> np.nda
     along = (places - np.outer(places @ upright, upright)) / (ONE_END * assembly.block_size)
     # Points of different blocks are never near each other.
     other = 10.0 * (contacts.block_a + contacts.block_b - support)
-    pairs = KDTree(np.column_stack([along, other])).query_pairs(1.0, output_type="ndarray")
-    graph = sp.coo_array((np.ones(len(pairs)), pairs.T), shape=(len(along),) * 2)
-    return np.asarray(connected_components(graph, directed=False)[1])
+    return within_reach(np.column_stack([along, other]), 1.0)

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import shapely
-from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
+from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 from scipy.spatial import ConvexHull
 
 import solver
+from blockvis.layout.linked import linked
 from blockvis.text import width_text
 from solver.mechanics import counted
 
@@ -174,9 +175,8 @@ def _groups(meeting: np.ndarray, members: np.ndarray) -> list[np.ndarray]:
     place[members] = np.arange(len(members))
     one, other = place[meeting]
     both = (one >= 0) & (other >= 0)
-    graph = sp.coo_array((np.ones(int(both.sum())), (one[both], other[both])), shape=(len(members), len(members)))
-    count, group = connected_components(graph, directed=False)
-    return [members[group == k] for k in range(count)]
+    group = linked(one[both], other[both], len(members))
+    return [members[group == k] for k in range(int(group.max(initial=-1)) + 1)]
 
 
 def _courses(
