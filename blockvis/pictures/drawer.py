@@ -42,7 +42,6 @@ from .underlay import Underlay
 if TYPE_CHECKING:
     from .curves import CurvePanel
     from .paired_scenes import PairedScenes
-    from .solid_scene import SolidScene
 
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
@@ -233,7 +232,7 @@ class Drawer:
         """(2 n_views, 3) array: to the right and up in each view."""
         return np.concatenate([view.axes[:2] for view in self._views])
 
-    def _scene(self, frame: Frame) -> FlatScene | SolidScene | PairedScenes:
+    def _scene(self, frame: Frame) -> FlatScene | PairedScenes:
         """Set up what draws blocks in the plane, or in space."""
         if not self._views:
             scene = FlatScene(self.assembly, frame, self.sheet.inside_size, self.fill, self._underlay)
@@ -250,7 +249,7 @@ class Drawer:
         )
         if self.fall is not None:
             pair.show_ground(self.fall.ground)
-        return pair if len(self._views) > 1 else pair.scenes[0]
+        return pair
 
     def hold(self, drawers: Sequence[Drawer]) -> None:
         """Draw in one frame that holds those of several, this among them, with arrows of supports as long."""
@@ -571,7 +570,7 @@ class Drawer:
         if not self.look.joints:
             return np.zeros((0, self.assembly.dimension))
         found = marks_of(self.assembly, self.joints, increment, shown)
-        self.scene.cracks(found, self.look.magnification, self._seen.widest)
+        self.scene.cracks(found, self.look.magnification)
         if self.look.magnification != 1.0:
             return np.zeros((0, self.assembly.dimension))
         self.scene.crushing(found)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 import numpy as np
+import shapely
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 from PIL import Image
@@ -16,7 +17,7 @@ from solver import mechanics
 from . import palette
 from .backfill import FillBodies
 from .frame import Frame
-from .hatching import hatch_lines
+from .hatching import hatched
 from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes, part_outlines
 from .painting import painted
 from .scene import Scene
@@ -120,7 +121,7 @@ class FlatScene(Scene):
         rim = radius * self.pixel * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         self.polygons(layer, centres[:, None, :] + rim[None, :, :], colour)
 
-    def cracks(self, found: Marks, magnification: float, widest: float) -> None:
+    def cracks(self, found: Marks, magnification: float) -> None:
         """Fill what lies between faces, and draw a line where that would be too thin to see."""
         narrow, thin = ~found.gapes, self._thin
         self.polygons("crack", found.cracks[narrow], palette.OPEN)
@@ -254,13 +255,16 @@ class FlatScene(Scene):
         return float(np.clip(self.assembly.block_size / self.pixel / 25.0, 0.6, self.size[1] / 540.0))
 
     def _hatch(self) -> None:
+        """Hatch supports as laid out, in the picture and around it."""
         supports = np.flatnonzero(~self.assembly.free)
+        outlines = [shapely.Polygon(self.assembly.outline(block)) for block in supports.tolist()]
+        around = shapely.box(*(self.frame.low - self.frame.size), *(self.frame.high + self.frame.size))
         spacing = self.size[1] / 60.0 * self.pixel
-        low, high = self.frame.low - self.frame.size, self.frame.high + self.frame.size
-        points, blocks = hatch_lines(self.assembly, supports, low, high, spacing)
-        self._hatched = points, blocks
-        if len(points):
-            self.lines("hatch", points.reshape(-1, 2, 2), palette.HATCH, max(0.7, self.size[1] / 1000.0))
+        found = [hatched(shapely.intersection(outline, around), spacing, 1.0) for outline in outlines]
+        lines = np.concatenate([np.zeros((0, 2, 2)), *found])
+        self._hatched = lines.reshape(-1, 2), np.repeat(supports, [2 * len(of) for of in found])
+        if len(lines):
+            self.lines("hatch", lines, palette.HATCH, max(0.7, self.size[1] / 1000.0))
 
 
 class _Layer:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-import solver
-
 
 def hatched(area: shapely.Geometry, spacing: float, rise: float) -> np.ndarray:
     """(n, 2, 2) array [m]: lines across an area, ``spacing`` [m] apart, that rise to the right by 1 or fall by -1.
@@ -23,19 +21,3 @@ def hatched(area: shapely.Geometry, spacing: float, rise: float) -> np.ndarray:
     parts = shapely.get_parts(shapely.intersection(shapely.linestrings(ends), area))
     parts = parts[(shapely.get_type_id(parts) == 1) & (shapely.get_num_points(parts) == 2)]
     return np.asarray(shapely.get_coordinates(parts)).reshape(-1, 2, 2)
-
-
-def hatch_lines(
-    assembly: solver.Assembly, supports: np.ndarray, low: np.ndarray, high: np.ndarray, spacing: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Hatch supports (n_supports,) as laid out, inside a box between two corners (2,) [m].
-
-    Gives both ends of each line, (2 n, 2) [m], and the support of each end, (2 n,) int.
-    """
-    box = shapely.box(*low, *high)
-    found = [
-        hatched(shapely.intersection(shapely.Polygon(assembly.outline(block)), box), spacing, 1.0)
-        for block in supports.tolist()
-    ]
-    ends = np.concatenate([np.zeros((0, 2, 2)), *found]).reshape(-1, 2)
-    return ends, np.repeat(supports, [2 * len(lines) for lines in found])

@@ -231,7 +231,7 @@ class SolidScene(Scene):
             faces = np.insert(np.arange(len(points)), np.cumsum(counts) - counts, counts)
             self._add(layer, pv.PolyData(points, faces=faces), colour, forward=forward)
 
-    def cracks(self, found: Marks, magnification: float, widest: float) -> None:
+    def cracks(self, found: Marks, magnification: float) -> None:
         """Draw the rims of what is open, all alike: of a hairline they fall into one line, a gap shows between them."""
         rims = np.concatenate([found.cracks[:, [0, 1]], found.cracks[:, [3, 2]]])
         self.lines("crack", rims, palette.OPEN, max(3.0 * self._thin, 1.4), forward=2.0)

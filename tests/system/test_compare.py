@@ -117,7 +117,7 @@ def test_between_rest_and_the_first_increment_no_reaction_is_told(tmp_path, monk
 def test_blocks_in_space_are_seen_from_one_side(tmp_path, monkeypatch):
     sights, blank, folders = [], Image.new("RGB", (800, 620)), []
     picture = "blockvis.pictures.drawer.Drawer.picture"
-    monkeypatch.setattr(picture, lambda drawer, *of, **look: sights.append(drawer.scene.view) or blank)
+    monkeypatch.setattr(picture, lambda drawer, *of, **look: sights.append(drawer.sight) or blank)
     pads = [box((x, y, -0.2), (x + 0.3, y + 0.3, 0.0)) for x in (0.0, 0.7) for y in (0.0, 0.7)]
     columns = [box((x + 0.05, y + 0.05, 0.0), (x + 0.25, y + 0.25, 1.0)) for x in (0.0, 0.7) for y in (0.0, 0.7)]
     for sinks in (0, 3):
