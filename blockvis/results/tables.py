@@ -163,20 +163,25 @@ def own_columns(parameter: mechanics.Quantity) -> tuple[str, ...]:
     return () if name in COLUMNS else (name,)
 
 
+def place_in_table(
+    number: int, increment: solver.Increment, parameter: mechanics.Quantity
+) -> tuple[tuple[Any, ...], tuple[str, ...]]:
+    """Make the first cells of a row, number, phase and settlement of an increment, and its last, of own columns."""
+    value = repr(float(increment.parameter))
+    place = number, increment.phase, value if parameter.is_path else repr(0.0)
+    return place, tuple(value for _ in own_columns(parameter))
+
+
 def row_of_increment(
     number: int, increment: solver.Increment, assembly: solver.Assembly, parameter: mechanics.Quantity
 ) -> Sequence[Any]:
     """Make the row of response.csv for an increment over a parameter, in the order of :data:`COLUMNS`."""
     certificate = increment.certificate
-    value = repr(float(increment.parameter))
-    settlement = value if parameter.is_path else repr(0.0)
+    place, own = place_in_table(number, increment, parameter)
     mechanism = mechanics.mechanism_of(assembly, increment)
-    own = [value for _ in own_columns(parameter)]
     counts = np.bincount(increment.states, minlength=len(mechanics.ContactState))
     return (
-        number,
-        increment.phase,
-        settlement,
+        *place,
         repr(float(increment.reaction)),
         repr(float(increment.reaction) / mechanics.total_weight(assembly)),
         repr(float(increment.load_multiplier)),
@@ -196,9 +201,7 @@ def rows_of_supports(
     number: int, increment: solver.Increment, assembly: solver.Assembly, parameter: mechanics.Quantity
 ) -> list[Sequence[Any]]:
     """Make the rows of supports.csv for an increment: what acts on each support, about its centroid where it is."""
-    value = repr(float(increment.parameter))
-    place = number, increment.phase, value if parameter.is_path else repr(0.0)
-    own = [value for _ in own_columns(parameter)]
+    place, own = place_in_table(number, increment, parameter)
     return [
         (*place, assembly.names[k], assembly.roles[k], *map(repr, increment.support_forces[k].tolist()), *own)
         for k in np.flatnonzero(~assembly.free).tolist()

@@ -16,7 +16,7 @@ from solver import mechanics
 
 from .about import certified, in_phase, unit_in
 from .npz import packed, read_stored
-from .tables import own_columns
+from .tables import place_in_table
 
 #: File of the ties of a results folder, which is there where it has any.
 TIES = "ties.npz"
@@ -78,9 +78,7 @@ def tie_rows(
     ties: Sequence[solver.Tie], number: int, increment: solver.Increment, parameter: mechanics.Quantity
 ) -> list[tuple[Any, ...]]:
     """Make the rows of ties.csv for an increment by its number, in the order of :data:`COLUMNS`, its parameter last."""
-    found, value = increment.ties, repr(float(increment.parameter))
-    place = number, increment.phase, value if parameter.is_path else repr(0.0)
-    own = [value for _ in own_columns(parameter)]
+    found, (place, own) = increment.ties, place_in_table(number, increment, parameter)
     return [
         (*place, tie.name, tie.kind, repr(float(force)), repr(float(elongation)), STATE_WORDS[state], *own)
         for tie, force, elongation, state in zip(ties, found.forces, found.elongations, found.states, strict=True)
