@@ -128,10 +128,8 @@ def displacement_colours(fraction: np.ndarray) -> np.ndarray:
 
 
 def _on_ramp(ramp: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    place = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0) * (len(ramp) - 1)
-    below = np.minimum(place.astype(int), len(ramp) - 2)
-    rest = (place - below)[..., None]
-    return np.rint(ramp[below] * (1.0 - rest) + ramp[below + 1] * rest).astype(np.uint8)
+    places = np.linspace(0.0, 1.0, len(ramp))
+    return np.rint(np.stack([np.interp(fraction, places, of) for of in ramp.T], axis=-1)).astype(np.uint8)
 
 
 def rgb(colour: np.ndarray) -> tuple[int, int, int]:
