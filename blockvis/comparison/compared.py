@@ -82,7 +82,7 @@ class Side:
         ends = [k for k in here if path[k].phase == path[here[0]].phase]
         if ends:
             return path[ends[-1]]
-        state = state_at(self.response, at)
+        state = state_at(path, self.response.parameters, at)
         before = max(int(np.searchsorted(self.response.parameters, at)) - 1, 0)
         on_line = np.isclose(left_rest(self.response, before), path[before].measured, atol=0.0)
         return state if on_line else replace(state, measured=np.nan)

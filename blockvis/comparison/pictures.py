@@ -21,7 +21,7 @@ from blockvis.pictures.captions import (
 )
 from blockvis.pictures.curves import TEXT
 from blockvis.pictures.drawer import Drawer, Look
-from blockvis.pictures.figures import plain_text
+from blockvis.pictures.figures import plain_text, saved
 from blockvis.pictures.film import END, PAUSE
 from blockvis.pictures.frame import fitting_font, framed
 from blockvis.pictures.swing import shown_increments
@@ -74,9 +74,7 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
     axes.grid(color="#e4e4e4", linewidth=0.8)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=2, fontsize=TEXT, frameon=False)
-    with atomic_file(path) as partial:
-        figure.savefig(partial, dpi=200)
-    return path
+    return saved(figure, path, 200)
 
 
 class Pair:

@@ -21,14 +21,13 @@ import solver
 from blockvis.layout.sights import BELOW, Sight
 from blockvis.pictures import palette
 from blockvis.pictures.drawer import WHOLE, magnified
-from blockvis.pictures.figures import plain_text
+from blockvis.pictures.figures import plain_text, saved
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.sight_lines import SightLines
 from blockvis.pictures.solid_view import ABOVE, View, hiding_supports, views_from
 from blockvis.results.cracks import SMALLEST_OPENING
 from blockvis.results.joint_faces import Rings
 from blockvis.results.joints import carried_faces
-from blockvis.system.atomic_files import atomic_file
 from blockvis.text import rounded_length
 from solver import mechanics
 
@@ -105,10 +104,7 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     written = [label for own in labels for label in _uncover(own)]
     if any(label.get_gid() == HIDDEN for label in written):
         _title(axes[0], f"{axes[0].get_title(loc='left')}, dashed: hidden")
-    path = Path(path)
-    with atomic_file(path) as partial:
-        figure.savefig(partial, dpi=DPI, facecolor="white")
-    return path
+    return saved(figure, path, DPI, facecolor="white")
 
 
 def _magnification(assembly: solver.Assembly, pose: solver.Pose) -> float:

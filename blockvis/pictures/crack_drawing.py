@@ -15,7 +15,6 @@ from blockvis.layout.sights import Cut, Sight
 from blockvis.results.cracks import Crack, cracks_of, main_cracks, slid_joints
 from blockvis.results.joint_faces import InitialJoints, initial_joints
 from blockvis.results.joints import end_openings, opening_and_slip
-from blockvis.system.atomic_files import atomic_file
 from blockvis.text import width_text
 from solver import mechanics
 
@@ -23,7 +22,7 @@ from . import palette
 from .captions import loss_words, phase_words, state_text
 from .flat_scene import FlatScene
 from .frame import Key, Sheet, framed, write_labels
-from .render import STILL_SIZE, numbered, seen_from
+from .render import STILL_SIZE, numbered, save_picture, seen_from
 
 #: Thickness of a crack that only slides and of the widest one, in heights of the picture; the latter in block sizes at
 #: most, or the steps of a fine bond would run into each other.
@@ -91,9 +90,7 @@ def draw_cracks(
         keys=keys,
         pixel=pixel,
     )
-    with atomic_file(path) as partial:
-        page.save(partial)
-    return Path(path)
+    return save_picture(page, path)
 
 
 def _drawn_in_plane(

@@ -19,7 +19,6 @@ import solver
 from blockvis.results.about import about, collapse_phase, counts_text, in_phase, losing
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.results.ties import TieForceCurves, tie_force_curves
-from blockvis.system.atomic_files import atomic_file
 from solver import mechanics
 
 from . import palette
@@ -37,7 +36,7 @@ from .captions import (
     unit_for,
     value_label,
 )
-from .figures import plain_text
+from .figures import plain_frame, plain_text, saved
 
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
@@ -111,9 +110,7 @@ def draw_curve(
     name += "" if band is None else f"   ·   band: range of {mechanics.counted(band.runs.max(initial=0), 'run')}"
     above = _mark_phases(axes, response, int(LETTERS * size[0])) if response.settlements else 0.0
     axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK), pad=6.0 + above)
-    with atomic_file(path) as partial:
-        figure.savefig(partial, dpi=200)
-    return path
+    return saved(figure, path, 200)
 
 
 class CurvePanel:
@@ -410,8 +407,6 @@ def _word(
 
 
 def _style(axes: Axes, text: float) -> None:
-    """Give a plot a grid, no frame, and numbers as they are, without a power of ten or an offset in the corner."""
-    axes.tick_params(labelsize=0.9 * text)
+    """Give a plot numbers as they are, without a power of ten or an offset in the corner."""
+    plain_frame(axes, text)
     axes.ticklabel_format(useOffset=False, style="plain")
-    axes.grid(color="#e4e4e4", linewidth=0.8)
-    axes.spines[["top", "right"]].set_visible(False)

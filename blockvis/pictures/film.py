@@ -27,11 +27,11 @@ Draw: TypeAlias = Callable[[], Image.Image]
 
 def film_of(
     drawer: Drawer, fps: float, seconds: float, progress: Callable[[int, int], None] | None = None
-) -> tuple[int, Iterator[Image.Image]]:
+) -> Iterator[Image.Image]:
     """Plan a film: even motion along the path, in so many seconds, a pause, then the fall.
 
-    Returns the number of its frames, and the frames, drawn as they are asked for; what stands still is drawn once.
-    ``progress`` is called with the frames drawn and their number.
+    Gives its frames, drawn as they are asked for; what stands still is drawn once. ``progress`` is called with the
+    frames drawn and their number.
     """
     for name, value in (("fps", fps), ("seconds", seconds)):
         if not (np.isfinite(value) and value > 0.0):
@@ -52,7 +52,7 @@ def film_of(
                 progress(number, len(draws))
             yield picture
 
-    return len(draws), frames()
+    return frames()
 
 
 def poster_of(drawer: Drawer) -> Image.Image:
@@ -67,12 +67,11 @@ def poster_of(drawer: Drawer) -> Image.Image:
     return drawer.picture(last if last.status == solver.Status.FALLING or governing is None else governing)
 
 
-def state_at(response: solver.Response, at: float) -> solver.Increment:
-    """Find what is shown at a parameter over all phases [m or rad]: between two increments all changes evenly."""
-    return _state_at(response.path, response.parameters, at)
+def state_at(path: Sequence[solver.Increment], total: np.ndarray, at: float) -> solver.Increment:
+    """Find what is shown at a parameter over all phases [m or rad]: between two increments all changes evenly.
 
-
-def _state_at(path: Sequence[solver.Increment], total: np.ndarray, at: float) -> solver.Increment:
+    The parameters (n,) over all phases of the path are ``total``.
+    """
     k = int(np.clip(np.searchsorted(total, at, side="right") - 1, 0, len(path) - 1))
     if k == len(path) - 1 or at <= total[k]:
         return path[k]
@@ -166,7 +165,7 @@ def _drawn_at(
     drawer: Drawer, path: Sequence[solver.Increment], total: np.ndarray, at: float, badge: str | None
 ) -> Image.Image:
     # Worked out when it is drawn: increments may read their arrays from files, and a film holds none of them.
-    return drawer.picture(_state_at(path, total, at), badge=badge)
+    return drawer.picture(state_at(path, total, at), badge=badge)
 
 
 def _losses_told(

@@ -17,12 +17,11 @@ from matplotlib.patheffects import withStroke
 
 import solver
 from blockvis.layout.joints.facing_edges import Facing
-from blockvis.system.atomic_files import atomic_file
 from blockvis.text import rounded_length
 from solver import mechanics
 
 from . import palette
-from .figures import plain_text
+from .figures import plain_text, saved
 from .frame import Frame, room_in
 
 if TYPE_CHECKING:
@@ -118,9 +117,7 @@ def draw_contents(contents: Contents, path: str | Path) -> Path:
     figure.set_figheight(figure.get_figheight() + 0.5 + 0.19 * (len(lines) + (len(keys) + 3) // 4))
     figure.suptitle("\n".join([contents.title, *lines]), x=0.01, ha="left", fontsize=9.5)
     figure.legend(handles=keys, loc="outside lower center", ncols=4, frameon=False, fontsize=8.5)
-    with atomic_file(path) as partial:
-        figure.savefig(partial, dpi=DPI)
-    return Path(path)
+    return saved(figure, path, DPI)
 
 
 def _in_the_plane(figure: Any, contents: Contents) -> _Canvas:

@@ -85,7 +85,7 @@ def draw_still(
     chosen = increment if isinstance(increment, solver.Increment) else numbered(response.increments, increment)
     look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
     drawer = Drawer(response, look, size, (chosen,), curve=curve, underlay=underlay, still=True)
-    return _save(drawer.picture(chosen, widths=True), path)
+    return save_picture(drawer.picture(chosen, widths=True), path)
 
 
 def seen_from(view: Any, section: Any) -> tuple[Sight | None, Cut | None]:
@@ -137,7 +137,7 @@ def draw_mechanism(
     note = "   ·   ".join([_mechanism_note(response, swing.n_parts), *phase_words(response, swing.increment)])
     moved_on = swing.moves and response.assembly.dimension == 3 and response.stop != solver.Status.SOLVER_FAILED
     badge = MECHANISM_BADGE if moved_on else None
-    return _save(drawer.picture(swing.increment, note=note, badge=badge, widths=True), path)
+    return save_picture(drawer.picture(swing.increment, note=note, badge=badge, widths=True), path)
 
 
 def animate(
@@ -198,10 +198,9 @@ def animate(
     shown = shown_increments(response) if fall is None else response.path
     drawer = Drawer(response, look, size, shown, curve=curve, fall=fall, underlay=underlay)
     fps = min(fps, FASTEST_GIF) if Path(path).suffix.lower() == ".gif" else fps
-    _, frames = film_of(drawer, fps, seconds, progress)
-    film = write_film(frames, path, size=size, fps=fps)
+    film = write_film(film_of(drawer, fps, seconds, progress), path, size=size, fps=fps)
     if poster is not None:
-        _save(poster_of(drawer), poster)
+        save_picture(poster_of(drawer), poster)
     return film
 
 
@@ -244,7 +243,8 @@ def _check_response(response: solver.Response) -> None:
         raise ValueError(f"there is no increment to draw: {response.message or response.stop}")
 
 
-def _save(picture: Image.Image, path: str | os.PathLike[str]) -> Path:
+def save_picture(picture: Image.Image, path: str | os.PathLike[str]) -> Path:
+    """Save a picture, whole or not at all; raises ``ValueError`` for an ending that Pillow does not write."""
     path = Path(path)
     if Image.registered_extensions().get(path.suffix.lower()) not in Image.SAVE:
         raise ValueError(f"'{path}' is no picture that blockvis draws; end its name in .png, or as Pillow writes")

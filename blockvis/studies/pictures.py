@@ -15,11 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from blockvis.pictures import palette
-from blockvis.pictures.figures import plain_text
+from blockvis.pictures.figures import plain_frame, plain_text, saved
 from blockvis.pictures.frame import Frame, frame_around
 from blockvis.pictures.ties import COLOURS
 from blockvis.results.about import LOCAL
-from blockvis.system.atomic_files import atomic_file
 from blockvis.text import rounded_text
 from solver import mechanics
 from solver.mechanics import counted
@@ -104,7 +103,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     _plain_frame(axes)
     axes.legend(loc="upper left", frameon=False, fontsize=0.9 * TEXT)
     axes.set_title(runs_counted(curve, rows, factor, unit), **HEADING)
-    return _saved(figure, path)
+    return saved(figure, path, 150)
 
 
 @plain_text
@@ -144,7 +143,7 @@ def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Pat
     for axes in (left, right):
         _plain_frame(axes)
         axes.grid(visible=False, axis="y")
-    return _saved(figure, path)
+    return saved(figure, path, 150)
 
 
 def _draw_swing(axes: Axes, place: int, swing: Swing, centre: float, factor: float) -> None:
@@ -206,7 +205,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     if stood.any():
         handles.append(_mark("#333333", "^", f"stood as far as it was followed ({int(stood.sum())})", hollow=True))
     figure.legend(handles=handles, loc="outside lower left", frameon=False, fontsize=0.82 * TEXT)
-    return _saved(figure, path)
+    return saved(figure, path, 150)
 
 
 @plain_text
@@ -248,7 +247,7 @@ def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path)
         figure.supxlabel(
             f"{counted(len(classes) - len(shown), 'more mechanism')} in {counted(rest, 'run')}", fontsize=0.9 * TEXT
         )
-    return _saved(figure, path)
+    return saved(figure, path, 150)
 
 
 def _draw_shape(axes: Axes, shape: dict[str, np.ndarray], low: np.ndarray, high: np.ndarray) -> None:
@@ -333,14 +332,5 @@ def _mark(colour: str, mark: str, label: str, *, hollow: bool = False) -> Line2D
 
 
 def _plain_frame(axes: Axes) -> None:
-    axes.grid(color="#e4e4e4", linewidth=0.8)
+    plain_frame(axes, TEXT)
     axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(labelsize=0.9 * TEXT)
-
-
-def _saved(figure: Figure, path: str | Path) -> Path:
-    path = Path(path)
-    with atomic_file(path) as partial:
-        figure.savefig(partial, dpi=150)
-    return path

@@ -123,8 +123,7 @@ def test_results_are_read_one_at_a_time(use, folder, tmp_path, monkeypatch):
         assert f"{response.collapse.displacement:.6g} m" in report_of(response)
     else:
         drawer = Drawer(response, Look(), (320, 180), response.increments, curve=True)
-        _, pictures = film_of(drawer, 4.0, 2.0)
-        write_film(pictures, tmp_path / "film.gif", size=(320, 180), fps=4.0)
+        write_film(film_of(drawer, 4.0, 2.0), tmp_path / "film.gif", size=(320, 180), fps=4.0)
     # Each is read, and no more than a few times.
     assert n < len(seen) < 6 * n
     assert max(most) <= AT_LEAST + 1, most

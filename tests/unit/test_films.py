@@ -69,7 +69,7 @@ def test_a_film_tells_what_is_lost_and_goes_on():
     drawer = Drawer(response, Look(forces="none"), SIZE, shown)
     told = []
     drawer.picture = lambda state, badge=None: told.append((state.parameter, badge, bool(state.fallen.any())))
-    list(film_of(drawer, 10.0, 3.0)[1])
+    list(film_of(drawer, 10.0, 3.0))
     gone = response.losses[0].settlement
     named = [parameter for parameter, badge, _ in told if badge == "LOST · brick"]
     assert len(named) == 10
@@ -92,7 +92,7 @@ def test_a_film_tells_what_is_taken_away_between_settlements():
     drawer = Drawer(response, Look(forces="none"), SIZE, response.path)
     told = []
     drawer.picture = lambda state, badge=None: told.append((badge, bool(state.removed.any())))
-    list(film_of(drawer, 10.0, 4.0)[1])
+    list(film_of(drawer, 10.0, 4.0))
     first = next(k for k, (badge, _) in enumerate(told) if badge)
     assert told[first : first + 10] == [(f"TAKEN AWAY · {assembly.names[3]}", True)] * 10
     assert {badge for badge, _ in told[:first] + told[first + 10 :]} == {None}
@@ -115,7 +115,7 @@ def test_a_film_tells_what_is_taken_away_apart_from_what_falls_with_it():
     drawer = Drawer(response, Look(forces="none"), SIZE, response.path)
     told = []
     drawer.picture = lambda state, badge=None: told.append(badge)
-    list(film_of(drawer, 10.0, 4.0)[1])
+    list(film_of(drawer, 10.0, 4.0))
     assert set(told) == {None, f"TAKEN AWAY · {assembly.names[3]}; LOST · 2 blocks"}
 
 
@@ -151,7 +151,7 @@ def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
     response = sideways_block()
     loads = LiveLoads(response, response.path, 1.0)
     before, after = response.path[:2]
-    state = state_at(response, (before.parameter + after.parameter) / 2.0)
+    state = state_at(response.path, response.parameters, (before.parameter + after.parameter) / 2.0)
     lengths = [
         np.linalg.norm(np.subtract(*loads.arrows(one, one.pose)), axis=1)[0] / one.load_multiplier
         for one in (before, state, after)
@@ -237,7 +237,8 @@ def test_forces_between_increments_are_those_of_the_reaction_that_the_title_tell
     response = arch_response()
     moving = int(np.flatnonzero(response.assembly.moving)[0])
     for before, after in list(pairwise(response.path))[1:]:
-        state = state_at(response, before.parameter + 0.75 * (after.parameter - before.parameter))
+        at = before.parameter + 0.75 * (after.parameter - before.parameter)
+        state = state_at(response.path, response.parameters, at)
         assert state.reaction == pytest.approx(0.25 * before.reaction + 0.75 * after.reaction)
         push = mechanics.block_forces(state.contacts, state.pose, state.forces)[moving, 0]
         assert push == pytest.approx(state.reaction, rel=0.02)
@@ -256,7 +257,7 @@ def test_ties_between_increments_carry_what_lies_between_theirs():
     before, after = response.path[-2:]
     assert before.ties.states[0] == mechanics.SLACK
     assert after.ties.states[0] == mechanics.ELASTIC
-    ties = state_at(response, response.parameters[-2] + 0.25 * after.parameter).ties
+    ties = state_at(response.path, response.parameters, response.parameters[-2] + 0.25 * after.parameter).ties
     assert ties.forces[0] == pytest.approx(0.25 * after.ties.forces[0])
     stretched = 0.75 * before.ties.elongations[0] + 0.25 * after.ties.elongations[0]
     assert ties.elongations[0] == pytest.approx(stretched)

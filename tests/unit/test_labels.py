@@ -41,8 +41,7 @@ def words(monkeypatch):
 
 def filmed(response, fps=4.0, seconds=4.0, size=SMALL):
     drawer = Drawer(response, Look(colour_by="mechanism"), size, response.increments)
-    _, pictures_of = film_of(drawer, fps, seconds)
-    return list(pictures_of)
+    return list(film_of(drawer, fps, seconds))
 
 
 @cache
@@ -303,7 +302,7 @@ def test_what_lies_still_has_no_badge_of_falling(words):
     response = arch_response()
     fall = fall_of(response)
     drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.path, fall=fall)
-    *_, last = film_of(drawer, 4.0, 1.0)[1]
+    *_, last = film_of(drawer, 4.0, 1.0)
     drawer.falling_picture(float(fall.times[-1]))
     badges = [said["badge"] for said in words if said["title"].startswith("Fall")]
     assert FALL_BADGE in badges
