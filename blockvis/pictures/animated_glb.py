@@ -46,24 +46,13 @@ def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None 
     """
     if not response.increments:
         raise ValueError(f"there is no motion to write to '{path}': {response.message or response.stop}")
-    ties = response.ties
     times, poses, tied, stands = _played(response, fall)
-    moves = [_as_gltf(pose, response.assembly.dimension) for pose in poses]
-    places, turns = np.array([place for place, _ in moves]), np.array([turn for _, turn in moves])
-    # Of the two quaternions of a rotation the one next to the last: players go the short way.
-    for k in range(1, len(turns)):
-        turns[k] *= np.where((turns[k] * turns[k - 1]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
-    sizes = np.repeat(stands[:, :, None].astype(float), 3, axis=2)
-    rods = _rods(response, ties, poses, tied)
+    courses = _courses(response, poses, tied, stands)
     # Numbers in single precision are those about the first place of the first block.
-    origin = places[0, 0].copy()
-    blocks, members = (places - origin, turns, sizes), (rods[0] - origin, *rods[1:])
-    courses = {
-        what: np.concatenate([of_blocks, of_members], axis=1)
-        for what, of_blocks, of_members in zip(("translation", "rotation", "scale"), blocks, members, strict=True)
-    }
-    names = [*response.assembly.names, *map(_rod_name, ties)]
-    scene = _still(response.assembly, ties)
+    origin = courses["translation"][0, 0].copy()
+    courses["translation"] -= origin
+    names = [*response.assembly.names, *map(_rod_name, response.ties)]
+    scene = _still(response.assembly, response.ties)
 
     def animated(buffer: dict[str, bytes], tree: dict[str, Any]) -> None:
         """Add the motion to what trimesh writes of the blocks at rest."""
@@ -133,17 +122,29 @@ def _played(
     return clock, [pose for _, pose, _ in moments], [ties for *_, ties in moments], np.array(stands)
 
 
+def _courses(
+    response: solver.Response, poses: Sequence[solver.Pose], tied: Sequence[mechanics.TieForces], stands: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Arrays (n, n_blocks + n_ties, 3 or 4) of what a node of glTF has; arguments as :func:`_played` gives them."""
+    moves = [_as_gltf(pose, response.assembly.dimension) for pose in poses]
+    places, turns = np.array([place for place, _ in moves]), np.array([turn for _, turn in moves])
+    # Of the two quaternions of a rotation the one next to the last: players go the short way.
+    for k in range(1, len(turns)):
+        turns[k] *= np.where((turns[k] * turns[k - 1]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+    sizes = np.repeat(stands[:, :, None].astype(float), 3, axis=2)
+    both = zip((places, turns, sizes), _rods(response, poses, tied), strict=True)
+    whole = [np.concatenate(of_blocks_and_rods, axis=1) for of_blocks_and_rods in both]
+    return dict(zip(("translation", "rotation", "scale"), whole, strict=True))
+
+
 def _rods(
-    response: solver.Response,
-    ties: Sequence[solver.Tie],
-    poses: Sequence[solver.Pose],
-    tied: Sequence[mechanics.TieForces],
+    response: solver.Response, poses: Sequence[solver.Pose], tied: Sequence[mechanics.TieForces]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places (n, n_ties, 3), quaternions (n, n_ties, 4) and scales (n, n_ties, 3) of rods along z.
 
     ``tied`` (n,) is what they do at the poses, or nothing.
     """
-    assembly = response.assembly
+    assembly, ties = response.assembly, response.ties
     ends = np.array([mechanics.tie_ends(ties, assembly, pose) for pose in poses]).reshape(
         len(poses), len(ties), 2, assembly.dimension
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw, ImageFont
 
@@ -279,6 +280,11 @@ def _inside(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
 def write_words(picture: Image.Image, place: tuple[float, float], words: str, text: int) -> None:
     """Write faint words, their middle at a place of a picture [pixel]."""
     ImageDraw.Draw(picture).text(place, words, palette.FAINT, _font(round(0.85 * text)), anchor="mm")
+
+
+def place_in(shape: shapely.Geometry) -> np.ndarray:
+    """(2,) array: the centroid of an area, or another place in it where it is bent and has that outside."""
+    return shapely.get_coordinates(shape.centroid if shape.contains(shape.centroid) else shape.point_on_surface())[0]
 
 
 def room_in(ring: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from solver import mechanics
 
 from . import palette
 from .figures import plain_text, saved
-from .frame import Frame, room_in
+from .frame import Frame, place_in, room_in
 
 if TYPE_CHECKING:
     from blockvis.layout.layout import Layout
@@ -269,8 +269,7 @@ def _inside(ring: np.ndarray) -> np.ndarray:
     shape = shapely.Polygon(ring)
     if not shape.is_valid or not shape.area:
         return _middle(ring)
-    middle = shape.centroid if shape.contains(shape.centroid) else shape.representative_point()
-    return np.array([middle.x, middle.y])
+    return place_in(shape)
 
 
 def _middle(corners: np.ndarray) -> np.ndarray:

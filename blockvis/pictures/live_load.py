@@ -33,8 +33,8 @@ MOST_ARROWS, CELL = 100, 0.12
 class LiveLoad:
     """Live loads times their multiplier, in the multiplier's sign: forces (n, d) [N] at points (n, d) [m].
 
-    Each acts on one of the blocks (n,), or on several, of which it is the resultant and one is given; the pose is of
-    these alone. In space they may be the largest of all that act, ``n_acting``.
+    Each acts on one of the blocks (n,), or on several, of which it is the resultant and one is given. In space they may
+    be the largest of all that act, ``n_acting``.
     """
 
     points: np.ndarray
@@ -45,7 +45,7 @@ class LiveLoad:
 
     def carried(self, pose: solver.Pose) -> np.ndarray:
         """(n, d) array [m]: where the points are when all blocks are at another pose."""
-        return mechanics.carried(self.points, np.arange(len(self.blocks)), self.pose, _of(self.blocks, pose))
+        return mechanics.carried(self.points, self.blocks, self.pose, pose)
 
     @property
     def largest(self) -> float:
@@ -64,7 +64,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     assembly, pose = response.assembly, increment.pose
     if not (standing and finite):
         nowhere = np.zeros((0, assembly.dimension))
-        return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), _of(np.zeros(0, dtype=int), pose))
+        return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), pose)
     live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + response.dead_at(increment))
     live -= _of_ties(response, increment)
     live[~assembly.free | increment.fallen] = 0.0
@@ -79,8 +79,8 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
         points = leaving(assembly, pose, blocks, pose.positions[blocks] + arms, -units)
     else:
         points = np.array([_entry(assembly, pose, int(block), live[block]) for block in blocks]).reshape(-1, 2)
-    load = LiveLoad(points, forces[blocks], blocks, _of(blocks, pose), len(acting))
-    return load if len(blocks) <= MOST_ARROWS else _gathered(load, pose, CELL * extent)
+    load = LiveLoad(points, forces[blocks], blocks, pose, len(acting))
+    return load if len(blocks) <= MOST_ARROWS else _gathered(load, CELL * extent)
 
 
 def _largest(numbers: np.ndarray, sizes: np.ndarray) -> np.ndarray:
@@ -196,7 +196,7 @@ def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.nd
     return np.asarray(through + ((crossed - through) @ unit).min() * unit) if len(crossed) else centre
 
 
-def _gathered(load: LiveLoad, pose: solver.Pose, cell: float) -> LiveLoad:
+def _gathered(load: LiveLoad, cell: float) -> LiveLoad:
     """Resultants of the loads in each cell of a grid, at the load nearest to where their weights meet.
 
     Where they meet itself may lie in an opening.
@@ -212,9 +212,4 @@ def _gathered(load: LiveLoad, pose: solver.Pose, cell: float) -> LiveLoad:
     away = np.linalg.norm(points - np.stack(middles, axis=1)[which], axis=1)
     order = np.lexsort((away, which))
     nearest = order[np.searchsorted(which[order], np.arange(n))]
-    blocks = load.blocks[nearest]
-    return LiveLoad(points[nearest], np.stack(sums, axis=1), blocks, _of(blocks, pose), load.n_acting)
-
-
-def _of(blocks: np.ndarray, pose: solver.Pose) -> solver.Pose:
-    return solver.Pose(pose.positions[blocks], pose.rotations[blocks])
+    return replace(load, points=points[nearest], forces=np.stack(sums, axis=1), blocks=load.blocks[nearest])

@@ -13,7 +13,7 @@ from blockvis.results.joint_faces import TOUCHING, InitialJoints
 from blockvis.results.joints import carried_faces
 from solver import mechanics
 
-from .frame import Frame
+from .frame import Frame, place_in
 
 #: What lies between faces is a crack until they are apart by this many block sizes, or by their own extent: then the
 #: blocks have parted, and it is air. Of faces that are turned against each other by more than this angle [rad] only the
@@ -324,9 +324,7 @@ def _seen_places(
     (places, extents), axes = np.zeros((2, len(rows), 2)), _own_axes(pose, blocks[rows])
     for row, k in enumerate(rows):
         extents[row] = np.ptp(shapely.get_coordinates(shown[k]) @ axes[row].T, axis=0)
-        # A bent support may have its centroid outside.
-        inside = shown[k].centroid if shown[k].contains(shown[k].centroid) else shown[k].point_on_surface()
-        places[row] = inside.coords[0]
+        places[row] = place_in(shown[k])
     return blocks[rows], places, extents
 
 

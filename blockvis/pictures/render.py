@@ -81,7 +81,7 @@ def draw_still(
         For a number that no increment has, a view or a section of blocks in the plane, and a plane that misses the
         blocks.
     """
-    _check_response(response)
+    check_increments(response)
     chosen = increment if isinstance(increment, solver.Increment) else numbered(response.increments, increment)
     look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
     drawer = Drawer(response, look, size, (chosen,), curve=curve, underlay=underlay, still=True)
@@ -127,7 +127,7 @@ def draw_mechanism(
         As of :func:`draw_still`.
     """
     response = response if isinstance(response, solver.Response) else response.response
-    _check_response(response)
+    check_increments(response)
     swing = swing_of(response)
     sight, cut = seen_from(view, section)
     look, extra = Look(forces="none", sight=sight, cut=cut), (swing.displaced,)
@@ -189,7 +189,7 @@ def animate(
     poster : path, optional
         Of a picture that stands for the film where it does not play: the frame in which the fall is fastest.
     """
-    _check_response(response)
+    check_increments(response)
     look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
     if magnification != 1.0:
         fall = None
@@ -238,9 +238,10 @@ def _digits(bracket: tuple[float, float]) -> int:
     return next((n for n in range(5, 9) if f"{bracket[0]:.{n}g}" != f"{bracket[1]:.{n}g}"), 9)
 
 
-def _check_response(response: solver.Response) -> None:
+def check_increments(response: solver.Response) -> None:
+    """Raise ``ValueError`` for a response without an increment, which no picture or page can show."""
     if not response.increments:
-        raise ValueError(f"there is no increment to draw: {response.message or response.stop}")
+        raise ValueError(f"there is no increment to show: {response.message or response.stop}")
 
 
 def save_picture(picture: Image.Image, path: str | os.PathLike[str]) -> Path:

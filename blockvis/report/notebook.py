@@ -63,11 +63,7 @@ def response_html(response: solver.Response) -> str:
             pictures.append(draw_mechanism(response, Path(folder) / "mechanism.png", size=PICTURE))
         if response.path:
             pictures.append(draw_curve(response, Path(folder) / "curve.png", size=CURVE))
-        images = [
-            f'<img alt="{path.stem}" width="{PICTURE[0] // 2}" '
-            f'src="data:image/png;base64,{base64.b64encode(path.read_bytes()).decode("ascii")}">'
-            for path in pictures
-        ]
+        images = [_image(path.stem, PICTURE[0] // 2, path.read_bytes()) for path in pictures]
     return f"<div>{''.join(images)}{_table(summary_rows(response))}</div>"
 
 
@@ -119,8 +115,11 @@ def _drawn_in_space(assembly: solver.Assembly) -> str:
 
     buffer = io.BytesIO()
     blocks_picture(assembly, (2 * WIDE, 2 * HIGH), palette.role_colours(assembly)).save(buffer, "PNG")
-    data = base64.b64encode(buffer.getvalue()).decode("ascii")
-    return f'<img alt="blocks" width="{WIDE}" src="data:image/png;base64,{data}">'
+    return _image("blocks", WIDE, buffer.getvalue())
+
+
+def _image(alt: str, width: int, png: bytes) -> str:
+    return f'<img alt="{alt}" width="{width}" src="data:image/png;base64,{base64.b64encode(png).decode("ascii")}">'
 
 
 def _drawn(assembly: solver.Assembly) -> str:

@@ -39,6 +39,7 @@ from blockvis.pictures.captions import (
     value_label,
 )
 from blockvis.pictures.marks import STEEPEST, WIDEST
+from blockvis.pictures.render import check_increments
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.pictures.ties import DrawnTies
 from blockvis.results.about import about, certified, counts_text, governing_limit, loss_of
@@ -144,8 +145,7 @@ def add_error(path: str | os.PathLike[str], error: str) -> None:
 
 
 def _error(error: str) -> str:
-    name, _, value = error.partition(": ")
-    return html_rows([(name, value)]) if error else ERROR_UNKNOWN
+    return html_rows([error.partition(": ")[::2]]) if error else ERROR_UNKNOWN
 
 
 def range_rows(band: ReactionRange | None) -> list[tuple[str, str]]:
@@ -167,8 +167,7 @@ def report_html(
     Everything that comes from a file (names, materials, the case) is escaped or goes through ``textContent``; the page
     forbids itself any request.
     """
-    if not response.increments:
-        raise ValueError(f"there is no increment to show: {response.message or response.stop}")
+    check_increments(response)
     page = files("blockvis") / "report"
     # No "<" may survive in the data: a name with "</script>" in it would end the script.
     origin = about(response)

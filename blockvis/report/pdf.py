@@ -21,7 +21,7 @@ from blockvis.pictures.captions import failure_text, in_one_unit, parameter_text
 from blockvis.pictures.crack_drawing import draw_cracks
 from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.marks import evenly
-from blockvis.pictures.render import draw_mechanism, draw_still
+from blockvis.pictures.render import check_increments, draw_mechanism, draw_still
 from blockvis.pictures.underlay import Underlay
 from blockvis.results.about import about
 from blockvis.results.cracks import Crack, cracks_of
@@ -62,21 +62,19 @@ def write_pdf(
     Underlay, view and section are as of :func:`blockvis.draw_still`, all else as of :func:`blockvis.write_report`.
     Raises ``ValueError`` if there is no increment to show.
     """
-    if not response.increments:
-        raise ValueError(f"there is no increment to show: {response.message or response.stop}")
+    check_increments(response)
     eye = {"view": view, "section": section}
     origin = about(response)
     paper = _Paper(f"{origin.name} · {origin.version}".strip(" ·"))
     # A number and its unit stay on one line.
     title = re.sub(r"(?<=\d) (?=\S)", "\N{NO-BREAK SPACE}", headline_of(response))
     paper.heading(" · ".join(filter(None, (origin.name, title))), 15.0)
-    paper.faint(" · ".join(filter(None, (origin.file, origin.finished, origin.version))))
+    paper.words(" · ".join(filter(None, (origin.file, origin.finished, origin.version))), 8.0, palette.FAINT)
     if response.stop is solver.Status.SOLVER_FAILED:
-        paper.warning(failure_text(response))
+        paper.words(failure_text(response), TEXT, palette.WARNING, bold=True)
     with TemporaryDirectory() as folder:
         paper.picture(draw_mechanism(response, Path(folder) / "mechanism.png", underlay=underlay, **eye))
-        name, _, value = error.partition(": ")
-        rows = [*summary_rows(response, fall), *([(name, value)] if value else []), *range_rows(band)]
+        rows = [*summary_rows(response, fall), *([error.partition(": ")[::2]] if error else []), *range_rows(band)]
         paper.tabulate("Numbers", ("", ""), rows, (62.0, 112.0))
         if response.path:
             last = response.path[-1]
@@ -97,7 +95,8 @@ def write_pdf(
     if certificate:
         paper.tabulate("Certificate", ("", ""), certificate, (112.0, 62.0))
     for note in dict.fromkeys(response.notes):
-        paper.note(note)
+        paper.ln(1.0)
+        paper.words(f"Note: {note}", TEXT, palette.INK, after=0.0)
     if case_text:
         paper.listing("Case: keys in use; its whole text is in summary.json", _keys_in_use(case_text))
     return write_atomic(path, paper.output())
@@ -160,44 +159,27 @@ class _Paper(FPDF):
 
     def footer(self) -> None:
         """Write the number of the page and what the document is of."""
-        self.set_y(-12.0)
-        self._write(self._foot, 7.5, palette.FAINT, align="L", ends=False)
-        self.set_y(-12.0)
-        self._write(f"{self.page_no()} of {{nb}}", 7.5, palette.FAINT, align="R", ends=False)
+        self.set_font("text", "", 7.5)
+        self.set_text_color(*palette.FAINT)
+        for text, align in ((self._foot, "L"), (f"{self.page_no()} of {{nb}}", "R")):
+            self.set_y(-12.0)
+            self.cell(WIDTH, LINE, text, align=align)
 
-    def _write(
-        self, text: str, size: float, colour: tuple[int, int, int], *, bold: bool = False, align: str = "L",
-        ends: bool = True,
-    ) -> None:  # fmt: skip
+    def words(
+        self, text: str, size: float, colour: tuple[int, int, int], *, bold: bool = False, after: float = 2.0
+    ) -> None:
+        """Write a paragraph in letters of a size [points], with so much room below it [mm]."""
         self.set_font("text", "B" if bold else "", size)
         self.set_text_color(*colour)
-        if ends:
-            self.multi_cell(WIDTH, size * 0.5, text, align=align, new_x="LMARGIN", new_y="NEXT")
-        else:
-            self.cell(WIDTH, LINE, text, align=align)
+        self.multi_cell(WIDTH, size * 0.5, text, align="L", new_x="LMARGIN", new_y="NEXT")
+        self.ln(after)
 
     def heading(self, text: str, size: float, follows: float = 30.0) -> None:
         """Write a heading, on the next page where what follows, so high [mm], does not fit below it."""
         if self.get_y() > self.h - MARGIN - follows:
             self.add_page()
         self.ln(2.0)
-        self._write(text, size, palette.INK, bold=True)
-        self.ln(1.0)
-
-    def faint(self, text: str) -> None:
-        """Write a line of small grey text."""
-        self._write(text, 8.0, palette.FAINT)
-        self.ln(2.0)
-
-    def warning(self, text: str) -> None:
-        """Write a red line."""
-        self._write(text, TEXT, palette.WARNING, bold=True)
-        self.ln(2.0)
-
-    def note(self, text: str) -> None:
-        """Write a note."""
-        self.ln(1.0)
-        self._write(f"Note: {text}", TEXT, palette.INK)
+        self.words(text, size, palette.INK, bold=True, after=1.0)
 
     def picture(self, path: Path, width: float = WIDTH) -> None:
         """Place a picture of a width [mm], on the next page where it does not fit."""
