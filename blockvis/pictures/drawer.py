@@ -150,7 +150,7 @@ class Drawer:
         if self._flat and (look.sight or look.cut):
             raise ValueError("view and section are of blocks in space; these lie in the plane: leave both out")
         self._underlay, self._still = underlay, still
-        few = self._flat and assembly.n_blocks <= FEW_BLOCKS
+        few = self._flat and not self.many
         self._forces_hidden = look.forces == "auto" and self._flat and not few
         if look.magnification != 1.0:
             # Between blocks that are magnified apart, points of contact have no place.

@@ -14,6 +14,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
 
 import solver
 from blockvis.layout.joints.facing_edges import Facing
@@ -364,8 +365,4 @@ def _round_limits(low: float, high: float) -> list[float]:
         digit = 10.0 ** (np.floor(np.log10(high)) - 1)
         low, high = np.floor(low / digit * (1 + 1e-9)) * digit, np.ceil(high / digit * (1 - 1e-9)) * digit
         return [float(f"{low:.3g}"), float(f"{high if high > low else low + digit:.3g}")]
-    power = 10.0 ** np.floor(np.log10((high - low) / 5.0))
-    step = next(power * k for k in (1.0, 2.0, 5.0, 10.0) if power * k * 5.0 >= (high - low) * (1 - 1e-9))
-    first = np.floor(low / step * (1 + 1e-9))
-    last = max(np.ceil(high / step * (1 - 1e-9)), first + 1)
-    return [float(f"{k * step:.6g}") for k in range(int(first), int(last) + 1)]
+    return [float(f"{tick:.6g}") for tick in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
@@ -14,7 +13,7 @@ from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 from PIL import Image
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkFloatArray, vtkLogger
+from vtkmodules.vtkCommonCore import vtkFloatArray
 from vtkmodules.vtkCommonDataModel import vtkPlane
 
 import solver
@@ -316,7 +315,7 @@ class SolidScene(Scene):
 
     def image(self) -> Image.Image:
         """Draw the picture."""
-        with _quiet():
+        with pv.vtk_verbosity("error"):
             self._plotter.render()
             pixels = self._plotter.screenshot(return_img=True)
         picture = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
@@ -477,23 +476,13 @@ def _line_cells(ends: np.ndarray) -> np.ndarray:
 
 def _plotter(size: tuple[int, int]) -> pv.Plotter:
     """Make a plotter without a window: white, one lamp, several samples a pixel."""
-    with _quiet():
+    # VTK draws without a display, and need not say on stderr that there is none.
+    with pv.vtk_verbosity("error"):
         plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
         plotter.background_color = "white"
         plotter.enable_anti_aliasing("msaa", multi_samples=SAMPLES)
         plotter.add_light(pv.Light(position=LAMP, light_type="camera light", intensity=1.0))
     return plotter
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep VTK from saying on stderr that there is no display: it draws without one."""
-    before = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
-    try:
-        yield
-    finally:
-        vtkLogger.SetStderrVerbosity(before)
 
 
 def _fading(picture: Image.Image, wide: int) -> Image.Image:

@@ -38,6 +38,7 @@ from blockvis.pictures.captions import (
     unit_for,
     value_label,
 )
+from blockvis.pictures.drawer import FEW_BLOCKS
 from blockvis.pictures.marks import STEEPEST, WIDEST
 from blockvis.pictures.render import check_increments
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
@@ -77,9 +78,6 @@ TURNING = "the mouse or Shift with the arrows turns the picture, the mouse with 
 
 #: Crack lines that the table of the page lists.
 LISTED_CRACKS = 8
-
-#: Above this many blocks dots of hinges and lines of sliding joints hide the cracks: they are off until asked for.
-FEW_BLOCKS = 300
 
 
 @dataclass(frozen=True)
@@ -285,6 +283,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
         "tints_words": _tints_text(response, swing),
         "moving": int(np.argmax(swing.parts >= 0)),
         "ramp": hexadecimals(palette.RAMP.astype(int)),
+        # Dots of hinges and lines of sliding joints are off until asked for: they hide the cracks.
         "many": assembly.n_blocks > FEW_BLOCKS,
         "colours": {
             name: palette.hexadecimal(getattr(palette, name.upper()))
