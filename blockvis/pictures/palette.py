@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 import solver
@@ -137,7 +139,7 @@ def rgb(colour: np.ndarray) -> tuple[int, int, int]:
     return int(colour[0]), int(colour[1]), int(colour[2])
 
 
-def hexadecimal(colour: tuple[int, int, int]) -> str:
+def hexadecimal(colour: Iterable[float]) -> str:
     """Write a colour as CSS and matplotlib do.
 
     Examples
@@ -145,4 +147,4 @@ def hexadecimal(colour: tuple[int, int, int]) -> str:
     >>> hexadecimal((255, 0, 16))
     '#ff0010'
     """
-    return "#{:02x}{:02x}{:02x}".format(*colour)
+    return "#{:02x}{:02x}{:02x}".format(*map(int, colour))

@@ -138,7 +138,7 @@ def _drawn(assembly: solver.Assembly) -> str:
         corners = " ".join(f"{x:.2f},{y:.2f}" for x, y in ring.tolist())
         edge = f' stroke="{palette.hexadecimal(palette.SETTLEMENT)}" stroke-width="2"' if assembly.moving[i] else ""
         name = html.escape(assembly.names[i])
-        fill = palette.hexadecimal(tuple(fills[i].tolist()))
+        fill = palette.hexadecimal(fills[i])
         lines.append(f'<polygon points="{corners}" fill="{fill}"{edge}><title>{name}</title></polygon>')
     return "\n".join([*lines, "</svg>"])
 

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.pictures import palette
-
 #: Lengths are stored in this fraction of the extent of the structure, rotations in this many radians.
 FINENESS, TURN_UNIT = 1e-6, 1e-6
 
@@ -39,8 +37,3 @@ def counted_steps(values: np.ndarray, smallest: float) -> np.ndarray:
     """Count, from ``smallest``, the steps by TOLD_FINENESS of itself up to each value, with its sign; 0 below that."""
     sizes = np.maximum(np.abs(values) / smallest, 1.0)
     return (np.sign(values) * rounded(np.log(sizes), TOLD_FINENESS)).astype(np.int32)
-
-
-def hexadecimals(colours: np.ndarray) -> list[str]:
-    """Write colours, (n, 3), as CSS does."""
-    return [palette.hexadecimal((int(r), int(g), int(b))) for r, g, b in colours]

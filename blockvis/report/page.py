@@ -54,7 +54,7 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from .frames import model_of_frames
-from .packing import TURN_UNIT, deflated, hexadecimals, rounded
+from .packing import TURN_UNIT, deflated, rounded
 from .space import model_in_space
 
 #: Endings of a report.
@@ -166,21 +166,20 @@ def report_html(
     forbids itself any request.
     """
     check_increments(response)
-    page = files("blockvis") / "report"
     # No "<" may survive in the data: a name with "</script>" in it would end the script.
     origin = about(response)
     model = _model(response, fall, band) | {"name": origin.name}
     data = json.dumps(model, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
-    failed = response.stop is solver.Status.SOLVER_FAILED
-    return Template((page / "player.html").read_text(encoding="utf-8")).substitute(
+    failed, in_space = response.stop is solver.Status.SOLVER_FAILED, response.assembly.dimension == 3
+    return Template(_part("player.html")).substitute(
         title=html.escape(title or " · ".join(filter(None, (origin.name, headline_of(response))))),
         about=" · ".join(html.escape(part) for part in (origin.file, origin.finished, origin.version) if part),
         failed=f'<p class="failed">{html.escape(failure_text(response))}</p>' if failed else "",
         badge=html.escape(FALL_BADGE if fall is not None else badge_of(response)),
         notes=_notes(response),
-        style=(page / "player.css").read_text(encoding="utf-8"),
-        script=_script(response.assembly.dimension),
-        turning=TURNING if response.assembly.dimension == 3 else "Shift with the arrows moves the picture",
+        style=_part("player.css"),
+        script=_part("player.js").replace("  // SCENE\n", _part("space.js" if in_space else "plane.js")),
+        turning=TURNING if in_space else "Shift with the arrows moves the picture",
         summary=html_rows(summary_rows(response, fall)),
         cracks=_cracks(response) + _table("Ties and props", "ties", tie_rows(response)),
         certificate=html_rows(certificate_rows(response)),
@@ -191,11 +190,9 @@ def report_html(
     )
 
 
-def _script(dimension: int) -> str:
-    """Put what draws blocks in the plane, or in space, into the script of the page."""
-    page = files("blockvis") / "report"
-    scene = (page / ("space.js" if dimension == 3 else "plane.js")).read_text(encoding="utf-8")
-    return (page / "player.js").read_text(encoding="utf-8").replace("  // SCENE\n", scene)
+def _part(name: str) -> str:
+    """Read a file that the page is made of."""
+    return (files("blockvis") / "report" / name).read_text(encoding="utf-8")
 
 
 def headline_of(response: solver.Response) -> str:
@@ -278,11 +275,11 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
         "names": list(assembly.names),
         "materials": list(assembly.materials),
         "roles": [roles[str(role)] for role in assembly.roles],
-        "fills": hexadecimals(fills),
-        "tints": hexadecimals(mechanism_colours(assembly, fills, swing)) if swing.moves else [],
+        "fills": list(map(palette.hexadecimal, fills)),
+        "tints": list(map(palette.hexadecimal, mechanism_colours(assembly, fills, swing))) if swing.moves else [],
         "tints_words": _tints_text(response, swing),
         "moving": int(np.argmax(swing.parts >= 0)),
-        "ramp": hexadecimals(palette.RAMP.astype(int)),
+        "ramp": list(map(palette.hexadecimal, palette.RAMP)),
         # Dots of hinges and lines of sliding joints are off until asked for: they hide the cracks.
         "many": assembly.n_blocks > FEW_BLOCKS,
         "colours": {

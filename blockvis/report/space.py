@@ -15,7 +15,7 @@ from blockvis.pictures.swing import Swing
 from blockvis.results.joint_faces import initial_joints
 
 from .frames import model_of_frames
-from .packing import deflated, hexadecimals, rounded
+from .packing import deflated, rounded
 
 #: Directions are stored in this unit.
 DIRECTION_UNIT = 1e-6
@@ -34,7 +34,7 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
     corners = rounded(rings.points - np.array(model["origin"]), model["unit"])
     return model | {
         "view": np.radians([view.around, view.above]).tolist(),
-        "cracks": hexadecimals(palette.CRACKS.astype(int)),
+        "cracks": list(map(palette.hexadecimal, palette.CRACKS)),
         "fill": _fill(bodies, np.array(model["origin"])) if response.loads.fills else None,
         "packed": model["packed"]
         | {
