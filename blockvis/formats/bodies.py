@@ -108,7 +108,8 @@ class Bodies:
     """Blocks of a file that draws them in space.
 
     ``unit`` is that of length which the file states, "" for none; ``up`` the coordinate that points up, z or y, ""
-    where it differs between files, and ``up_says`` why, for a note.
+    where it differs between files, and ``up_says`` why, for a note; ``grouped`` says whether they may be parts of
+    stones.
     """
 
     bodies: Sequence[Body]
@@ -116,6 +117,7 @@ class Bodies:
     notes: Sequence[str] = ()
     up: str = "z"
     up_says: str = ""
+    grouped: bool = False
 
 
 @dataclass(frozen=True)

@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from blockvis.layout.notes import Note
 from blockvis.layout.units import UNITS
 from blockvis.system.extras import require
 
-from .bodies import Body, drawn_row
+from .bodies import Bodies, Body, drawn_row
 
 #: Nodes nested deeper than this are refused: nodes may place each other.
 DEEPEST = 100
@@ -24,23 +23,7 @@ DEEPEST = 100
 UP = {"X_UP": ([1, 2, 0], "z"), "Y_UP": ([0, 1, 2], "y"), "Z_UP": ([0, 1, 2], "z")}
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """What a file draws: its meshes in place, of which those that we wrote say their name.
-
-    ``unit`` and what is up are as of :class:`blockvis.formats.bodies.Bodies`; ``grouped`` says whether the meshes may
-    be parts of stones.
-    """
-
-    parts: list[Body]
-    unit: str = ""
-    up: str = "z"
-    up_says: str = ""
-    grouped: bool = False
-    notes: list[Note] = field(default_factory=list)
-
-
-def drawn_in(path: Path) -> Drawn:
+def drawn_in(path: Path) -> Bodies:
     """Read the meshes of a file, each placed by the nodes above it and named after the innermost that has a name."""
     require("dae", f"COLLADA files ('{path}'; .obj and .glb are read without)")
     import collada
@@ -74,7 +57,7 @@ def drawn_in(path: Path) -> Drawn:
             parts.append(Body(name, points[:, order] * factor, faces))
             paths.append(around)
     parts = said_below(parts, paths, [[]] * len(parts))
-    return Drawn(parts, unit or "m", up, "y is up, as the file says" if up == "y" else "")
+    return Bodies(parts, unit or "m", up=up, up_says="y is up, as the file says" if up == "y" else "")
 
 
 def said_below(parts: Sequence[Body], paths: Sequence[Sequence[str]], materials: Sequence[Sequence[str]]) -> list[Body]:
@@ -116,13 +99,9 @@ def _has_nan(geometry: Any) -> bool:
 
 def _mesh(geometry: Any) -> tuple[np.ndarray, np.ndarray]:
     """Points and triangles of a geometry: its primitives are one surface in several materials."""
-    points, faces, start = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
-    for primitive in geometry.primitives:
-        triangles = primitive.triangleset() if hasattr(primitive, "triangleset") else primitive
-        if np.ndim(triangles.vertex_index) != 2 or np.shape(triangles.vertex_index)[1] != 3:
-            continue
-        own = np.asarray(triangles.vertex, dtype=float).reshape(-1, 3)
-        faces.append(np.asarray(triangles.vertex_index, dtype=np.int64) + start)
-        points.append(own)
-        start += len(own)
-    return np.concatenate(points), np.concatenate(faces)
+    from trimesh.util import append_faces
+
+    primitives = (one.triangleset() if hasattr(one, "triangleset") else one for one in geometry.primitives)
+    parts = [one for one in primitives if np.ndim(one.vertex_index) == 2 and np.shape(one.vertex_index)[1] == 3]
+    points, faces = append_faces([one.vertex for one in parts], [one.vertex_index for one in parts])
+    return points.reshape(-1, 3).astype(float), faces.reshape(-1, 3).astype(np.int64)

@@ -48,35 +48,35 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read bodies or a flat mesh; .glb is in metres, .dae states its unit, the other formats state none."""
     suffix = path.suffix.lower()
     drawn = {".dae": _dae, ".obj": _obj}.get(suffix, _scene)(path)
-    size = _checked_size(drawn.parts, path)
-    if is_flat(np.concatenate([part.points for part in drawn.parts])):
-        flat = _flat(drawn.parts, path, reading.view)
+    size = _checked_size(drawn.bodies, path)
+    if is_flat(np.concatenate([part.points for part in drawn.bodies])):
+        flat = _flat(drawn.bodies, path, reading.view)
         return replace(flat, unit=drawn.unit, notes=(*flat.notes, *drawn.notes))
     bodies, notes = _enclosed(drawn, size, path, reading)
     if suffix == ".glb":
         up, up_says = _up(path, bodies, size)
     else:
         # .dae states it, and we have z up where we write a row, with a name, for each block.
-        stated = suffix == ".dae" or all("name" in part.said for part in drawn.parts)
+        stated = suffix == ".dae" or all("name" in part.said for part in drawn.bodies)
         up, up_says = drawn.up, drawn.up_says if stated else _stand_along_y(bodies, size)
-    return Bodies(bodies, drawn.unit, (*notes, *drawn.notes), up=up, up_says=up_says)
+    return replace(drawn, bodies=bodies, notes=(*notes, *drawn.notes), up=up, up_says=up_says)
 
 
-def _enclosed(drawn: dae.Drawn, size: float, path: Path, reading: Reading) -> tuple[list[Body], list[Note]]:
+def _enclosed(drawn: Bodies, size: float, path: Path, reading: Reading) -> tuple[list[Body], list[Note]]:
+    from trimesh.util import append_faces
+
     try:
-        return enclosed(drawn.parts, size, path, reading)
+        return enclosed(drawn.bodies, size, path, reading)
     except OpenSurface as error:
         if not drawn.grouped:
             raise
         # Groups may be those of the faces of one stone.
-        starts = np.cumsum([0, *(len(part.points) for part in drawn.parts)])
-        points = np.concatenate([part.points for part in drawn.parts])
-        faces = np.concatenate([part.faces + start for part, start in zip(drawn.parts, starts[:-1], strict=True)])
+        whole = Body(path.name, *append_faces(*zip(*((part.points, part.faces) for part in drawn.bodies), strict=True)))
         try:
-            bodies, notes = enclosed([Body(path.name, points, faces)], size, path, reading)
+            bodies, notes = enclosed([whole], size, path, reading)
         except ValueError:
             raise error from None
-        groups = counted(len(drawn.parts), "name of a group", "names of groups")
+        groups = counted(len(drawn.bodies), "name of a group", "names of groups")
         said = f"{groups}, not closed by themselves; name blocks by 'o' lines"
         return bodies, [*notes, Note(LEFT_OUT, f"not read: {said}")]
 
@@ -106,7 +106,7 @@ class _Object:
         return drawn_row(name, [*groups] if len(groups) == 1 and named_by == "o" else (), materials)
 
 
-def _obj(path: Path) -> dae.Drawn:
+def _obj(path: Path) -> Bodies:
     """Read the objects of an .obj file, or, where it has none, its groups, or else its materials, in their order."""
     text = _obj_text(path)
     there = re.findall(r"^[ \t]*(o|g|usemtl)[ \t]", text, re.MULTILINE)
@@ -153,7 +153,7 @@ def _obj(path: Path) -> dae.Drawn:
     rows = _own_rows(path)
     if word == "o" and _distinct(rows) == [part.name for part in parts]:
         parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
-    return dae.Drawn(parts, grouped=word != "o", notes=_inherited(objects))
+    return Bodies(parts, grouped=word != "o", notes=_inherited(objects))
 
 
 def _inherited(objects: dict[str, _Object]) -> list[Any]:
@@ -196,7 +196,7 @@ def _distinct(rows: Sequence[dict[str, Any]]) -> list[str]:
     return list(found)
 
 
-def _scene(path: Path) -> dae.Drawn:
+def _scene(path: Path) -> Bodies:
     import trimesh
 
     # What it would print of a missing texture is no fault of a stone.
@@ -222,17 +222,17 @@ def _scene(path: Path) -> dae.Drawn:
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
         raise ValueError(f"'{path}' cannot be read as {suffix} ({reason}); export it again") from None
     if suffix != ".glb":
-        return dae.Drawn(parts)
+        return Bodies(parts)
     beside = [mesh.metadata for _, mesh in placed if len(mesh.faces)]
     rows = [one.get("blockvis") for one in beside]
     if all(isinstance(row, dict) for row in rows):
         parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
     else:
         parts = dae.said_below(parts, [one["around"] for one in beside], [one["materials"] for one in beside])
-    return dae.Drawn(parts, "m", "y")
+    return Bodies(parts, "m", up="y")
 
 
-def _dae(path: Path) -> dae.Drawn:
+def _dae(path: Path) -> Bodies:
     try:
         return dae.drawn_in(path)
     except MissingExtra:
@@ -368,14 +368,14 @@ def _materials(node: dict[str, Any], description: dict[str, Any]) -> list[str]:
     return [str(every[one["material"]].get("name", "")) for one in mesh.get("primitives", []) if "material" in one]
 
 
-def _numbered(parts: list[Body], scene: Any, rows: list[dict[str, Any]]) -> dae.Drawn:
+def _numbered(parts: list[Body], scene: Any, rows: list[dict[str, Any]]) -> Bodies:
     """Split a .ply whose faces have a ``block_id`` into one part per number, to which its row belongs."""
     raw = next(iter(scene.geometry.values())).metadata.get("_ply_raw", {}) if parts else {}
     data = raw.get("face", {}).get("data")
     names = getattr(getattr(data, "dtype", None), "names", None) or (data if isinstance(data, dict) else ())
     if "block_id" not in names:
         lost = f"not read: what blockvis wrote of {counted(len(rows), 'block')}: faces have no block_id any more"
-        return dae.Drawn(parts, notes=[Note(LEFT_OUT, lost)] if rows else [])
+        return Bodies(parts, notes=[Note(LEFT_OUT, lost)] if rows else [])
     # trimesh puts the triangles of polygons in another order.
     polygons = data["vertex_indices" if "vertex_indices" in names else "vertex_index"]
     polygons = polygons if isinstance(data, dict) else polygons["f1"]
@@ -387,10 +387,10 @@ def _numbered(parts: list[Body], scene: Any, rows: list[dict[str, Any]]) -> dae.
     known = all(value in range(len(rows)) for value in values.tolist())
     said = [rows[int(value)] if known else {} for value in values]
     numbered = zip(values.tolist(), faces, said, strict=True)
-    return dae.Drawn([Body(f"block {value}", points, fans(own), row) for value, own, row in numbered])
+    return Bodies([Body(f"block {value}", points, fans(own), row) for value, own, row in numbered])
 
 
-def _flat(parts: list[Body], path: Path, view: str | None) -> Layout:
+def _flat(parts: Sequence[Body], path: Path, view: str | None) -> Layout:
     if path.suffix.lower() == ".stl":
         # Each triangle has corners of its own there, by which it would be a piece of its own.
         same = [np.unique(part.points, axis=0, return_inverse=True) for part in parts]
