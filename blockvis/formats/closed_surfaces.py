@@ -11,7 +11,7 @@ import numpy as np
 
 from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, Note
-from blockvis.layout.outlines import FLAT
+from blockvis.layout.outlines import FLAT, loops_of
 from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.solids import area_vectors, fans
 from blockvis.layout.surfaces import same_points, turned_faces
@@ -104,26 +104,13 @@ def _with_holes_closed(
     points: np.ndarray, faces: np.ndarray, open_edges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Points and faces, with those that close its holes; None where a hole is large, or holes touch."""
-    beside: dict[int, list[int]] = {}
-    for a, b in open_edges.tolist():
-        beside.setdefault(a, []).append(b)
-        beside.setdefault(b, []).append(a)
-    if any(len(others) != 2 for others in beside.values()):
+    rings, crossing = loops_of(open_edges.tolist())
+    if crossing is not None or max(map(len, rings)) > HOLE_EDGES:
         return None
-    middles: list[np.ndarray] = []
-    patches, waiting = [], dict.fromkeys(beside)
-    while waiting:
-        ring = [next(iter(waiting))]
-        del waiting[ring[0]]
-        while following := [k for k in beside[ring[-1]] if k in waiting]:
-            ring.append(following[0])
-            del waiting[ring[-1]]
-        if len(ring) > HOLE_EDGES:
-            return None
-        # Around a point in the middle: a diagonal may be an edge of the surface already.
-        patches.append([[ring[k - 1], ring[k], len(points) + len(middles)] for k in range(len(ring))])
-        middles.append(points[ring].mean(axis=0))
-    points, patch = np.vstack([points, middles]), np.concatenate(patches)
+    # Around a point in the middle: a diagonal may be an edge of the surface already.
+    sides = [np.column_stack([np.roll(ring, 1), ring, np.full(len(ring), n)]) for n, ring in enumerate(rings)]
+    patch = np.add(np.concatenate(sides), [0, 0, len(points)])
+    points = np.vstack([points, [points[ring].mean(axis=0) for ring in rings]])
     areas = [float(np.linalg.norm(area_vectors(points, some), axis=1).sum()) for some in (patch, faces)]
     return (points, np.concatenate([faces, patch])) if areas[0] <= HOLE_AREA * areas[1] else None
 

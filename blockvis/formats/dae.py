@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.layout.units import UNITS
+from blockvis.layout.units import unit_of
 from blockvis.system.extras import require
 
 from .bodies import Bodies, Body, drawn_row
@@ -46,18 +45,17 @@ def drawn_in(path: Path) -> Bodies:
     about = document.assetInfo
     order, up = UP.get(str(about.upaxis), UP["Y_UP"])
     metres = float(about.unitmeter or 1.0)
-    unit = next((name for name, size in UNITS.items() if math.isclose(metres, size, rel_tol=1e-3)), "")
-    factor = 1.0 if unit else metres
     parts, paths = list[Body](), list[list[str]]()
     for names, matrix, geometry in _placed(document.scene.nodes if document.scene else [], np.eye(4), (), 0):
         points, faces = _mesh(geometry)
         points = points @ matrix[:3, :3].T + matrix[:3, 3]
         if len(faces):
             *around, name = names or [str(geometry.name or geometry.id)]
-            parts.append(Body(name, points[:, order] * factor, faces))
+            parts.append(Body(name, points[:, order], faces))
             paths.append(around)
     parts = said_below(parts, paths, [[]] * len(parts))
-    return Bodies(parts, unit or "m", up=up, up_says="y is up, as the file says" if up == "y" else "")
+    says = "y is up, as the file says" if up == "y" else ""
+    return Bodies(parts, unit_of(metres) or f"{metres!r} m", up=up, up_says=says)
 
 
 def said_below(parts: Sequence[Body], paths: Sequence[Sequence[str]], materials: Sequence[Sequence[str]]) -> list[Body]:

@@ -144,10 +144,8 @@ class Drawing:
         """
         every = [one.points for one in self.strokes]
         spread_of(np.concatenate(every), f"'{path}'")
-        unwanted, asked = self.choice(reading.ignore), self.choice(reading.only)
-        wanted = [one for one in self.strokes if not unwanted.takes(one.labels, one.looks)]
-        chosen = [one for one in wanted if asked.takes(one.labels, one.looks)] or wanted
-        turn, notes = drawing_plane([one.points for one in chosen] or every, f"'{path}'", reading.view)
+        wanted = [one.points for one in filter(self.wants(reading), self.strokes)]
+        turn, notes = drawing_plane(wanted or every, f"'{path}'", reading.view)
         self.outlines = [outline.mapped(turn[:2]) for outline in self.outlines]
         self.holed = [(outline.mapped(turn[:2]), called) for outline, called in self.holed]
         self.loose = [line.mapped(turn[:2]) for line in self.loose]

@@ -23,7 +23,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches, passed_over
 from blockvis.layout.notes import CHANGED, UNIT, Note
 from blockvis.layout.outlines import ring_area
-from blockvis.layout.units import DOUBTED, UNITS
+from blockvis.layout.units import DOUBTED, unit_of
 from blockvis.system.extras import require
 from solver import mechanics
 
@@ -245,8 +245,7 @@ def _unit_of_system(text: str) -> tuple[str, str]:
         metres = float(found[-1]) if found else 0.0
     except ValueError:
         return "", ""
-    other = f"{metres:.9g} m" if 0.0 < metres < math.inf else ""
-    return next((unit for unit, size in UNITS.items() if math.isclose(metres, size, rel_tol=1e-5)), other), ""
+    return unit_of(metres, 1e-5) or (f"{metres:.9g} m" if 0.0 < metres < math.inf else ""), ""
 
 
 def _is_web_mercator(text: str) -> bool:

@@ -25,7 +25,7 @@ from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import CHANGED, LEFT_OUT, UNIT_TAKEN, Note
 from blockvis.layout.outlines import chords_of, filled
 from blockvis.layout.refusal import Refused
-from blockvis.layout.units import UNITS, metres_per
+from blockvis.layout.units import UNITS, metres_per, unit_of
 from solver import mechanics
 
 from .arcs import MOST_CHORDS, Arc, Bezier, Curve, bezier_chords
@@ -196,9 +196,8 @@ def _unit(root: ElementTree.Element) -> tuple[str, list[str]]:
             return "", [Note(CHANGED, f"{no_scale}; {remedy}")]
         # The drawing is shown as large as fits into the page.
         number = min(number, upright)
-    scale = number * UNITS[width[2]]
-    named = (unit for unit, metres in UNITS.items() if math.isclose(scale, metres, rel_tol=1e-3))
-    return next(named, f"{number:.9g} {width[2]}" if 0.0 < number < math.inf else ""), []
+    scaled = f"{number:.9g} {width[2]}" if 0.0 < number < math.inf else ""
+    return unit_of(number * UNITS[width[2]]) or scaled, []
 
 
 def _view_box(element: ElementTree.Element) -> list[float] | None:

@@ -253,7 +253,7 @@ def outlines_of_cells(
 
 def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> tuple[np.ndarray, LeftOut | None]:
     """Outline of a block, and why it cannot be used if so."""
-    loops, crossing = _loops(edges)
+    loops, crossing = loops_of(edges)
     if crossing is not None:
         x, y = points[crossing]
         around = points[np.unique(edges)]
@@ -281,7 +281,7 @@ def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> tuple[
     return ring, LeftOut("pieces", ring, message, serious=True)
 
 
-def _loops(edges: list[tuple[int, int]]) -> tuple[list[list[int]], int | None]:
+def loops_of(edges: Sequence[Sequence[int]]) -> tuple[list[list[int]], int | None]:
     """Find the closed loops of edges; or a point in which more than two of them end."""
     neighbours: dict[int, list[int]] = {}
     for a, b in edges:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -72,6 +73,17 @@ def metres_per(unit: str) -> float:
     if not 0.0 < metres < np.inf:
         raise ValueError(f"unit '{unit}' is {metres:g} m long; give a number above 0, as 20 mm")
     return metres
+
+
+def unit_of(metres: float, near: float = 1e-3) -> str:
+    """Name the unit that is so long, to a fraction of it; "" for none.
+
+    Examples
+    --------
+    >>> unit_of(0.0254), unit_of(0.02)
+    ('in', '')
+    """
+    return next((unit for unit, size in UNITS.items() if math.isclose(metres, size, rel_tol=near)), "")
 
 
 def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str, str]:

@@ -68,7 +68,7 @@ def test_nodes_around_those_of_stones_are_groups_but_for_those_around_all(tmp_pa
 def test_the_axis_that_points_up_is_that_of_the_file(tmp_path, up, turn):
     leaning = (BOX @ SHEAR.T)[:, turn]
     layout = blockvis.read_layout(document(tmp_path / "a.dae", [("a", np.eye(4))], points=leaning, up=up, unit=2.5))
-    assert (layout.dimension, layout.unit) == (3, "m")
+    assert (layout.dimension, layout.unit) == (3, "2.5 m")
     np.testing.assert_allclose(layout.volumes, 2.5**3, rtol=1e-5)
     np.testing.assert_allclose(np.ptp(layout.points[:, 2]), 2.5, rtol=1e-5)
     np.testing.assert_allclose(sorted(np.ptp(layout.points, axis=0)), 2.5 * np.array([1.0, 1.1, 1.2]), rtol=1e-5)
