@@ -6,6 +6,7 @@ import difflib
 import math
 import re
 import shlex
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,22 @@ def listed(words: Sequence[str], most: int = 6) -> str:
     "'a', 'b' and 1 more"
     """
     return ", ".join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")
+
+
+def numbered(words: Sequence[str], sign: str = " ") -> list[str]:
+    """Put their numbers behind words that are there several times.
+
+    Examples
+    --------
+    >>> numbered(["pier", "arch", "pier"])
+    ['pier 1', 'arch', 'pier 2']
+    """
+    total, seen = Counter(words), Counter[str]()
+    found = []
+    for word in words:
+        seen[word] += 1
+        found.append(f"{word}{sign}{seen[word]}" if total[word] > 1 else word)
+    return found
 
 
 def place_text(place: Iterable[float], digits: int = 4) -> str:

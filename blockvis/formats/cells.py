@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +16,7 @@ from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, UPRIGHT, Note, kind_of
 from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells, spread_of
 from blockvis.layout.solids import fans
+from blockvis.text import numbered
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -76,19 +75,15 @@ def layout_of_cells(
     flat, note = flattened(points, f"'{path}'", view)
     key, names, owner = owners(data, len(rings))
     if key is not None:
-        n, how = len(names), f"one per value of the cell array '{key}'"
+        n, how = len(names), f"one block per value of the cell array '{key}'"
         if key not in OF_BLOCKS:
             names, owner = _in_pieces(rings, names, owner)
-            how = f"one per connected piece of a value of the cell array '{key}'" if len(names) > n else how
-        how = f"{counted(len(names), 'block')}, {how}"
-    elif any(len(ring) > 3 for ring in rings):
-        owner = np.arange(len(rings))
-        names = [f"block {k}" for k in owner]
-        how = f"{counted(len(rings), 'block')}, one per cell: no cell array 'block_id' says which cells are one block"
+            how = f"one block per connected piece of a value of the cell array '{key}'" if len(names) > n else how
     else:
-        owner = _pieces(rings, owner)
+        whole = any(len(ring) > 3 for ring in rings)
+        owner = np.arange(len(rings)) if whole else _pieces(rings, owner)
         names = [f"block {k}" for k in range(int(owner.max()) + 1)]
-        how = f"{counted(len(names), 'block')}, one per connected piece: no cell array 'block_id' says which are one"
+        how = f"one block per {'cell' if whole else 'connected piece'}: no cell array 'block_id' says which are one"
     unusable: dict[int, LeftOut] = {}
     outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     notes = tuple(text for text in (how, note) if text)
@@ -120,10 +115,7 @@ def _in_pieces(rings: Sequence[np.ndarray], names: Sequence[str], owner: np.ndar
     """Names of the connected pieces of parts, numbered where a part has several, and that of each cell."""
     pairs = np.column_stack([owner, _pieces(rings, owner)])
     pieces, piece = np.unique(pairs, axis=0, return_inverse=True)
-    parts, several = pieces[:, 0], np.bincount(pieces[:, 0]) > 1
-    numbers = np.arange(len(parts)) - np.searchsorted(parts, parts) + 1
-    pairs_of = zip(parts.tolist(), numbers.tolist(), strict=True)
-    return [f"{names[part]} {k}" if several[part] else names[part] for part, k in pairs_of], piece.ravel()
+    return numbered([names[part] for part in pieces[:, 0]]), piece.ravel()
 
 
 def _enclosed(
@@ -144,8 +136,8 @@ def _enclosed(
         if key or len(names) < 2 or len(rings) < 4 * len(names):
             raise
         bodies, notes = bodies_of_surfaces(points, rings, owner, rows_of_cells(data, owner, names, path), path)
-    how = f"one per value of the cell array '{key}'" if key else "one per closed surface"
-    return Bodies(bodies, notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}", *notes))
+    how = f"one block per value of the cell array '{key}'" if key else "one block per closed surface"
+    return Bodies(bodies, notes=(how, *notes))
 
 
 def rows_of_cells(
@@ -273,7 +265,7 @@ def _own_names(names: Sequence[str], label: str) -> tuple[str, ...]:
     """Name the blocks of a part after it, unless they have names of their own."""
     if not label or not all(f"{name} ".startswith("block ") for name in names):
         return tuple(names)
-    return (label,) if len(names) == 1 else tuple(f"{label} {k + 1}" for k in range(len(names)))
+    return tuple(numbered([label] * len(names)))
 
 
 def _merged_bodies(parts: Sequence[tuple[Bodies, str]]) -> Bodies:
@@ -286,22 +278,8 @@ def _merged_bodies(parts: Sequence[tuple[Bodies, str]]) -> Bodies:
             for body, name in zip(part.bodies, names, strict=True)
         ]
     first, ups = parts[0][0], {part.up for part, _ in parts}
-    notes = _joined_notes([part for part, _ in parts])
+    notes = tuple(dict.fromkeys(note for part, _ in parts for note in part.notes))
     return replace(first, bodies=bodies, notes=notes, up=first.up if len(ups) == 1 else "")
-
-
-def _joined_notes(parts: Sequence[Layout | Bodies]) -> tuple[str, ...]:
-    """Join the notes of parts: each once, with the sum of the blocks or bodies that it counts."""
-    totals, joined = Counter[str](), dict[str, str]()
-    for note in (note for part in parts for note in part.notes):
-        match = re.fullmatch(r"(\d+) (?:(blocks?)|body|bodies), (.*)", note)
-        if match is None:
-            joined.setdefault(note, note)
-            continue
-        totals[match[3]] += int(match[1])
-        word = ("block",) if match[2] else ("body", "bodies")
-        joined[match[3]] = f"{counted(totals[match[3]], *word)}, {match[3]}"
-    return tuple(joined.values())
 
 
 def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> Layout:
@@ -318,7 +296,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
         unit=named[0].unit,
         unit_by=named[0].unit_by,
         thickness_unit=named[0].thickness_unit,
-        notes=_joined_notes(named),
+        notes=tuple(dict.fromkeys(joined("notes"))),
         left_out=joined("left_out"),
         looks=joined("looks"),
         within=joined("within"),

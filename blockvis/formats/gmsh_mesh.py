@@ -7,7 +7,6 @@ name in different dimensions, and reserves whatever memory the file asks for. It
 from __future__ import annotations
 
 import json
-from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 from blockvis.layout.triangulation import cells_of_ring
+from blockvis.text import numbered
 from solver.mechanics import counted
 
 from .bodies import Bodies
@@ -132,7 +132,7 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
     flat, note = flattened(mesh.coordinates, f"'{path}'", reading.view)
     unusable: dict[int, LeftOut] = {}
     outlines = outlines_of_cells(flat, rings, owner, names, unusable)
-    notes = _notes(counted(len(tags), "block"), groups, "surface") + ([note] if note else [])
+    notes = _notes(groups, "surface") + ([note] if note else [])
     layout = Layout(tuple(outlines), tuple(names), tuple(groups), materials=tuple(groups), unit="", notes=tuple(notes))
     rows = [table.get(str(tag)) for tag in tags]
     if all(isinstance(row, dict) for row in rows):
@@ -153,7 +153,7 @@ def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Pat
             # A drawing that is meant to be flat: the error says how far it is not.
             flattened(mesh.coordinates, f"'{path}'")
             raise
-    return Bodies(bodies, notes=(f"{counted(len(bodies), 'body', 'bodies')}, one per closed surface", *notes))
+    return Bodies(bodies, notes=("one block per closed surface", *notes))
 
 
 def _said(group: str) -> dict[str, str]:
@@ -176,15 +176,15 @@ def _bodies(mesh: _Mesh, path: Path) -> Bodies:
         for name, group in zip(_entity_names(groups, tags, "volume"), groups, strict=True)
     ]
     bodies = bodies_of_cells(mesh.coordinates, mesh.solids, owner, rows)
-    notes = _notes(counted(len(bodies), "body", "bodies"), groups, "volume")
+    notes = _notes(groups, "volume")
     if len(bodies) > len(tags):
         notes[0] = f"{len(bodies)} bodies, the pieces of {counted(len(tags), 'meshed volume')}"
     return Bodies(bodies, notes=notes)
 
 
-def _notes(found: str, groups: list[str], kind: str) -> list[str]:
+def _notes(groups: list[str], kind: str) -> list[str]:
     """Say where blocks come from, and how many entities of a kind are in no physical group."""
-    notes = [f"{found}, one per meshed {kind}; a {kind} in no physical group may be missing from the file"]
+    notes = [f"one block per meshed {kind}; a {kind} in no physical group may be missing from the file"]
     if "" in groups:
         notes.append(f"in no physical group: {groups.count('')} of {counted(len(groups), kind)}")
     return notes
@@ -206,12 +206,7 @@ def _group_names(mesh: _Mesh, dimension: int, tags: np.ndarray, path: Path) -> l
 
 
 def _entity_names(groups: list[str], tags: np.ndarray, kind: str) -> list[str]:
-    total, seen = Counter(groups), Counter[str]()
-    names = []
-    for group, tag in zip(groups, tags, strict=True):
-        seen[group] += 1
-        names.append(f"{kind} {tag}" if not group else group if total[group] == 1 else f"{group} {seen[group]}")
-    return names
+    return [name if group else f"{kind} {tag}" for name, group, tag in zip(numbered(groups), groups, tags, strict=True)]
 
 
 def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, object]]]:

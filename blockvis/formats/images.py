@@ -15,7 +15,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
 from blockvis.layout.outlines import ring_area
-from blockvis.text import listed
+from blockvis.text import listed, numbered
 from solver.mechanics import counted
 
 from .image_labels import Labels, Photograph, labels_of
@@ -213,16 +213,10 @@ def _named(labels: Labels, regions: Regions) -> tuple[tuple[str, ...], tuple[str
     """Name each region after its label, numbered where there are several; these are a group."""
     if not labels.names:
         return tuple(f"stone {k + 1}" for k in range(len(regions.labels))), ()
-    of_label = np.bincount(regions.labels, minlength=len(labels.names) + 1)
-    seen = np.zeros_like(of_label)
-    names, groups = [], []
-    for label in regions.labels.tolist():
-        seen[label] += 1
-        word = labels.names[label - 1]
-        word = word if word.startswith("#") else f"label {word}"
-        names.append(word if of_label[label] == 1 else f"{word}-{seen[label]}")
-        groups.append(word if of_label[label] > 1 else "")
-    return tuple(names), tuple(groups)
+    words = [labels.names[label - 1] for label in regions.labels.tolist()]
+    words = [word if word.startswith("#") else f"label {word}" for word in words]
+    names = numbered(words, "-")
+    return tuple(names), tuple("" if name == word else word for name, word in zip(names, words, strict=True))
 
 
 def _notes(labels: Labels, regions: Regions, found: Outlined, placement: Placement) -> tuple[str, ...]:

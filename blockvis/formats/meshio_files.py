@@ -17,7 +17,6 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.text import listed
-from solver.mechanics import counted
 
 from .bodies import Bodies
 from .cells import CELL_SET, flat_beside, layout_of_cells, owners, rows_of_cells
@@ -130,8 +129,8 @@ def _bodies(
 ) -> Bodies:
     key, numbered, owner = owners(data, sum(len(nodes) for _, nodes in cells))
     bodies = bodies_of_cells(points, cells, owner, rows_of_cells(data, owner, numbered, path))
-    how = f"one per value of the cell array '{key}'" if key else "one per piece that hangs together"
-    return Bodies(bodies, notes=(f"{counted(len(bodies), 'body', 'bodies')}, {how}",))
+    how = f"one block per value of the cell array '{key}'" if key else "one block per piece that hangs together"
+    return Bodies(bodies, notes=(how,))
 
 
 class _Ending(io.StringIO):

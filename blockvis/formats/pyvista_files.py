@@ -330,12 +330,12 @@ def _bodies_of_solids(grid: Any, path: Path | str, stands: np.ndarray) -> Bodies
     solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, POLYHEDRON]) & stands)
     data = {str(key): np.asarray(grid.cell_data[key])[solid] for key in grid.cell_data}
     key, names, owner = owners(data, len(solid))
-    note = f"one per value of the cell array '{key}'"
+    how = f"one block per value of the cell array '{key}'"
     if key is None:
-        note = "one per piece that hangs together: no cell array 'block_id' says which cells are one block"
+        how = "one block per piece that hangs together: no cell array 'block_id' says which are one"
         if (types[solid] == POLYHEDRON).all():
             owner, names = np.arange(len(solid)), [f"block {k}" for k in range(len(solid))]
-            note = "one per cell: no cell array 'block_id' says which cells are one block"
+            how = "one block per cell: no cell array 'block_id' says which are one"
     faceted = types[solid] == POLYHEDRON
     if faceted.any() and not faceted.all():
         raise ValueError(f"'{path}' has polyhedra beside other cells with a volume; write all blocks as polyhedra")
@@ -345,7 +345,7 @@ def _bodies_of_solids(grid: Any, path: Path | str, stands: np.ndarray) -> Bodies
         bodies = find(grid, np.asarray(grid.points, dtype=float), solid, owner, rows)
     except IndexError as error:
         raise ValueError(f"'{path}' has a damaged cell ({error}); export it again") from None
-    return Bodies(bodies, notes=(f"{counted(len(bodies), 'body', 'bodies')}, {note}",))
+    return Bodies(bodies, notes=(how,))
 
 
 def _bodies_by_shape(

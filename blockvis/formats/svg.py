@@ -417,30 +417,35 @@ def _matrix(text: str, path: Path) -> np.ndarray:
     result = np.eye(3)
     text = _CSS_UNIT.sub(r"\1", text)
     for name, arguments in _TRANSFORM.findall(text):
-        v = [float(x) for x in re.findall(_NUMBER, arguments)]
         step = np.eye(3)
-        if name == "matrix" and len(v) == 6:
-            step[:2] = np.array(v).reshape(3, 2).T
-        elif name == "translate" and v:
-            step[:2, 2] = [v[0], v[1] if len(v) > 1 else 0.0]
-        elif name == "scale" and v:
-            step[0, 0], step[1, 1] = v[0], v[1] if len(v) > 1 else v[0]
-        elif name == "rotate" and len(v) in (1, 3):
-            c, s = math.cos(math.radians(v[0])), math.sin(math.radians(v[0]))
-            step[:2, :2] = [[c, -s], [s, c]]
-            if len(v) == 3:
-                step[:2, 2] = np.array(v[1:]) - step[:2, :2] @ v[1:]
-        elif name in ("skewX", "skewY") and len(v) == 1:
-            step[(0, 1) if name == "skewX" else (1, 0)] = math.tan(math.radians(v[0]))
-        else:
+        try:
+            step[:2] = _STEPS[name](*(float(x) for x in re.findall(_NUMBER, arguments)))
+        except (TypeError, ValueError):
             raise ValueError(
                 f"'{path}' has a transform {name}({arguments:.60}) that cannot be read; apply it to the shapes"
-            )
+            ) from None
         result = result @ step
     unread = _TRANSFORM.sub("", text).strip(" ,\t\r\n")
     if unread not in ("", "none"):
         raise ValueError(f"'{path}' has a transform {unread:.60} that cannot be read; apply it to the shapes")
     return result
+
+
+def _rotated(angle: float, *centre: float) -> list[list[float]]:
+    x, y = centre or (0.0, 0.0)
+    c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    return [[c, -s, x - (c * x - s * y)], [s, c, y - (s * x + c * y)]]
+
+
+#: Rows of the matrices of transforms.
+_STEPS: dict[str, Callable[..., list[list[float]]]] = {
+    "matrix": lambda a, b, c, d, e, f: [[a, c, e], [b, d, f]],
+    "translate": lambda x, y=0.0: [[1.0, 0.0, x], [0.0, 1.0, y]],
+    "scale": lambda x, y=None: [[x, 0.0, 0.0], [0.0, x if y is None else y, 0.0]],
+    "rotate": _rotated,
+    "skewX": lambda angle: [[1.0, math.tan(math.radians(angle)), 0.0], [0.0, 1.0, 0.0]],
+    "skewY": lambda angle: [[1.0, 0.0, 0.0], [math.tan(math.radians(angle)), 1.0, 0.0]],
+}
 
 
 def _length(element: ElementTree.Element, key: str) -> float:

@@ -154,10 +154,14 @@ STONES = """*ELSET, ELSET=fixed
 @pytest.mark.parametrize(
     ("tail", "groups", "note"),
     [
-        (STONES, ("", "", "", ""), "4 blocks"),
-        (f"{STONES}\n*ELSET, ELSET=all\nfixed, a\nb, c", ("", "", "", ""), "4 blocks"),
-        (f"{STONES}\n*ELSET, ELSET=section\na, b", ("", "section", "section", ""), "4 blocks"),
-        (f"{STONES}\n*ELSET, ELSET=moving\nc", ("", "", "", "moving"), "4 blocks"),
+        (STONES, ("", "", "", ""), "one block per value of the cell array"),
+        (f"{STONES}\n*ELSET, ELSET=all\nfixed, a\nb, c", ("", "", "", ""), "one block per value of the cell array"),
+        (
+            f"{STONES}\n*ELSET, ELSET=section\na, b",
+            ("", "section", "section", ""),
+            "one block per value of the cell array",
+        ),
+        (f"{STONES}\n*ELSET, ELSET=moving\nc", ("", "", "", "moving"), "one block per value of the cell array"),
         (f"{STONES}\n*ELSET, ELSET=_loaded\n2, 4", ("", "", "", ""), "the cell sets '_loaded' were not used: they cut"),
     ],
 )

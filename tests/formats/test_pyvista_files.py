@@ -23,7 +23,7 @@ def test_one_polygon_is_one_block_without_ids(tmp_path, suffix):
     quads().save(tmp_path / f"a{suffix}")
     drawing = read_layout(tmp_path / f"a{suffix}")
     assert drawing.n_blocks == 3
-    assert any("one per cell: no cell array 'block_id'" in note for note in drawing.notes)
+    assert any("one block per cell: no cell array 'block_id'" in note for note in drawing.notes)
 
 
 def test_reading_leaves_logging_as_it_was(tmp_path):

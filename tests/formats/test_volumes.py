@@ -158,7 +158,7 @@ def test_pieces_of_a_vtu_without_ids(tmp_path):
     pv.UnstructuredGrid({pv.CellType.TETRA: cells}, points).save(tmp_path / "a.vtu")
     layout = read_layout(tmp_path / "a.vtu")
     assert layout.n_blocks == 3
-    assert any("one per piece that hangs together" in note for note in layout.notes)
+    assert any("one block per piece that hangs together" in note for note in layout.notes)
 
 
 def test_polyhedra_are_one_block_each(tmp_path):
@@ -229,7 +229,7 @@ def test_closed_surfaces_are_bodies(tmp_path, suffix):
     layout = read_layout(path, view="xz")
     assert layout.thickness == pytest.approx([0.25])
     assert read(path, view="xz").areas == pytest.approx([0.5])
-    assert any("one per closed surface" in note for note in layout.notes)
+    assert any("one block per closed surface" in note for note in layout.notes)
 
 
 @pytest.mark.parametrize("suffix", [".msh", ".vtp"])
