@@ -7,6 +7,7 @@ import logging
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +40,6 @@ STANDING = 0.5
 
 #: Words of an .obj file that name its objects, groups and materials.
 _WORDS = ("o", "g", "usemtl")
-
-#: Largest description of a .glb file that is looked into [bytes].
-LARGEST_HEADER = 64 * 2**20
 
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
@@ -208,28 +206,23 @@ def _scene(path: Path) -> Bodies:
         bodies = counted(begun, "body begins", "bodies begin")
         raise ValueError(f"'{path}' breaks off: {bodies} and {ended} end (endsolid); export it again")
     try:
+        if suffix == ".glb":
+            return _nodes(path)
         scene = trimesh.load_scene(str(path), process=False)
-        placed = _placed(scene, path)
-        parts = [
-            Body(name, np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
-            for name, mesh in placed
-            if len(mesh.faces)
-        ]
-        if suffix == ".ply":
-            return _numbered(parts, scene, _own_rows(path))
+        meshes = {str(name): mesh for name, mesh in scene.geometry.items() if hasattr(mesh, "faces")}
+        parts = [_body(name, [mesh]) for name, mesh in meshes.items() if len(mesh.faces)]
+        return _numbered(parts, scene, _own_rows(path)) if suffix == ".ply" else Bodies(parts)
     except Exception as error:  # noqa: BLE001
         # trimesh passes on the errors of whatever parser it uses.
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
         raise ValueError(f"'{path}' cannot be read as {suffix} ({reason}); export it again") from None
-    if suffix != ".glb":
-        return Bodies(parts)
-    beside = [mesh.metadata for _, mesh in placed if len(mesh.faces)]
-    rows = [one.get("blockvis") for one in beside]
-    if all(isinstance(row, dict) for row in rows):
-        parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
-    else:
-        parts = dae.said_below(parts, [one["around"] for one in beside], [one["materials"] for one in beside])
-    return Bodies(parts, "m", up="y")
+
+
+def _body(name: str, meshes: Sequence[Any]) -> Body:
+    from trimesh.util import append_faces
+
+    points, faces = append_faces([mesh.vertices for mesh in meshes], [mesh.faces for mesh in meshes])
+    return Body(name, np.asarray(points, dtype=float), np.asarray(faces, dtype=np.int64))
 
 
 def _dae(path: Path) -> Bodies:
@@ -263,7 +256,7 @@ def _description(path: Path) -> dict[str, Any]:
     """Read what a .glb file says about itself; empty where it is no JSON."""
     with path.open("rb") as stream:
         head = stream.read(20)
-        return json_object(stream.read(min(int.from_bytes(head[12:16], "little"), LARGEST_HEADER)))
+        return json_object(stream.read(int.from_bytes(head[12:16], "little")))
 
 
 def _up(path: Path, bodies: Sequence[Body], size: float) -> tuple[str, str]:
@@ -308,47 +301,55 @@ def _standing(bodies: Sequence[Body], axis: int, size: float) -> int:
     return len(feet) if ground.covers(shapely.Point(middle[plan])) else 0
 
 
-def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:
-    """Meshes of a scene with its transforms applied, and their names.
+def _nodes(path: Path) -> Bodies:
+    """Read the meshes at the nodes of a .glb file, of which one may be at several, and have a part for each material.
 
-    In a .glb file the node has the name of the stone: several nodes may place one mesh, and have one name, and a mesh
-    has a primitive for each of its materials. The names of these and of the nodes around are in its metadata.
+    A node has the name of the stone, the nodes around it are its groups.
     """
-    from trimesh import Trimesh
-    from trimesh.util import concatenate, unique_name
+    import trimesh
 
-    description = _description(path) if path.suffix.lower() == ".glb" else {}
-    nodes, meshes = description.get("nodes", []), description.get("meshes", [])
-    above = {below: k for k, node in enumerate(nodes) for below in node.get("children", [])}
-    # trimesh numbers nodes of the same name, and one that is called as its frame of all.
-    number, counts = dict[str, int](), dict[str | None, int]()
+    described = _description(path)
+    nodes, meshes = described.get("nodes", []), described.get("meshes", [])
     for k, node in enumerate(nodes):
-        number[unique_name(node.get("name", str(k)), number, counts=counts)] = k
         if "mesh" in node and not 0 <= node["mesh"] < len(meshes):
             raise ValueError(f"node {node.get('name', k)} has mesh {node['mesh']} of {len(meshes)}")
-    if scene.graph.base_frame in number:
-        number[unique_name(scene.graph.base_frame, set(number))] = number[scene.graph.base_frame]
-    order, parents = {name: k for k, name in enumerate(scene.geometry)}, scene.graph.transforms.parents
+    # Called by their numbers: trimesh changes names that are there several times.
+    called = {"nodes": [{**node, "name": str(k)} for k, node in enumerate(nodes)]} if nodes else {}
+    scene = trimesh.load_scene(_with_description(path, described | called), file_type="glb", process=False)
+    order, found = {name: k for k, name in enumerate(scene.geometry)}, dict[int, list[Any]]()
     placed = []
-    for below in scene.graph.nodes_geometry:
-        transform, name = scene.graph[below]
-        # Each primitive of several lies, under a name by chance, below the node that places their mesh.
-        node = parents[below] if below not in number and parents.get(below) in number else below
-        placed.append((order[name], number.get(node, -1), str(node), scene.geometry[name], transform))
-    found: dict[str, tuple[str, list[Any]]] = {}
-    for k, n, node, mesh, transform in sorted(placed, key=lambda item: item[:3]):
-        if hasattr(mesh, "faces"):
-            drawn = nodes[n] if n >= 0 else {"name": str([*order][k])}
-            own = drawn.get("name") or meshes[drawn["mesh"]].get("name") or path.name
-            # Without its textures, which would be joined to one.
-            beside = {"around": _around(n, nodes, above), "materials": _materials(drawn, description)}
-            shape = Trimesh(mesh.vertices, mesh.faces, process=False, metadata={**mesh.metadata, **beside})
-            found.setdefault(node, (str(own), []))[1].append(shape.apply_transform(transform))
-    joined = [(name, parts[0] if len(parts) == 1 else concatenate(parts), parts) for name, parts in found.values()]
-    for _, mesh, parts in joined:
-        # Not every version of trimesh keeps it where parts are joined.
-        mesh.metadata.update(parts[0].metadata)
-    return [(name, mesh) for name, mesh, _ in joined]
+    for frame in scene.graph.nodes_geometry:
+        transform, name = scene.graph[frame]
+        # Of a mesh in several parts each has a frame that is called after the node, and more.
+        placed.append((order[name], int(frame.partition("_")[0]), transform))
+    for k, node, transform in sorted(placed, key=lambda one: one[:2]):
+        mesh = scene.geometry[[*order][k]]
+        if len(getattr(mesh, "faces", ())):
+            # Without its textures.
+            shape = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).apply_transform(transform)
+            found.setdefault(node, []).append(shape)
+    drawn = [(nodes[k], meshes[nodes[k]["mesh"]]) for k in found]
+    names = [str(node.get("name") or mesh.get("name") or path.name) for node, mesh in drawn]
+    parts = [_body(name, shapes) for name, shapes in zip(names, found.values(), strict=True)]
+    rows = [row for _, mesh in drawn if isinstance(row := (mesh.get("extras") or {}).get("blockvis"), dict)]
+    if len(rows) == len(parts):
+        parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
+    else:
+        above = {below: k for k, node in enumerate(nodes) for below in node.get("children", [])}
+        around, every = [_around(k, nodes, above) for k in found], described.get("materials", [])
+        painted = [[one["material"] for one in mesh["primitives"] if "material" in one] for _, mesh in drawn]
+        materials = [[str(every[k].get("name", "")) for k in own] for own in painted]
+        parts = dae.said_below(parts, around, materials)
+    return Bodies(parts, "m", up="y")
+
+
+def _with_description(path: Path, described: dict[str, Any]) -> BytesIO:
+    """Give the content of a .glb file with another description of it."""
+    data, text = path.read_bytes(), json.dumps(described).encode()
+    text += b" " * (-len(text) % 4)
+    rest = data[20 + int.from_bytes(data[12:16], "little") :]
+    sizes = [n.to_bytes(4, "little") for n in (20 + len(text) + len(rest), len(text))]
+    return BytesIO(b"".join([data[:8], *sizes, data[16:20], text, rest]))
 
 
 def _around(node: int, nodes: Sequence[dict[str, Any]], above: dict[int, int]) -> list[str]:
@@ -357,15 +358,6 @@ def _around(node: int, nodes: Sequence[dict[str, Any]], above: dict[int, int]) -
     while (node := above.get(node, -1)) >= 0 and len(names) < len(nodes):
         names.insert(0, str(nodes[node].get("name", "")))
     return names
-
-
-def _materials(node: dict[str, Any], description: dict[str, Any]) -> list[str]:
-    """Names of the materials of the mesh at a node of a .glb file."""
-    mesh, every = (
-        description.get("meshes", [])[node["mesh"]] if "mesh" in node else {},
-        description.get("materials", []),
-    )
-    return [str(every[one["material"]].get("name", "")) for one in mesh.get("primitives", []) if "material" in one]
 
 
 def _numbered(parts: list[Body], scene: Any, rows: list[dict[str, Any]]) -> Bodies:
