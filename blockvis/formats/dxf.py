@@ -7,6 +7,7 @@ import logging
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, Set
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -189,7 +190,7 @@ def _bounded(entities: Any, path: Path, frozen: Set[str]) -> Iterator[tuple[Any,
     """Yield entities and their handles; of a small file that inserts any number of copies no more than it may have."""
     size = path.stat().st_size
     most = max(size // 4, 1000)
-    for number, found in enumerate(_flat(entities, 0, path, frozen)):
+    for number, found in enumerate(_flat(entities, path, frozen, _Place())):
         if number >= most:
             raise ValueError(
                 f"'{path}' inserts more than {most} entities, though it has {size} bytes only; "
@@ -198,90 +199,82 @@ def _bounded(entities: Any, path: Path, frozen: Set[str]) -> Iterator[tuple[Any,
         yield found
 
 
-def _flat(
-    entities: Any,
-    depth: int,
-    path: Path,
-    frozen: Set[str],
-    parent: str = "",
-    layer: str = "0",
-    colour: int = WHITE,
-    line_type: str = BY_LAYER_TYPE,
-) -> Iterator[tuple[Any, str]]:
-    """Yield all entities, inserted blocks resolved, each with a handle that names it.
+@dataclass(frozen=True)
+class _Place:
+    """Where a block is drawn: its matrix, and what its entities take over of the reference that inserts it."""
 
-    What a block draws on layer 0 lies on the layer on which it is inserted; on a frozen one none of it is seen.
-    """
-    if depth > DEEPEST_INSERT:
+    matrix: Any = None
+    handle: str = ""
+    block: str = ""
+    layer: str = "0"
+    colour: int = WHITE
+    line_type: str = BY_LAYER_TYPE
+    depth: int = 0
+
+    def drawn(self, entity: Any, path: Path) -> list[Any]:
+        """Draw an entity of the block here; arcs become those of ellipses, of which one outline may have several.
+
+        What a block draws on layer 0 lies on the layer on which it is inserted.
+        """
+        from ezdxf import transform
+
+        if self.matrix is None:
+            return [entity]
+        # References are followed by their matrices, which can be sheared.
+        matrix = None if entity.dxftype() == "INSERT" else self.matrix
+        with _resolving(self.block, path):
+            found = list[Any](transform.copies([entity], matrix)[1])
+        for one in found:
+            if one.dxf.layer == "0":
+                one.dxf.layer = self.layer
+            if one.dxf.get("color", BY_LAYER) == BY_BLOCK:
+                one.dxf.color = self.colour
+            if str(one.dxf.get("linetype", BY_LAYER_TYPE)).upper() == BY_BLOCK_TYPE:
+                one.dxf.linetype = self.line_type
+        return found
+
+
+@contextmanager
+def _resolving(block: str, path: Path) -> Iterator[None]:
+    """Refuse a damaged block, for which ezdxf raises errors of any kind."""
+    try:
+        yield
+    except (TypeError, AttributeError, ValueError, KeyError, IndexError, ArithmeticError) as error:
+        raise ValueError(f"'{path}': block reference '{block}' cannot be resolved ({error}); explode it") from None
+
+
+def _flat(entities: Any, path: Path, frozen: Set[str], where: _Place) -> Iterator[tuple[Any, str]]:
+    """Yield all entities, inserted blocks resolved, each with a handle that names it; none on a frozen layer."""
+    if where.depth > DEEPEST_INSERT:
         raise ValueError(f"'{path}' inserts blocks into each other more than {DEEPEST_INSERT} deep; explode them")
     for number, entity in enumerate(entities):
-        handle = f"{parent}.{number}" if parent else str(entity.dxf.handle or number)
-        if parent and entity.dxf.layer == "0":
-            entity.dxf.layer = layer
-        if parent and entity.dxf.get("color", BY_LAYER) == BY_BLOCK:
-            entity.dxf.color = colour
-        if parent and str(entity.dxf.get("linetype", BY_LAYER_TYPE)).upper() == BY_BLOCK_TYPE:
-            entity.dxf.linetype = line_type
-        if entity.dxftype() != "INSERT" or entity.dxf.layer in frozen or _is_closed(entity):
-            yield entity, handle
-            continue
-        copies = entity.multi_insert() if entity.mcount > 1 else [entity]
-        for k, copy in enumerate(copies):
-            plain, stretch = _stretched(copy)
-            number_of = f"{handle}.{k}" if entity.mcount > 1 else handle
-            own = entity.dxf.layer, int(entity.dxf.get("color", BY_LAYER)), _line_type(entity) or "Continuous"
-            inner = _flat(_inserted(plain, path), depth + 1, path, frozen, number_of, *own)
-            yield from inner if stretch is None else _transformed(inner, stretch, frozen)
+        handle = f"{where.handle}.{number}" if where.handle else str(entity.dxf.handle or number)
+        drawn = where.drawn(entity, path)
+        for k, one in enumerate(drawn):
+            if one.dxftype() != "INSERT" or one.dxf.layer in frozen or _is_closed(one):
+                yield one, f"{handle}.{k}" if len(drawn) > 1 else handle
+                continue
+            content = [own for own in one.block() if own.dxftype() != "ATTDEF"]
+            for place in _places(one, handle, path, where):
+                yield from _flat(content, path, frozen, place)
+
+
+def _places(insert: Any, handle: str, path: Path, where: _Place) -> Iterator[_Place]:
+    """Yield the places where a reference inserts its block: one, or those in rows and columns."""
+    # QCAD writes a zscale of 0 for plane drawings, with which no transformation can be made.
+    insert.dxf.zscale = insert.dxf.get("zscale", 1.0) or 1.0
+    block, layer, colour = str(insert.dxf.get("name", "?")), insert.dxf.layer, int(insert.dxf.get("color", BY_LAYER))
+    for k, copy in enumerate(insert.multi_insert() if insert.mcount > 1 else [insert]):
+        with _resolving(block, path):
+            matrix = copy.matrix44() if where.matrix is None else copy.matrix44() * where.matrix
+        called = f"{handle}.{k}" if insert.mcount > 1 else handle
+        yield _Place(matrix, called, block, layer, colour, _line_type(insert) or "Continuous", where.depth + 1)
 
 
 def _is_closed(insert: Any) -> bool:
     """Whether nothing of an inserted block is drawn here: it is invisible, in another file, or not there."""
     block = insert.block()
     return bool(insert.dxf.get("invisible", 0)) or block is None or bool(block.block.is_xref)
-
-
-def _stretched(insert: Any) -> tuple[Any, Any]:
-    """Split a stretched reference to a block that inserts others into one that only places it, and a matrix.
-
-    Inserted blocks that are turned are sheared by it, which ezdxf cannot say of a reference: it draws them turned.
-    """
-    # QCAD writes a zscale of 0 for plane drawings, with which no transformation can be made.
-    insert.dxf.zscale = insert.dxf.get("zscale", 1.0) or 1.0
-    scales = {abs(insert.dxf.get(f"{axis}scale", 1.0)) for axis in "xyz"}
-    block = insert.block()
-    if len(scales) == 1 or block is None or not block.query("INSERT"):
-        return insert, None
-    plain = insert.copy()
-    for key, value in (("insert", (0, 0, 0)), ("rotation", 0), ("extrusion", (0, 0, 1))):
-        plain.dxf.set(key, value)
-    for axis in "xyz":
-        plain.dxf.set(f"{axis}scale", 1.0)
-    placed = plain.matrix44()
-    placed.inverse()
-    return plain, placed * insert.matrix44()
-
-
-def _transformed(entities: Iterator[tuple[Any, str]], matrix: Any, frozen: Set[str]) -> Iterator[tuple[Any, str]]:
-    """Transform the entities of a block; arcs become those of ellipses, of which one outline may have several."""
-    from ezdxf import transform
-
-    for entity, handle in entities:
-        if entity.dxftype() == "INSERT":
-            yield entity, handle
-            continue
-        _, found = transform.copies([entity], matrix)
-        for k, one in enumerate(found):
-            yield one, f"{handle}.{k}" if len(found) > 1 else handle
-
-
-def _inserted(insert: Any, path: Path) -> Iterator[Any]:
-    """Yield the entities of an inserted block at its place; ezdxf raises errors of any kind for a damaged one."""
-    try:
-        yield from insert.virtual_entities()
-    except (TypeError, AttributeError, ValueError, KeyError, IndexError, ArithmeticError) as error:
-        raise ValueError(
-            f"'{path}': block reference '{insert.dxf.get('name', '?')}' cannot be resolved ({error}); explode it"
-        ) from None
 
 
 def _flattened(curve: Any, tolerance: float | None) -> Stroke:
