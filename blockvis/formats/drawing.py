@@ -142,6 +142,8 @@ class Drawing:
 
         Gives the directions of x, y and across in the rows of a matrix (3, 3), and notes on what that changes.
         """
+        if not self.strokes:
+            return np.eye(3), []
         every = [one.points for one in self.strokes]
         spread_of(np.concatenate(every), f"'{path}'")
         wanted = [one.points for one in filter(self.wants(reading), self.strokes)]

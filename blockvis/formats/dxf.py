@@ -20,7 +20,6 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import CHANGED, Note, kind_of
 from blockvis.layout.outlines import chords_of, filled
-from blockvis.layout.refusal import Refused
 from blockvis.layout.units import metres_per
 from solver.mechanics import counted
 
@@ -29,7 +28,7 @@ from .bodies import Bodies
 from .cells import Mesh
 from .drawing import Drawing, Line, Outline, Stroke, is_chain, joined_ends
 from .dxf_bodies import drawn_mesh, is_mesh, layout_of_meshes, meshes_of_faces, said_by_layer
-from .loose_lines import nothing_closed, with_faces
+from .loose_lines import refuse_open, with_faces
 from .reading import Reading, json_object
 
 #: How a binary file begins.
@@ -131,7 +130,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     meshes = _chosen_meshes(found, reading)
     if meshes:
         return layout_of_meshes(meshes, path, reading, stated, _faults(audit) + _skipped(found))
-    notes = found.turn(reading, path)[1] if found.strokes else []
+    notes = found.turn(reading, path)[1]
     if found.faces:
         remedy = "; 3DFACEs of a layer are read as bodies in space where they close one"
         notes = [Note(CHANGED, f"{note}{remedy}") if kind_of(note) == CHANGED else note for note in notes]
@@ -143,14 +142,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         row_of=lambda layers, name: {**said_by_layer(layers[-1]), "name": name},
         tolerance=tolerance,
     )
-    if found.is_open:
-        seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
-        listed = "; ".join(words for words in (nothing_closed(found.left_out), seen) if words) or "nothing"
-        raise Refused(
-            f"'{path}' has no closed outline in its model space (found: {listed}); draw each block as a closed "
-            "polyline",
-            found.layout(stated),
-        )
+    refuse_open(found, path, "closed outline in its model space", "a closed polyline", stated)
     found.notes += _skipped(found)
     return found.layout(stated, own=True)
 

@@ -29,7 +29,7 @@ from solver import mechanics
 
 from .bodies import ROLE_WORDS
 from .drawing import Drawing, Line, Outline, joined_ends
-from .loose_lines import nothing_closed, with_faces
+from .loose_lines import refuse_open, with_faces
 from .reading import Reading
 
 #: Attributes that name a block and its group, the first that a file has; in small letters.
@@ -296,9 +296,6 @@ def layout_of_features(
         if len(parts := found.outlines[first:]) > 1:
             named = [{**row, "name": f"{row['name']} {k + 1}"} for k in range(len(parts))]
             found.outlines[first:] = [replace(one, row=own) for one, own in zip(parts, named, strict=True)]
-    if not found.strokes:
-        seen = "".join(passed_over(found.skipped, "found")) or "found: nothing"
-        raise ValueError(f"'{path}' has no polygon ({seen}); draw each block as one polygon")
     turn, notes = found.turn(reading, path)
     found.notes += notes
     if roles:
@@ -308,7 +305,6 @@ def layout_of_features(
     if web and reading.unit is None:
         unit, stretched = _true_unit(features)
         found.notes += stretched
-    found.notes += passed_over(found.skipped)
     with_faces(
         found,
         reading,
@@ -316,9 +312,8 @@ def layout_of_features(
         row_of=lambda layers, name: _row(name, layers[-1], {}),
         in_place=True,
     )
-    if found.is_open:
-        closed = nothing_closed(found.left_out)
-        raise ValueError(f"'{path}' has no polygon: {closed}; draw each block as one polygon")
+    refuse_open(found, path, "polygon", "one polygon", unit)
+    found.notes += passed_over(found.skipped)
     return found.layout(unit)
 
 

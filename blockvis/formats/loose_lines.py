@@ -6,13 +6,15 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from blockvis.layout.left_out import LeftOut, matches
-from blockvis.layout.notes import CHANGED, Note
+from blockvis.layout.notes import CHANGED, LEFT_OUT, Note, kind_of
 from blockvis.layout.outlines import ring_width
+from blockvis.layout.refusal import Refused
 from solver.mechanics import counted
 
 from .arcs import with_shared_corners
@@ -259,7 +261,19 @@ def _faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
     )
 
 
-def nothing_closed(left_out: Sequence[LeftOut]) -> str:
+def refuse_open(
+    found: Drawing, path: Path, what: str, remedy: str, unit: str, factors: Sequence[float] = (1, 1)
+) -> None:
+    """Refuse a drawing that has nothing but lines that close nothing, and say what it has."""
+    if found.is_open:
+        skipped = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items() if n)
+        notes = [note for note in found.notes if kind_of(note) == LEFT_OUT]
+        seen = "; ".join(words for words in (_nothing_closed(found.left_out), skipped, *notes) if words) or "nothing"
+        drawn = found.layout(unit, factors=factors)
+        raise Refused(f"'{path}' has no {what} (found: {seen}); draw each block as {remedy}", drawn)
+
+
+def _nothing_closed(left_out: Sequence[LeftOut]) -> str:
     """Say what lines there are where nothing closed is, for an error message."""
     lines = [item for item in left_out if item.kind == "open"]
     if not lines:

@@ -24,13 +24,12 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import CHANGED, LEFT_OUT, UNIT_TAKEN, Note
 from blockvis.layout.outlines import chords_of, filled
-from blockvis.layout.refusal import Refused
 from blockvis.layout.units import UNITS, metres_per, unit_of
 from solver import mechanics
 
 from .arcs import MOST_CHORDS, Arc, Bezier, Curve, bezier_chords
 from .drawing import Drawing, Line, Outline, Stroke, is_chain, joined_ends
-from .loose_lines import nothing_closed, with_faces
+from .loose_lines import refuse_open, with_faces
 from .reading import Reading, json_object
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -150,13 +149,7 @@ def read(path: Path, reading: Reading) -> Layout:
     found.sheets_missed = len(styled) > 0
     _walk(root, _Context(np.eye(3), (), tolerance, path), found)
     with_faces(found, reading, called=lambda name, k: f"{name} {k + 1}", row_of=_row, tolerance=tolerance)
-    if found.is_open:
-        said = (nothing_closed(found.left_out), *passed_over(found.skipped), *_pattern_fills(root))
-        rest = "; ".join(words for words in said if words)
-        raise Refused(
-            f"'{path}' has no closed shape{f': {rest}' if rest else ''}; draw each block as a closed path or polygon",
-            found.layout(stated, factors=(1.0, -1.0)),
-        )
+    refuse_open(found, path, "closed shape", "a closed path or polygon", stated, factors=(1.0, -1.0))
     found.notes += passed_over(found.skipped)
     found.notes += passed_over(found.clipped, "read whole, not clipped")
     return found.layout(stated, unit_by="layout" if own else "page" if stated else "", own=True, factors=(1.0, -1.0))

@@ -201,7 +201,7 @@ def test_metres_that_a_program_calls_degrees_are_read_with_a_note(tmp_path):
         ({"type": "FeatureCollection", "features": [3]}, "feature 0 has a geometry that cannot be read"),
         ({"type": "Polygon", "coordinates": [[[0, 0], [1, 0]]]}, "feature 0 has a geometry that cannot be read"),
         ({"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, float("nan")]]]}, "must be finite"),
-        ({"type": "LineString", "coordinates": [[0, 0], [1, 0]]}, "has no polygon: "),
+        ({"type": "LineString", "coordinates": [[0, 0], [1, 0]]}, "has no polygon (found: 1 line closes nothing"),
         ({"type": "Topology"}, "features of GeoJSON, or"),
     ],
 )

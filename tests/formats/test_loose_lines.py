@@ -319,7 +319,7 @@ def test_an_outline_whose_ends_miss_by_little_is_closed_with_a_note(tmp_path):
 def test_where_nothing_closes_the_message_says_what_there_is(tmp_path):
     path = svg(tmp_path, '<g id="a"><path d="M0 0L100 0"/><path d="M103 0L200 50"/></g>')
     with pytest.raises(
-        ValueError, match=r"no closed shape: 2 lines close nothing \(2 on layer 'a'\); their ends are 3 to"
+        ValueError, match=r"no closed shape \(found: 2 lines close nothing \(2 on layer 'a'\); their ends are 3 to"
     ):
         read(path)
 

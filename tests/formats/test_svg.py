@@ -128,7 +128,7 @@ def test_what_nobody_sees_is_no_block(tmp_path):
     layout = read_layout(saved(tmp_path, clear, 'viewBox="0 0 200 100"'))
     assert sorted(ring[:, 1].max() for ring in layout.outlines) == pytest.approx([-70.0, -60.0, -40.0, -30.0, -20.0])
     assert "skipped: 2 hidden <rect>" in layout.notes
-    with pytest.raises(ValueError, match="no closed shape: skipped: 1 hidden <rect>; draw each block"):
+    with pytest.raises(ValueError, match=r"no closed shape \(found: 1 hidden <rect>\); draw each block"):
         read_layout(saved(tmp_path, '<rect width="9" height="9" opacity="0%"/>'))
 
 
