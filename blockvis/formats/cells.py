@@ -21,7 +21,7 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from .bodies import Bodies, Body, with_role
-from .closed_surfaces import OpenSurface, bodies_of_surfaces, components, enclosed
+from .closed_surfaces import bodies_of_surfaces, enclosed
 from .reading import Reading
 
 #: Our name of the number of the named set of each cell.
@@ -123,19 +123,7 @@ def _enclosed(
 ) -> Bodies:
     """Find the bodies that surface cells in space enclose, one per value of a cell array, or one per piece."""
     key, names, owner = owners(data, len(rings))
-    try:
-        bodies, notes = bodies_of_surfaces(points, rings, owner, rows_of_cells(data, owner, names, path), path)
-    except OpenSurface:
-        # A drawing that is meant to be flat: the error says how far it is not.
-        flattened(points, f"'{path}'")
-        raise
-    except ValueError:
-        # Bodies that touch: those that share no point can be told apart by their pieces, if all are closed.
-        owner = components(rings, len(points))
-        names = [f"block {k}" for k in range(int(owner.max()) + 1)]
-        if key or len(names) < 2 or len(rings) < 4 * len(names):
-            raise
-        bodies, notes = bodies_of_surfaces(points, rings, owner, rows_of_cells(data, owner, names, path), path)
+    bodies, notes = bodies_of_surfaces(points, rings, owner, rows_of_cells(data, owner, names, path), path)
     how = f"one block per value of the cell array '{key}'" if key else "one block per closed surface"
     return Bodies(bodies, notes=(how, *notes))
 

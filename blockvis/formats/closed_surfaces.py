@@ -11,7 +11,7 @@ import numpy as np
 
 from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, Note
-from blockvis.layout.outlines import FLAT, loops_of
+from blockvis.layout.outlines import FLAT, flattened, loops_of
 from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.solids import area_vectors, fans
 from blockvis.layout.surfaces import same_points, turned_faces
@@ -35,14 +35,6 @@ HOLE_EDGES, HOLE_AREA = 16, 0.02
 
 class OpenSurface(Refused):
     """A surface that encloses nothing."""
-
-
-def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
-    """(n_cells,) int array: number of the connected piece of each cell; shared points connect cells."""
-    first = np.concatenate([ring for ring in rings])
-    second = np.concatenate([np.full(len(ring), ring[0]) for ring in rings])
-    piece = linked(first, second, n_points)
-    return np.unique(piece[[ring[0] for ring in rings]], return_inverse=True)[1]
 
 
 def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -96,7 +88,7 @@ def closed_bodies(part: Body, size: float, path: Path | str) -> list[Body]:
         )
     # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
     edge = inverse.ravel().reshape(-1, 3)
-    piece = components(list(edge), len(unique))
+    piece = linked(edge[:, [0, 0]].ravel(), edge[:, [1, 2]].ravel(), len(unique))[edge[:, 0]]
     return _pieces(part, points, _seen_from_outside(points, faces, edge, piece), piece, holes)
 
 
@@ -239,4 +231,9 @@ def bodies_of_surfaces(
         Body(row["name"], points, fans([rings[k].tolist() for k in np.flatnonzero(owner == whose).tolist()]), row)
         for whose, row in enumerate(rows)
     ]
-    return enclosed(parts, float(np.ptp(points, axis=0).max()), path, reading)
+    try:
+        return enclosed(parts, float(np.ptp(points, axis=0).max()), path, reading)
+    except OpenSurface:
+        # A drawing that is meant to be flat: the error says how far it is not.
+        flattened(points, f"'{path}'")
+        raise

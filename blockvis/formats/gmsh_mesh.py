@@ -21,7 +21,7 @@ from blockvis.text import numbered
 from solver.mechanics import counted
 
 from .bodies import Bodies
-from .closed_surfaces import OpenSurface, bodies_of_surfaces
+from .closed_surfaces import bodies_of_surfaces
 from .node_order import GMSH, ring_of_nodes
 from .reading import Reading, json_object
 from .volumes import GMSH_SOLIDS, Faces, bodies_of_cells
@@ -147,12 +147,7 @@ def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Pat
     try:
         bodies, notes = bodies_of_surfaces(mesh.coordinates, rings, owner, rows, path, reading)
     except ValueError:
-        try:
-            bodies, notes = bodies_of_surfaces(mesh.coordinates, rings, np.zeros_like(owner), [{"name": "body"}], path)
-        except OpenSurface:
-            # A drawing that is meant to be flat: the error says how far it is not.
-            flattened(mesh.coordinates, f"'{path}'")
-            raise
+        bodies, notes = bodies_of_surfaces(mesh.coordinates, rings, np.zeros_like(owner), [{"name": "body"}], path)
     return Bodies(bodies, notes=("one block per closed surface", *notes))
 
 
