@@ -2,7 +2,8 @@
 
 A reader takes the path and a :class:`~blockvis.formats.reading.Reading` and returns a ``Layout``, or the ``Bodies`` of
 a file that draws them in space, in the file's own unit of length, which it names in ``unit`` ("" if the file does not
-state it); what it cannot read is a ``ValueError`` with the remedy. A writer takes a ``Layout`` in m and the path.
+state it); what it cannot read is a ``ValueError`` with the remedy, in which "it" is the file. A writer takes a
+``Layout`` in m and the path.
 """
 
 from __future__ import annotations

@@ -16,11 +16,12 @@ import numpy as np
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import LARGEST_CHORD
+from blockvis.layout.refusal import Refused
 from solver.mechanics import counted
 
 from .image_scale import Placement, placement_of
 from .pixels import STAIRS, outlined, regions_of
-from .reading import Reading
+from .reading import Reading, naming
 
 
 @dataclass(frozen=True)
@@ -69,18 +70,18 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     program = program_of(content)
     if not program:
         return None
-    reading.refuse_view(path)
+    reading.refuse_view()
     try:
-        found = _READERS[program](content, path)
+        found = _READERS[program](content)
+    except Refused:
+        raise
     except (LookupError, TypeError, AttributeError, ValueError, OverflowError) as error:
-        if str(error).startswith(f"'{path}'"):
-            raise
         raise ValueError(
-            f"'{path}' has annotations of {program} that cannot be read ({type(error).__name__} {error}); export again"
+            f"it has annotations of {program} that cannot be read ({type(error).__name__} {error}); export again"
         ) from None
     if not found.shapes:
         kinds = ", ".join(f"{n} {kind}" for kind, n in found.dropped.items()) or "nothing"
-        raise ValueError(f"'{path}' outlines no stone, it has {kinds}; annotate each stone by a polygon or a mask")
+        raise ValueError(f"it outlines no stone, it has {kinds}; annotate each stone by a polygon or a mask")
     return _layout_of(found, placement_in(path, found, reading), reading)
 
 
@@ -129,7 +130,8 @@ def placement_in(path: Path, found: _Annotated, reading: Reading) -> Placement:
 
 def annotated_placement(content: Any, path: Path, reading: Reading) -> tuple[Placement, tuple[float, float] | None]:
     """Find where the image of annotations lies, and its size."""
-    found = _READERS[program_of(content)](content, path)
+    with naming(path):
+        found = _READERS[program_of(content)](content)
     return placement_in(path, found, reading), found.size
 
 
@@ -175,17 +177,17 @@ def _ellipse(x: float, y: float, rx: float, ry: float, turn: float = 0.0) -> np.
     return np.array([x, y]) + np.stack([rx * np.cos(angle), ry * np.sin(angle)], axis=1) @ [[c, s], [-s, c]]
 
 
-def _one_image(names: list[str], path: Path) -> None:
+def _one_image(names: list[str]) -> None:
     if len(names) > 1:
         listed = ", ".join(names[:4]) + (" ..." if len(names) > 4 else "")
-        raise ValueError(f"'{path}' annotates {len(names)} images ({listed}); export one of them alone")
+        raise Refused(f"it annotates {len(names)} images ({listed}); export one of them alone")
 
 
-def _coco(content: Mapping[str, Any], path: Path) -> _Annotated:
+def _coco(content: Mapping[str, Any]) -> _Annotated:
     found = _Annotated("COCO")
     used = {one.get("image_id") for one in content["annotations"]}
     images = [image for image in content["images"] if image.get("id") in used] or content["images"][:1]
-    _one_image([str(image.get("file_name", image.get("id"))) for image in images], path)
+    _one_image([str(image.get("file_name", image.get("id"))) for image in images])
     if images:
         found.image = str(images[0].get("file_name", ""))
         found.size = _size(images[0].get("width"), images[0].get("height"))
@@ -194,7 +196,7 @@ def _coco(content: Mapping[str, Any], path: Path) -> _Annotated:
         shape = one.get("segmentation")
         name = label.get(one.get("category_id"), "")
         if isinstance(shape, dict):
-            found.shapes.append((name, [_Mask(_run_lengths(shape, path))]))
+            found.shapes.append((name, [_Mask(_run_lengths(shape))]))
             continue
         rings = [_corners(ring) for ring in shape or [] if len(ring) >= 6]
         if rings:
@@ -204,7 +206,7 @@ def _coco(content: Mapping[str, Any], path: Path) -> _Annotated:
     return found
 
 
-def _run_lengths(shape: Mapping[str, Any], path: Path) -> np.ndarray:
+def _run_lengths(shape: Mapping[str, Any]) -> np.ndarray:
     """(height, width) bool array: a mask of COCO, written as the lengths of its runs, column by column."""
     height, width = (int(n) for n in shape["size"])
     counts = shape["counts"]
@@ -212,9 +214,7 @@ def _run_lengths(shape: Mapping[str, Any], path: Path) -> np.ndarray:
         counts = _unpacked(counts)
     runs = np.array(counts, dtype=np.int64)
     if height * width > 10**8 or (runs < 0).any() or runs.sum() != height * width:
-        raise ValueError(
-            f"'{path}' has a mask whose runs make {runs.sum()} pixels, not {height} × {width}; export it again"
-        )
+        raise Refused(f"it has a mask whose runs make {runs.sum()} pixels, not {height} × {width}; export it again")
     filled = np.repeat(np.arange(len(runs)) % 2 == 1, runs)
     return filled.reshape(width, height).T
 
@@ -244,7 +244,7 @@ def _size(width: Any, height: Any) -> tuple[float, float] | None:
     return size if min(size) > 0.0 else None
 
 
-def _labelme(content: Mapping[str, Any], path: Path) -> _Annotated:
+def _labelme(content: Mapping[str, Any]) -> _Annotated:
     found = _Annotated("LabelMe", str(content.get("imagePath") or ""))
     found.size = _size(content.get("imageWidth"), content.get("imageHeight"))
     for one in content["shapes"]:
@@ -260,7 +260,7 @@ def _labelme(content: Mapping[str, Any], path: Path) -> _Annotated:
             radius = float(np.hypot(*(points[1] - points[0])))
             outline = _ellipse(float(points[0, 0]), float(points[0, 1]), radius, radius)
         elif kind == "mask" and one.get("mask"):
-            outline = _Mask(_picture_of(str(one["mask"]), path), (int(points[:, 0].min()), int(points[:, 1].min())))
+            outline = _Mask(_picture_of(str(one["mask"])), (int(points[:, 0].min()), int(points[:, 1].min())))
         else:
             found.dropped[f"shapes of kind {kind}"] += 1
             continue
@@ -268,14 +268,14 @@ def _labelme(content: Mapping[str, Any], path: Path) -> _Annotated:
     return found
 
 
-def _picture_of(text: str, path: Path) -> np.ndarray:
+def _picture_of(text: str) -> np.ndarray:
     """(height, width) bool array: a mask of LabelMe, written as a picture."""
     from PIL import Image
 
     try:
         return np.asarray(Image.open(io.BytesIO(base64.b64decode(text))).convert("L")) > 0
     except (OSError, binascii.Error) as error:
-        raise ValueError(f"'{path}' has a mask that is no picture ({error}); export it again") from None
+        raise Refused(f"it has a mask that is no picture ({error}); export it again") from None
 
 
 def _via_files(content: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -283,9 +283,9 @@ def _via_files(content: Mapping[str, Any]) -> Mapping[str, Any]:
     return held if isinstance(held, dict) else {}
 
 
-def _via(content: Mapping[str, Any], path: Path) -> _Annotated:
+def _via(content: Mapping[str, Any]) -> _Annotated:
     files = [one for one in _via_files(content).values() if one["regions"]]
-    _one_image([str(one.get("filename")) for one in files], path)
+    _one_image([str(one.get("filename")) for one in files])
     found = _Annotated("VIA", str(files[0].get("filename") or "") if files else "")
     for one in files:
         regions = one["regions"]

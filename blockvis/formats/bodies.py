@@ -6,7 +6,6 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -159,19 +158,19 @@ def _refused(message: str, found: Bodies, wrong: Body) -> Refused:
     return Refused(message, as_drawn(found), [k for k, body in enumerate(_drawable(found)) if body is wrong])
 
 
-def layout_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layout:
+def layout_of_bodies(found: Bodies, reading: Reading) -> Layout:
     """Make a layout of prismatic bodies: outlines across the axis of their extrusion, thicknesses along it.
 
     Without a view one is taken in which no body lies behind another, of several that in which the bodies come closest
     to lying between the same two planes.
     """
-    asked, view = _selected(found, path, reading), reading.view
+    asked, view = _selected(found, reading), reading.view
     bodies, size = asked.bodies, asked.size
     axes = (2, 1, 0) if view is None else (axis_across(view),)
     seen = [_projected(axis, bodies, size) for axis in axes]
     fitting = [one for one in seen if not one.refused]
     if not fitting:
-        raise _not_flat(seen, asked, path, view)
+        raise _not_flat(seen, asked, view)
     best = fitting[0]
     for one in fitting[1:]:
         if one.scatter < best.scatter - 1e-4 * size:
@@ -205,17 +204,17 @@ def with_z_up(points: np.ndarray) -> np.ndarray:
     return points[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
 
 
-def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layout:
+def solids_of_bodies(found: Bodies, reading: Reading) -> Layout:
     """Make a layout in space of bodies of any shape.
 
     The last coordinate of a view is up: y of "xy", else z; without a view what the format has as up.
     """
     if not found.up and reading.view is None:
         raise ValueError(
-            f"'{path}': y is up in some of its files and z in others; export them alike, or give view = \"xy\" if y is "
+            'y is up in some of its files and z in others; export them alike, or give view = "xy" if y is '
             'up in all of them, "xz" if z is'
         )
-    asked, view = _selected(found, path, reading), reading.view
+    asked, view = _selected(found, reading), reading.view
     lying = found.up == "y" if view is None else view == "xy"
     solids, warped, changed = [], [], []
     for body in asked.bodies:
@@ -223,7 +222,7 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
         points, faces = plane.solid
         if len(faces) > MOST_FACES:
             raise _refused(
-                f"'{path}': body '{body.name}' has {len(faces)} faces, more than {MOST_FACES}; simplify it to the "
+                f"body '{body.name}' has {len(faces)} faces, more than {MOST_FACES}; simplify it to the "
                 "plane faces of a stone",
                 found,
                 body,
@@ -231,7 +230,7 @@ def solids_of_bodies(found: Bodies, path: Path | str, reading: Reading) -> Layou
         if not volume(points, faces) > NO_VOLUME * asked.size**3:
             x, y, z = points.mean(axis=0)
             raise _refused(
-                f"'{path}': body '{body.name}' around ({x:.6g}, {y:.6g}, {z:.6g}) has no volume; remove or redraw it",
+                f"body '{body.name}' around ({x:.6g}, {y:.6g}, {z:.6g}) has no volume; remove or redraw it",
                 found,
                 body,
             )
@@ -280,16 +279,16 @@ def _plane_faces_said(
     return said
 
 
-def in_dimension(found: Bodies, path: Path | str, reading: Reading) -> Layout:
+def in_dimension(found: Bodies, reading: Reading) -> Layout:
     """Make a layout in the plane, 2, or in space, 3; by default in space where bodies are not prisms side by side."""
     if reading.dimension == 3:
-        return solids_of_bodies(found, path, reading)
+        return solids_of_bodies(found, reading)
     try:
-        return layout_of_bodies(found, path, reading)
+        return layout_of_bodies(found, reading)
     except NotFlat as error:
         if reading.dimension == 2 or reading.view is not None:
             raise
-        layout = solids_of_bodies(found, path, reading)
+        layout = solids_of_bodies(found, reading)
         return replace(layout, notes=(Note(CHANGED, f"blocks in space: {error.reason}"), *layout.notes))
 
 
@@ -335,24 +334,24 @@ def _accepted(bodies: Sequence[Body]) -> tuple[Note, ...]:
     return tuple(Note(CHANGED, text) for text in said)
 
 
-def _selected(found: Bodies, path: Path | str, reading: Reading) -> _Selection:
+def _selected(found: Bodies, reading: Reading) -> _Selection:
     """Choose the bodies that are asked for, and check their coordinates."""
     if not found.bodies:
-        raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
+        raise ValueError("it has no bodies; export the blocks as closed bodies")
     labels = [body.labels for body in found.bodies]
     dropped = {k: "asked" for k, words in enumerate(labels) if not reading.wants(words)}
     dropped |= {k: "mortar" for k in _mortar(found, labels, reading.only) if k not in dropped}
     kept = [k for k in range(len(labels)) if k not in dropped]
     if not kept:
-        raise ValueError(f"'{path}' draws no block: all that it draws is left out as asked (ignore, only)")
+        raise ValueError("it draws no block: all that it draws is left out as asked (ignore, only)")
     bodies = [found.bodies[k] for k in kept]
     bare = next((body.name for body in bodies if not len(body.faces)), None)
     if bare is not None:
-        raise ValueError(f"'{path}': body '{bare}' has no surface, as of cells that are there twice; export it once")
+        raise ValueError(f"body '{bare}' has no surface, as of cells that are there twice; export it once")
     every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
-    size = float(spread_of(every, f"'{path}'").max())
+    size = float(spread_of(every).max())
     if not 0.0 < size < LARGEST_SIZE:
-        raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
+        raise ValueError(f"it spreads over {size:.3g} units of length; repair the file")
     return _Selection(bodies, size, dropped)
 
 
@@ -463,18 +462,18 @@ class NotFlat(ValueError):
         self.reason = reason
 
 
-def _not_flat(seen: Sequence[_Projection], asked: _Selection, path: Path | str, view: str | None) -> NotFlat:
+def _not_flat(seen: Sequence[_Projection], asked: _Selection, view: str | None) -> NotFlat:
     """Make the error for bodies that are not prisms side by side, with the reason in every view that was tried."""
     bodies, size = asked.bodies, asked.size
     remedy = "dimension = 3 reads them in space; in the plane leave out all but one leaf (ignore), or draw its outlines"
     if view is None and not any(len(one.outlines) for one in seen):
         holed = [one.refused for one in seen if "no extrusion" not in one.refused]
         if holed:
-            return NotFlat(f"'{path}': {holed[0]}; dimension = 3 reads the blocks in space", holed[0])
+            return NotFlat(f"{holed[0]}; dimension = 3 reads the blocks in space", holed[0])
         alone = next((body.name for body in bodies if not any(_is_prism(body, axis, size) for axis in range(3))), None)
         reason = f"body '{alone}' is no extrusion along x, y or z" if alone else "; ".join(one.refused for one in seen)
         return NotFlat(
-            f"'{path}' is not prismatic: {reason}; dimension = 3 reads the blocks in space, in the plane export "
+            f"it is not prismatic: {reason}; dimension = 3 reads the blocks in space, in the plane export "
             "extrusions of their outlines along an axis",
             reason,
         )
@@ -482,10 +481,10 @@ def _not_flat(seen: Sequence[_Projection], asked: _Selection, path: Path | str, 
         # Views in which every body is a prism come first: they are what the model may have been meant for.
         ordered = sorted(seen, key=lambda one: not len(one.outlines))
         reasons = "; ".join(one.refused for one in ordered)
-        return NotFlat(f"'{path}' is three-dimensional: {reasons}; {remedy}", ordered[0].refused)
+        return NotFlat(f"it is three-dimensional: {reasons}; {remedy}", ordered[0].refused)
     other = next((v for v in VIEWS if v != view and not _projected(axis_across(v), bodies, size).refused), "")
     remedy = f'view = "{other}" shows them side by side' if other else remedy
-    return NotFlat(f"'{path}' cannot be seen as {view}: {seen[0].refused}; {remedy}", seen[0].refused)
+    return NotFlat(f"it cannot be seen as {view}: {seen[0].refused}; {remedy}", seen[0].refused)
 
 
 def _is_prism(body: Body, axis: int, size: float) -> bool:

@@ -56,7 +56,6 @@ def layout_of_cells(
     points: np.ndarray,
     rings: Sequence[np.ndarray],
     data: Mapping[str, np.ndarray],
-    path: Path | str,
     view: str | None = None,
 ) -> Layout | Bodies:
     """Make a layout of surface cells; if they do not lie in a plane, find the bodies that they enclose.
@@ -66,13 +65,13 @@ def layout_of_cells(
     and triangles that share sides form one; :data:`TABLE_ARRAYS` are optional.
     """
     if not rings:
-        raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
+        raise ValueError("it has no surface cells; mesh the surfaces, or save polygons")
     used = np.unique(np.concatenate(list(rings)))
     if used.min() < 0 or used.max() >= len(points):
-        raise ValueError(f"'{path}': a cell uses point {int(used.max())}, but there are {len(points)}; export it again")
+        raise ValueError(f"a cell uses point {int(used.max())}, but there are {len(points)}; export it again")
     if not is_flat(points):
-        return _enclosed(points, rings, data, path)
-    flat, note = flattened(points, f"'{path}'", view)
+        return _enclosed(points, rings, data)
+    flat, note = flattened(points, view)
     key, names, owner = owners(data, len(rings))
     if key is not None:
         n, how = len(names), f"one block per value of the cell array '{key}'"
@@ -88,7 +87,7 @@ def layout_of_cells(
     outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     notes = tuple(text for text in (how, note) if text)
     layout = Layout(blocks=tuple(outlines), names=tuple(names), unit="", notes=notes)
-    layout = with_rows(layout, [with_role(row) for row in rows_of_cells(data, owner, names, path)])
+    layout = with_rows(layout, [with_role(row) for row in rows_of_cells(data, owner, names)])
     return layout.leaving_out(unusable)
 
 
@@ -118,19 +117,15 @@ def _in_pieces(rings: Sequence[np.ndarray], names: Sequence[str], owner: np.ndar
     return numbered([names[part] for part in pieces[:, 0]]), piece.ravel()
 
 
-def _enclosed(
-    points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray], path: Path | str
-) -> Bodies:
+def _enclosed(points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray]) -> Bodies:
     """Find the bodies that surface cells in space enclose, one per value of a cell array, or one per piece."""
     key, names, owner = owners(data, len(rings))
-    bodies, notes = bodies_of_surfaces(points, rings, owner, rows_of_cells(data, owner, names, path), path)
+    bodies, notes = bodies_of_surfaces(points, rings, owner, rows_of_cells(data, owner, names))
     how = f"one block per value of the cell array '{key}'" if key else "one block per closed surface"
     return Bodies(bodies, notes=(how, *notes))
 
 
-def rows_of_cells(
-    data: Mapping[str, np.ndarray], owner: np.ndarray, names: Sequence[str], path: Path | str
-) -> list[dict[str, Any]]:
+def rows_of_cells(data: Mapping[str, np.ndarray], owner: np.ndarray, names: Sequence[str]) -> list[dict[str, Any]]:
     """Read the block table from cell arrays, (n_cells, ...), given the number of the block of each cell.
 
     Names hold where no array has them.
@@ -150,7 +145,7 @@ def rows_of_cells(
             block = int(several[0])
             listed = " and ".join(str(value) for value in known[pairs[1][pairs[0] == block]][:2])
             raise ValueError(
-                f"'{path}': cells of the block '{names[block]}' differ in the cell array '{key}', as {listed}; give "
+                f"cells of the block '{names[block]}' differ in the cell array '{key}', as {listed}; give "
                 "them one value, or number the blocks in a cell array 'block_id'"
             )
     first = np.unique(owner, return_index=True)[1].tolist()
@@ -193,18 +188,18 @@ class Mesh:
     curved: str = ""
 
 
-def found_in_meshes(meshes: Sequence[Mesh], path: Path | str, reading: Reading) -> Layout | Bodies:
+def found_in_meshes(meshes: Sequence[Mesh], reading: Reading) -> Layout | Bodies:
     """Make outlines of meshes in a plane, and of others the bodies that they enclose."""
     every = np.concatenate([mesh.points for mesh in meshes])
-    size = float(spread_of(every, f"'{path}'").max())
+    size = float(spread_of(every).max())
     if is_flat(every):
-        return _layout_of_meshes(meshes, path, reading.view)
+        return _layout_of_meshes(meshes, reading.view)
     parts = [Body(str(mesh.row["name"]), mesh.points, fans(mesh.faces), mesh.row) for mesh in meshes]
-    bodies, notes = enclosed(parts, size, path, reading)
+    bodies, notes = enclosed(parts, size, reading)
     return Bodies(bodies, notes=notes)
 
 
-def _layout_of_meshes(meshes: Sequence[Mesh], path: Path | str, view: str | None) -> Layout | Bodies:
+def _layout_of_meshes(meshes: Sequence[Mesh], view: str | None) -> Layout | Bodies:
     # Some repeat the corners of each face.
     points, number = np.unique(np.concatenate([mesh.points for mesh in meshes]), axis=0, return_inverse=True)
     starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
@@ -213,7 +208,7 @@ def _layout_of_meshes(meshes: Sequence[Mesh], path: Path | str, view: str | None
     data = {"block_id": np.repeat(np.arange(len(meshes)), counts)}
     for key in ("name", "group", "role", "material"):
         data[key] = np.repeat([str(mesh.row.get(key, "")) for mesh in meshes], counts)
-    return layout_of_cells(points, rings, data, path, view)
+    return layout_of_cells(points, rings, data, view)
 
 
 def flat_beside(bodies: Sequence[np.ndarray], flat: Sequence[np.ndarray]) -> tuple[str, ...]:
@@ -226,27 +221,27 @@ def flat_beside(bodies: Sequence[np.ndarray], flat: Sequence[np.ndarray]) -> tup
     return (Note(LEFT_OUT, f"left out: {counted(n, 'flat cell')} beside bodies"),) if n else ()
 
 
-def merged(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path | str) -> Layout | Bodies:
+def merged(found: Sequence[Layout | Bodies], labels: Sequence[str]) -> Layout | Bodies:
     """Join the parts of a file to one; blocks without a name of their own are named after their part, "" for none."""
     if not found:
-        raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
-    joined = _joined(found, labels, path)
+        raise ValueError("it has no surface cells; mesh the surfaces, or save polygons")
+    joined = _joined(found, labels)
     if isinstance(joined, Bodies):
         return joined
     return with_rows(joined, [with_role(row) for row in rows_of(joined)])
 
 
-def _joined(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path | str) -> Layout | Bodies:
+def _joined(found: Sequence[Layout | Bodies], labels: Sequence[str]) -> Layout | Bodies:
     if len(found) == 1:
         return found[0]
     flat = [(part, label) for part, label in zip(found, labels, strict=True) if isinstance(part, Layout)]
     solid = [(part, label) for part, label in zip(found, labels, strict=True) if isinstance(part, Bodies)]
     if flat and solid:
         raise ValueError(
-            f"'{path}' has flat blocks ('{flat[0][1] or 'the first'}') and bodies in space "
+            f"it has flat blocks ('{flat[0][1] or 'the first'}') and bodies in space "
             f"('{solid[0][1] or 'the first'}'); give one kind"
         )
-    return _merged_bodies(solid) if solid else _merged_layouts(flat, path)
+    return _merged_bodies(solid) if solid else _merged_layouts(flat)
 
 
 def _own_names(names: Sequence[str], label: str) -> tuple[str, ...]:
@@ -270,9 +265,9 @@ def _merged_bodies(parts: Sequence[tuple[Bodies, str]]) -> Bodies:
     return replace(first, bodies=bodies, notes=notes, up=first.up if len(ups) == 1 else "")
 
 
-def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> Layout:
+def _merged_layouts(parts: Sequence[tuple[Layout, str]]) -> Layout:
     if len({tuple(note for note in part.notes if kind_of(note) == UPRIGHT) for part, _ in parts}) > 1:
-        raise ValueError(f"'{path}' has flat parts that lie in different planes; draw them in one")
+        raise ValueError("it has flat parts that lie in different planes; draw them in one")
     named = [replace(part, names=_own_names(part.names, label)) for part, label in parts]
 
     def joined(key: str) -> tuple[Any, ...]:
@@ -294,12 +289,12 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
     return with_rows(layout, [group | row for group, row in zip(groups, rows, strict=True)])
 
 
-def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path | str) -> Layout | Bodies:
+def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path]) -> Layout | Bodies:
     """Join what several files hold; the block of a file that holds one is named after it."""
     units = {part.unit: file for part, file in zip(found, files, strict=True)}
     if len(units) > 1:
         listed = ", ".join(f"'{file.name}' {unit or 'none'}" for unit, file in units.items())
-        raise ValueError(f"'{path}': its files state different units ({listed}); export them in one")
+        raise ValueError(f"its files state different units ({listed}); export them in one")
     parts, labels = [], []
     for part, file in zip(found, files, strict=True):
         if isinstance(part, Bodies):
@@ -313,4 +308,4 @@ def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path
         parts.append(part)
         labels.append("" if alone else file.stem)
     # Bodies have their roles by how names begin; outlines by the rules of their own format, which may not.
-    return _joined(parts, labels, path)
+    return _joined(parts, labels)

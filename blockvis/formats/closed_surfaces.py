@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,7 +47,7 @@ def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> t
     return points[kept], faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
 
 
-def closed_bodies(part: Body, size: float, path: Path | str) -> list[Body]:
+def closed_bodies(part: Body, size: float) -> list[Body]:
     """Split a mesh of triangles, of which the name is for messages, into the closed bodies that it holds.
 
     ``size`` is that of the drawing, in the unit of the points. ``OpenSurface`` is raised for a mesh that is not
@@ -59,7 +58,7 @@ def closed_bodies(part: Body, size: float, path: Path | str) -> list[Body]:
     # Some files hold each face twice.
     faces = every[np.sort(np.unique(np.sort(every, axis=1), axis=0, return_index=True)[1])]
     if len(faces) == 0:
-        raise OpenSurface(f"'{path}': body '{name}' has no face with an area; export closed bodies")
+        raise OpenSurface(f"body '{name}' has no face with an area; export closed bodies")
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     if (counts != 2).any():
@@ -75,14 +74,14 @@ def closed_bodies(part: Body, size: float, path: Path | str) -> list[Body]:
     if (counts == 1).any():
         x, y, z = points[unique[counts == 1][0]].mean(axis=0)
         raise OpenSurface(
-            f"'{path}': body '{name}' is not closed: "
+            f"body '{name}' is not closed: "
             f"{counted(int((counts == 1).sum()), 'edge belongs', 'edges belong')} to one face only, "
             f"one around ({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies, or leave it out (ignore)"
         )
     if (counts > 2).any():
         x, y, z = points[unique[counts > 2][0]].mean(axis=0)
         raise ValueError(
-            f"'{path}': body '{name}' holds bodies that touch and cannot be told apart: {int((counts > 2).sum())} "
+            f"body '{name}' holds bodies that touch and cannot be told apart: {int((counts > 2).sum())} "
             f"edges belong to more than two faces, one around ({x:.6g}, {y:.6g}, {z:.6g}); "
             "export one file or one named object per block (.obj, .glb, .step)"
         )
@@ -177,9 +176,7 @@ def _volumes(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.asarray((a * np.cross(b, c)).sum(axis=1) / 6.0)
 
 
-def enclosed(
-    parts: Sequence[Body], size: float, path: Path | str, reading: Reading | None = None
-) -> tuple[list[Body], list[Note]]:
+def enclosed(parts: Sequence[Body], size: float, reading: Reading | None = None) -> tuple[list[Body], list[Note]]:
     """Find the closed bodies of meshes; plane ones, and open ones that nobody wants, are left out, with notes.
 
     ``size`` is that of the drawing, in the unit of the points. Raises ``OpenSurface`` for a part that is wanted and
@@ -191,7 +188,7 @@ def enclosed(
     with carrying(lambda: as_drawn(Bodies(parts))):
         for part in parts:
             try:
-                bodies += closed_bodies(part, size, path)
+                bodies += closed_bodies(part, size)
             except ValueError as error:
                 if reading is not None and not reading.wants(part.labels):
                     unwanted.append(f"'{part.name}'")
@@ -220,7 +217,6 @@ def bodies_of_surfaces(
     rings: Sequence[np.ndarray],
     owner: np.ndarray,
     rows: Sequence[dict[str, Any]],
-    path: Path | str,
     reading: Reading | None = None,
 ) -> tuple[list[Body], list[Note]]:
     """Find the bodies that surface cells enclose, of each owner by itself; returned as by :func:`enclosed`.
@@ -232,8 +228,8 @@ def bodies_of_surfaces(
         for whose, row in enumerate(rows)
     ]
     try:
-        return enclosed(parts, float(np.ptp(points, axis=0).max()), path, reading)
+        return enclosed(parts, float(np.ptp(points, axis=0).max()), reading)
     except OpenSurface:
         # A drawing that is meant to be flat: the error says how far it is not.
-        flattened(points, f"'{path}'")
+        flattened(points)
         raise

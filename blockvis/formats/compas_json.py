@@ -54,26 +54,24 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies 
         meshes.extend(_meshes(content, context))
     except (LookupError, TypeError, AttributeError, OverflowError) as error:
         raise ValueError(
-            f"'{path}' has a mesh of COMPAS that cannot be read, number {len(meshes) + 1} ({type(error).__name__} "
+            f"it has a mesh of COMPAS that cannot be read, number {len(meshes) + 1} ({type(error).__name__} "
             f"{error}); export it again"
         ) from None
-    except ValueError as error:
-        raise ValueError(f"'{path}': {error}") from None
     if not meshes:
         return None
-    found = _layout_of(meshes, path, reading)
+    found = _layout_of(meshes, reading)
     return replace(found, notes=(*found.notes, *passed_over(context.passed)))
 
 
-def _layout_of(meshes: list[Mesh], path: Path, reading: Reading) -> Layout | Bodies:
+def _layout_of(meshes: list[Mesh], reading: Reading) -> Layout | Bodies:
     """Make blocks of meshes: each is one, but of a single one in a plane each face."""
     if len({mesh.row["name"] for mesh in meshes}) < len(meshes):
         # COMPAS names a mesh after its class unless it is told otherwise.
         meshes = [replace(mesh, row={**mesh.row, "name": f"block {mesh.row['key']}"}) for mesh in meshes]
     if len(meshes) == 1 and is_flat(meshes[0].points):
         rings = [np.array(face) for face in meshes[0].faces]
-        return layout_of_cells(meshes[0].points, rings, {"block_id": np.arange(len(rings))}, path, reading.view)
-    found = found_in_meshes(meshes, path, reading)
+        return layout_of_cells(meshes[0].points, rings, {"block_id": np.arange(len(rings))}, reading.view)
+    found = found_in_meshes(meshes, reading)
     if isinstance(found, Layout):
         return found
     return replace(found, notes=(f"{counted(len(found.bodies), 'block')} of COMPAS", *found.notes))

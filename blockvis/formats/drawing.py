@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -137,7 +136,7 @@ class Drawing:
         """All that is drawn."""
         return [*self.outlines, *self.loose, *(outline for outline, _ in self.holed)]
 
-    def turn(self, reading: Reading, path: Path) -> tuple[np.ndarray, list[str]]:
+    def turn(self, reading: Reading) -> tuple[np.ndarray, list[str]]:
         """Turn a drawing, of which what is wanted stands upright, into the plane of x and y.
 
         Gives the directions of x, y and across in the rows of a matrix (3, 3), and notes on what that changes.
@@ -145,9 +144,9 @@ class Drawing:
         if not self.strokes:
             return np.eye(3), []
         every = [one.points for one in self.strokes]
-        spread_of(np.concatenate(every), f"'{path}'")
+        spread_of(np.concatenate(every))
         wanted = [one.points for one in filter(self.wants(reading), self.strokes)]
-        turn, notes = drawing_plane(wanted or every, f"'{path}'", reading.view)
+        turn, notes = drawing_plane(wanted or every, reading.view)
         self.outlines = [outline.mapped(turn[:2]) for outline in self.outlines]
         self.holed = [(outline.mapped(turn[:2]), called) for outline, called in self.holed]
         self.loose = [line.mapped(turn[:2]) for line in self.loose]

@@ -106,9 +106,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         else:
             document, audit = recover.readfile(path)
     except (OSError, ezdxf.DXFError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
-        raise ValueError(
-            f"'{path}' is not a readable DXF file ({error}); save it again as DXF R2000 or later"
-        ) from None
+        raise ValueError(f"it is not a readable DXF file ({error}); save it again as DXF R2000 or later") from None
     stated, doubts = _unit(document, reading)
     in_metres = metres_per(reading.unit or stated or "m")
     tolerance = None if reading.chord_tolerance is None else reading.chord_tolerance / in_metres
@@ -122,15 +120,15 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
             found.skipped[f"invisible {entity.dxftype()}"] += 1
         else:
             _add(entity, handle, found, tolerance)
-    closed = meshes_of_faces([(one.row["group"], one.row["name"], one.points) for one in found.faces], path)
+    closed = meshes_of_faces([(one.row["group"], one.row["name"], one.points) for one in found.faces])
     if closed:
         found.meshes += closed
         faces = {*found.faces}
         found.outlines = [one for one in found.outlines if one not in faces]
     meshes = _chosen_meshes(found, reading)
     if meshes:
-        return layout_of_meshes(meshes, path, reading, stated, _faults(audit) + _skipped(found))
-    notes = found.turn(reading, path)[1]
+        return layout_of_meshes(meshes, reading, stated, _faults(audit) + _skipped(found))
+    notes = found.turn(reading)[1]
     if found.faces:
         remedy = "; 3DFACEs of a layer are read as bodies in space where they close one"
         notes = [Note(CHANGED, f"{note}{remedy}") if kind_of(note) == CHANGED else note for note in notes]
@@ -142,7 +140,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         row_of=lambda layers, name: {**said_by_layer(layers[-1]), "name": name},
         tolerance=tolerance,
     )
-    refuse_open(found, path, "closed outline in its model space", "a closed polyline", stated)
+    refuse_open(found, "closed outline in its model space", "a closed polyline", stated)
     found.notes += _skipped(found)
     return found.layout(stated, own=True)
 
@@ -182,11 +180,10 @@ def _bounded(entities: Any, path: Path, frozen: Set[str]) -> Iterator[tuple[Any,
     """Yield entities and their handles; of a small file that inserts any number of copies no more than it may have."""
     size = path.stat().st_size
     most = max(size // 4, 1000)
-    for number, found in enumerate(_flat(entities, path, frozen, _Place())):
+    for number, found in enumerate(_flat(entities, frozen, _Place())):
         if number >= most:
             raise ValueError(
-                f"'{path}' inserts more than {most} entities, though it has {size} bytes only; "
-                "explode its block references"
+                f"it inserts more than {most} entities, though it has {size} bytes only; explode its block references"
             )
         yield found
 
@@ -203,7 +200,7 @@ class _Place:
     line_type: str = BY_LAYER_TYPE
     depth: int = 0
 
-    def drawn(self, entity: Any, path: Path) -> list[Any]:
+    def drawn(self, entity: Any) -> list[Any]:
         """Draw an entity of the block here; arcs become those of ellipses, of which one outline may have several.
 
         What a block draws on layer 0 lies on the layer on which it is inserted.
@@ -214,7 +211,7 @@ class _Place:
             return [entity]
         # References are followed by their matrices, which can be sheared.
         matrix = None if entity.dxftype() == "INSERT" else self.matrix
-        with _resolving(self.block, path):
+        with _resolving(self.block):
             found = list[Any](transform.copies([entity], matrix)[1])
         for one in found:
             if one.dxf.layer == "0":
@@ -227,37 +224,37 @@ class _Place:
 
 
 @contextmanager
-def _resolving(block: str, path: Path) -> Iterator[None]:
+def _resolving(block: str) -> Iterator[None]:
     """Refuse a damaged block, for which ezdxf raises errors of any kind."""
     try:
         yield
     except (TypeError, AttributeError, ValueError, KeyError, IndexError, ArithmeticError) as error:
-        raise ValueError(f"'{path}': block reference '{block}' cannot be resolved ({error}); explode it") from None
+        raise ValueError(f"block reference '{block}' cannot be resolved ({error}); explode it") from None
 
 
-def _flat(entities: Any, path: Path, frozen: Set[str], where: _Place) -> Iterator[tuple[Any, str]]:
+def _flat(entities: Any, frozen: Set[str], where: _Place) -> Iterator[tuple[Any, str]]:
     """Yield all entities, inserted blocks resolved, each with a handle that names it; none on a frozen layer."""
     if where.depth > DEEPEST_INSERT:
-        raise ValueError(f"'{path}' inserts blocks into each other more than {DEEPEST_INSERT} deep; explode them")
+        raise ValueError(f"it inserts blocks into each other more than {DEEPEST_INSERT} deep; explode them")
     for number, entity in enumerate(entities):
         handle = f"{where.handle}.{number}" if where.handle else str(entity.dxf.handle or number)
-        drawn = where.drawn(entity, path)
+        drawn = where.drawn(entity)
         for k, one in enumerate(drawn):
             if one.dxftype() != "INSERT" or one.dxf.layer in frozen or _is_closed(one):
                 yield one, f"{handle}.{k}" if len(drawn) > 1 else handle
                 continue
             content = [own for own in one.block() if own.dxftype() != "ATTDEF"]
-            for place in _places(one, handle, path, where):
-                yield from _flat(content, path, frozen, place)
+            for place in _places(one, handle, where):
+                yield from _flat(content, frozen, place)
 
 
-def _places(insert: Any, handle: str, path: Path, where: _Place) -> Iterator[_Place]:
+def _places(insert: Any, handle: str, where: _Place) -> Iterator[_Place]:
     """Yield the places where a reference inserts its block: one, or those in rows and columns."""
     # QCAD writes a zscale of 0 for plane drawings, with which no transformation can be made.
     insert.dxf.zscale = insert.dxf.get("zscale", 1.0) or 1.0
     block, layer, colour = str(insert.dxf.get("name", "?")), insert.dxf.layer, int(insert.dxf.get("color", BY_LAYER))
     for k, copy in enumerate(insert.multi_insert() if insert.mcount > 1 else [insert]):
-        with _resolving(block, path):
+        with _resolving(block):
             matrix = copy.matrix44() if where.matrix is None else copy.matrix44() * where.matrix
         called = f"{handle}.{k}" if insert.mcount > 1 else handle
         yield _Place(matrix, called, block, layer, colour, _line_type(insert) or "Continuous", where.depth + 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -73,7 +72,7 @@ def _flat_faces(entity: Any) -> tuple[list[Any], str]:
     return meshes, "" if whole else entity.dxftype()
 
 
-def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]], path: Path) -> list[Mesh]:
+def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]]) -> list[Mesh]:
     """Join 3DFACEs, those of a layer and of an inserted block together; none where none of these encloses a body.
 
     Given are layer, name and (n, 3) corners of each.
@@ -89,23 +88,21 @@ def meshes_of_faces(drawn: Sequence[tuple[str, str, np.ndarray]], path: Path) ->
         meshes.append(Mesh(np.concatenate(rings), numbers, {"name": faces[0][0], **said_by_layer(layer)}))
         try:
             size = float(np.ptp(meshes[-1].points, axis=0).max())
-            closed = closed or bool(closed_bodies(Body("", meshes[-1].points, fans(numbers)), size, path))
+            closed = closed or bool(closed_bodies(Body("", meshes[-1].points, fans(numbers)), size))
         except ValueError:
             continue
     return meshes if closed else []
 
 
-def layout_of_meshes(
-    meshes: Sequence[Mesh], path: Path, reading: Reading, unit: str, notes: Sequence[str]
-) -> Layout | Bodies:
+def layout_of_meshes(meshes: Sequence[Mesh], reading: Reading, unit: str, notes: Sequence[str]) -> Layout | Bodies:
     """Make bodies of the meshes of a drawing, or outlines where all of them are flat."""
     curved = [mesh for mesh in meshes if mesh.curved]
     if curved:
         first = curved[0]
         raise ValueError(
-            f"'{path}': {first.curved} '{first.row['name']}' on layer '{first.row['group']}' has faces of the ACIS "
+            f"{first.curved} '{first.row['name']}' on layer '{first.row['group']}' has faces of the ACIS "
             f"kernel that are not read ({len(curved)} of {counted(len(meshes), 'body', 'bodies')}): export the bodies "
             "as .stl (AutoCAD: STLOUT) or .step, or leave it out (ignore)"
         )
-    found = found_in_meshes(meshes, path, reading)
+    found = found_in_meshes(meshes, reading)
     return replace(found, unit=unit, notes=(*found.notes, *notes))

@@ -73,7 +73,7 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     """Read parsed GeoJSON, which states no unit; None if it is another kind of JSON."""
     if not isinstance(content, dict) or content.get("type") not in GEOJSON:
         return None
-    features = [_feature(one, k, path) for k, one in enumerate(_geojson_features(content, path))]
+    features = [_feature(one, k) for k, one in enumerate(_geojson_features(content))]
     crs = content.get("crs")
     name = str(crs.get("properties", {}).get("name", "")) if isinstance(crs, dict) else ""
     says = name if re.search(r"CRS84|4326$", name) else ""
@@ -83,16 +83,16 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     return layout_of_features(known, path, reading, degrees=says, lengths=lengths, web=web, skipped=skipped)
 
 
-def _geojson_features(content: Mapping[str, Any], path: Path) -> list[Any]:
+def _geojson_features(content: Mapping[str, Any]) -> list[Any]:
     if content["type"] != "FeatureCollection":
         return [content]
     features = content.get("features")
     if not isinstance(features, list):
-        raise ValueError(f"'{path}' is GeoJSON without a list \"features\"; export it again")
+        raise ValueError('it is GeoJSON without a list "features"; export it again')
     return features
 
 
-def _feature(found: Any, number: int, path: Path) -> Feature | None:
+def _feature(found: Any, number: int) -> Feature | None:
     """Make a feature of a member of GeoJSON; None of one without geometry."""
     from shapely.errors import ShapelyError
     from shapely.geometry import shape
@@ -110,9 +110,7 @@ def _feature(found: Any, number: int, path: Path) -> Feature | None:
             return Feature(shape(geometry), attributes)
     except (ShapelyError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         reason = " ".join(f"{type(error).__name__} {error}".split())[:120]
-        raise ValueError(
-            f"'{path}': feature {number} has a geometry that cannot be read ({reason}); repair it"
-        ) from None
+        raise ValueError(f"feature {number} has a geometry that cannot be read ({reason}); repair it") from None
 
 
 def read(path: Path, reading: Reading) -> Layout:
@@ -145,7 +143,7 @@ def _read_shapefile(path: Path, reading: Reading) -> Layout:
     except Exception as error:  # noqa: BLE001
         # pyshp passes on whatever its parsing runs into.
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
-        raise ValueError(f"'{path}' cannot be read as a shapefile ({reason}); export it again") from None
+        raise ValueError(f"it cannot be read as a shapefile ({reason}); export it again") from None
     text = projection.read_text(encoding="utf-8", errors="replace") if projection else ""
     unit, degrees = _unit_of_system(text)
     web = _is_web_mercator(text)
@@ -159,7 +157,7 @@ def _read_geopackage(path: Path, reading: Reading) -> Layout:
             layers = _layers(base, path)
     except (sqlite3.Error, IndexError) as error:
         # Python's error where a table lacks the column that the contents name.
-        raise ValueError(f"'{path}' is no readable GeoPackage ({error}); export it again") from None
+        raise ValueError(f"it is no readable GeoPackage ({error}); export it again") from None
     named = [layer.name for layer in layers]
     chosen = [name for name in named if matches([name], reading.only)] or named
     wanted = [one for one in layers if one.name in chosen and not matches([one.name], reading.ignore)]
@@ -167,7 +165,7 @@ def _read_geopackage(path: Path, reading: Reading) -> Layout:
     if len(systems) > 1:
         listed = ", ".join(f"'{one.name}' in {one.system or 'none'}" for one in reversed(systems.values()))
         raise ValueError(
-            f"'{path}' has layers in several coordinate systems: {listed}; leave one out (ignore), or export one"
+            f"it has layers in several coordinate systems: {listed}; leave one out (ignore), or export one"
         )
     text = next((layer.description for layer in systems.values()), "")
     unit, degrees = _unit_of_system(text)
@@ -214,7 +212,7 @@ def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Fe
     import shapely
 
     blob = row.pop(column)
-    called = f"'{path}': geometry {row.get('fid', '?')} of layer '{layer}'"
+    called = f"geometry {row.get('fid', '?')} of layer '{layer}'"
     if not isinstance(blob, bytes) or blob[:2] != b"GP" or len(blob) < 8:
         raise ValueError(f"{called} has no header of a GeoPackage; export it again")
     start = ENVELOPES.get((blob[3] >> 1) & 7)
@@ -296,7 +294,7 @@ def layout_of_features(
         if len(parts := found.outlines[first:]) > 1:
             named = [{**row, "name": f"{row['name']} {k + 1}"} for k in range(len(parts))]
             found.outlines[first:] = [replace(one, row=own) for one, own in zip(parts, named, strict=True)]
-    turn, notes = found.turn(reading, path)
+    turn, notes = found.turn(reading)
     found.notes += notes
     if roles:
         listed = ", ".join(f"'{role}'" for role in roles)
@@ -312,7 +310,7 @@ def layout_of_features(
         row_of=lambda layers, name: _row(name, layers[-1], {}),
         in_place=True,
     )
-    refuse_open(found, path, "polygon", "one polygon", unit)
+    refuse_open(found, "polygon", "one polygon", unit)
     found.notes += passed_over(found.skipped)
     return found.layout(unit)
 
@@ -369,7 +367,7 @@ def _check_degrees(found: Drawing, path: Path, reading: Reading, system: str, *,
         code = (32600 if y.mean() >= 0.0 else 32700) + zone
         unless = "" if system else "; if they are no degrees, give their unit"
         raise ValueError(
-            f"'{path}' is in degrees{f' ({system})' if system else ''}: its median block is {median:.2g} across, near "
+            f"it is in degrees{f' ({system})' if system else ''}: its median block is {median:.2g} across, near "
             f"({x[0]:.6f}, {y[0]:.6f}); reproject it to metres: ogr2ogr -t_srs EPSG:{code} {path.stem}_m.gpkg "
             f"{path.name}{unless}"
         )

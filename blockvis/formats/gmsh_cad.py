@@ -44,7 +44,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         found = _REACHES_OUT.search(text)
         if found:
             raise ValueError(
-                f"'{path}' uses '{found[0].strip()}', which reaches beyond the file; "
+                f"it uses '{found[0].strip()}', which reaches beyond the file; "
                 "run gmsh on it yourself and give the .msh"
             )
     # Chords within a thousandth of the radius, or within the given tolerance for a radius of 1 m.
@@ -55,8 +55,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         bodies = _meshed(path, target, chords)
         unit, per_mm = ("", 1.0) if path.suffix.lower() not in (".step", ".stp") else _step_unit(path)
         if bodies is not None:
-            return _bodies_of_volumes(bodies, path, unit, per_mm)
-        surfaces = gmsh_mesh.layout_of_mesh(target.read_bytes(), path, reading)
+            return _bodies_of_volumes(bodies, unit, per_mm)
+        surfaces = gmsh_mesh.layout_of_mesh(target.read_bytes(), reading)
     if isinstance(surfaces, Bodies):
         scaled = [replace(body, points=per_mm * body.points) for body in surfaces.bodies]
         return replace(surfaces, bodies=scaled, unit=unit)
@@ -71,35 +71,34 @@ def _meshed(path: Path, target: Path, chords: int) -> list[dict[str, object]] | 
         worker.say("mesh", (str(path.resolve()), str(target), chords, MOST_MEMORY))
         bodies: list[dict[str, object]] | None = worker.hear("mesh", "bodies", seconds=LONGEST_SECONDS)[1]
     except TimeoutError:
-        raise ValueError(f"'{path}': gmsh did not finish within {LONGEST_SECONDS} s; give it as .msh") from None
+        raise ValueError(f"gmsh did not finish within {LONGEST_SECONDS} s; give it as .msh") from None
     except ImportError as error:
         raise ValueError(
-            f"'{path}' needs gmsh, which could not be loaded ({error}); install with: "
+            f"it needs gmsh, which could not be loaded ({error}); install with: "
             f"{install_command('cad')} and, on Debian, apt-get install {_PACKAGES}"
         ) from None
     except WorkerEnded as ended:
-        raise _failed(path, ended.errors, target) from None
+        raise _failed(ended.errors, target) from None
     except Exception as error:  # noqa: BLE001
         # gmsh raises a bare Exception with the last line of its log.
-        raise _failed(path, "MemoryError" if isinstance(error, MemoryError) else str(error), target) from None
+        raise _failed("MemoryError" if isinstance(error, MemoryError) else str(error), target) from None
     finally:
         worker.close()
     return bodies
 
 
-def _failed(path: Path, said: str, target: Path) -> ValueError:
+def _failed(said: str, target: Path) -> ValueError:
     reason = " ".join(said.split())[-300:].replace(str(target), "the mesh")
     most = f"{MOST_MEMORY / 2**30:.3g} GiB of memory"
     remedy = "run gmsh on it yourself, with a coarser mesh, and give the .msh"
     if "alloc" in reason or "MemoryError" in reason:
-        return ValueError(f"'{path}': gmsh needs more than {most} for it; {remedy}")
+        return ValueError(f"gmsh needs more than {most} for it; {remedy}")
     if not reason:
         # So it mostly ends, too, where it cannot have more memory.
         return ValueError(
-            f"'{path}': gmsh crashed on it without a word, as on some closed round faces, or with no more than {most}; "
-            f"{remedy}"
+            f"gmsh crashed on it without a word, as on some closed round faces, or with no more than {most}; {remedy}"
         )
-    return ValueError(f"'{path}' cannot be read by gmsh: {reason}; repair it or give it as .msh")
+    return ValueError(f"it cannot be read by gmsh: {reason}; repair it or give it as .msh")
 
 
 def _step_unit(path: Path) -> tuple[str, float]:
@@ -120,13 +119,11 @@ def _step_unit(path: Path) -> tuple[str, float]:
     return unit, metres_per("mm") / metres_per(unit)
 
 
-def _bodies_of_volumes(found: list[dict[str, object]], path: Path, unit: str, per_mm: float) -> Bodies:
+def _bodies_of_volumes(found: list[dict[str, object]], unit: str, per_mm: float) -> Bodies:
     bodies = []
     for part in found:
         if int(str(part["groups"])) > 1:
-            raise ValueError(
-                f"'{path}': '{part['name']}' is in {part['groups']} physical groups; keep it in one of them"
-            )
+            raise ValueError(f"'{part['name']}' is in {part['groups']} physical groups; keep it in one of them")
         points, faces = np.array(part["points"], dtype=float), np.array(part["faces"], dtype=np.int64)
         drawn = per_mm**3 * float(str(part.get("volume", 0.0)))
         said = {"group": str(part["group"]), "material": str(part["group"])} if part["group"] else {}

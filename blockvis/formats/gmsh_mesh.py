@@ -23,7 +23,7 @@ from solver.mechanics import counted
 from .bodies import Bodies
 from .closed_surfaces import bodies_of_surfaces
 from .node_order import GMSH, ring_of_nodes
-from .reading import Reading, json_object
+from .reading import Reading, json_object, naming
 from .volumes import GMSH_SOLIDS, Faces, bodies_of_cells
 
 #: Number of nodes of each element type.
@@ -62,8 +62,8 @@ class _Mesh:
 class _Numbers:
     """The numbers of a section, ASCII or binary, read one after another."""
 
-    def __init__(self, body: bytes, section: str, path: Path, binary: bool, order: str, wide: str) -> None:
-        self.section, self.path, self.binary = section, path, binary
+    def __init__(self, body: bytes, section: str, binary: bool, order: str, wide: str) -> None:
+        self.section, self.binary = section, binary
         self.types = {"int": np.dtype(f"{order}i4"), "size": np.dtype(wide), "double": np.dtype(f"{order}f8")}
         self.body: bytes | list[bytes] = body if binary else body.split()
         self.position = 0
@@ -75,7 +75,7 @@ class _Numbers:
         # A count is checked against the length of the file before memory is reserved for it.
         if n < 0 or self.position + n * width > len(self.body):
             raise ValueError(
-                f"'{self.path}' is cut off: its section ${self.section} announces {n} more numbers and holds "
+                f"it is cut off: its section ${self.section} announces {n} more numbers and holds "
                 f"{max(0, (len(self.body) - self.position) // width)}; export it again"
             )
         part = self.body[self.position : self.position + n * width]
@@ -86,7 +86,7 @@ class _Numbers:
             return np.array(part, dtype=float if kind == "double" else np.int64)
         except (ValueError, OverflowError):
             raise ValueError(
-                f"'{self.path}': its section ${self.section} holds something that is not a number near "
+                f"its section ${self.section} holds something that is not a number near "
                 f"{b' '.join(part[:8])!r}; export it again"
             ) from None
 
@@ -101,35 +101,35 @@ class _Numbers:
         end = self.body.find(b"\n", self.position)
         text = self.body[self.position : end]
         if end < 0 or not text.strip().isdigit():
-            raise ValueError(f"'{self.path}': its section ${self.section} has no count; export it again")
+            raise ValueError(f"its section ${self.section} has no count; export it again")
         self.position = end + 1
         return int(text)
 
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a .msh file, which states no unit."""
-    return layout_of_mesh(path.read_bytes(), path, reading)
+    return layout_of_mesh(path.read_bytes(), reading)
 
 
-def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies:
-    """Read the content of a .msh file; the path is named in messages."""
-    mesh, table = _sections(data, path)
+def layout_of_mesh(data: bytes, reading: Reading) -> Layout | Bodies:
+    """Read the content of a .msh file."""
+    mesh, table = _sections(data)
     if mesh.solids:
-        return _bodies(mesh, path)
+        return _bodies(mesh)
     if not mesh.rings:
         rest = f" of its {mesh.other_elements} elements" if mesh.other_elements else ""
         raise ValueError(
-            f"'{path}' has no surface cells: none{rest} is a triangle or quadrangle; "
+            f"it has no surface cells: none{rest} is a triangle or quadrangle; "
             "mesh the surfaces (gmsh -2) and save them (a surface in no physical group is left out of the file)"
         )
     surface = np.concatenate(mesh.surfaces)
     tags, owner = np.unique(surface, return_inverse=True)
     rings = [ring for block in mesh.rings for ring in block]
-    groups = _group_names(mesh, 2, tags, path)
+    groups = _group_names(mesh, 2, tags)
     if not is_flat(mesh.coordinates):
-        return _enclosed(mesh, rings, [groups[k] for k in owner], path, reading)
+        return _enclosed(mesh, rings, [groups[k] for k in owner], reading)
     names = _entity_names(groups, tags, "surface")
-    flat, note = flattened(mesh.coordinates, f"'{path}'", reading.view)
+    flat, note = flattened(mesh.coordinates, reading.view)
     unusable: dict[int, LeftOut] = {}
     outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     notes = _notes(groups, "surface") + ([note] if note else [])
@@ -140,14 +140,14 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
     return layout.leaving_out(unusable)
 
 
-def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Path, reading: Reading) -> Bodies:
+def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], reading: Reading) -> Bodies:
     """Find the bodies that surfaces in space enclose: those of each physical group, or else of all together."""
     named, owner = np.unique(groups, return_inverse=True)
     rows = [{"name": str(name) or "body", **(_said(str(name)) if len(named) > 1 else {})} for name in named]
     try:
-        bodies, notes = bodies_of_surfaces(mesh.coordinates, rings, owner, rows, path, reading)
+        bodies, notes = bodies_of_surfaces(mesh.coordinates, rings, owner, rows, reading)
     except ValueError:
-        bodies, notes = bodies_of_surfaces(mesh.coordinates, rings, np.zeros_like(owner), [{"name": "body"}], path)
+        bodies, notes = bodies_of_surfaces(mesh.coordinates, rings, np.zeros_like(owner), [{"name": "body"}])
     return Bodies(bodies, notes=("one block per closed surface", *notes))
 
 
@@ -158,14 +158,15 @@ def _said(group: str) -> dict[str, str]:
 
 def holds_flat_blocks(path: Path) -> bool:
     """Whether a .msh file has surface cells in a plane and none with a volume."""
-    mesh, _ = _sections(path.read_bytes(), path)
+    with naming(path):
+        mesh, _ = _sections(path.read_bytes())
     return bool(mesh.rings) and not mesh.solids and is_flat(mesh.coordinates)
 
 
-def _bodies(mesh: _Mesh, path: Path) -> Bodies:
+def _bodies(mesh: _Mesh) -> Bodies:
     """Find the bodies of a mesh of volumes; surface cells beside them are their skin."""
     tags, owner = np.unique(np.concatenate(mesh.volumes), return_inverse=True)
-    groups = _group_names(mesh, 3, tags, path)
+    groups = _group_names(mesh, 3, tags)
     rows = [
         {"name": name, **_said(group)}
         for name, group in zip(_entity_names(groups, tags, "volume"), groups, strict=True)
@@ -185,7 +186,7 @@ def _notes(groups: list[str], kind: str) -> list[str]:
     return notes
 
 
-def _group_names(mesh: _Mesh, dimension: int, tags: np.ndarray, path: Path) -> list[str]:
+def _group_names(mesh: _Mesh, dimension: int, tags: np.ndarray) -> list[str]:
     """Name the physical group of each entity, "" for none; one entity may be in one group only."""
     named = []
     for tag in tags.tolist():
@@ -193,9 +194,7 @@ def _group_names(mesh: _Mesh, dimension: int, tags: np.ndarray, path: Path) -> l
         if len(groups) > 1:
             listed = " and ".join(f"'{mesh.group_names.get((dimension, g), str(g))}'" for g in groups)
             kind = "surface" if dimension == 2 else "volume"
-            raise ValueError(
-                f"'{path}': {kind} {tag} is in {len(groups)} physical groups, {listed}; keep it in one of them"
-            )
+            raise ValueError(f"{kind} {tag} is in {len(groups)} physical groups, {listed}; keep it in one of them")
         named.append(mesh.group_names.get((dimension, groups[0]), f"group {groups[0]}") if groups else "")
     return named
 
@@ -204,16 +203,15 @@ def _entity_names(groups: list[str], tags: np.ndarray, kind: str) -> list[str]:
     return [name if group else f"{kind} {tag}" for name, group, tag in zip(numbered(groups), groups, tags, strict=True)]
 
 
-def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, object]]]:
+def _sections(data: bytes) -> tuple[_Mesh, dict[str, dict[str, object]]]:
     head = _section(data, "MeshFormat")
     words = head.split(b"\n", 1)[0].split() if head else []
     if len(words) < 3:
-        raise ValueError(f"'{path}' is not a gmsh mesh: it has no section $MeshFormat; export it as .msh 4.1 or 2.2")
+        raise ValueError("it is not a gmsh mesh: it has no section $MeshFormat; export it as .msh 4.1 or 2.2")
     version, binary, width = words[0].decode("ascii", "replace"), words[1] == b"1", words[2]
     if version not in ("2", "2.1", "2.2", "4.1"):
         raise ValueError(
-            f"'{path}' is version {version} of .msh; versions 2 and 4.1 are read: "
-            f"gmsh '{path}' -save -format msh41 -o new.msh"
+            f"it is version {version} of .msh; versions 2 and 4.1 are read: gmsh old.msh -save -format msh41 -o new.msh"
         )
     order = "<"
     if binary and head is not None:
@@ -224,7 +222,7 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
 
     def numbers(section: str) -> _Numbers | None:
         body = _section(data, section)
-        return None if body is None else _Numbers(body, section, path, binary, order, wide)
+        return None if body is None else _Numbers(body, section, binary, order, wide)
 
     names = _section(data, "PhysicalNames")
     for line in (names or b"").decode("utf-8", "replace").splitlines():
@@ -234,7 +232,7 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
     nodes, elements = numbers("Nodes"), numbers("Elements")
     if nodes is None or elements is None:
         missing = "Nodes" if nodes is None else "Elements"
-        raise ValueError(f"'{path}' has no section ${missing}; mesh the surfaces (gmsh -2) and export again")
+        raise ValueError(f"it has no section ${missing}; mesh the surfaces (gmsh -2) and export again")
     if version == "4.1":
         for section in ("Entities", "PartitionedEntities"):
             _entities_41(numbers(section), mesh)
@@ -310,9 +308,7 @@ def _set_nodes(mesh: _Mesh, numbers: _Numbers, tags: np.ndarray, coordinates: np
     mesh.coordinates = coordinates
     mesh.nodes, mesh.places = np.unique(tags, return_index=True)
     if len(mesh.nodes) < len(tags):
-        raise ValueError(
-            f"'{numbers.path}' gives {len(tags)} nodes but {len(mesh.nodes)} different numbers to them; export it again"
-        )
+        raise ValueError(f"it gives {len(tags)} nodes but {len(mesh.nodes)} different numbers to them; export it again")
 
 
 def _elements_41(numbers: _Numbers, mesh: _Mesh) -> None:
@@ -338,7 +334,7 @@ def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
             follow = 1
             rows = numbers.take("int", n_tags + _width(kind, numbers)).reshape(1, -1)
         if follow < 1:
-            raise ValueError(f"'{numbers.path}': its section $Elements has a header of {follow} elements; export again")
+            raise ValueError(f"its section $Elements has a header of {follow} elements; export again")
         remaining -= follow
         dimension = 2 if kind in GMSH else 3 if kind in GMSH_SOLIDS else 0
         if dimension == 0:
@@ -354,9 +350,7 @@ def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
 
 def _width(kind: int, numbers: _Numbers) -> int:
     if kind not in N_NODES:
-        raise ValueError(
-            f"'{numbers.path}' has elements of gmsh's type {kind}, which is not known; mesh with order 2 at most"
-        )
+        raise ValueError(f"it has elements of gmsh's type {kind}, which is not known; mesh with order 2 at most")
     return N_NODES[kind]
 
 
@@ -376,7 +370,7 @@ def _known(mesh: _Mesh, numbers: _Numbers, nodes: np.ndarray) -> np.ndarray:
     """Replace the numbers of nodes by their positions among the coordinates."""
     missing = nodes[~np.isin(nodes, mesh.nodes)]
     if len(missing):
-        raise ValueError(f"'{numbers.path}': an element uses node {missing[0]}, which the file lacks; export again")
+        raise ValueError(f"an element uses node {missing[0]}, which the file lacks; export again")
     found: np.ndarray = mesh.places[np.searchsorted(mesh.nodes, nodes)]
     return found
 

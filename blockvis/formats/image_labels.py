@@ -101,7 +101,7 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
         known, called = [*known, TRANSPARENT], [*called, "transparent"]
         wanted = TRANSPARENT if wanted is None else wanted
     if wanted is not None and wanted not in known:
-        raise ValueError(f"has no background {background!r}; its values are {', '.join(called[:8])}")
+        raise ValueError(f"it has no background {background!r}; its values are {', '.join(called[:8])}")
     mask = len(known) == 2
     outer: int | None
     lines = _lines_of_mask(numbers) if mask else None
@@ -188,7 +188,7 @@ def _values(image: Image.Image) -> tuple[np.ndarray, bool]:
         real = np.asarray(image)
         if not np.isfinite(real).all() or (real != np.round(real)).any():
             bad = real[~(np.isfinite(real) & (real == np.round(real)))][0]
-            raise ValueError(f"has the value {bad:g}; labels are whole numbers: joints 0, stones 1, 2, ...")
+            raise ValueError(f"it has the value {bad:g}; labels are whole numbers: joints 0, stones 1, 2, ...")
         return real.astype(np.int64), False
     if image.mode in ("1", "L", "P", "I") or image.mode.startswith("I;16"):
         return np.asarray(image).astype(np.int64), False
@@ -208,7 +208,7 @@ def _value(background: int | str, image: Image.Image, coloured: bool) -> int:
         r, g, b = ImageColor.getrgb(background)[:3]
     except ValueError:
         raise ValueError(
-            f'has no background {background!r}; give a value, or a colour such as "white" or "#ff8000"'
+            f'it has no background {background!r}; give a value, or a colour such as "white" or "#ff8000"'
         ) from None
     if coloured or image.format == "JPEG":
         return (r << 16) + (g << 8) + b
@@ -222,7 +222,7 @@ def _nearest_colour(wanted: int, known: np.ndarray, word: str) -> int:
     rgb = np.array([wanted >> 16, wanted >> 8 & 255, wanted & 255] if wanted > 255 else [wanted] * 3)
     apart = np.abs(known - rgb).max(axis=1)
     if apart.min() > 2 * FLAT:
-        raise ValueError(f"has no background {word!r}; its colours are {', '.join(map(_colour, known[:8]))}")
+        raise ValueError(f"it has no background {word!r}; its colours are {', '.join(map(_colour, known[:8]))}")
     return int(apart.argmin())
 
 
@@ -283,7 +283,7 @@ def _of_values(values: np.ndarray, image: Image.Image, wanted: int | None) -> _F
         # Many values of some share each are a blur, not lines between stones.
         label |= thin & (thin.sum() <= max(2, label.sum()))
     if not label.any():
-        raise ValueError("has no region of one value three pixels wide; give an image of more pixels")
+        raise ValueError("it has no region of one value three pixels wide; give an image of more pixels")
     numbers = np.where(label[place], (np.cumsum(label) - 1)[place], -1).astype(np.int32)
     first = np.unique(numbers.ravel(), return_index=True)[1][-int(label.sum()) :]
     colours = shown.reshape(-1, shown.shape[2])[first]

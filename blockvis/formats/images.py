@@ -48,19 +48,17 @@ MASK_MAKERS = "by hand GIMP, labelme or CVAT, by a model SAM"
 
 def read(path: Path, reading: Reading) -> Layout:
     """Read the stones of an image."""
-    reading.refuse_view(path)
+    reading.refuse_view()
     image, tags = opened(path)
     placement = placement_of(path, image.size, reading, tags=tags)
     try:
         labels = labels_of(image, reading.image.get("background"))
     except Photograph:
         raise ValueError(
-            f"'{path}' is a photograph: its colours are no labels, and blockvis does not find stones in one; make a "
+            f"it is a photograph: its colours are no labels, and blockvis does not find stones in one; make a "
             f"mask of it ({MASK_MAKERS}), and put the photograph under the pictures: [output] underlay"
         ) from None
-    except ValueError as error:
-        raise ValueError(f"'{path}' {error}") from None
-    return layout_of_labels(path, labels, placement, reading)
+    return layout_of_labels(labels, placement, reading)
 
 
 def opened(path: Path) -> tuple[Image.Image, Mapping[int, Any]]:
@@ -87,15 +85,15 @@ def opened(path: Path) -> tuple[Image.Image, Mapping[int, Any]]:
     return upright, tags
 
 
-def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: Reading) -> Layout:
+def layout_of_labels(labels: Labels, placement: Placement, reading: Reading) -> Layout:
     """Make a layout of the regions of labels."""
     smallest, tolerance = reading.image.get("smallest"), reading.image.get("outline_tolerance")
     noisy = not labels.is_mask and not labels.names
     speck = SPECK_OF_NOISE if noisy else SPECK
     regions = regions_of(labels.numbers, None if smallest is None else smallest / placement.pixel, speck)
-    _check_stones(path, labels, regions, placement)
+    _check_stones(labels, regions, placement)
     if smallest is None:
-        _check_sizes(path, regions, placement)
+        _check_sizes(regions, placement)
     found = outlined(regions, STAIRS if tolerance is None else tolerance / placement.pixel)
     holes = {k: inner for k, inner in found.holes.items() if _hole_share(found.rings[k], inner) > PINHOLES}
     filled = [k for k in found.holes if k not in holes]
@@ -109,7 +107,7 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
         notes = (*notes, *maybe_openings(rings, names, holes))
     layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit, notes=notes)
     if not labels.is_of_lines:
-        _check_holes(path, labels, regions, holes)
+        _check_holes(labels, regions, holes)
     around = {}
     for k, inner in holes.items():
         placed = tuple(placement.placed(hole * [1.0, -1.0]) for hole in inner)
@@ -119,13 +117,13 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
     return layout.leaving_out(around)
 
 
-def _check_stones(path: Path, labels: Labels, regions: Regions, placement: Placement) -> None:
+def _check_stones(labels: Labels, regions: Regions, placement: Placement) -> None:
     """Refuse pictures without stones, masks of one region, and what is neither a mask nor a label image."""
     n = len(regions.labels)
     if n == 0:
         what = f"all of it is background ({labels.background})" if labels.background else "it is of one value"
         raise ValueError(
-            f"'{path}' shows no stone: {what}, or smaller than {regions.smallest:.3g} pixels across (smallest); stones "
+            f"it shows no stone: {what}, or smaller than {regions.smallest:.3g} pixels across (smallest); stones "
             "need another value than joints, see background"
         )
     if labels.is_mask and n == 1:
@@ -135,28 +133,28 @@ def _check_stones(path: Path, labels: Labels, regions: Regions, placement: Place
             size = regions.smallest * placement.pixel
             why = f"lines on paper enclose no stone of {size:.3g} m across or more (smallest); close them, or, if they "
             why += "are the stones, give the value of what is around them as background"
-        raise ValueError(f"'{path}' shows one region of {regions.areas[0] * placement.pixel**2:.4g} m²: {why}")
+        raise ValueError(f"it shows one region of {regions.areas[0] * placement.pixel**2:.4g} m²: {why}")
     if labels.moved > MOST_MOVED * labels.numbers.size:
         share = f"{100.0 * labels.moved / labels.numbers.size:.2g} %"
         raise ValueError(
-            f"'{path}' is no mask or label image: {share} of its pixels have no label's value; write it without "
+            f"it is no mask or label image: {share} of its pixels have no label's value; write it without "
             "shading and antialiasing, as PNG"
         )
 
 
-def _check_holes(path: Path, labels: Labels, regions: Regions, holed: Collection[int]) -> None:
+def _check_holes(labels: Labels, regions: Regions, holed: Collection[int]) -> None:
     """Refuse pictures of which too much are regions with holes: there the background is taken for stones."""
     area = sum(int(regions.areas[k]) for k in holed)
     if area > MOST_HOLED * regions.areas.sum():
         largest = max(holed, key=lambda k: int(regions.areas[k]))
         that = f"that ({labels.names[regions.labels[largest] - 1]})" if labels.names else "its other value"
         raise ValueError(
-            f"'{path}' is no picture of stones: {100.0 * area / regions.areas.sum():.0f} % of what is not background "
+            f"it is no picture of stones: {100.0 * area / regions.areas.sum():.0f} % of what is not background "
             f"({labels.background or 'none'}) has holes; if {that} lies around the stones, give it as background"
         )
 
 
-def _check_sizes(path: Path, regions: Regions, placement: Placement) -> None:
+def _check_sizes(regions: Regions, placement: Placement) -> None:
     """Refuse charts, screens and drawings of results: their regions are mostly letters, strokes and specks."""
     n, (specks, _) = len(regions.areas), regions.specks
     small = np.sort(regions.areas)[: n // 2].sum() / regions.areas.sum()
@@ -168,7 +166,7 @@ def _check_sizes(path: Path, regions: Regions, placement: Placement) -> None:
         return
     size = 0.2 * placement.pixel * float(np.sqrt(np.median(regions.areas[regions.areas >= np.mean(regions.areas)])))
     raise ValueError(
-        f"'{path}' is no picture of stones but a chart, a screen or a shaded drawing: {why}; make a mask of its stones "
+        f"it is no picture of stones but a chart, a screen or a shaded drawing: {why}; make a mask of its stones "
         f"({MASK_MAKERS}), or, if they are stones and specks, say from what size across they are stones: smallest = "
         f"{size:.2g} (m)"
     )

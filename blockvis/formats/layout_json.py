@@ -58,30 +58,30 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
-        raise ValueError(f"'{path}' is not a JSON file: {error}; export it again") from None
+        raise ValueError(f"it is not a JSON file: {error}; export it again") from None
     if not program_of(content):
-        reading.refuse_image_keys(path)
+        reading.refuse_image_keys()
     for read_content in () if _is_own(content) else KINDS:
         found = read_content(content, path, reading)
         if found is not None:
             return found
     if not isinstance(content, dict) or not isinstance(content.get("blocks"), list):
         raise ValueError(
-            f"'{path}' is JSON but no layout; it needs a list \"blocks\" of {{name, outline}}, annotations of COCO, "
+            'it is JSON but no layout; it needs a list "blocks" of {name, outline}, annotations of COCO, '
             "LabelMe or VIA, features of GeoJSON, or meshes of COMPAS"
         )
     version = content.get("version", 1)
     if version != 1:
-        raise ValueError(f"'{path}' is a layout of version {version!r}; version 1 is read: update blockvis")
+        raise ValueError(f"it is a layout of version {version!r}; version 1 is read: update blockvis")
     more = _not_read(content, KEYS, f"'{path}'")
     in_space = any(isinstance(block, dict) and "points" in block for block in content["blocks"])
     if not in_space:
-        reading.refuse_view(path)
+        reading.refuse_view()
     of_block = (*BLOCK_KEYS, *(("points", "faces") if in_space else ("outline", "thickness")))
     shapes, names = [], []
     for k, block in enumerate(content["blocks"]):
         names.append(str(block.get("name", f"block {k}")) if isinstance(block, dict) else f"block {k}")
-        called = f"'{path}': block '{names[-1]}'"
+        called = f"block '{names[-1]}'"
         more += _not_read(block, of_block, called) if isinstance(block, dict) else []
         shapes.append(_solid(block, called) if in_space else _outline(block, called))
     layout = Layout(blocks=tuple(shapes), names=tuple(names), unit=str(content.get("unit", "")))

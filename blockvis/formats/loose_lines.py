@@ -6,7 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -261,16 +260,14 @@ def _faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
     )
 
 
-def refuse_open(
-    found: Drawing, path: Path, what: str, remedy: str, unit: str, factors: Sequence[float] = (1, 1)
-) -> None:
+def refuse_open(found: Drawing, what: str, remedy: str, unit: str, factors: Sequence[float] = (1, 1)) -> None:
     """Refuse a drawing that has nothing but lines that close nothing, and say what it has."""
     if found.is_open:
         skipped = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items() if n)
         notes = [note for note in found.notes if kind_of(note) == LEFT_OUT]
         seen = "; ".join(words for words in (_nothing_closed(found.left_out), skipped, *notes) if words) or "nothing"
         drawn = found.layout(unit, factors=factors)
-        raise Refused(f"'{path}' has no {what} (found: {seen}); draw each block as {remedy}", drawn)
+        raise Refused(f"it has no {what} (found: {seen}); draw each block as {remedy}", drawn)
 
 
 def _nothing_closed(left_out: Sequence[LeftOut]) -> str:

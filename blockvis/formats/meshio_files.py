@@ -49,12 +49,12 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
             sets = _abaqus_sets(cards, mesh.cells) if cards else {}
     except (SystemExit, Exception) as error:  # noqa: BLE001
         if isinstance(error, ModuleNotFoundError):
-            raise ValueError(f"'{path}' needs the package {error.name}: pip install {error.name}") from None
+            raise ValueError(f"it needs the package {error.name}: pip install {error.name}") from None
         words = said.getvalue() if isinstance(error, SystemExit) else str(error)
         name = type(error).__name__
         reason = " ".join((f"{name} {words}" if isinstance(error, LookupError) else words or name).split())
         raise ValueError(
-            f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again, with straight cells "
+            f"it cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again, with straight cells "
             "(order 1), or as .msh or .vtu"
         ) from None
     if suffix == ".f3grid":
@@ -66,7 +66,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         chosen = [(k, len(mesh.cells[k].data)) for k, _ in solid]
         cells = [(shape, np.asarray(mesh.cells[k].data, dtype=np.int64)) for k, shape in solid]
         data, notes = _cell_data(mesh, chosen, sets)
-        bodies = _bodies(points, cells, data, path)
+        bodies = _bodies(points, cells, data)
         flat = [cell for block in mesh.cells if block.type in MESHIO for cell in block.data]
         notes += flat_beside([nodes for _, nodes in cells], flat)
         return replace(bodies, notes=(*bodies.notes, *notes, *strange))
@@ -79,7 +79,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         rings += [ring_of_nodes(np.asarray(cell, dtype=np.int64), MESHIO[kind]) for cell in block.data]
         chosen.append((k, len(block.data)))
     data, notes = _cell_data(mesh, chosen, sets)
-    found = layout_of_cells(points, rings, data, path, reading.view)
+    found = layout_of_cells(points, rings, data, reading.view)
     return replace(found, notes=(*found.notes, *notes, *strange))
 
 
@@ -124,11 +124,9 @@ def _starts(cells: Sequence[Any]) -> np.ndarray:
     return np.cumsum([0, *(len(block.data) for block in cells)])
 
 
-def _bodies(
-    points: np.ndarray, cells: list[tuple[Faces, np.ndarray]], data: dict[str, np.ndarray], path: Path
-) -> Bodies:
+def _bodies(points: np.ndarray, cells: list[tuple[Faces, np.ndarray]], data: dict[str, np.ndarray]) -> Bodies:
     key, numbered, owner = owners(data, sum(len(nodes) for _, nodes in cells))
-    bodies = bodies_of_cells(points, cells, owner, rows_of_cells(data, owner, numbered, path))
+    bodies = bodies_of_cells(points, cells, owner, rows_of_cells(data, owner, numbered))
     how = f"one block per value of the cell array '{key}'" if key else "one block per piece that hangs together"
     return Bodies(bodies, notes=(how,))
 
@@ -156,14 +154,14 @@ def _check_text(path: Path) -> None:
         named += re.findall(r"(?i)<DataItem[^>]*Format\s*=\s*[\"'](?:HDF|Binary)[\"'][^>]*>\s*([^<:]+)", text)
         for name in (name.strip().strip("\"'") for name in named):
             if Path(name).is_absolute() or not (path.parent / name).resolve().is_relative_to(path.parent.resolve()):
-                raise ValueError(f"'{path}' names '{name}', which is outside its folder; keep the files together")
+                raise ValueError(f"it names '{name}', which is outside its folder; keep the files together")
     if suffix in (".tec", ".dat"):
         size = path.stat().st_size
         with path.open("rb") as stream:
             head = stream.read(1_000_000)
         for match in re.finditer(rb"(?i)\b(N|E|I|J|K|NODES|ELEMENTS)\s*=\s*(\d+)", head):
             if int(match[2][:18]) > size:
-                raise ValueError(f"'{path}' announces {match[0].decode()} in {size} bytes; export it again")
+                raise ValueError(f"it announces {match[0].decode()} in {size} bytes; export it again")
 
 
 def _sets_of_mesh(mesh: Any) -> dict[str, np.ndarray]:
@@ -248,7 +246,7 @@ def _abaqus_cards(path: Path) -> list[tuple[str, str, str]]:
     moved = any(word in ("INSTANCE", "SYSTEM") and data for word, _, data in cards)
     if moved or words.count("INSTANCE") > 1 or len(set(nodes)) < len(nodes):
         raise ValueError(
-            f"'{path}' is written in parts with nodes of their own, or in a moved system; one list of nodes is read: "
+            "it is written in parts with nodes of their own, or in a moved system; one list of nodes is read: "
             "in Abaqus/CAE Model, Edit Attributes, 'Do not use parts and assemblies in input files'"
         )
     return [] if "INCLUDE" in words else cards

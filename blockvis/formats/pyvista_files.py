@@ -26,7 +26,7 @@ from solver.mechanics import counted
 from .bodies import Bodies, Body, body_of_polygons, in_dimension
 from .cells import flat_beside, layout_of_cells, merged, owners, rows_of_cells
 from .node_order import VTK, VTK_LINES, VTK_OTHER_FACES, ring_of_nodes
-from .reading import Reading
+from .reading import Reading, naming
 from .volumes import VTK_SOLIDS, bodies_of_cells
 from .vtk_arrays import announced_bytes, largest_number
 
@@ -75,10 +75,10 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         # At an array of a type that it does not know VTK leaves out all further ones and hands out the rest.
         reason = " ".join(faults.error_events[0].alert.split())[:200]
         remedy = "save it as .vtu" if path.suffix.lower() == ".vtk" else "export it again"
-        raise ValueError(f"'{path}' cannot be read whole by VTK ({reason}); {remedy}")
+        raise ValueError(f"it cannot be read whole by VTK ({reason}); {remedy}")
     if failed is not None:
-        raise ValueError(f"'{path}' cannot be read as {path.suffix} ({failed}); export it again") from None
-    return found_in_dataset(data, path, reading.view)
+        raise ValueError(f"it cannot be read as {path.suffix} ({failed}); export it again") from None
+    return found_in_dataset(data, reading.view)
 
 
 def _check_counts(path: Path) -> None:
@@ -92,7 +92,7 @@ def _check_counts(path: Path) -> None:
 def _check_legacy(path: Path) -> None:
     data = path.read_bytes()
     if not data.lstrip().startswith(b"# vtk DataFile"):
-        raise _not_vtk(path, data)
+        raise _not_vtk(data)
     found = re.finditer(
         rb"(?im)^[ \t]*(?:POINTS|VERTICES|LINES|POLYGONS|TRIANGLE_STRIPS|CELLS|CELL_TYPES|CELL_DATA|POINT_DATA|METADATA"
         rb"|FIELD[ \t]+\S+|LOOKUP_TABLE[ \t]+\S+|[XYZ]_COORDINATES|OFFSETS|CONNECTIVITY)[ \t]+(-?\d+)"
@@ -107,18 +107,18 @@ def _check_legacy(path: Path) -> None:
     for match in re.finditer(rb"(?im)^[ \t]*DIMENSIONS((?:[ \t]+-?\d+)+)", data):
         sizes = [int(number[:18]) for number in match[1].split()]
         counts += [min(sizes), math.prod(sizes)]
-    _refuse(path, counts, len(data))
+    _refuse(counts, len(data))
 
 
 def _check_xml(path: Path) -> None:
     """Check document type, nesting and counts; appended data are no XML, and are looked up from the arrays."""
     data = path.read_bytes()
     if not data.lstrip().startswith(b"<"):
-        raise _not_vtk(path, data)
+        raise _not_vtk(data)
     start = data.find(b"<AppendedData")
     markup, appended = (data, b"") if start < 0 else (data[:start], data[start:])
     if re.search(rb"<!\s*DOCTYPE", markup, re.IGNORECASE):
-        raise ValueError(f"'{path}' has an XML document type; no VTK file needs one: export it again")
+        raise ValueError("it has an XML document type; no VTK file needs one: export it again")
     parser: Any = ElementTree.XMLPullParser(("start", "end"))
     try:
         parser.feed(markup)
@@ -126,19 +126,19 @@ def _check_xml(path: Path) -> None:
             parser.close()
         events = [*parser.read_events()]
     except ElementTree.ParseError as error:
-        raise ValueError(f"'{path}' cannot be read as {path.suffix} ({error}); export it again") from None
+        raise ValueError(f"it cannot be read as {path.suffix} ({error}); export it again") from None
     file: dict[str, str] = {}
     depth = items = numbers = 0
     for event, element in events:
         depth += 1 if event == "start" else -1
         if depth > DEEPEST:
-            raise ValueError(f"'{path}' nests elements more than {DEEPEST} deep; no VTK file does: export it again")
+            raise ValueError(f"it nests elements more than {DEEPEST} deep; no VTK file does: export it again")
         is_array = element.tag in ("DataArray", "Array")
         if event == "end":
             if is_array:
-                _check_array(element, appended, file, path, len(data))
+                _check_array(element, appended, file, len(data))
             continue
-        counts = _counts(element, path, len(data))
+        counts = _counts(element, len(data))
         if element.tag == "VTKFile":
             file = element.attrib
         elif element.tag == "Piece":
@@ -146,10 +146,10 @@ def _check_xml(path: Path) -> None:
         elif is_array:
             numbers += counts.get("NumberOfComponents", 1) * counts.get("NumberOfTuples", items)
         items = counts.get("Extent", counts.get("WholeExtent", items))
-        _refuse(path, [items, numbers], len(data))
+        _refuse([items, numbers], len(data))
 
 
-def _counts(element: ElementTree.Element, path: Path, size: int) -> dict[str, int]:
+def _counts(element: ElementTree.Element, size: int) -> dict[str, int]:
     """Numbers of items that an element announces, those of an extent included, none of them more than a file holds."""
     counts = dict[str, int]()
     for key, value in element.items():
@@ -158,13 +158,13 @@ def _counts(element: ElementTree.Element, path: Path, size: int) -> dict[str, in
             counts[key] = math.prod(abs(b - a) + 1 for a, b in zip(ends[::2], ends[1::2], strict=False))
         elif key.startswith("NumberOf"):
             if not re.fullmatch(r"\s*\d{1,15}\s*", value):
-                raise ValueError(f"'{path}' announces {value[:20]} items in {size} bytes ({key}); export it again")
+                raise ValueError(f"it announces {value[:20]} items in {size} bytes ({key}); export it again")
             counts[key] = int(value)
-    _refuse(path, [*counts.values()], size)
+    _refuse([*counts.values()], size)
     return counts
 
 
-def _check_array(array: ElementTree.Element, appended: bytes, file: dict[str, str], path: Path, size: int) -> None:
+def _check_array(array: ElementTree.Element, appended: bytes, file: dict[str, str], size: int) -> None:
     """Check the size that a binary array announces, and the largest of its offsets: VTK reserves as much memory."""
     attributes, is_offsets = array.attrib, array.get("Name", "").endswith("offsets")
     content = (array.text or "").strip().encode()
@@ -179,37 +179,38 @@ def _check_array(array: ElementTree.Element, appended: bytes, file: dict[str, st
         largest = largest_number(content, attributes, file, 8 * MOST_NUMBERS) if is_offsets else 0
     except (ValueError, KeyError, OverflowError, zlib.error) as error:
         raise ValueError(
-            f"'{path}' has an array '{array.get('Name', '')}' that cannot be read ({error}); export it again"
+            f"it has an array '{array.get('Name', '')}' that cannot be read ({error}); export it again"
         ) from None
-    _refuse(path, [numbers, largest], size)
+    _refuse([numbers, largest], size)
 
 
-def _refuse(path: Path, counts: Sequence[int], size: int) -> None:
+def _refuse(counts: Sequence[int], size: int) -> None:
     """Refuse more items than a file of so many bytes can hold, or than a drawing has."""
     wrong = [count for count in counts if not 0 <= count <= min(MOST_NUMBERS, MOST_PER_BYTE * size)]
     if wrong:
-        raise ValueError(f"'{path}' announces {wrong[0]} items in {size} bytes; export it again")
+        raise ValueError(f"it announces {wrong[0]} items in {size} bytes; export it again")
 
 
-def _not_vtk(path: Path, data: bytes) -> ValueError:
-    return ValueError(f"'{path}' is not a file of VTK: it starts with {data[:16]!r}; export it again")
+def _not_vtk(data: bytes) -> ValueError:
+    return ValueError(f"it is not a file of VTK: it starts with {data[:16]!r}; export it again")
 
 
 def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
     """Refuse lists of files (.pvd, .vtm) that name a missing file, one outside the folder, or one of no VTK format."""
     if path in seen:
-        raise ValueError(f"'{path}' names itself; export it again")
+        raise ValueError("it names itself; export it again")
     data = path.read_text(encoding="utf-8", errors="replace")
     for name in re.findall(r"""<DataSet\b[^>]*?\bfile\s*=\s*["']([^"']*)["']""", data):
         name = unescape(name, {"&quot;": '"', "&apos;": "'"})
         target = path.parent / name
         if Path(name).is_absolute() or not target.resolve().is_relative_to(path.parent.resolve()):
-            raise ValueError(f"'{path}' names '{name}', which is outside its folder; keep the files together")
+            raise ValueError(f"it names '{name}', which is outside its folder; keep the files together")
         if target.suffix.lower() not in (".vtu", ".vtp", ".vtk", ".vtm", ".vtmb"):
-            raise ValueError(f"'{path}' names '{name}', which is no .vtu, .vtp, .vtk, .vtm or .vtmb; export it again")
+            raise ValueError(f"it names '{name}', which is no .vtu, .vtp, .vtk, .vtm or .vtmb; export it again")
         if not target.is_file():
-            raise ValueError(f"'{path}' names '{name}', which does not exist; keep the files together")
-        _check_counts(target)
+            raise ValueError(f"it names '{name}', which does not exist; keep the files together")
+        with naming(target):
+            _check_counts(target)
         if target.suffix.lower() in (".vtm", ".vtmb"):
             _check_parts(target, (*seen, path))
 
@@ -219,29 +220,28 @@ def layout_of_dataset(data: Any, dimension: int | None = None) -> Layout:
 
     By default it is in space where bodies are not prisms side by side.
     """
-    found = found_in_dataset(data, "dataset", None)
-    return in_dimension(found, "dataset", Reading(dimension=dimension)) if isinstance(found, Bodies) else found
+    with naming("dataset"):
+        found = found_in_dataset(data, None)
+        return in_dimension(found, Reading(dimension=dimension)) if isinstance(found, Bodies) else found
 
 
-def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:
-    """Read the blocks of a pyvista dataset, flat or in space; the path is named in messages."""
+def found_in_dataset(data: Any, view: str | None) -> Layout | Bodies:
+    """Read the blocks of a pyvista dataset, flat or in space."""
     import pyvista
 
     if isinstance(data, pyvista.MultiBlock):
-        return _found_in_parts(data, path, view)
-    grid = _as_cells(data, path)
+        return _found_in_parts(data, view)
+    grid = _as_cells(data)
     types = np.asarray(grid.celltypes)
     gone = _gone(grid)
     if gone.all():
-        raise ValueError(
-            f"'{path}': {counted(len(gone), 'block')}, all gone by the cell array '{GONE}'; give a file before that"
-        )
+        raise ValueError(f"{counted(len(gone), 'block')}, all gone by the cell array '{GONE}'; give a file before that")
     note = (Note(LEFT_OUT, f"left out: {counted(int(gone.sum()), 'block')} taken away or lost (array '{GONE}')"),)
     notes: tuple[str, ...] = note if gone.any() else ()
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
     solid = np.isin(types, [*VTK_SOLIDS, POLYHEDRON])
     if solid.any():
-        found: Layout | Bodies = _bodies_of_solids(grid, path, ~gone)
+        found: Layout | Bodies = _bodies_of_solids(grid, ~gone)
         points_of = np.split(connectivity, offset[1:-1])
         faces = np.isin(types, [*VTK, *VTK_OTHER_FACES])
         flat = [points_of[k] for k in np.flatnonzero(faces & ~gone)]
@@ -254,7 +254,7 @@ def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | 
         nodes = connectivity[offset[cell] : offset[cell + 1]].astype(np.int64)
         rings.append(ring_of_nodes(nodes, VTK[int(types[cell])]))
     cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
-    found = layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path, view)
+    found = layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, view)
     notes += _unread(types[~gone & ~np.isin(types, list(VTK))])
     return replace(found, notes=(*found.notes, *notes))
 
@@ -279,7 +279,7 @@ def _gone(grid: Any) -> np.ndarray:
     return np.asarray(grid.cell_data[GONE]).reshape(grid.n_cells, -1)[:, 0] == 1
 
 
-def _found_in_parts(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:
+def _found_in_parts(data: Any, view: str | None) -> Layout | Bodies:
     """Read the parts of a multiblock; those that hold no blocks, such as centres and contact points, are left out."""
     import pyvista
 
@@ -294,13 +294,13 @@ def _found_in_parts(data: Any, path: Path | str, view: str | None) -> Layout | B
         if not _has_blocks(part):
             left_out.append(f"'{name or k}'")
             continue
-        found = found_in_dataset(part, path, view)
+        found = found_in_dataset(part, view)
         (solid if isinstance(found, Bodies) else flat).append((found, name))
     if solid and flat:
         # Flat cells beside bodies are faces in contact, as LMGC90 writes them.
         left_out += [f"'{name or 'a flat part'}'" for _, name in flat]
     chosen = solid or flat
-    joined = merged([found for found, _ in chosen], [name for _, name in chosen], path)
+    joined = merged([found for found, _ in chosen], [name for _, name in chosen])
     note = (Note(LEFT_OUT, f"left out: {', '.join(left_out)}, which draw no blocks"),) if left_out else ()
     return replace(joined, notes=(*joined.notes, *note))
 
@@ -314,17 +314,17 @@ def _has_blocks(part: Any) -> bool:
     return bool(np.isin(types, [*VTK, *VTK_SOLIDS, POLYHEDRON]).any())
 
 
-def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
+def _as_cells(data: Any) -> pyvista.UnstructuredGrid:
     import pyvista
 
     if not isinstance(data, pyvista.DataSet) or data.n_cells == 0:
-        raise ValueError(f"'{path}' has no cells; save the blocks as polygons or a meshed surface")
+        raise ValueError("it has no cells; save the blocks as polygons or a meshed surface")
     if isinstance(data, pyvista.UnstructuredGrid):
         return data
     return data.cast_to_unstructured_grid()
 
 
-def _bodies_of_solids(grid: Any, path: Path | str, stands: np.ndarray) -> Bodies:
+def _bodies_of_solids(grid: Any, stands: np.ndarray) -> Bodies:
     """Read the bodies of the cells with a volume that stand."""
     types = np.asarray(grid.celltypes)
     solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, POLYHEDRON]) & stands)
@@ -338,13 +338,13 @@ def _bodies_of_solids(grid: Any, path: Path | str, stands: np.ndarray) -> Bodies
             how = "one block per cell: no cell array 'block_id' says which are one"
     faceted = types[solid] == POLYHEDRON
     if faceted.any() and not faceted.all():
-        raise ValueError(f"'{path}' has polyhedra beside other cells with a volume; write all blocks as polyhedra")
+        raise ValueError("it has polyhedra beside other cells with a volume; write all blocks as polyhedra")
     find = _faceted_bodies if faceted.any() else _bodies_by_shape
-    rows = rows_of_cells(data, owner, names, path)
+    rows = rows_of_cells(data, owner, names)
     try:
         bodies = find(grid, np.asarray(grid.points, dtype=float), solid, owner, rows)
     except IndexError as error:
-        raise ValueError(f"'{path}' has a damaged cell ({error}); export it again") from None
+        raise ValueError(f"it has a damaged cell ({error}); export it again") from None
     return Bodies(bodies, notes=(how,))
 
 

@@ -37,7 +37,7 @@ from .elsewhere import cannot_read
 from .files import MissingFile as MissingFile
 from .files import files_of
 from .image_scale import ImageKeys
-from .reading import Reading
+from .reading import Reading, naming
 
 #: Largest coordinate [m], larger than the Earth; double precision resolves 1e-8 m there.
 LARGEST_COORDINATE = 1e8
@@ -189,11 +189,12 @@ def _outlines(path: Path, reading: Reading) -> Layout:
     unit = reading.unit or ("m" if sized else None)
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
-    content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
-    with carrying(lambda: as_drawn(content)):
-        if isinstance(content, Layout) and content.dimension == 3 and reading.dimension == 2:
-            raise ValueError(f"'{path}' draws its blocks in space; leave out dimension = 2")
-        layout = content if isinstance(content, Layout) else in_dimension(content, path, reading)
+    with naming(path):
+        content = found[0] if files == [path] else of_files([_apart(one) for one in found], files)
+        with carrying(lambda: as_drawn(content)):
+            if isinstance(content, Layout) and content.dimension == 3 and reading.dimension == 2:
+                raise ValueError("it draws its blocks in space; leave out dimension = 2")
+            layout = content if isinstance(content, Layout) else in_dimension(content, reading)
     layout = replace(layout, source=str(path), notes=layout.notes + _rounded_note(content, layout))
     if layout.dimension == 3:
         return _in_metres(layout, unit)
@@ -209,10 +210,10 @@ def _outlines(path: Path, reading: Reading) -> Layout:
     return _in_metres(layout, unit)
 
 
-def _apart(content: Layout | Bodies, path: Path) -> Layout | Bodies:
+def _apart(content: Layout | Bodies) -> Layout | Bodies:
     """Refuse layouts in space as files of one stone each: they hold all blocks."""
     if isinstance(content, Layout) and content.dimension == 3:
-        raise ValueError(f"'{path}' stands for layouts of blocks in space; give one of them")
+        raise ValueError("it stands for layouts of blocks in space; give one of them")
     return content
 
 
@@ -450,15 +451,10 @@ def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     if path.stat().st_size == 0:
         raise ValueError(f"'{path}' is empty (0 bytes); export it again")
     module = _module_of(path, "read")
-    if _format(path, "read").module not in HOLD_IMAGES:
-        reading.refuse_image_keys(path)
-    try:
+    with naming(path):
+        if _format(path, "read").module not in HOLD_IMAGES:
+            reading.refuse_image_keys()
         found: Layout | Bodies = module.read(path, reading)
-    except ValueError as error:
-        if str(path) not in str(error):
-            # What is wrong with a block is found where its file is not known.
-            error.args = (f"'{path}': {error}", *error.args[1:])
-        raise
     return found
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -33,18 +34,30 @@ class Reading:
         labels = [label for label in labels if label]
         return not matches(labels, self.ignore) and (not self.only or matches(labels, self.only))
 
-    def refuse_view(self, path: Path) -> None:
+    def refuse_view(self) -> None:
         """Refuse a view of what is drawn in the plane."""
         if self.view not in (None, "xy"):
-            raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {self.view}")
+            raise ValueError(f"it is drawn in the plane xy; it has no view {self.view}")
 
-    def refuse_image_keys(self, path: Path) -> None:
+    def refuse_image_keys(self) -> None:
         """Refuse what is said of an image where a file is none; ``outline_tolerance`` is of every drawing."""
         given = [key for key, value in self.image.items() if value is not None and key != "outline_tolerance"]
         if given:
             raise ValueError(
-                f"'{path}' is no image: {given[0]} is of images and annotations of them; leave it out, or give the unit"
+                f"it is no image: {given[0]} is of images and annotations of them; leave it out, or give the unit"
             )
+
+
+@contextmanager
+def naming(path: Path | str) -> Iterator[None]:
+    """Name a file in what is refused of it, which readers leave to their callers: "it" is the file."""
+    try:
+        yield
+    except ValueError as error:
+        if str(path) not in (words := str(error)):
+            named = f"'{path}' {words[3:]}" if words.startswith("it ") else f"'{path}': {words}"
+            error.args = (named, *error.args[1:])
+        raise
 
 
 def json_object(text: str | bytes) -> dict[str, Any]:

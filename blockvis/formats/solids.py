@@ -46,7 +46,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read bodies or a flat mesh; .glb is in metres, .dae states its unit, the other formats state none."""
     suffix = path.suffix.lower()
     drawn = {".dae": _dae, ".obj": _obj}.get(suffix, _scene)(path)
-    size = _checked_size(drawn.bodies, path)
+    size = _checked_size(drawn.bodies)
     if is_flat(np.concatenate([part.points for part in drawn.bodies])):
         flat = _flat(drawn.bodies, path, reading.view)
         return replace(flat, unit=drawn.unit, notes=(*flat.notes, *drawn.notes))
@@ -64,14 +64,14 @@ def _enclosed(drawn: Bodies, size: float, path: Path, reading: Reading) -> tuple
     from trimesh.util import append_faces
 
     try:
-        return enclosed(drawn.bodies, size, path, reading)
+        return enclosed(drawn.bodies, size, reading)
     except OpenSurface as error:
         if not drawn.grouped:
             raise
         # Groups may be those of the faces of one stone.
         whole = Body(path.name, *append_faces(*zip(*((part.points, part.faces) for part in drawn.bodies), strict=True)))
         try:
-            bodies, notes = enclosed([whole], size, path, reading)
+            bodies, notes = enclosed([whole], size, reading)
         except ValueError:
             raise error from None
         groups = counted(len(drawn.bodies), "name of a group", "names of groups")
@@ -137,13 +137,13 @@ def _obj(path: Path) -> Bodies:
                     words.add(said[key])
                 since_face.clear()
         except ValueError:
-            raise ValueError(f"'{path}' cannot be read as .obj ('{line.strip()[:60]}'); export it again") from None
+            raise ValueError(f"it cannot be read as .obj ('{line.strip()[:60]}'); export it again") from None
     every, parts = np.array(points).reshape(-1, 3), []
     for name, one in objects.items():
         outside = next((k for face in one.faces for k in face if not 0 <= k < len(points)), None)
         if outside is not None:
             raise ValueError(
-                f"'{path}': a face of '{name}' uses point {outside + 1}, but there are {len(points)}; export it again"
+                f"a face of '{name}' uses point {outside + 1}, but there are {len(points)}; export it again"
             )
         own, triangles = np.unique(fans(one.faces), return_inverse=True)
         if len(own):
@@ -175,7 +175,7 @@ def _obj_text(path: Path) -> str:
     data = path.read_bytes()
     # A name may have any character.
     if b"\0" in data and not re.search(rb"^[ \t]*f[ \t]", data, re.MULTILINE):
-        raise ValueError(f"'{path}' is no .obj file: it begins with {data[:16]!r}; give it the suffix that it has")
+        raise ValueError(f"it is no .obj file: it begins with {data[:16]!r}; give it the suffix that it has")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -204,7 +204,7 @@ def _scene(path: Path) -> Bodies:
     begun, ended = (len(re.findall(rb"(?im)^\s*%s\b" % word, text)) for word in (b"solid", b"endsolid"))
     if begun > ended and re.search(rb"(?i)\bvertex\s", text):
         bodies = counted(begun, "body begins", "bodies begin")
-        raise ValueError(f"'{path}' breaks off: {bodies} and {ended} end (endsolid); export it again")
+        raise ValueError(f"it breaks off: {bodies} and {ended} end (endsolid); export it again")
     try:
         if suffix == ".glb":
             return _nodes(path)
@@ -215,7 +215,7 @@ def _scene(path: Path) -> Bodies:
     except Exception as error:  # noqa: BLE001
         # trimesh passes on the errors of whatever parser it uses.
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
-        raise ValueError(f"'{path}' cannot be read as {suffix} ({reason}); export it again") from None
+        raise ValueError(f"it cannot be read as {suffix} ({reason}); export it again") from None
 
 
 def _body(name: str, meshes: Sequence[Any]) -> Body:
@@ -234,19 +234,19 @@ def _dae(path: Path) -> Bodies:
         # pycollada passes on the errors of its parsers.
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__} "
         reason = " ".join(f"{kind}{error}".split())[:200]
-        raise ValueError(f"'{path}' cannot be read as .dae ({reason}); export it again") from None
+        raise ValueError(f"it cannot be read as .dae ({reason}); export it again") from None
 
 
-def _checked_size(parts: Sequence[Body], path: Path) -> float:
+def _checked_size(parts: Sequence[Body]) -> float:
     """Return the size of all parts, whose points must be finite and there."""
     if not parts:
-        raise ValueError(f"'{path}' has no surface cells; export the blocks as closed bodies or a flat mesh")
-    spread = spread_of(np.concatenate([part.points for part in parts]), f"'{path}'")
+        raise ValueError("it has no surface cells; export the blocks as closed bodies or a flat mesh")
+    spread = spread_of(np.concatenate([part.points for part in parts]))
     for part in parts:
         outside = part.faces[(part.faces < 0) | (part.faces >= len(part.points))]
         if len(outside):
             raise ValueError(
-                f"'{path}': a face of '{part.name}' uses point {int(outside[0])}, but there are {len(part.points)}; "
+                f"a face of '{part.name}' uses point {int(outside[0])}, but there are {len(part.points)}; "
                 "export it again"
             )
     return float(spread.max())
@@ -392,11 +392,11 @@ def _flat(parts: Sequence[Body], path: Path, view: str | None) -> Layout:
         ]
     layouts = []
     for part in parts:
-        found = layout_of_cells(part.points, list(part.faces), {}, path, view)
+        found = layout_of_cells(part.points, list(part.faces), {}, view)
         assert isinstance(found, Layout)
         every = [{key: word for key, word in part.said.items() if key != "name"}] * found.n_blocks
         layouts.append(with_rows(found, every, own=True) if part.said else found)
-    layout = merged(layouts, [part.name for part in parts], path)
+    layout = merged(layouts, [part.name for part in parts])
     assert isinstance(layout, Layout)
     named = len(parts) == layout.n_blocks and all("name" in part.said for part in parts)
     return with_rows(layout, [part.said for part in parts], own=True) if named else layout

@@ -101,7 +101,6 @@ class _Context:
     matrix: np.ndarray
     layers: tuple[str, ...]
     tolerance: float | None
-    path: Path
     depth: int = 0
     named: bool = False
     painting: Mapping[str, str] = field(default_factory=_PAINTING.copy)
@@ -133,7 +132,7 @@ class _Context:
 
 def read(path: Path, reading: Reading) -> Layout:
     """Read a .svg drawing; its unit follows from its width and its viewBox."""
-    reading.refuse_view(path)
+    reading.refuse_view()
     root = _root(path)
     own = root.get("data-blockvis-unit", "")
     stated, doubts = (own, []) if own else _unit(root)
@@ -147,9 +146,9 @@ def read(path: Path, reading: Reading) -> Layout:
         found.notes.append(Note(UNIT_TAKEN, scale))
     # What sheets that are not read say may paint a shape.
     found.sheets_missed = len(styled) > 0
-    _walk(root, _Context(np.eye(3), (), tolerance, path), found)
+    _walk(root, _Context(np.eye(3), (), tolerance), found)
     with_faces(found, reading, called=lambda name, k: f"{name} {k + 1}", row_of=_row, tolerance=tolerance)
-    refuse_open(found, path, "closed shape", "a closed path or polygon", stated, factors=(1.0, -1.0))
+    refuse_open(found, "closed shape", "a closed path or polygon", stated, factors=(1.0, -1.0))
     found.notes += passed_over(found.skipped)
     found.notes += passed_over(found.clipped, "read whole, not clipped")
     return found.layout(stated, unit_by="layout" if own else "page" if stated else "", own=True, factors=(1.0, -1.0))
@@ -158,15 +157,15 @@ def read(path: Path, reading: Reading) -> Layout:
 def _root(path: Path) -> ElementTree.Element:
     text = path.read_bytes()
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise ValueError(f"'{path}' is not in UTF-8; save it as plain SVG")
+        raise ValueError("it is not in UTF-8; save it as plain SVG")
     if re.search(rb"<!\s*(DOCTYPE|ENTITY)[^>]*(\[|ENTITY)", text, re.IGNORECASE):
-        raise ValueError(f"'{path}' defines XML entities; save it as plain SVG without a document type")
+        raise ValueError("it defines XML entities; save it as plain SVG without a document type")
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
-        raise ValueError(f"'{path}' is not an SVG file: {error}; save it as plain SVG") from None
+        raise ValueError(f"it is not an SVG file: {error}; save it as plain SVG") from None
     if _tag(root) != "svg":
-        raise ValueError(f"'{path}' is XML with the root <{_tag(root)}>, not <svg>; save it as plain SVG")
+        raise ValueError(f"it is XML with the root <{_tag(root)}>, not <svg>; save it as plain SVG")
     return root
 
 
@@ -279,7 +278,7 @@ def _tag(element: ElementTree.Element) -> str:
 
 def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
     if where.depth > DEEPEST:
-        raise ValueError(f"'{where.path}' nests groups more than {DEEPEST} deep; ungroup it")
+        raise ValueError(f"it nests groups more than {DEEPEST} deep; ungroup it")
     tag = _tag(element)
     if tag in ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata"):
         return
@@ -289,7 +288,7 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
     if tag == "use":
         found.skipped["<use> (clones; unlink them to have them read)"] += 1
         return
-    matrix = where.matrix @ _matrix(_transform(element), where.path)
+    matrix = where.matrix @ _matrix(_transform(element))
     if tag == "svg" and where.depth:
         try:
             matrix = matrix @ _viewport(element)
@@ -309,7 +308,7 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
         try:
             parts = shape(element, where)
         except (ValueError, OverflowError) as error:
-            raise ValueError(f"'{where.path}': {_called(element)} {error}") from None
+            raise ValueError(f"{_called(element)} {error}") from None
         _add(element, parts, where, found)
     for child in element:
         _walk(child, where, found)
@@ -338,7 +337,7 @@ def _add(element: ElementTree.Element, parts: list[_Part], where: _Context, foun
         if len(points) < 2:
             continue
         if not np.isfinite(points).all():
-            raise ValueError(f"'{where.path}': {_called(element)} has a point that is not a finite number; repair it")
+            raise ValueError(f"{_called(element)} has a point that is not a finite number; repair it")
         stroke = Stroke(points=points, looks=looks, within=where.layers, curves=of_part)
         stroke = stroke.mapped(where.matrix[:2, :2], where.matrix[:2, 2])
         joined = joined_ends(stroke.points, closed)
@@ -406,7 +405,7 @@ def _row(layers: Sequence[str], name: str) -> dict[str, Any]:
     return row | ({"name": name} if name else {})
 
 
-def _matrix(text: str, path: Path) -> np.ndarray:
+def _matrix(text: str) -> np.ndarray:
     result = np.eye(3)
     text = _CSS_UNIT.sub(r"\1", text)
     for name, arguments in _TRANSFORM.findall(text):
@@ -415,12 +414,12 @@ def _matrix(text: str, path: Path) -> np.ndarray:
             step[:2] = _STEPS[name](*(float(x) for x in re.findall(_NUMBER, arguments)))
         except (TypeError, ValueError):
             raise ValueError(
-                f"'{path}' has a transform {name}({arguments:.60}) that cannot be read; apply it to the shapes"
+                f"it has a transform {name}({arguments:.60}) that cannot be read; apply it to the shapes"
             ) from None
         result = result @ step
     unread = _TRANSFORM.sub("", text).strip(" ,\t\r\n")
     if unread not in ("", "none"):
-        raise ValueError(f"'{path}' has a transform {unread:.60} that cannot be read; apply it to the shapes")
+        raise ValueError(f"it has a transform {unread:.60} that cannot be read; apply it to the shapes")
     return result
 
 

@@ -58,7 +58,7 @@ def is_flat(points: np.ndarray) -> bool:
     return not np.isfinite(spread).all() or bool((spread <= FLAT * spread.max()).any())
 
 
-def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[np.ndarray, str]:
+def flattened(points: np.ndarray, view: str | None = None) -> tuple[np.ndarray, str]:
     """Take the two coordinates in which a flat drawing extends, or those of a view; note whether it stands upright.
 
     Of (n, 2) or (n, 3) points these are (x, y), of upright ones (x, z) or (y, z). ValueError for coordinates that are
@@ -66,10 +66,10 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
     """
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
-    spread, flat = _flat_views(points, where, view)
+    spread, flat = _flat_views(points, view)
     if not flat:
         raise ValueError(
-            f"{where} is not flat: its points spread over {spread[0]:.4g} × {spread[1]:.4g} × {spread[2]:.4g}; "
+            f"it is not flat: its points spread over {spread[0]:.4g} × {spread[1]:.4g} × {spread[2]:.4g}; "
             "draw the blocks in the plane, or give closed prismatic bodies"
         )
     chosen = view or flat[0]
@@ -77,7 +77,7 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
     return points[:, VIEWS[chosen]], note
 
 
-def drawing_plane(lines: Sequence[np.ndarray], where: str, view: str | None = None) -> tuple[np.ndarray, list[str]]:
+def drawing_plane(lines: Sequence[np.ndarray], view: str | None = None) -> tuple[np.ndarray, list[str]]:
     """Find the plane of a drawing of lines, which may have a relief: walls are traced on scans, at any angle.
 
     Lines are (n, 3) arrays; where each is level, they lie in x and y, one above the other. Returned are the directions
@@ -86,7 +86,7 @@ def drawing_plane(lines: Sequence[np.ndarray], where: str, view: str | None = No
     without area.
     """
     points = np.concatenate(lines)
-    spread, flat = _flat_views(points, where, view)
+    spread, flat = _flat_views(points, view)
     chosen = view or (flat[0] if flat else "xy")
     turn, notes = np.eye(3)[[*VIEWS[chosen], axis_across(chosen)]], [] if chosen == "xy" else [upright_note(chosen)]
     if flat:
@@ -103,12 +103,12 @@ def drawing_plane(lines: Sequence[np.ndarray], where: str, view: str | None = No
     return np.array([first, [0.0, 0.0, 1.0], [first[1], -first[0], 0.0]]), [Note(UPRIGHT, text + ignored)]
 
 
-def _flat_views(points: np.ndarray, where: str, view: str | None) -> tuple[np.ndarray, list[str]]:
+def _flat_views(points: np.ndarray, view: str | None) -> tuple[np.ndarray, list[str]]:
     """(3,) array: how far points spread, and in which views they are flat; ValueError for a view in which not."""
-    spread = spread_of(points, where)
+    spread = spread_of(points)
     flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
     if view is not None and flat and view not in flat:
-        raise ValueError(f'{where} lies in {flat[0]}: seen as {view} it has no area; give view = "{flat[0]}", or none')
+        raise ValueError(f'it lies in {flat[0]}: seen as {view} it has no area; give view = "{flat[0]}", or none')
     return spread, flat
 
 
@@ -201,11 +201,11 @@ def filled(rings: Sequence[np.ndarray], out: float = WITHIN) -> list[tuple[int, 
     return list(holes.items())
 
 
-def spread_of(points: np.ndarray, where: str) -> np.ndarray:
+def spread_of(points: np.ndarray) -> np.ndarray:
     """(d,) array: how far points spread along each axis; ValueError for coordinates that are not finite."""
     if not np.isfinite(points).all():
         bad = points[~np.isfinite(points).all(axis=1)][0]
-        raise ValueError(f"{where} has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+        raise ValueError(f"it has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
     return np.asarray(np.ptp(points, axis=0))
 
 

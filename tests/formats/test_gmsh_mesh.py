@@ -147,7 +147,7 @@ def hostile(text, old, new):
         (
             "4.1 0 8",
             "5.0 0 8",
-            r"is version 5.0 of .msh; versions 2 and 4.1 are read: gmsh '.*' -save -format msh41",
+            r"is version 5.0 of .msh; versions 2 and 4.1 are read: gmsh old.msh -save -format msh41",
         ),
         ("$MeshFormat", "$Mesh", "is not a gmsh mesh: it has no section"),
         ("$Nodes\n70 56 1 56", "$Nodes\n99999999999 9 1 9", "is cut off: its section .Nodes|has no section"),
