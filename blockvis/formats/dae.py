@@ -14,6 +14,7 @@ from blockvis.layout.units import unit_of
 from blockvis.system.extras import require
 
 from .bodies import Bodies, Body, drawn_row
+from .reading import parsing
 
 #: Nodes nested deeper than this are refused: nodes may place each other.
 DEEPEST = 100
@@ -25,6 +26,11 @@ UP = {"X_UP": ([1, 2, 0], "z"), "Y_UP": ([0, 1, 2], "y"), "Z_UP": ([0, 1, 2], "z
 def drawn_in(path: Path) -> Bodies:
     """Read the meshes of a file, each placed by the nodes above it and named after the innermost that has a name."""
     require("dae", f"COLLADA files ('{path}'; .obj and .glb are read without)")
+    with parsing(".dae"):
+        return _drawn_in(path)
+
+
+def _drawn_in(path: Path) -> Bodies:
     import collada
 
     text = path.read_bytes()

@@ -30,7 +30,7 @@ from solver import mechanics
 from .bodies import ROLE_WORDS
 from .drawing import Drawing, Line, Outline, joined_ends
 from .loose_lines import refuse_open, with_faces
-from .reading import Reading
+from .reading import Reading, parsing
 
 #: Attributes that name a block and its group, the first that a file has; in small letters.
 NAMES = ("name", "label", "title", "stone", "block", "brick", "id", "fid", "objectid")
@@ -128,22 +128,22 @@ def _read_shapefile(path: Path, reading: Reading) -> Layout:
     features, skipped = [], Counter[str]()
     # What pyshp would print of rings that turn the wrong way is no fault of a drawing.
     logging.getLogger("shapefile").setLevel(logging.CRITICAL + 1)
-    try:
-        with path.open("rb") as shapes, (table or path).open("rb") as rows, warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            files = {"shp": shapes, **({"dbf": rows} if table else {})}
-            reader = shapefile.Reader(**files, encodingErrors="replace")
-            records = [record.as_dict() for record in reader.iterRecords()] if table else []
-            for k, drawn in enumerate(reader.iterShapes()):
-                if drawn.shapeTypeName in ("NULL", "MULTIPATCH"):
-                    skipped[NO_GEOMETRY if drawn.shapeTypeName == "NULL" else "MULTIPATCH"] += 1
-                    continue
-                row = records[k] if k < len(records) else {}
-                features.append(Feature(shape(drawn.__geo_interface__), row))
-    except Exception as error:  # noqa: BLE001
-        # pyshp passes on whatever its parsing runs into.
-        reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
-        raise ValueError(f"it cannot be read as a shapefile ({reason}); export it again") from None
+    with (
+        parsing("a shapefile"),
+        path.open("rb") as shapes,
+        (table or path).open("rb") as rows,
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore")
+        files = {"shp": shapes, **({"dbf": rows} if table else {})}
+        reader = shapefile.Reader(**files, encodingErrors="replace")
+        records = [record.as_dict() for record in reader.iterRecords()] if table else []
+        for k, drawn in enumerate(reader.iterShapes()):
+            if drawn.shapeTypeName in ("NULL", "MULTIPATCH"):
+                skipped[NO_GEOMETRY if drawn.shapeTypeName == "NULL" else "MULTIPATCH"] += 1
+                continue
+            row = records[k] if k < len(records) else {}
+            features.append(Feature(shape(drawn.__geo_interface__), row))
     text = projection.read_text(encoding="utf-8", errors="replace") if projection else ""
     unit, degrees = _unit_of_system(text)
     web = _is_web_mercator(text)

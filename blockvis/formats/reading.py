@@ -60,6 +60,17 @@ def naming(path: Path | str) -> Iterator[None]:
         raise
 
 
+@contextmanager
+def parsing(kind: str) -> Iterator[None]:
+    """Refuse a file that a library cannot read, which passes on whatever its parsing runs into."""
+    try:
+        yield
+    except Exception as error:  # noqa: BLE001
+        name = "" if isinstance(error, ValueError) else type(error).__name__
+        reason = " ".join(f"{name} {error}".split())[:200]
+        raise ValueError(f"it cannot be read as {kind} ({reason}); export it again") from None
+
+
 def json_object(text: str | bytes) -> dict[str, Any]:
     """Parse what one of our writers put beside a block, or a program beside its blocks; empty where it is no object."""
     try:

@@ -18,7 +18,6 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
 from blockvis.layout.outlines import is_flat, spread_of
 from blockvis.layout.solids import BASE_FRAME, Solid, area_vectors, fans, prism, triangles_of
-from blockvis.system.extras import MissingExtra
 from blockvis.text import listed
 from solver import mechanics
 from solver.mechanics import counted
@@ -27,7 +26,7 @@ from . import dae
 from .bodies import Bodies, Body, drawn_row, with_role
 from .cells import layout_of_cells, merged
 from .closed_surfaces import OpenSurface, enclosed
-from .reading import Reading, json_object
+from .reading import Reading, json_object, parsing
 
 #: Programs that write coordinates to .glb as they are, whichever of them is up, in small letters.
 AS_THEY_ARE = ("trimesh",)
@@ -45,7 +44,7 @@ _WORDS = ("o", "g", "usemtl")
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read bodies or a flat mesh; .glb is in metres, .dae states its unit, the other formats state none."""
     suffix = path.suffix.lower()
-    drawn = {".dae": _dae, ".obj": _obj}.get(suffix, _scene)(path)
+    drawn = {".dae": dae.drawn_in, ".obj": _obj}.get(suffix, _scene)(path)
     size = _checked_size(drawn.bodies)
     if is_flat(np.concatenate([part.points for part in drawn.bodies])):
         flat = _flat(drawn.bodies, path, reading.view)
@@ -205,17 +204,13 @@ def _scene(path: Path) -> Bodies:
     if begun > ended and re.search(rb"(?i)\bvertex\s", text):
         bodies = counted(begun, "body begins", "bodies begin")
         raise ValueError(f"it breaks off: {bodies} and {ended} end (endsolid); export it again")
-    try:
+    with parsing(suffix):
         if suffix == ".glb":
             return _nodes(path)
         scene = trimesh.load_scene(str(path), process=False)
         meshes = {str(name): mesh for name, mesh in scene.geometry.items() if hasattr(mesh, "faces")}
         parts = [_body(name, [mesh]) for name, mesh in meshes.items() if len(mesh.faces)]
         return _numbered(parts, scene, _own_rows(path)) if suffix == ".ply" else Bodies(parts)
-    except Exception as error:  # noqa: BLE001
-        # trimesh passes on the errors of whatever parser it uses.
-        reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
-        raise ValueError(f"it cannot be read as {suffix} ({reason}); export it again") from None
 
 
 def _body(name: str, meshes: Sequence[Any]) -> Body:
@@ -223,18 +218,6 @@ def _body(name: str, meshes: Sequence[Any]) -> Body:
 
     points, faces = append_faces([mesh.vertices for mesh in meshes], [mesh.faces for mesh in meshes])
     return Body(name, np.asarray(points, dtype=float), np.asarray(faces, dtype=np.int64))
-
-
-def _dae(path: Path) -> Bodies:
-    try:
-        return dae.drawn_in(path)
-    except MissingExtra:
-        raise
-    except Exception as error:  # noqa: BLE001
-        # pycollada passes on the errors of its parsers.
-        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__} "
-        reason = " ".join(f"{kind}{error}".split())[:200]
-        raise ValueError(f"it cannot be read as .dae ({reason}); export it again") from None
 
 
 def _checked_size(parts: Sequence[Body]) -> float:
@@ -335,11 +318,8 @@ def _nodes(path: Path) -> Bodies:
     if len(rows) == len(parts):
         parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
     else:
-        above = {below: k for k, node in enumerate(nodes) for below in node.get("children", [])}
-        around, every = [_around(k, nodes, above) for k in found], described.get("materials", [])
-        painted = [[one["material"] for one in mesh["primitives"] if "material" in one] for _, mesh in drawn]
-        materials = [[str(every[k].get("name", "")) for k in own] for own in painted]
-        parts = dae.said_below(parts, around, materials)
+        materials = [_materials(mesh, described.get("materials", [])) for _, mesh in drawn]
+        parts = dae.said_below(parts, _around([*found], nodes), materials)
     return Bodies(parts, "m", up="y")
 
 
@@ -352,12 +332,21 @@ def _with_description(path: Path, described: dict[str, Any]) -> BytesIO:
     return BytesIO(b"".join([data[:8], *sizes, data[16:20], text, rest]))
 
 
-def _around(node: int, nodes: Sequence[dict[str, Any]], above: dict[int, int]) -> list[str]:
-    """Names of the nodes of a .glb file around one, the outermost first."""
-    names = list[str]()
-    while (node := above.get(node, -1)) >= 0 and len(names) < len(nodes):
-        names.insert(0, str(nodes[node].get("name", "")))
-    return names
+def _around(found: Sequence[int], nodes: Sequence[dict[str, Any]]) -> list[list[str]]:
+    """Names of the nodes of a .glb file around each of some, the outermost first."""
+    above = {below: k for k, node in enumerate(nodes) for below in node.get("children", [])}
+    around = []
+    for node in found:
+        names = list[str]()
+        while (node := above.get(node, -1)) >= 0 and len(names) < len(nodes):
+            names.insert(0, str(nodes[node].get("name", "")))
+        around.append(names)
+    return around
+
+
+def _materials(mesh: dict[str, Any], every: Sequence[dict[str, Any]]) -> list[str]:
+    """Names of the materials of a mesh of a .glb file."""
+    return [str(every[part["material"]].get("name", "")) for part in mesh["primitives"] if "material" in part]
 
 
 def _numbered(parts: list[Body], scene: Any, rows: list[dict[str, Any]]) -> Bodies:
