@@ -130,7 +130,7 @@ def placement_in(path: Path, found: _Annotated, reading: Reading) -> Placement:
 
 def annotated_placement(content: Any, path: Path, reading: Reading) -> tuple[Placement, tuple[float, float] | None]:
     """Find where the image of annotations lies, and its size."""
-    with naming(path):
+    with naming(f"'{path}'"):
         found = _READERS[program_of(content)](content)
     return placement_in(path, found, reading), found.size
 

@@ -158,7 +158,7 @@ def _said(group: str) -> dict[str, str]:
 
 def holds_flat_blocks(path: Path) -> bool:
     """Whether a .msh file has surface cells in a plane and none with a volume."""
-    with naming(path):
+    with naming(f"'{path}'"):
         mesh, _ = _sections(path.read_bytes())
     return bool(mesh.rings) and not mesh.solids and is_flat(mesh.coordinates)
 

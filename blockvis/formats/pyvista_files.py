@@ -209,7 +209,7 @@ def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
             raise ValueError(f"it names '{name}', which is no .vtu, .vtp, .vtk, .vtm or .vtmb; export it again")
         if not target.is_file():
             raise ValueError(f"it names '{name}', which does not exist; keep the files together")
-        with naming(target):
+        with naming(f"'{target}'"):
             _check_counts(target)
         if target.suffix.lower() in (".vtm", ".vtmb"):
             _check_parts(target, (*seen, path))
@@ -220,7 +220,7 @@ def layout_of_dataset(data: Any, dimension: int | None = None) -> Layout:
 
     By default it is in space where bodies are not prisms side by side.
     """
-    with naming("dataset"):
+    with naming("'dataset'"):
         found = found_in_dataset(data, None)
         return in_dimension(found, Reading(dimension=dimension)) if isinstance(found, Bodies) else found
 

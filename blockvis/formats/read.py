@@ -189,7 +189,7 @@ def _outlines(path: Path, reading: Reading) -> Layout:
     unit = reading.unit or ("m" if sized else None)
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
-    with naming(path):
+    with naming(f"'{path}'"):
         content = found[0] if files == [path] else of_files([_apart(one) for one in found], files)
         with carrying(lambda: as_drawn(content)):
             if isinstance(content, Layout) and content.dimension == 3 and reading.dimension == 2:
@@ -451,7 +451,7 @@ def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     if path.stat().st_size == 0:
         raise ValueError(f"'{path}' is empty (0 bytes); export it again")
     module = _module_of(path, "read")
-    with naming(path):
+    with naming(f"'{path}'"):
         if _format(path, "read").module not in HOLD_IMAGES:
             reading.refuse_image_keys()
         found: Layout | Bodies = module.read(path, reading)

@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from blockvis.layout.left_out import matches
@@ -49,13 +48,13 @@ class Reading:
 
 
 @contextmanager
-def naming(path: Path | str) -> Iterator[None]:
-    """Name a file in what is refused of it, which readers leave to their callers: "it" is the file."""
+def naming(called: str) -> Iterator[None]:
+    """Say where something is refused, in which file or line, which readers leave to their callers: "it" is that."""
     try:
         yield
     except ValueError as error:
-        if str(path) not in (words := str(error)):
-            named = f"'{path}' {words[3:]}" if words.startswith("it ") else f"'{path}': {words}"
+        if not (words := str(error)).startswith(called.rstrip("'")):
+            named = f"{called} {words[3:]}" if words.startswith("it ") else f"{called}: {words}"
             error.args = (named, *error.args[1:])
         raise
 

@@ -75,9 +75,8 @@ BRICK = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (
 
 @dataclass
 class _Block:
-    """A block: where it was made, (n, 3) corners, faces, and what is said of it."""
+    """A block: (n, 3) corners, faces, and what is said of it."""
 
-    line: int
     points: np.ndarray
     faces: list[list[int]]
     words: dict[str, str] = field(default_factory=dict)
@@ -128,12 +127,13 @@ def _run(path: Path, text: str, model: _Model, depth: int) -> None:
         elif inside_fish and small[0] == "end":
             inside_fish = False
         elif inside_fish and MAKES.match(" ".join(words)):
-            raise ValueError(_by_fish(line, words))
+            raise ValueError(f"line {line} {_by_fish(words)}")
         elif not inside_fish and (small[0] == "call" or small[:2] == ["program", "call"]):
             for word in words[1 if small[0] == "call" else 2 :]:
                 _call(_plain(word), path, model, depth)
         elif not inside_fish:
-            _follow(line, words, model)
+            with naming(f"line {line}"):
+                _follow(words, model)
 
 
 def _call(name: str, path: Path, model: _Model, depth: int) -> None:
@@ -143,7 +143,7 @@ def _call(name: str, path: Path, model: _Model, depth: int) -> None:
     if depth >= DEEPEST_CALL or not beside:
         model.passed[f"call '{name}'"] += 1
     else:
-        with naming(called):
+        with naming(f"'{called}'"):
             _run(called, called.read_text(encoding="utf-8", errors="replace"), model, depth + 1)
 
 
@@ -162,23 +162,20 @@ def _commands(text: str) -> Iterator[tuple[int, list[str]]]:
             whole = ""
 
 
-def _by_fish(line: int, words: Sequence[str]) -> str:
+def _by_fish(words: Sequence[str]) -> str:
     called = " ".join(words)[:60]
-    return (
-        f"line {line} makes blocks by FISH ('{called}'), which only 3DEC runs; write them with numbers, or "
-        "export them from 3DEC"
-    )
+    return f"makes blocks by FISH ('{called}'), which only 3DEC runs; write them with numbers, or export them from 3DEC"
 
 
-def _follow(line: int, words: list[str], model: _Model) -> None:
+def _follow(words: list[str], model: _Model) -> None:
     """Carry out one command, or count it as passed over."""
     small = [word.lower() for word in words]
     two = " ".join(small[:2])
     head = two if small[0] in LONG else small[0]
     if small[0] in ("poly", "polyhedron"):
-        model.blocks.append(_made(line, words[1:]))
+        model.blocks.append(_made(words[1:]))
     elif two == "block create":
-        model.blocks.append(_made(line, words[2:]))
+        model.blocks.append(_made(words[2:]))
     elif small[0] == "range" and small[1:2] == ["name"] and len(words) == 5 and small[3] == "region":
         model.names[words[4]] = _plain(words[2])
     elif head in ("gravity", "model gravity", "block gravity", "set gravity"):
@@ -187,12 +184,12 @@ def _follow(line: int, words: list[str], model: _Model) -> None:
         model.passed[head] += not _says(head, words, model)
     elif two in IMPORTS:
         raise ValueError(
-            f"line {line} makes blocks ('{' '.join(words)[:60]}'), which only 3DEC does; write them by "
+            f"it makes blocks ('{' '.join(words)[:60]}'), which only 3DEC does; write them by "
             "poly prism or block create, or take the line out"
         )
     elif model.blocks and (small[0] in CHANGES or two in CHANGES):
         raise ValueError(
-            f"line {line} changes the blocks ('{' '.join(words)[:60]}'), which only 3DEC does; write "
+            f"it changes the blocks ('{' '.join(words)[:60]}'), which only 3DEC does; write "
             "the blocks as they are then, by poly prism or block create"
         )
     elif head in BRINGS or not STEERS & {small[0], head}:
@@ -217,14 +214,14 @@ def _says(head: str, words: list[str], model: _Model) -> bool:
     return bool(chosen)
 
 
-def _made(line: int, words: list[str]) -> _Block:
+def _made(words: list[str]) -> _Block:
     lists, about = list[tuple[str, list[float]]](), dict[str, str]()
     for word in words:
         number = _number(word)
         if number is not None and lists:
             lists[-1][1].append(number)
         elif word[0] in "@[":
-            raise ValueError(_by_fish(line, words))
+            raise ValueError(f"it {_by_fish(words)}")
         elif lists and lists[-1][0] == "group" and not lists[-1][1] and "group" not in about:
             about["group"] = _plain(word)
         else:
@@ -233,49 +230,49 @@ def _made(line: int, words: list[str]) -> _Block:
         if word in ABOUT and len(numbers) == 1:
             about[REGION.get(word, word)] = f"{numbers[0]:g}"
     shapes = [(word, numbers) for word, numbers in lists if word in SHAPES]
-    points, faces = _shape(shapes or lists[:1], line)
+    points, faces = _shape(shapes or lists[:1])
     if not np.isfinite(points).all():
-        raise ValueError(f"line {line} has a corner that is not finite; repair it")
-    return _Block(line, points, faces, about, [about.pop("group")] if "group" in about else [])
+        raise ValueError("it has a corner that is not finite; repair it")
+    return _Block(points, faces, about, [about.pop("group")] if "group" in about else [])
 
 
-def _shape(shapes: list[tuple[str, list[float]]], line: int) -> tuple[np.ndarray, list[list[int]]]:
+def _shape(shapes: list[tuple[str, list[float]]]) -> tuple[np.ndarray, list[list[int]]]:
     """Corners and faces of a block by the words of its shape, each with the numbers after it."""
     word = shapes[0][0] if shapes else ""
     if word == "brick":
-        return _brick(shapes[0][1], line)
+        return _brick(shapes[0][1])
     if word == "prism" and len(shapes) == 3:
-        return _prism(shapes[1][1], shapes[2][1], line)
+        return _prism(shapes[1][1], shapes[2][1])
     if word == "face":
-        return _polyhedron([numbers for _, numbers in shapes], line)
-    raise ValueError(f"line {line} makes a block by '{word}', which is not read; write it as brick, prism or faces")
+        return _polyhedron([numbers for _, numbers in shapes])
+    raise ValueError(f"it makes a block by '{word}', which is not read; write it as brick, prism or faces")
 
 
-def _brick(numbers: list[float], line: int) -> tuple[np.ndarray, list[list[int]]]:
+def _brick(numbers: list[float]) -> tuple[np.ndarray, list[list[int]]]:
     if len(numbers) not in (2, 4, 6):
-        raise ValueError(f"line {line}: brick takes x0 x1 y0 y1 z0 z1; {len(numbers)} numbers stand there")
+        raise ValueError(f"brick takes x0 x1 y0 y1 z0 z1; {len(numbers)} numbers stand there")
     # The last pair holds for the directions that are not given.
     pairs = [*numbers, *numbers[-2:] * 2][:6]
     x, y, z = pairs[:2], pairs[2:4], pairs[4:]
     return np.array([[a, b, c] for c in z for b in y for a in x]), [list(face) for face in BRICK]
 
 
-def _prism(first: list[float], second: list[float], line: int) -> tuple[np.ndarray, list[list[int]]]:
+def _prism(first: list[float], second: list[float]) -> tuple[np.ndarray, list[list[int]]]:
     n = len(first) // 3
     if len(first) != len(second) or len(first) % 3 or n < 3:
         raise ValueError(
-            f"line {line}: both faces of a prism take as many corners (x, y, z), three or more; there are "
+            f"both faces of a prism take as many corners (x, y, z), three or more; there are "
             f"{len(first)} and {len(second)} numbers"
         )
     sides = [[k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)]
     return np.reshape(first + second, (-1, 3)), [list(range(n)), list(range(n, 2 * n)), *sides]
 
 
-def _polyhedron(faces: list[list[float]], line: int) -> tuple[np.ndarray, list[list[int]]]:
+def _polyhedron(faces: list[list[float]]) -> tuple[np.ndarray, list[list[int]]]:
     wrong = next((k for k, numbers in enumerate(faces) if len(numbers) % 3 or len(numbers) < 9), None)
     if wrong is not None or len(faces) < 4:
         what = f"there are {len(faces)}" if wrong is None else f"face {wrong + 1} has {len(faces[wrong])} numbers"
-        raise ValueError(f"line {line} takes four faces or more of three corners (x, y, z) or more; {what}")
+        raise ValueError(f"it takes four faces or more of three corners (x, y, z) or more; {what}")
     counts = [len(numbers) // 3 for numbers in faces]
     ends = np.cumsum(counts)
     rings = [list(range(end - n, end)) for n, end in zip(counts, ends.tolist(), strict=True)]
