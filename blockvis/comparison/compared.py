@@ -32,6 +32,9 @@ MOST_CRACKS = 10
 #: How many settlements have pictures side by side: the last that both reach, and even parts of it.
 STATIONS = 3
 
+#: Openings below this are none [m].
+CLOSED = 1e-6
+
 #: Layouts are the same where no corner is farther off than this, in block sizes.
 SAME = 1e-9
 
@@ -166,13 +169,13 @@ class Comparison:
         Returns
         -------
         list of (str, (2,) array [m])
-            The two blocks of each joint, and its opening in both runs, to the µm, the widest first; nan where the run
-            has no such joint, or a block of it has fallen.
+            The two blocks of each joint, and its opening in both runs, the widest first; nan where the run has no such
+            joint, or a block of it has fallen.
         """
         (lines, one), (more_lines, other) = (_cracks_at(side, at) for side in self.sides)
         crack_at = {frozenset(line.widest.split(" | ")): line.widest for line in [*more_lines, *lines]}
         joints = [(crack_at[pair], np.array([of.get(pair, np.nan) for of in (one, other)])) for pair in crack_at]
-        return sorted(joints, key=lambda joint: -np.nanmax(joint[1]))[:MOST_CRACKS]
+        return sorted(joints, key=lambda joint: -np.round(np.nanmax(joint[1]), 6))[:MOST_CRACKS]
 
 
 def compared(one: str | Path, other: str | Path) -> Comparison:
@@ -261,7 +264,8 @@ def _cracks_at(side: Side, at: float) -> tuple[list[Crack], dict[frozenset[str],
     """Trace the crack lines of a run, and find the openings [m] of its joints by the names of their blocks."""
     state, assembly = side.state(at), side.response.assembly
     joints = initial_joints(assembly)
-    opening = np.maximum(np.round(opening_and_slip(assembly, joints, state.pose)[:, 0], 6), 0.0)
+    opening = opening_and_slip(assembly, joints, state.pose)[:, 0]
+    opening[opening < CLOSED] = 0.0
     opening[state.fallen[joints.block_a] | state.fallen[joints.block_b]] = np.nan
     found: dict[frozenset[str], float] = {}
     for a, b, width in zip(joints.block_a.tolist(), joints.block_b.tolist(), opening.tolist(), strict=True):

@@ -71,6 +71,19 @@ def test_a_crack_of_one_run_has_the_opening_of_its_joint_in_the_other(other, tmp
     assert any(min(openings) < 0.01 for openings in found.values()), "closed in one of them"
 
 
+@pytest.mark.parametrize(("opening", "told"), [(1.1846e-3, "1.18 mm"), (3e-13, "0 mm")])
+def test_widths_of_cracks_are_rounded_once(arch_results, other, tmp_path, monkeypatch, opening, told):
+    """As the report of each run has them; what rounding leaves of a closed joint is no width."""
+    openings = "blockvis.comparison.compared.opening_and_slip"
+    monkeypatch.setattr(openings, lambda assembly, joints, pose: np.tile([opening, 0.0], (len(joints), 1)))
+    picture, blank = "blockvis.pictures.drawer.Drawer.picture", Image.new("RGB", (800, 620))
+    monkeypatch.setattr(picture, lambda *of, **look: blank)
+    assert main(["compare", str(arch_results), str(other), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    cracks = table((tmp_path / "both" / "compare.html").read_text(encoding="utf-8"), "cracks")
+    assert cracks.pop("") == ["out", "sinking"]
+    assert {cell for cells in cracks.values() for cell in cells} == {told}
+
+
 def test_both_pictures_of_a_settlement_have_one_unit(arch_results, other, tmp_path, monkeypatch):
     """That of the run that goes further."""
     titles, blank = [], Image.new("RGB", (800, 620))
