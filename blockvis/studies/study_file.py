@@ -37,6 +37,9 @@ RESERVED = (
 #: Most runs of one study: their table is made in memory.
 MOST_RUNS = 1_000_000
 
+#: Number of runs of which one has to be built before any run starts.
+TRIED = 8
+
 #: Number of runs that are checked as cases before any run starts, which takes a few seconds; another run of a larger
 #: study that is no valid case is recorded as failed.
 CHECKED = 10_000
@@ -203,7 +206,12 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
 
 
 def _check(study: Study, where: str) -> None:
-    base = case_of(study.values, study.case_source)
+    try:
+        base = case_of(study.values, study.case_source)
+    except ValueError as error:
+        if study.n_seeded:
+            raise ValueError(f"{where}with its [[imperfections]] behind those of the case, {error}") from None
+        raise
     if not KINDS[base.analysis].in_studies:
         raise ValueError(
             f"{base.source}: a study follows settlements, but [analysis] kind is '{base.analysis}'; leave it out, or "
@@ -218,9 +226,6 @@ def _check(study: Study, where: str) -> None:
         raise ValueError(f"{where}[study] {error}") from None
     if n > MOST_RUNS:
         raise ValueError(f"{where}the study has {n:,} runs; at most {MOST_RUNS:,} make one study")
-    for run in study.keep:
-        if run >= n:
-            raise ValueError(f"{where}[study] keep names run {run}; runs are numbered from 0 to {n - 1}")
     drawn = next((p for p in study.parameters if p.points and study.method != "grid"), None)
     if drawn is not None:
         raise ValueError(f'{where}[parameters] "{drawn.path}": points belong to a grid; give [study] runs')
@@ -250,15 +255,25 @@ def _check_paths(study: Study, where: str) -> None:
                 raise ValueError(f'{where}[parameters] "{path}": {error}') from None
 
 
+def _spread(study: Study, most: int) -> list[int]:
+    """Choose so many runs from all over a study: the outermost value of a grid changes last."""
+    runs: list[int] = np.unique(np.linspace(0, study.n_runs - 1, min(study.n_runs, most)).astype(int)).tolist()
+    return runs
+
+
 def _check_runs(study: Study, where: str) -> None:
-    try:
-        # Only building a parametric layout shows whether its parameters are right.
-        case_assembly(case_of(study.values_of(0), study.case_source))
-    except ValueError as error:
-        raise ValueError(f"{where}run 0 cannot be built: {error}") from None
+    refused = []
+    for run in _spread(study, TRIED):
+        try:
+            # Only building a parametric layout shows whether its parameters are right.
+            case_assembly(case_of(study.values_of(run), study.case_source))
+            break
+        except ValueError as error:
+            refused.append(error)
+    else:
+        raise ValueError(f"{where}run 0 cannot be built, nor can others of the study: {refused[0]}")
     first: dict[str, str] = {}
-    # A large study is checked all over: the outermost value of a grid changes last.
-    for run in np.unique(np.linspace(0, study.n_runs - 1, min(study.n_runs, CHECKED)).astype(int)).tolist():
+    for run in _spread(study, CHECKED):
         shown = f"run {run} ({', '.join(f'{name} = {shortened(value)}' for name, value in study.point(run).items())})"
         try:
             case = case_of(study.values_of(run), study.case_source)

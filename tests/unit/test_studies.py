@@ -221,6 +221,28 @@ BAD = [
 ]
 
 
+def test_a_study_does_not_hang_on_its_first_run(study_file, capsys):
+    values = '"geometry.parameters.voussoirs" = [1, 8, 9]\n"material.density" = [1900, 2000]\n'
+    text = STUDY.partition("[parameters]")[0].replace("runs = 8\n", "").replace("latin hypercube", "grid")
+    study_file.write_text(f"{text}[parameters]\n{values}", encoding="utf-8")
+    assert read_study(study_file).n_runs == 6
+    _with(study_file, "[1, 8, 9]", "[1, 0]")
+    assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
+    assert "run 0 cannot be built, nor can others of the study: " in capsys.readouterr().err
+
+
+def test_imperfections_of_a_kind_that_the_case_has_are_refused_by_the_study(study_file, capsys):
+    more = '[[imperfections]]\nkind = "friction"\ndistribution = "lognormal"\ndeviation = 0.1\n'
+    with open(study_file.parent / "case.toml", "a", encoding="utf-8") as file:
+        file.write(f"{more}seed = 1\n")
+    with open(study_file, "a", encoding="utf-8") as file:
+        file.write(more)
+    assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "study.toml: with its [[imperfections]] behind those of the case, " in said
+    assert "[imperfections 2] kind 'friction' is there twice" in said
+
+
 def test_settlements_in_m_and_in_rad_are_no_study(study_file, capsys):
     turn = "[[settlement]]\nrotation_centre = [1.0, 0.0]\nincrement = 0.001\nlimit = 0.002\n"
     (study_file.parent / "case.toml").write_text(CASE + turn, encoding="utf-8")
