@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from blockvis.pictures import palette
 from blockvis.pictures.figures import plain_frame, plain_text, saved
@@ -24,10 +25,10 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from .fragility import CONFIDENCE, Fragility, fragility_of
-from .sensitivity import Swing, first_order, outcome, stood_as_far, swings
+from .sensitivity import Swing, first_order, independent_rows, outcome, swings, without_collapse
 from .study_file import Study
-from .study_folder import NO_RESULT, StudyFolder
-from .summary import classes_of, curve_name, ends_counted, independent_rows, is_sample, is_single
+from .study_folder import NO_RESULT, NOT_BUILT, StudyFolder
+from .summary import classes_of, curve_name, ends_counted, is_sample, is_single
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,28 +76,33 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     axes = figure.add_subplot()
     colour = palette.hexadecimal(palette.FORCE)
-    x = factor * np.concatenate([[0.0], curve.settlement, [curve.furthest]])
-    level = np.concatenate([[0.0], curve.probability, curve.probability[-1:] if len(curve.probability) else [0.0]])
+    steps = factor * np.concatenate([[0.0], curve.settlement, [curve.furthest]])
+    least, most, low, high = (
+        np.pad([0.0, *of], (0, 1), mode="edge") for of in (curve.probability, curve.at_most, curve.lower, curve.upper)
+    )
     if len(curve.settlement):
-        ends = factor * np.append(curve.settlement, curve.furthest)
-        low, high = np.append(curve.lower, curve.lower[-1]), np.append(curve.upper, curve.upper[-1])
         axes.fill_between(
-            ends, low, high, step="post", color=colour, alpha=0.18, linewidth=0,
+            steps, low, high, step="post", color=colour, alpha=0.18, linewidth=0,
             label=f"{100 * CONFIDENCE:g} % confidence, point by point",
         )  # fmt: skip
-    axes.step(x, level, where="post", color=colour, linewidth=2.2, label=curve_name(study))
+    never = ", if runs without result never collapse" if curve.n_broken_off else ""
+    axes.step(steps, least, where="post", color=colour, linewidth=2.2, label=f"{curve_name(study)}{never}")
+    if never:
+        axes.step(steps, most, "--", where="post", color=colour, label="if they collapse where they were left")
     for share, words in ((0.05, "5 %"), (0.5, "half")):
-        at = curve.quantile(share)
-        if at is None:
-            continue
-        axes.plot([0.0, factor * at, factor * at], [share, share, 0.0], color="#7a7a7a", linewidth=0.9, dashes=(4, 3))
-        axes.annotate(
-            f"{words} by {factor * at:.3g} {unit}", (factor * at, share), xytext=(6, -4), textcoords="offset points",
-            va="top", fontsize=0.9 * TEXT, color="#4a4a4a",
-        )  # fmt: skip
+        # Where both are one it is the last.
+        for at, by in dict(zip(curve.quantile(share), ("not before", "by"), strict=True)).items():
+            if at is None:
+                continue
+            x = factor * at
+            axes.plot([0.0, x, x], [share, share, 0.0], color="#7a7a7a", linewidth=0.9, dashes=(4, 3))
+            axes.annotate(
+                f"{words} {by} {x:.3g} {unit}", (x, share), xytext=(6, -4), textcoords="offset points",
+                va="top", fontsize=0.9 * TEXT, color="#4a4a4a",
+            )  # fmt: skip
     axes.set_ylim(0.0, 1.02)
     # Where all runs collapsed nothing is to be seen beyond the last.
-    all_fell = curve.n_stood == 0 and len(curve.settlement) > 0
+    all_fell = curve.n_stood == curve.n_broken_off == 0 and len(curve.settlement) > 0
     axes.set_xlim(0.0, 1.03 * factor * max(float(curve.settlement[-1]) if all_fell else curve.furthest, 1e-12))
     axes.set_xlabel(f"settlement of the support [{unit}]", fontsize=TEXT)
     axes.set_ylabel(curve_name(study), fontsize=TEXT)
@@ -108,61 +114,66 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
 
 @plain_text
 def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draw the swing of the collapse displacement with every parameter, and Sobol' indices beside it."""
+    """Draw the swing of the collapse displacement with every parameter, and Sobol' indices beside it, if known."""
     found, indices = swings(study, table)[:12], first_order(study, table)
     factor, unit = _length(table)
-    rest = [name for name in indices if name not in {s.name for s in found}]
-    names = [*(s.name for s in found), *rest]
+    names = list(dict.fromkeys([*(swing.name for swing in found), *indices]))
     figure = Figure(figsize=(10.0, 1.9 + 0.6 * len(names)), layout="constrained")
-    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.6, 1.0))
-    centre = factor * float(np.nanmean(outcome(table)))
+    ratios = (1.6, 1.0) if indices else (1.0,)
+    left, *others = figure.subplots(1, len(ratios), sharey=True, squeeze=False, width_ratios=ratios)[0]
+    centre = factor * float(np.nanmean(outcome(independent_rows(study, table))))
     for place, swing in enumerate(found):
         _draw_swing(left, place, swing, centre, factor)
     left.axvline(centre, color="#333333", linewidth=1.0)
     left.margins(x=0.22)
     left.set_yticks(range(len(names)), [textwrap.shorten(name, 40) for name in names], fontsize=0.95 * TEXT)
     left.set_ylim(len(names) - 0.4, -0.6)
-    stood = int(stood_as_far(table).sum())
-    bound = f", at least: {counted(stood, 'run')} stood" if stood else ""
+    stood = int(without_collapse(table).sum())
+    bound = f", at least: {counted(stood, 'run')} without collapse" if stood else ""
     left.set_xlabel(f"mean collapse displacement [{unit}]{bound}", fontsize=TEXT)
-    extreme = "fifth of the values" if study.method != "grid" else "value"
-    left.set_title(f"mean of the runs with the lowest and the highest {extreme}", **HEADING)
-    for place, name in enumerate(names):
-        if name in indices:
-            share, error = indices[name]
-            right.barh(place, share, color=palette.hexadecimal(palette.SETTLEMENT), height=0.52, zorder=2)
-            right.errorbar(share, place, xerr=error, color="#333333", linewidth=1.0, capsize=3, zorder=3)
-    right.set_xlim(min(0.0, *(s - e for s, e in indices.values()), 0.0) if indices else 0.0, 1.0)
-    right.set_xlabel("first-order Sobol’ index", fontsize=TEXT)
-    title = "share of the variance" if indices else "too few runs for indices"
-    if indices:
+    left.set_title("mean of the runs with the\nlowest and the highest values", **HEADING)
+    for right in others:
+        for place, name in enumerate(names):
+            if name in indices:
+                share, error = indices[name]
+                right.barh(place, share, color=palette.hexadecimal(palette.SETTLEMENT), height=0.52, zorder=2)
+                _draw_error(right, share, place, error)
+        reach = [0.0, 1.0, *(share + side * error for share, error in indices.values() for side in (-1, 1))]
+        right.set_xlim(min(reach), max(reach))
+        right.set_xlabel("first-order Sobol’ index", fontsize=TEXT)
         remaining = max(1.0 - sum(s for s, _ in indices.values()), 0.0)
         words = "interactions" if study.design.factors or not study.n_seeded else "imperfections, interactions"
-        title += f"\n{words}: {100 * remaining:.0f} %"
-    right.set_title(title, **HEADING)
-    for axes in (left, right):
+        right.set_title(f"share of the variance\n{words}: {100 * remaining:.0f} %", **HEADING)
+    for axes in (left, *others):
         _plain_frame(axes)
         axes.grid(visible=False, axis="y")
     return saved(figure, path, 150)
 
 
 def _draw_swing(axes: Axes, place: int, swing: Swing, centre: float, factor: float) -> None:
-    """Draw the bar of a parameter to both sides of the mean of all runs, with its values at the ends."""
-    ends = ((swing.low, swing.low_value, swing.low_error, "#9bc0e0"),
-            (swing.high, swing.high_value, swing.high_error, palette.hexadecimal(palette.FORCE)))  # fmt: skip
-    for side, (mean, value, error, colour) in zip((-1, 1), ends, strict=True):
-        axes.barh(place, factor * mean - centre, left=centre, color=colour, height=0.52, zorder=2)
-        axes.errorbar(factor * mean, place, xerr=factor * error, color="#333333", linewidth=1.0, capsize=3, zorder=3)
-        # Of a parameter without effect the two values stand to both sides.
-        outwards = side if np.isclose(factor * mean, centre, rtol=1e-9) else 1 if factor * mean > centre else -1
+    """Draw the bars of a parameter from the mean of all runs, with its values at the ends, the smaller mean's left."""
+    light, dark = "#9bc0e0", palette.hexadecimal(palette.FORCE)
+    ends = [
+        (factor * swing.low, factor * swing.low_error, swing.low_value, light),
+        (factor * swing.high, factor * swing.high_error, swing.high_value, dark),
+    ]
+    # Of two bars to one side the shorter lies upon the longer.
+    for mean, error, _, colour in sorted(ends, key=lambda end: -abs(end[0] - centre)):
+        axes.barh(place, mean - centre, left=centre, color=colour, height=0.52, zorder=2)
+        _draw_error(axes, mean, place, error)
+    for outwards, (*_, value, _) in zip((-1, 1), sorted(ends, key=lambda end: end[0]), strict=True):
         # Beyond the errors of both ends, which lie in one line: one of them would strike the value through.
-        reaches = [mean, *(of + outwards * about for of, _, about, _ in ends if not np.isnan(about))]
-        edge = factor * (max(reaches) if outwards > 0 else min(reaches))
+        edge = outwards * max(outwards * centre, *(outwards * mean + error for mean, error, *_ in ends))
         words = textwrap.shorten(value, 16) if isinstance(value, str) else rounded_text(value)
         axes.annotate(
             words, (edge, place), xytext=(6 * outwards, 0), textcoords="offset points", va="center",
             ha="left" if outwards > 0 else "right", fontsize=0.85 * TEXT,
         )  # fmt: skip
+
+
+def _draw_error(axes: Axes, at: float, place: int, error: float) -> None:
+    if error > 0.0:
+        axes.errorbar(at, place, xerr=error, color="#333333", linewidth=1.0, capsize=3, zorder=3)
 
 
 @plain_text
@@ -179,7 +190,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     figure = Figure(figsize=(width, 4.6 + 0.2 * lines), layout="constrained")
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
     y = factor * outcome(table)
-    stood = stood_as_far(table)
+    stood = without_collapse(table)
     kind = table["mechanism_class"].to_numpy(dtype=object)
     for axes, name in zip(panels, names, strict=True):
         x = table[name].to_numpy(dtype=float)
@@ -193,6 +204,8 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
             axes.plot(x[order], y[order], color="#b5b5b5", linewidth=1.2, zorder=1)
         axes.scatter(x[stood], y[stood], s=26, facecolor="none", edgecolor="#333333", marker="^", zorder=3)
         axes.set_xlabel(name, fontsize=TEXT)
+        if not (x % 1.0).any():
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         _plain_frame(axes)
     panels[0].set_ylabel(f"collapse displacement [{unit}]", fontsize=TEXT)
     # Where nothing ever stands all are 0.
@@ -203,7 +216,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     if rest:
         handles.append(_mark("#b5b5b5", "o", f"{counted(len(classes) - len(shown), 'other mechanism')} ({rest})"))
     if stood.any():
-        handles.append(_mark("#333333", "^", f"stood as far as it was followed ({int(stood.sum())})", hollow=True))
+        handles.append(_mark("#333333", "^", f"no collapse as far as followed ({int(stood.sum())})", hollow=True))
     figure.legend(handles=handles, loc="outside lower left", frameon=False, fontsize=0.82 * TEXT)
     return saved(figure, path, 150)
 
@@ -313,9 +326,9 @@ def runs_counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str
         words.append(f"{never} never stood")
     if curve.n_stood:
         words.append(f"{curve.n_stood} stood (up to {factor * curve.furthest:.3g} {unit})")
-    failed = int(table["status"].isin(NO_RESULT).sum())
-    words.append(f"{failed} without result" + (" are left out" if failed else ""))
-    return ", ".join(words)
+    words.append(f"{curve.n_broken_off} without result")
+    not_built = int((table["status"] == NOT_BUILT).sum())
+    return ", ".join(words) + (f"; {not_built} not built are left out" if not_built else "")
 
 
 def _length(table: pd.DataFrame) -> tuple[float, str]:

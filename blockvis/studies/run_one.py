@@ -15,8 +15,8 @@ import numpy as np
 import solver
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly
-from blockvis.cases.contents import Case
 from blockvis.dynamics.fall import falls_from, with_mechanism
+from blockvis.kinds.kind import AnalysisRun
 from blockvis.pictures.frame import Frame
 from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
@@ -28,8 +28,8 @@ from solver import mechanics
 
 from .study_file import run_values
 
-#: Status of a run that raised an error.
-FAILED = "failed"
+#: Status of a run that raised an error, and of one whose values make no structure.
+FAILED, NOT_BUILT = "failed", "not built"
 
 #: Most joints that a class names; of more joints it gives the number.
 NAMED_JOINTS = 8
@@ -41,10 +41,6 @@ SWING = 0.05
 VIEW = View(AROUND[0], ABOVE)
 
 
-class _OutOfTime(RuntimeError):
-    """The run took longer than the study allows."""
-
-
 def run_once(
     values: Mapping[str, Any], source: str, order: Mapping[str, Any], n_seeded: int, seconds: float | None = None
 ) -> tuple[dict[str, Any], bytes]:
@@ -52,26 +48,30 @@ def run_once(
 
     ``values`` are the base case as TOML has it, read from a file ``source`` to whose folder its paths are relative. The
     order is as of :meth:`blockvis.studies.study_file.Study.order`; its seed is of the last ``n_seeded`` imperfections.
-    A run fails after so many seconds.
+    A run is interrupted after so many seconds.
 
-    Gives the row of the table, with the status "failed" and the error as ``message`` where one is raised, and the
-    mechanism for its picture, as an npz file; empty without a mechanism.
+    Gives the row of the table, with the status "not built" or "failed" and the error as ``message`` where one is
+    raised, and the mechanism for its picture, as an npz file; empty without a mechanism.
     """
-    started = time.perf_counter()
+    started, run = time.perf_counter(), None
     try:
         # Warnings about the layout would appear once per run; a run outside a study shows them.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             case = case_of(run_values(values, order, n_seeded), Path(source))
-            found, shape = _outcome(case, order["run"], seconds)
+            # Where nothing stands at all the first frame of the fall shows the mechanism; the others are not needed.
+            case = replace(case, controls=replace(case.controls, falling_frames=1))
+            run = planned(case, case_assembly(case))
+            found, shape = _outcome(run, order["run"], seconds)
     except Exception as error:  # noqa: BLE001 - any error is this run's result and must not end the study
-        return failed_row(order, _reason(error), time.perf_counter() - started), b""
+        status = NOT_BUILT if run is None and isinstance(error, ValueError) else FAILED
+        return _row(order, status=status, message=_reason(error), seconds=time.perf_counter() - started), b""
     return _row(order, **found, seconds=time.perf_counter() - started), shape
 
 
-def failed_row(order: Mapping[str, Any], message: str, seconds: float = 0.0) -> dict[str, Any]:
-    """Make the row of a run without result, after so many seconds."""
-    return _row(order, status=FAILED, message=message, seconds=seconds)
+def failed_row(order: Mapping[str, Any], message: str) -> dict[str, Any]:
+    """Make the row of a run of which nothing came back."""
+    return _row(order, status=FAILED, message=message, seconds=0.0)
 
 
 def _row(order: Mapping[str, Any], **found: Any) -> dict[str, Any]:
@@ -79,27 +79,28 @@ def _row(order: Mapping[str, Any], **found: Any) -> dict[str, Any]:
 
 
 def _reason(error: Exception) -> str:
-    kind = "" if isinstance(error, (ValueError, _OutOfTime)) else f"{type(error).__name__}: "
+    kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
     return f"{kind}{error}".strip() or type(error).__name__
 
 
-def _outcome(case: Case, number: int, seconds: float | None) -> tuple[dict[str, Any], bytes]:
-    """Follow a case by its kind of analysis; give what the table says of it, and the shape of its mechanism."""
-    # Where nothing stands at all the first frame of the fall shows the mechanism; the others are not needed.
-    case = replace(case, controls=replace(case.controls, falling_frames=1))
-    run = planned(case, case_assembly(case))
-    started = time.perf_counter()
+def _outcome(run: AnalysisRun, number: int, seconds: float | None) -> tuple[dict[str, Any], bytes]:
+    """Follow a run for so many seconds; give what the table says of it, and the shape of its mechanism."""
+    started, ending = time.perf_counter(), None
     # Only the ends of the path are kept.
     kept: list[solver.Increment] = []
     n_path = n_programs = 0
     for increment in run.steps:
-        if increment.status is not solver.Status.FALLING:
+        falling = increment.status is solver.Status.FALLING
+        if not falling:
             kept = kept[:1]
             n_path, n_programs = n_path + 1, n_programs + increment.programs
         kept.append(increment)
-        if seconds is not None and time.perf_counter() - started > seconds:
-            raise _OutOfTime(f"took longer than {seconds:g} s, at a settlement of {increment.settlement:.6g}")
-    response = run.response(kept, run.steps.ending)
+        # Of what falls the collapse is found already.
+        if seconds is not None and not falling and time.perf_counter() - started > seconds:
+            told = f"took longer than {seconds:g} s: let [study] seconds be longer, with --retry-failed"
+            ending = mechanics.Ending(solver.Status.INTERRUPTED, told)
+            break
+    response = run.response(kept, ending or run.steps.ending)
     found = _numbers(response) | {"increments": n_path, "programs": n_programs}
     falls = with_mechanism(response) or falls_from(response)
     if falls is None or "collapse_displacement" not in found:

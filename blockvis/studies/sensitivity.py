@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .study_file import Parameter, Study
-from .study_folder import NO_RESULT
+from .study_folder import NOT_BUILT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,97 +35,89 @@ class Swing:
     #: [m or rad] Mean outcome of the runs with the lowest and with the highest values.
     low: float
     high: float
-    #: [m or rad] Half the 95 % interval of these means.
+    #: [m or rad] Half the 95 % interval of these means; 0 of one run, and of a grid, which has all its values.
     low_error: float
     high_error: float
-    #: Whether runs of the one and of the other stood as far as they were followed: their means may be larger.
+    #: Whether some runs of the one and of the other did not collapse: their means may be larger.
     at_least: tuple[bool, bool] = (False, False)
-
-    @property
-    def size(self) -> float:
-        """Difference of the two means [m or rad]."""
-        return abs(self.high - self.low)
 
 
 def outcome(table: pd.DataFrame) -> np.ndarray:
     """(n_rows,) array [m or rad]: collapse displacement, or the last settlement of a run that did not collapse.
 
-    The latter is a lower bound of the collapse displacement. The outcome of a run without result is nan.
+    The latter is a lower bound of the collapse displacement, 0 where nothing is known. It is nan of what was not built.
     """
-    stood = table["collapse_displacement"].isna()
-    value = np.where(stood, table["last_settlement"], table["collapse_displacement"]).astype(float)
-    value[table["status"].isin(NO_RESULT).to_numpy(dtype=bool)] = np.nan
-    return value
+    least = table["last_settlement"].fillna(0.0).where(table["status"] != NOT_BUILT)
+    return table["collapse_displacement"].fillna(least).to_numpy(dtype=float)
 
 
-def stood_as_far(table: pd.DataFrame) -> np.ndarray:
-    """(n_rows,) bool array: runs with a result that stood as far as they were followed."""
-    return np.asarray(table["collapse_displacement"].isna() & ~table["status"].isin(NO_RESULT), dtype=bool)
+def without_collapse(table: pd.DataFrame) -> np.ndarray:
+    """(n_rows,) bool array: runs that did not collapse as far as they were followed."""
+    return np.asarray(table["collapse_displacement"].isna() & (table["status"] != NOT_BUILT), dtype=bool)
+
+
+def independent_rows(study: Study, table: pd.DataFrame) -> pd.DataFrame:
+    """Take the rows that form a random sample, without those in which a "saltelli" design combines two."""
+    return table[study.design.independent[table["run"].to_numpy(dtype=int)]]
 
 
 def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
-    """Compute the swing of every parameter, by the table of a study, the largest first.
+    """Compute the swing of every parameter, by the independent rows of the table of a study, the largest first.
 
     There is none where no run collapsed: outcomes are no more than how far runs were followed.
     """
-    y = outcome(table)
-    table, y = table[np.isfinite(y)], y[np.isfinite(y)]
-    stood, found = stood_as_far(table), []
+    table = independent_rows(study, table[table["status"] != NOT_BUILT])
+    y, stood, found = outcome(table), without_collapse(table), []
     if stood.all():
         return []
     for parameter in study.parameters:
-        x = table[parameter.name].to_numpy()
-        few = parameter.distribution is None
-        pairs: list[tuple[float | str, np.ndarray]] = []
-        if few and not parameter.numeric:
-            groups = {str(value): np.flatnonzero(x == value) for value in dict.fromkeys(x.tolist())}
-            ends = sorted(groups, key=lambda value: float(y[groups[value]].mean()))
-            if len(ends) > 1:
-                pairs = [(ends[0], groups[ends[0]]), (ends[-1], groups[ends[-1]])]
-        elif few:
-            x = x.astype(float)
-            if len(x) and np.ptp(x) > 0:
-                pairs = [(float(v), np.flatnonzero(x == v)) for v in (x.min(), x.max())]
+        x = table[parameter.name].to_numpy(dtype=float if parameter.numeric else object)
+        if parameter.distribution is None:
+            groups = [np.flatnonzero(x == value) for value in dict.fromkeys(x.tolist())]
+            # Texts have no order but that of their outcomes.
+            groups.sort(key=lambda rows: float((x if parameter.numeric else y)[rows].mean()))
         else:
-            x = x.astype(float)
-            order = np.argsort(x, kind="stable")
-            n = max(1, round(FIFTH * len(x)))
-            if len(x) > 1:
-                pairs = [(float(x[k].mean()), k) for k in (order[:n], order[-n:])]
-        if not pairs:
+            order, n = np.argsort(x, kind="stable"), max(1, round(FIFTH * len(x)))
+            groups = [order[:n], order[-n:]] if len(x) > 1 else []
+        if len(groups) < 2:
             continue
-        (low_value, lowest), (high_value, highest) = pairs
+        lowest, highest = groups[0], groups[-1]
+        values = [x[k].mean() if parameter.distribution else x[k[0]] for k in (lowest, highest)]
+        low_value, high_value = (float(value) if parameter.numeric else str(value) for value in values)
         low, high = y[lowest], y[highest]
-        means, errors = (float(low.mean()), float(high.mean())), (_error(low), _error(high))
+        means = float(low.mean()), float(high.mean())
+        errors = (0.0, 0.0) if study.method == "grid" else (_error(low), _error(high))
         at_least = bool(stood[lowest].any()), bool(stood[highest].any())
         found.append(Swing(parameter.name, low_value, high_value, *means, *errors, at_least))
-    return sorted(found, key=lambda swing: -swing.size)
+    return sorted(found, key=lambda swing: -abs(swing.high - swing.low))
 
 
 def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, float]]:
     """Estimate Sobol' indices of first order: the share of each parameter alone in the variance of the outcome.
 
-    Gives the index and half its 95 % interval by name of the parameter, for a "saltelli" study also of all
-    imperfections together; nothing if there are too few runs, none collapsed, or the outcome is the same in nearly all.
+    Gives the index and half its 95 % interval, 0 of a grid without repeats, by name of the parameter, for a "saltelli"
+    study also of all imperfections together; nothing if there are too few runs, some did not collapse, whose variance
+    would be that of how far they were followed, or the outcome is the same in nearly all.
 
     For a "saltelli" study: Saltelli et al., Computer Physics Communications 181 (2010) 259-270; for other samples
     RBD-FAST with the correction of its bias: J.-Y. Tissot and C. Prieur, Reliability Engineering and System Safety 107
-    (2012) 205-213, https://doi.org/10.1016/j.ress.2012.06.010; both by SALib. For a grid, with equal numbers of runs
-    per value: the variance of the means over the variance, its error by the jackknife.
+    (2012) 205-213, https://doi.org/10.1016/j.ress.2012.06.010; both by SALib. For a grid that has a run for all of its
+    values with each other: the variance of the means over the variance, its error by the jackknife of the repeats.
     """
     y = np.full(study.n_runs, np.nan)
     y[table["run"].to_numpy(dtype=int)] = outcome(table)
-    if stood_as_far(table).sum() == np.isfinite(y).sum():
-        return {}
-    few = np.isfinite(y).sum() < FEWEST_RUNS and study.method != "grid"
-    if few or not np.isfinite(y).any() or np.nanstd(y) <= 1e-9 * max(abs(float(np.nanmean(y))), 1e-300):
-        return {}
     known = np.isfinite(y)
-    u = study.design.probabilities[known]
+    u, grid = study.design.probabilities[known], study.method == "grid"
+    fewest = study.repeats * math.prod(len(np.unique(values)) for values in u.T) if grid else FEWEST_RUNS
+    if without_collapse(table).any() or not known.any() or known.sum() < fewest:
+        return {}
+    if np.std(y[known]) <= 1e-9 * max(abs(float(np.mean(y[known]))), 1e-300):
+        return {}
     if study.design.factors:
         found = _exchanged(study, y)
-    elif study.method == "grid":
-        found = {p.name: _of_groups(u[:, k], y[known]) for k, p in enumerate(study.parameters) if p.n_levels > 1}
+    elif grid:
+        parameters = enumerate(study.parameters)
+        found = {p.name: _of_groups(u[:, k], y[known], study.repeats) for k, p in parameters if p.n_levels > 1}
     else:
         # Where a single run differs, resamples without it have no variance.
         with np.errstate(invalid="ignore"):
@@ -160,22 +153,18 @@ def _of_sample(
     return {name: (float(s), float(e)) for name, s, e in zip(names, found["S1"], found["S1_conf"], strict=True)}
 
 
-def _of_groups(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    levels, group = np.unique(x, return_inverse=True)
-    count, total = np.bincount(group).astype(float), np.bincount(group, weights=y)
+def _of_groups(x: np.ndarray, y: np.ndarray, repeats: int) -> tuple[float, float]:
+    _, group = np.unique(x, return_inverse=True)
+    repeat = np.arange(len(y)) % repeats
 
-    def index(count: np.ndarray, total: np.ndarray, n: np.ndarray, s: np.ndarray, squares: np.ndarray) -> np.ndarray:
-        mean = s / n
-        between = (total**2 / np.maximum(count, 1.0)).sum(axis=-1) / n - mean**2
-        # Without one run the others may be the same: what rounding leaves of their variance is none.
-        return np.asarray(between / np.maximum(squares / n - mean**2, 1e-14 * squares / n + 1e-300))
+    def share(kept: np.ndarray) -> float:
+        means = np.bincount(group[kept], weights=y[kept]) / np.bincount(group[kept])
+        # What rounding leaves of a variance is none.
+        return float(means.var() / max(y[kept].var(), 1e-14 * (y[kept] ** 2).mean() + 1e-300))
 
-    n, s, squares = float(len(y)), y.sum(), (y**2).sum()
-    whole = float(index(count, total, np.array(n), s, squares))
-    own = np.eye(len(levels))[group]
-    without = index(count - own, total - own * y[:, None], np.array(n - 1.0), s - y, squares - y**2)
-    return whole, float(1.96 * np.sqrt((n - 1.0) / n * ((without - without.mean()) ** 2).sum()))
+    without = np.array([share(repeat != k) for k in range(repeats)]) if repeats > 1 else np.zeros(1)
+    return share(repeat >= 0), float(1.96 * np.sqrt((repeats - 1.0) * without.var()))
 
 
 def _error(values: np.ndarray) -> float:
-    return float(1.96 * values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
+    return float(1.96 * values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0

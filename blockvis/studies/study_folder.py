@@ -20,7 +20,7 @@ from blockvis.results.folder import locked
 from blockvis.system.atomic_files import atomic_file, flush, make_folder, write_atomic
 from solver.mechanics import counted
 
-from .run_one import FAILED
+from .run_one import FAILED, NOT_BUILT
 from .study_file import RESERVED, Study
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 RUNS = "runs.jsonl"
 
 #: Status of a run without result.
-NO_RESULT = (FAILED, str(solver.Status.SOLVER_FAILED), str(solver.Status.INTERRUPTED))
+NO_RESULT = (NOT_BUILT, FAILED, str(solver.Status.SOLVER_FAILED), str(solver.Status.INTERRUPTED))
 
 _TEXTS = ("status", "unit", "mechanism_class", "mechanism", "message")
 _COUNTS = ("run", "seed", "macro_blocks", "hinges", "sliding_joints", "increments", "programs")

@@ -14,9 +14,9 @@ from blockvis.text import rounded_text
 from solver.mechanics import counted
 
 from .fragility import fragility_of
-from .sensitivity import first_order, swings
+from .sensitivity import first_order, independent_rows, swings, without_collapse
 from .study_file import Study
-from .study_folder import NO_RESULT
+from .study_folder import NO_RESULT, NOT_BUILT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,11 +29,6 @@ MOST_VALUES = 12
 
 #: Most reasons of failure that the summary lists.
 MOST_REASONS = 5
-
-
-def independent_rows(study: Study, table: pd.DataFrame) -> pd.DataFrame:
-    """Take the rows that form a random sample, without those in which a "saltelli" design combines two."""
-    return table[study.design.independent[table["run"].to_numpy(dtype=int)]]
 
 
 def classes_of(table: pd.DataFrame) -> dict[str, int]:
@@ -61,20 +56,25 @@ def curve_name(study: Study) -> str:
 def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     """Summarise a study by its table, for its summary.json; lengths in m, angles in rad."""
     curve = fragility_of(independent_rows(study, table))
+    without_result = table[table["status"].isin(NO_RESULT)]
+    broken_off = without_result.loc[without_result["status"] != NOT_BUILT, "last_settlement"].fillna(0.0)
     units = [u for u in table["unit"].unique().tolist() if u]
     return {
         "n_runs": study.n_runs,
         "n_finished": len(table),
         **ends_counted(table),
         "n_stood": curve.n_stood,
-        "n_without_result": int(table["status"].isin(NO_RESULT).sum()),
-        "reasons": _reasons(table.loc[table["status"].isin(NO_RESULT), "message"].tolist()),
+        "n_without_collapse": int(without_collapse(table).sum()),
+        "n_without_result": len(without_result),
+        "n_not_built": len(without_result) - len(broken_off),
+        "broken_off_at": [float(broken_off.min()), float(broken_off.max())] if len(broken_off) else [],
+        "reasons": _reasons(without_result["message"].tolist()),
         "status": {str(k): int(v) for k, v in table["status"].value_counts().items()},
         "curve": curve_name(study),
         "parameter": study.parameters[0].name if len(study.parameters) == 1 else "",
         "unit": units[0] if units else "m",
-        "quantiles": {str(p): curve.quantile(p) for p in (0.05, 0.5, 0.95)},
-        "probability_at_the_end": float(curve.probability[-1]) if len(curve.probability) else 0.0,
+        "quantiles": {str(p): list(curve.quantile(p)) for p in (0.05, 0.5, 0.95)},
+        "probability_at_the_end": [float(of[-1]) if len(of) else 0.0 for of in (curve.probability, curve.at_most)],
         "furthest_settlement": curve.furthest,
         "first_order_indices": {} if is_single(study) else {k: list(v) for k, v in first_order(study, table).items()},
         "swings": [
@@ -122,19 +122,33 @@ def in_words(summary: dict[str, Any]) -> str:
         + ", ".join(f"{n} {status}" for status, n in summary["status"].items())
     ]
     for reason, n in summary["reasons"].items():
-        lines.append(f"without result, {counted(n, 'time')}: {reason}")
+        lines.append(f"without result, {counted(n, 'time')}{', the first' * (n > 1)}: {reason}")
+    lines += _left_out_lines(summary)
     if summary["n_local"]:
         number = summary["n_local"]
         words = "is a local loss" if number == 1 else "are local losses"
         lines.append(f"{number} of the collapses {words}: a few blocks fall, the structure stands")
-    lines += _line_lines(summary) if summary["line"] else [*_curve_lines(summary), *_swing_lines(summary)]
-    return "\n".join([*lines, *_index_lines(summary), *_mechanism_lines(summary["mechanism_classes"])])
+    lines += _line_lines(summary) if summary["line"] else [*_curve_lines(summary), *_parameter_lines(summary)]
+    return "\n".join([*lines, *_mechanism_lines(summary["mechanism_classes"])])
+
+
+def _left_out_lines(summary: dict[str, Any]) -> list[str]:
+    lines, number = [], summary["n_not_built"]
+    if number:
+        lines.append(f"not built, and left out of what follows: {counted(number, 'run')}")
+    if summary["broken_off_at"]:
+        far = " to ".join(dict.fromkeys(f"{at:.4g}" for at in summary["broken_off_at"]))
+        number = summary["n_without_result"] - number
+        runs = f"{counted(number, 'run')} without result {'was' if number == 1 else 'were'}"
+        lines.append(f"{runs} left at {far} {summary['unit']}, and may collapse there or never")
+    return lines
 
 
 def _line_lines(summary: dict[str, Any]) -> list[str]:
     unit = summary["unit"]
     ends = [
-        f"{_value(value)}: {f'{at:.4g} {unit}' if at is not None else f'none ({status})'}"
+        f"{_value(value)}: "
+        + (f"{at:.4g} {unit}" if at is not None else f"{'not known' if status in NO_RESULT else 'none'} ({status})")
         for value, at, status in summary["line"][:MOST_VALUES]
     ]
     if len(summary["line"]) > MOST_VALUES:
@@ -144,11 +158,8 @@ def _line_lines(summary: dict[str, Any]) -> list[str]:
 
 def _curve_lines(summary: dict[str, Any]) -> list[str]:
     unit = summary["unit"]
-    if summary["n_collapsed"] or summary["n_never_stood"]:
-        quantiles = [
-            f"{100 * float(p):g} % at {value:.4g} {unit}" if value is not None else f"{100 * float(p):g} % not reached"
-            for p, value in summary["quantiles"].items()
-        ]
+    if summary["n_collapsed"] or summary["n_never_stood"] or summary["broken_off_at"]:
+        quantiles = [f"{100 * float(p):g} % {_reached(ends, unit)}" for p, ends in summary["quantiles"].items()]
         return [f"{summary['curve']}: {', '.join(quantiles)}"]
     if not summary["n_stood"]:
         return []
@@ -156,30 +167,39 @@ def _curve_lines(summary: dict[str, Any]) -> list[str]:
         "what each parameter does to a collapse is not known: let settlement.limit be larger; last reactions and "
         "largest openings are in table.csv"
     )
-    return [f"no run collapsed up to {summary['furthest_settlement']:.4g} {unit}; {farther}"]
+    return [
+        f"no run collapsed as far as it was followed, at most {summary['furthest_settlement']:.4g} {unit}; {farther}"
+    ]
 
 
-def _swing_lines(summary: dict[str, Any]) -> list[str]:
+def _reached(ends: list[float | None], unit: str) -> str:
+    """Write where a probability is reached at the first and at the last."""
+    first, last = ends
+    if first is None:
+        return "not reached"
+    if last is None:
+        return f"not before {first:.4g} {unit}"
+    return f"at {first:.4g} {unit}" if first == last else f"between {first:.4g} and {last:.4g} {unit}"
+
+
+def _parameter_lines(summary: dict[str, Any]) -> list[str]:
     lines, unit = [], summary["unit"]
+    shares = {
+        name: f"{100 * share:.0f}{f' ± {100 * error:.0f}' if error else ''} % of the variance"
+        for name, (share, error) in summary["first_order_indices"].items()
+    }
     for swing in summary["swings"]:
-        (low_at, high_at), (low, high) = swing["at"], swing["mean"]
-        index = summary["first_order_indices"].get(swing["parameter"])
-        share = f", {100 * index[0]:.0f} ± {100 * index[1]:.0f} % of the variance" if index else ""
+        (low_at, high_at), (low, high), name = swing["at"], swing["mean"], swing["parameter"]
+        share = f", {shares.pop(name)}" if name in shares else ""
         least = ["at least " * bool(bound) for bound in swing["at_least"]]
         lines.append(
-            f"{swing['parameter']}: {least[0]}{low:.4g} {unit} on average at {_value(low_at)}, {least[1]}{high:.4g} "
-            f"{unit} at {_value(high_at)}{share}"
+            f"{name}: {least[0]}{low:.4g} {unit} on average at {_value(low_at)}, {least[1]}{high:.4g} {unit} at "
+            f"{_value(high_at)}{share}"
         )
+    lines += [f"{name}: {share}" for name, share in shares.items()]
+    if lines and summary["n_without_collapse"]:
+        lines.append(f"no shares of the variance: {counted(summary['n_without_collapse'], 'run')} without collapse")
     return lines
-
-
-def _index_lines(summary: dict[str, Any]) -> list[str]:
-    listed = {swing["parameter"] for swing in summary["swings"]}
-    return [
-        f"{name}: {100 * share:.0f} ± {100 * error:.0f} % of the variance"
-        for name, (share, error) in summary["first_order_indices"].items()
-        if name not in listed
-    ]
 
 
 def _mechanism_lines(classes: dict[str, int]) -> list[str]:

@@ -3,6 +3,7 @@
 import json
 import re
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -365,8 +366,8 @@ def test_kaplan_meier_of_published_data():
     assert (curve.n_runs, curve.n_stood, curve.furthest) == (21, 12, 35.0)
     reference = st.ecdf(st.CensoredData.right_censored(WEEKS, np.logical_not(RELAPSE))).sf
     np.testing.assert_allclose(1.0 - curve.probability, reference.evaluate(curve.settlement), rtol=1e-12)
-    assert curve.quantile(0.5) == 23
-    assert curve.quantile(0.9) is None
+    assert curve.quantile(0.5) == (23, 23)
+    assert curve.quantile(0.9) == (None, None)
 
 
 def test_band_is_wilsons_with_the_effective_number():
@@ -410,21 +411,69 @@ def test_band_covers_the_truth_as_often_as_it_says():
     assert 0.92 < inside / all_ < 0.98
 
 
-def test_runs_without_result_are_counted_and_left_out():
+def test_runs_without_result_are_counted_and_only_those_that_were_not_built_are_left_out():
     study = _study(runs=8)
     y = np.arange(1.0, 9.0)
-    y[[2, 5]] = np.nan
+    y[[2, 5, 6]] = np.nan
     status = ["collapsed"] * 8
-    status[2], status[5] = "failed", "limit reached"
+    status[2], status[5], status[6] = "failed", "limit reached", "not built"
     table = _table(study, y, status)
     table.loc[5, "last_settlement"] = 4.5
-    table.loc[2, "message"] = "out of memory"
+    table.loc[[2, 6], "last_settlement"] = np.nan
+    table.loc[[2, 6], "message"] = "out of memory", "overlaps"
     curve = fragility_of(table)
-    assert (curve.n_runs, curve.n_stood) == (7, 1)
+    assert (curve.n_runs, curve.n_stood, curve.n_broken_off) == (7, 1, 1)
+    assert (curve.settlement[0], curve.probability[0], curve.at_most[0]) == (0.0, 0.0, pytest.approx(1 / 7))
     summary = summary_of(study, table)
-    assert summary["n_without_result"] == 1
-    assert "1 failed" in in_words(summary)
-    assert "without result, 1 time: out of memory" in in_words(summary)
+    assert (summary["n_without_result"], summary["n_not_built"]) == (2, 1)
+    said = in_words(summary)
+    assert "1 failed" in said
+    assert "without result, 1 time: out of memory" in said
+    assert "not built, and left out of what follows: 1 run\n" in said
+    assert "1 run without result were left at 0 m" not in said
+    assert "1 run without result was left at 0 m, and may collapse there or never" in said
+
+
+def test_a_curve_holds_wherever_runs_that_were_broken_off_collapse():
+    """They are broken off as they collapse: what is left of the sample is those that stand."""
+    random = np.random.default_rng(4)
+    for _ in range(20):
+        collapse, limit = random.exponential(1.0, 30), random.uniform(0.5, 3.0, 30)
+        end, fell = np.minimum(collapse, limit), collapse <= limit
+        broken_off = random.random(30) < 0.3
+        left = np.where(broken_off, end * random.uniform(0.5, 1.0, 30), end)
+        truth, curve = fragility(end, fell), fragility(left, fell & ~broken_off, broken_off)
+        at = np.searchsorted(truth.settlement, curve.settlement, side="right")
+        probability = np.append(0.0, truth.probability)[at]
+        assert (curve.probability <= probability + 1e-12).all()
+        assert (probability <= curve.at_most + 1e-12).all()
+        first, last = curve.quantile(0.3)
+        assert first <= truth.quantile(0.3)[0]
+        assert last is None or last >= truth.quantile(0.3)[0]
+
+
+def test_where_runs_take_too_long_nothing_is_said_of_those_that_stand_alone(tmp_path):
+    """A run takes its time where it collapses."""
+    study = _study(runs=20)
+    table = _table(study, np.full(20, np.nan), ["interrupted"] * 19 + ["limit reached"])
+    table["last_settlement"] = np.append(np.linspace(0.068, 0.126, 19), 0.14)
+    table.loc[:18, "message"] = "took longer than 1.8 s"
+    summary = summary_of(study, table)
+    assert summary["probability_at_the_end"] == [0.0, pytest.approx(0.95)]
+    assert summary["quantiles"]["0.05"] == [0.068, None]
+    said = in_words(summary)
+    assert "19 runs without result were left at 0.068 to 0.126 m, and may collapse there or never" in said
+    assert "probability of collapse: 5 % not before 0.068 m, 50 % not before 0.097 m, 95 % not before 0.126 m" in said
+    assert "settlement.limit" not in said
+    assert "no run collapsed" not in said
+    drawn = pictures.draw_fragility(study, table, tmp_path / "fragility.svg").read_text(encoding="utf-8")
+    assert "20 runs, 0 collapsed, 1 stood (up to 140 mm), 19 without result" in drawn
+    assert "half not before 97 mm" in drawn
+    # One of them has collapsed: what is known of the others is no more than how far they came.
+    table.loc[3, ["status", "collapse_displacement"]] = "collapsed", 0.1
+    said = in_words(summary_of(study, table))
+    assert re.search(r"^a: at least 0\.\d+ m on average at 0\.\d+, at least ", said, re.M)
+    assert "no shares of the variance: 19 runs without collapse" in said
 
 
 def test_reasons_that_differ_in_numbers_only_are_counted_together():
@@ -445,7 +494,7 @@ def test_title_and_words_count_what_collapsed_and_what_never_stood_apart():
     assert "4 collapsed, 2 no initial equilibrium" in in_words(summary)
     assert "1 of the collapses is a local loss: a few blocks fall, the structure stands" in in_words(summary)
     title = pictures.runs_counted(fragility_of(table), table, 1e3, "mm")
-    assert title.startswith("7 runs, 4 collapsed (1 of a few blocks only), 2 never stood, 1 stood")
+    assert title.startswith("8 runs, 4 collapsed (1 of a few blocks only), 2 never stood, 1 stood")
 
 
 def test_values_chosen_by_hand_are_no_sample():
@@ -476,12 +525,65 @@ def test_first_order_indices_of_a_linear_function():
     assert found["b"][0] == pytest.approx(0.2, abs=0.08)
 
 
-def test_the_index_of_a_grid_of_two_runs_is_finite():
+def test_an_index_has_an_error_of_what_chance_does():
+    """Of a grid the repeats alone: its values are all that there are."""
     study = _study("grid", parameters={"material.friction_coefficient": {"name": "a", "values": [0.4, 0.5]}})
-    # Without one of them rounding leaves a variance of the other, 3e-17 here.
-    share, error = first_order(study, _table(study, [0.430128095527909, 0.026456931899677537]))["a"]
-    assert share == pytest.approx(1.0)
-    assert error < 2.0
+    assert first_order(study, _table(study, [0.430128095527909, 0.026456931899677537]))["a"] == (
+        pytest.approx(1.0),
+        0.0,
+    )
+    values = {"material.friction_coefficient": [0.3, 0.4, 0.5], "material.density": [1900.0, 2000.0]}
+    names = list(values)
+    study = replace(_study("grid", scattered=True, parameters=values), repeats=4)
+    exact, told = np.array([8 / 12, 3 / 12]) / (11 / 12 + 0.01), []
+    for seed in range(60):
+        table = _table(study, np.zeros(24))
+        table["collapse_displacement"] = (
+            10.0 * table[names[0]] + table[names[1]] / 100.0 + np.random.default_rng(seed).normal(scale=0.1, size=24)
+        )
+        told.append([first_order(study, table)[name] for name in names])
+    share, error = np.moveaxis(np.array(told), -1, 0)
+    assert np.abs(share.mean(axis=0) - exact).max() < 0.01
+    inside = np.abs(share - exact) < error
+    assert inside.mean() > 0.7, "of three degrees of freedom"
+    assert error.max() < 0.2
+
+
+def test_shares_of_the_variance_are_of_collapses_and_not_of_the_limit():
+    values = {"material.friction_coefficient": {"name": "a", "values": [0.38, 0.45, 0.6]}}
+    values["material.density"] = {"name": "b", "values": [1800.0, 1900.0, 2000.0, 2100.0]}
+    study = _study("grid", parameters=values)
+    collapse = np.array([0.02, 0.04, 0.06, 0.08, 0.05, 0.07, 0.09, 0.11, 0.1, 0.12, 0.2, 0.22])
+    for limit, stood in ((0.4, 0), (0.12, 3), (0.06, 9)):
+        table = _table(study, np.where(collapse < limit, collapse, np.nan))
+        table["last_settlement"] = np.minimum(collapse, limit)
+        table["status"] = np.where(collapse < limit, "collapsed", "limit reached")
+        said = in_words(summary_of(study, table))
+        assert ("% of the variance" in said) == (stood == 0)
+        assert (f"no shares of the variance: {stood} runs without collapse" in said) == (stood > 0)
+    said = in_words(summary_of(study, _table(study, collapse)))
+    assert re.search(r"^a: .* \d+ % of the variance$", said, re.M), "nothing is drawn: no error"
+    # The first is not built: the values have not the same partners.
+    assert first_order(study, _table(study, [np.nan, *collapse[1:]], ["not built"] + ["collapsed"] * 11)) == {}
+    gone = np.where(np.arange(12) < 4, np.nan, collapse)
+    partly = first_order(study, _table(study, gone, ["not built"] * 4 + ["collapsed"] * 8))
+    assert sum(share for share, _ in partly.values()) == pytest.approx(1.0, abs=0.1), "a value less is a smaller grid"
+
+
+@pytest.mark.parametrize("method", ["random", "saltelli"])
+def test_the_interval_of_a_mean_holds_the_truth_as_often_as_it_says(method):
+    """The rows of a saltelli design share their imperfections: they are no further draws."""
+    parameters = {
+        f"geometry.parameters.{key}": {"name": key, "distribution": "uniform", "lower": low, "upper": high}
+        for key, low, high in (("thickness_ratio", 0.12, 0.2), ("radius", 1.0, 2.0), ("embrace", 150.0, 170.0))
+    }
+    inside, base = [], _study(method, 16 if method == "saltelli" else 64, scattered=True, parameters=parameters)
+    for seed in range(100):
+        study = replace(base, seed=seed)
+        noise = np.array([np.random.default_rng(s).normal() for s in study.design.seeds.tolist()])
+        table = _table(study, noise)
+        inside += [abs(end) < error for s in swings(study, table) for end, error in ((s.low, s.low_error),)]
+    assert np.mean(inside) > 0.8, "few are compared: not 0.95"
 
 
 def test_first_order_indices_by_exchange_with_imperfections():
@@ -490,7 +592,7 @@ def test_first_order_indices_by_exchange_with_imperfections():
     noise = np.array([np.random.default_rng(s).uniform() for s in study.design.seeds.tolist()])
     table = _table(study, np.zeros(study.n_runs))
     table["collapse_displacement"] = 2.0 * table["a"] + table["b"] / 1000.0 + noise
-    table.loc[7, ["status", "collapse_displacement"]] = ["failed", np.nan]
+    table.loc[7, ["status", "collapse_displacement"]] = ["not built", np.nan]
     found = first_order(study, table)
     for name, exact in (("a", 4 / 6), ("b", 1 / 6), (IMPERFECTIONS, 1 / 6)):
         assert found[name][0] == pytest.approx(exact, abs=0.08), name
@@ -536,7 +638,7 @@ def test_a_study_in_which_nothing_collapses_says_nothing_of_a_collapse(tmp_path,
     assert main(["sweep", str(path), "-o", str(tmp_path / "out"), "--workers", "1"]) == 0
     said = capsys.readouterr().out
     unknown = "what each parameter does to a collapse is not known: let settlement.limit be larger; last reactions and"
-    assert f"no run collapsed up to 0.001 m; {unknown}" in said
+    assert f"no run collapsed as far as it was followed, at most 0.001 m; {unknown}" in said
     assert "average" not in said
     table = pd.read_csv(tmp_path / "out" / "table.csv")
     assert (table["last_reaction"] > 0.0).all()
@@ -575,7 +677,37 @@ def test_means_with_runs_that_stood_are_the_least_that_they_may_be(tmp_path):
     said = in_words(summary_of(study, table))
     assert re.search(r"^a: 0\.\d+ m on average at 0\.\d+, at least 0\.\d+ m at ", said, re.M)
     drawn = pictures.draw_sensitivity(study, table, tmp_path / "sensitivity.svg").read_text(encoding="utf-8")
-    assert f"at least: {mechanics.counted(int(stood.sum()), 'run')} stood" in drawn
+    assert f"at least: {mechanics.counted(int(stood.sum()), 'run')} without collapse" in drawn
+    assert "share of the variance" not in drawn
+
+
+def test_values_stand_where_their_means_are(tmp_path, monkeypatch):
+    """Also of two means to one side of that of all runs; the title of either panel keeps to it."""
+    path = "geometry.parameters.voussoirs"
+    study, beside = _study(runs=64, parameters={path: [10, 11, 12]}), {}
+    table = _table(study, np.zeros(64))
+    rows = table[path].map({10: 1.0, 11: 0.0, 12: 0.9}) + 0.001 * np.arange(64)
+    table["collapse_displacement"] = rows
+    (swing,) = swings(study, table)
+    assert min(swing.low, swing.high) > rows.mean()
+    with monkeypatch.context() as patched:
+        patched.setattr(
+            "matplotlib.axes.Axes.annotate",
+            lambda axes, words, at, xytext, **look: beside.update({words: (at[0], xytext[0])}),
+        )
+        saved, kept = pictures._saved, []
+        patched.setattr(pictures, "_saved", lambda figure, file: kept.append(figure) or saved(figure, file))
+        pictures.draw_sensitivity(study, table, tmp_path / "sensitivity.svg")
+    low, high = beside["12"], beside["10"]
+    assert low[0] <= rows.mean() < swing.low <= high[0]
+    assert (low[1], high[1]) == (-6, 6)
+    left, right = (axes._left_title.get_window_extent() for axes in kept[0].axes)
+    assert left.x1 < right.x0
+    kept[0].clear()
+    with monkeypatch.context() as patched:
+        patched.setattr(pictures, "_saved", lambda figure, file: kept.append(figure))
+        pictures.draw_scatter(study, table, tmp_path / "scatter.svg")
+    assert all(tick == round(tick) for tick in kept[-1].axes[0].get_xticks().tolist()), "whole stones"
 
 
 def test_no_error_strikes_a_value_through(tmp_path, monkeypatch):
