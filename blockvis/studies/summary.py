@@ -59,6 +59,8 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     without_result = table[table["status"].isin(NO_RESULT)]
     broken_off = without_result.loc[without_result["status"] != NOT_BUILT, "last_settlement"].fillna(0.0)
     units = [u for u in table["unit"].unique().tolist() if u]
+    reached = {str(p): curve.quantile(p) for p in (0.05, 0.5, 0.95)}
+    at_the_end = [float(of[-1]) if len(of) else 0.0 for of in (curve.probability, curve.at_most)]
     return {
         "n_runs": study.n_runs,
         "n_finished": len(table),
@@ -73,8 +75,10 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
         "curve": curve_name(study),
         "parameter": study.parameters[0].name if len(study.parameters) == 1 else "",
         "unit": units[0] if units else "m",
-        "quantiles": {str(p): list(curve.quantile(p)) for p in (0.05, 0.5, 0.95)},
-        "probability_at_the_end": [float(of[-1]) if len(of) else 0.0 for of in (curve.probability, curve.at_most)],
+        "quantiles": {p: first if first == last else None for p, (first, last) in reached.items()},
+        "quantile_bounds": {p: list(ends) for p, ends in reached.items()},
+        "probability_at_the_end": at_the_end[0],
+        "probability_at_the_end_at_most": at_the_end[1],
         "furthest_settlement": curve.furthest,
         "first_order_indices": {} if is_single(study) else {k: list(v) for k, v in first_order(study, table).items()},
         "swings": [
@@ -159,7 +163,7 @@ def _line_lines(summary: dict[str, Any]) -> list[str]:
 def _curve_lines(summary: dict[str, Any]) -> list[str]:
     unit = summary["unit"]
     if summary["n_collapsed"] or summary["n_never_stood"] or summary["broken_off_at"]:
-        quantiles = [f"{100 * float(p):g} % {_reached(ends, unit)}" for p, ends in summary["quantiles"].items()]
+        quantiles = [f"{100 * float(p):g} % {_reached(ends, unit)}" for p, ends in summary["quantile_bounds"].items()]
         return [f"{summary['curve']}: {', '.join(quantiles)}"]
     if not summary["n_stood"]:
         return []
