@@ -135,7 +135,7 @@ class Loss:
     """What a collapse mechanism takes with it."""
 
     weight: float  #: [N] Of the free blocks that move in the mechanism.
-    share: float  #: Of the weight of all free blocks.
+    share: float  #: Of the weight of the free blocks that have not been taken away.
 
     @property
     def local(self) -> bool:
@@ -151,8 +151,8 @@ class Loss:
 def loss_in(assembly: solver.Assembly, falling: solver.Increment) -> Loss:
     """Weigh what moves in the motion that follows an increment."""
     moves = mechanics.rigid_parts(assembly, falling) >= 0
-    weight = float(assembly.masses[moves & assembly.free].sum() * solver.GRAVITY)
-    return Loss(weight, weight / mechanics.total_weight(assembly))
+    masses = assembly.masses * (assembly.free & ~falling.removed)
+    return Loss(float(masses[moves].sum() * solver.GRAVITY), float(masses[moves].sum() / masses.sum()))
 
 
 def losing(response: solver.Response) -> solver.Increment | None:

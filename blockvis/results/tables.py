@@ -125,12 +125,13 @@ def _removed(response: solver.Response) -> list[dict[str, Any]]:
     for change in sorted(response.changes, key=lambda change: change.phase):
         taken = np.flatnonzero(there & (False if change.removed is None else change.removed))
         there[taken] = False
+        tied = [tie.name for tie in response.ties if set(tie.blocks) & set(taken.tolist())]
         if len(taken) or change.ties:
             removed.append(
                 {
                     "phase": change.phase + 1,
                     "blocks": [names[k] for k in taken],
-                    "ties": list(change.ties),
+                    "ties": [*change.ties, *(name for name in tied if name not in change.ties)],
                     "weight": float(weights[taken].sum()),
                 }
             )

@@ -105,6 +105,11 @@ class Members:
         lengths[number, 1] += sense * np.maximum(give, 0.0)
         return lengths
 
+    def work_beyond(self, before: np.ndarray, after: np.ndarray) -> float:
+        """Work of brittle members that give for good in a step, between two (n_ties, 2) arrays of lengths."""
+        give = np.abs(after - before)[self.brittle, 1] / self.model.length
+        return float(np.nansum(self.strength[self.brittle] * give))
+
     def without_broken(self, place: Place) -> Place:
         """The place without brittle members at their strength: they carry it there, and break as they go on."""
         if place.contacts is None or not self.brittle.any():
@@ -123,7 +128,9 @@ class Members:
         if not self.ties:
             return TieForces()
         force, ends = member_forces(contacts, forces, len(self.ties)), tie_ends(self.ties, self.model.assembly, pose)
-        state = member_states(np.abs(force), self.strength, float(np.abs(forces).max(initial=0.0)))
+        # Those that break do not yield before.
+        strength, lengths = np.where(self.brittle, np.inf, self.strength), np.where(self.held[:, None], lengths, np.nan)
+        state = member_states(np.abs(force), strength, float(np.abs(forces).max(initial=0.0)))
         state = np.where(np.isnan(lengths[:, 1]), BROKEN, state)
-        state = np.where(np.isnan(lengths[:, 0]) | ~self.held, ABSENT, state)
+        state = np.where(np.isnan(lengths[:, 0]), ABSENT, state)
         return TieForces(force * self.model.force, tie_lengths(ends) - lengths[:, 0], lengths[:, 1], state, ends)

@@ -440,6 +440,9 @@ class Path:
         fast = error.moved > min(max(FAST * length / self.stepper.unit, NEAR), FAR)
         if not (fast or refining):
             return True
+        # What jumps is followed in time, however little viscosity there is.
+        if refining and error.moved > FAR:
+            return False
         # Of a live load that has viscosity in it more than a step may err by.
         if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):
             return True
@@ -496,6 +499,8 @@ class Path:
         weights = self.model.assembly.masses * self.model.assembly.free * GRAVITY
         leaving = self.fall.movements(state.place, end) > FALLEN
         fell_at = np.where(leaving, state.place.s, state.fell_at if len(state.fell_at) else np.nan)
+        # What was taken away is no part of the structure.
+        weights[np.isneginf(fell_at)] = 0.0
         too_much = weights[np.isfinite(fell_at)].sum() > self.local_loss * weights.sum()
         if not leaving.any() or too_much or not weights[np.isnan(fell_at)].any():
             return None

@@ -13,7 +13,7 @@ from solver.kinematics import Pose, moved_vertices, relative_velocities
 from solver.loads import GRAVITY
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Increment, State, Status
-from solver.ties import is_member
+from solver.ties import held_ties, is_member
 from solver.tolerances import OVERLAP
 from solver.words import REMEDY, counted
 
@@ -191,7 +191,10 @@ class Reports:
         """Message that names the blocks that are taken away."""
         assembly = self.model.assembly
         weight = float(assembly.masses[removed & assembly.free].sum()) * GRAVITY
-        return f"{self._named(np.flatnonzero(removed))} taken away before settlement {self.number + 1}, {weight:.4g} N"
+        gone = [tie.name for tie in self.model.ties if not held_ties([tie], removed).all()]
+        with_it = f", and with it {', '.join(map(repr, gone))}" if gone else ""
+        named = self._named(np.flatnonzero(removed))
+        return f"{named} taken away before settlement {self.number + 1}, {weight:.4g} N{with_it}"
 
     def _named(self, blocks: np.ndarray) -> str:
         return f"block{'' if len(blocks) == 1 else 's'} {self.model.assembly.listed(blocks, 4)}"

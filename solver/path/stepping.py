@@ -150,6 +150,8 @@ class Stepper:
         sense = support_motion.sum(axis=0) / max(float(np.linalg.norm(support_motion, axis=1).sum()), 1e-300)
         self.imperfection = np.zeros_like(model.load)
         self.imperfection[:, :d] = model.imperfection * IMPERFECTION * self.weights[:, :1] * sense
+        if model.fallen is not None:
+            self.imperfection[model.fallen] = 0.0
 
     def unloaded(
         self, pose: Pose, phase: int, ties_at: TieForces | None = None, bonds_at: Bonds | None = None
@@ -317,6 +319,7 @@ class Stepper:
         velocity = motion / length if in_time else self._velocity(place, motion, length)
         new = self._arrived(place, replace(new, velocity=velocity), points, left, share)
         work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size)
+        work += self.members.work_beyond(place.tie_lengths, new.tie_lengths)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * self._largest((motion_so_far - before) * self._shares)
         return new, motion / model.lengths, StepError(work, turn, movement_size, self._penetration(points, new))

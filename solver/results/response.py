@@ -176,11 +176,12 @@ class Response(Shown):
             fell_at = end.state.fell_at
             fell_at = np.where(gone, np.nan, fell_at if len(fell_at) else np.nan)
             gone |= ~np.isnan(fell_at)
+            standing = float(weights[self.assembly.free & ~end.removed].sum())
             for value in np.unique(fell_at[np.isfinite(fell_at)]):
                 fallen = np.flatnonzero(fell_at == value)
                 weight = float(weights[fallen].sum())
                 names = tuple(self.assembly.names[k] for k in fallen)
-                losses.append(LocalLoss(float(value), names, weight, weight / self.total_weight, phase))
+                losses.append(LocalLoss(float(value), names, weight, weight / standing, phase))
         return tuple(losses)
 
     def dead_at(self, increment: Increment, pose: Pose | None = None) -> np.ndarray:

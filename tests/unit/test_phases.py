@@ -56,6 +56,51 @@ def test_what_a_prop_carried_goes_to_the_piers_when_it_is_taken_away() -> None:
     assert any("'prop' taken away before settlement 2" in note for note in response.notes)
 
 
+def test_what_has_been_taken_away_stays_where_it_was() -> None:
+    structure = beam_on_a_prop()
+    sinking = solver.Settlement([0.0, -1.0], increment=0.01, limit=0.02)
+    response = structure.settle([sinking], changes=[taken_away(structure, 0, "prop")])
+    prop, last = structure.assembly.index("prop"), response.path[-1]
+    assert not last.velocity[prop].any()
+    np.testing.assert_allclose(last.pose.positions[prop], structure.assembly.centroids[prop], atol=1e-12)
+    assert mechanics.rigid_parts(structure.assembly, last)[prop] == -1
+
+
+@pytest.mark.parametrize("role", ["free", "fixed"])
+def test_what_was_taken_away_is_no_part_of_the_weight_that_a_loss_is_measured_by(role: str) -> None:
+    stones = {f"stone {k}": ("free", rectangle(0.5 * k, 0.0, 0.5 * (k + 1), 0.5)) for k in range(4)}
+    blocks = {
+        **stones,
+        "loose": ("free", rectangle(2.05, -0.02, 2.3, 0.48)),
+        "prop": (role, rectangle(2.05, -3.0, 8.0, -0.02)),
+        "ground": ("fixed", rectangle(-1.0, -0.5, 2.05, 0.0)),
+        "base": ("fixed", rectangle(2.0, -3.5, 9.0, -3.0)),
+        "far": ("moving", rectangle(20.0, -0.5, 21.0, 0.0)),
+    }
+    outlines, roles = [outline for _, outline in blocks.values()], [role for role, _ in blocks.values()]
+    assembly = solver.Assembly.from_outlines(outlines, names=list(blocks), roles=roles)
+    structure = solver.Structure(assembly, friction_coefficient=0.6)
+    controls = solver.Controls(local_loss=0.2, falling_frames=1)
+    response = structure.settle([DOWN, DOWN], changes=[taken_away(structure, 1, "prop")], controls=controls)
+    (loss,) = response.losses
+    assert (loss.blocks, loss.share) == (("loose",), pytest.approx(0.125 / 1.125))
+    assert "11 % of the weight" in " ".join(response.notes)
+    # A ninth of what stands is more than may go, though little beside the prop.
+    response = structure.settle([DOWN, DOWN], changes=[taken_away(structure, 1, "prop")])
+    assert response.stop is solver.Status.COLLAPSED
+
+
+def test_a_tie_goes_with_the_block_that_it_ends_on() -> None:
+    structure = beam_on_a_prop()
+    ends = structure.assembly.index("prop"), structure.assembly.index("left")
+    tie = solver.Tie("rod", ends, ((1.0, 0.5), (0.0, 0.5)), stiffness=1e6, prestress=10.0)
+    tied = solver.Structure(structure.assembly, friction_coefficient=0.6, ties=[tie])
+    response = tied.settle([DOWN, DOWN], changes=[taken_away(structure, 1, "prop")])
+    assert any("N, and with it 'rod'" in note for note in response.notes)
+    assert [mechanics.ABSENT in i.ties.states for i in response.path] == [i.phase == 1 for i in response.path]
+    assert np.isnan(response.path[-1].ties.elongations).all()
+
+
 def test_a_phase_that_changes_nothing_begins_with_the_equilibrium_at_the_end_of_the_one_before() -> None:
     # One long increment: viscosity retards joints that close, and what is reported has come to rest.
     phase = solver.Settlement([-0.75, 0.67], increment=0.02, limit=0.02)

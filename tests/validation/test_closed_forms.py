@@ -288,3 +288,16 @@ def test_brick_in_a_tray_that_turns(friction_coefficient, clearance, limit):
     # Walls that only hold the brick do not squeeze it.
     weight = mechanics.total_weight(response.assembly)
     assert max(increment.forces[:, 0].max() for increment in response.path) < 2.0 * weight
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("increment", [0.02, 0.01])
+def test_a_block_on_a_corner_and_a_support_that_moves_off_turns_by_their_hinges(increment):
+    """Its right face slides on the corner of the moving support, with a snap as that passes the block's own corner."""
+    outlines = [rectangle(3, 0, 5, 1), rectangle(2.2, -4, 3.8, 0), rectangle(4.4, -4, 6.5, 0)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["free", "fixed", "moving"])
+    motion = solver.Settlement((1, 0), increment=increment, limit=0.66)
+    response = solver.Structure(assembly, friction_coefficient=0.6).settle(motion)
+    turned = [abs(float(i.pose.rotations[0, 0])) for i in response.path if i.parameter > 0.63]
+    by_hand = np.arccos(1.2 / (0.6 + response.settlement[response.settlement > 0.63]))
+    assert turned == pytest.approx(by_hand.tolist(), rel=0.02)
