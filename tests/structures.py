@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import astuple, replace
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -55,6 +55,19 @@ def prism(outline, low: float = 0.0, high: float = 1.0) -> tuple[np.ndarray, lis
 def box(low, high) -> tuple[np.ndarray, list[list[int]]]:
     """Vertices and faces of a box between two corners."""
     return prism(rectangle(*low[:2], *high[:2]), low[2], high[2])
+
+
+def of_cubes(places) -> tuple[np.ndarray, list[list[int]]]:
+    """Surface of what cubes of 1 m fill, by their least corners: a square where no other cube is beside one."""
+    number: dict[tuple[int, ...], int] = {}
+    faces = []
+    for place, axis, side in product(map(tuple, places), range(3), (0, 1)):
+        step = np.roll([1, 0, 0], axis)
+        if tuple((np.array(place) + (2 * side - 1) * step).tolist()) not in set(map(tuple, places)):
+            ring = np.roll([(side, 0, 0), (side, 1, 0), (side, 1, 1), (side, 0, 1)], axis, axis=1) + place
+            face = [number.setdefault(tuple(corner), len(number)) for corner in ring.tolist()]
+            faces.append(face if side else face[::-1])
+    return np.array(list(number), dtype=float), faces
 
 
 def hull_of(points) -> tuple[np.ndarray, list[list[int]]]:

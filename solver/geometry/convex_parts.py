@@ -209,7 +209,6 @@ class _Piece:
     points: np.ndarray  #: (n, 3)
     triangles: np.ndarray  #: (m, 3) int
     face: np.ndarray  #: (m,) int: the face of the block in which each lies; numbers beyond those of faces are of cuts
-    volume: float
 
     @cached_property
     def normals(self) -> np.ndarray:
@@ -253,7 +252,7 @@ class _Piece:
                 face, n = np.full(len(mesh.tri_verts), cut), mesh.run_index[1] // 3
                 face[:n] = self.face[mesh.face_id[:n]]
                 points, triangles = mesh.vert_properties @ frame + origin, mesh.tri_verts.astype(np.int64)
-                found.append(_Piece(points, triangles, face, part.volume()))
+                found.append(_Piece(points, triangles, face))
         return found
 
 
@@ -285,8 +284,9 @@ def _parts_of(points: bytes, faces: tuple[tuple[int, ...], ...]) -> list[tuple[n
             parts.append((corners * size + origin, rings, [k if k >= 0 else -next(inside) for k in faces_of]))
         if len(queue) + len(parts) > MOST_PARTS:
             raise ValueError(f"has more than {MOST_PARTS} convex parts; simplify its surface")
-    if abs(total - whole.volume) > VOLUME_LEFT * whole.volume:
-        raise ValueError(_why(whole, total, size, origin))
+    volume = drawn.volumes[0]
+    if abs(total - volume) > VOLUME_LEFT * volume:
+        raise ValueError(_why(whole, total, volume, size, origin))
     return parts
 
 
@@ -298,13 +298,13 @@ def _whole(points: np.ndarray, faces: list[list[int]], normals: np.ndarray) -> _
     for k, (loop, normal) in enumerate(zip(faces, normals, strict=True)):
         first = unit(np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())]))
         flat = points[loop] @ np.stack([first, np.cross(normal, first)], axis=1)
-        triangles.append(np.array(loop)[triangulate([flat])])
+        # The fast way through convex outlines leaves triangles without an area, which manifold3d clears with corners.
+        triangles.append(np.array(loop)[triangulate([flat], allow_convex=False)])
         face.append(np.full(len(triangles[-1]), k))
-    around, which = np.concatenate(triangles), np.concatenate(face)
-    return _Piece(points, around, which, _body(points, around).volume())
+    return _Piece(points, np.concatenate(triangles), np.concatenate(face))
 
 
-def _why(whole: _Piece, total: float, size: float, origin: np.ndarray) -> str:
+def _why(whole: _Piece, total: float, volume: float, size: float, origin: np.ndarray) -> str:
     """Say why the parts of a block do not fill it."""
     crossing = _crossing(whole)
     if crossing is not None:
@@ -316,7 +316,7 @@ def _why(whole: _Piece, total: float, size: float, origin: np.ndarray) -> str:
     n_holes = 1 - (len(whole.points) - len(whole.triangles) // 2) // 2
     holes = f"; {n_holes} holes run through it" if n_holes else ""
     return (
-        f"could not be cut into convex parts (parts hold {total * size**3:.6g} of {whole.volume * size**3:.6g} m³)"
+        f"could not be cut into convex parts (parts hold {total * size**3:.6g} of {volume * size**3:.6g} m³)"
         f"{holes}: draw it as several blocks"
     )
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from structures import box, prism, turn_by
+from structures import box, of_cubes, prism, turn_by
 from test_convex_parts import out_of_faces
 
 import solver
@@ -103,6 +103,12 @@ def test_corners_of_single_precision_leave_no_sheet_at_a_cut(shift):
     shapes, parts = parts_of(corners + noise, faces)
     assert len(parts.block_of_part) <= 4
     assert parts.solids.volumes.sum() == pytest.approx(shapes.volumes[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("rotation", [(0, 0, 0), (2.1, 0.8, 0.1), (-2.1, 2.0, 0.9)])
+def test_a_face_with_a_corner_in_the_middle_of_a_side_keeps_all_its_corners(rotation):
+    """An edge ends there. One corner of the stone got lost with a 21st of its volume, or the stone was refused."""
+    check(*of_cubes([(0, 0, 0), (0, 1, 0), (0, 2, 0), (0, 3, 0), (1, 3, 0), (1, 3, 1), (1, 4, 1)]), rotation, 1.0, 4)
 
 
 def test_a_warped_voussoir_has_few_parts():
