@@ -169,11 +169,13 @@ class _Problem:
         bonds: Bonds | None,
     ) -> None:
         assembly, interfaces, members, d = model.assembly, model.interfaces, Members(model), model.dimension
-        reach = max(closed_gap, REACH * model.length) if displacement > 0.0 else closed_gap
-        # Open points, too, measure the faces of joints with strength.
-        measured = reach if interfaces.dry and bonds is None else max(reach, REACH * model.length)
-        contacts = model.standing(find_contacts(assembly, moved_vertices(assembly, pose), measured))
+        # Open points close within a displacement, and hold with what is left of their strength.
+        reach = max(closed_gap, REACH * model.length) if displacement > 0.0 or bonds is not None else closed_gap
+        contacts = model.standing(find_contacts(assembly, moved_vertices(assembly, pose), reach))
         mortar, place = Mortar(model), members.installed(Place.unloaded(pose), 0, ties_at)
+        if bonds is None and not interfaces.dry:
+            touching = mortar.touching(pose, contacts, closed_gap)
+            contacts = replace(contacts, areas=np.where(contacts.gaps <= closed_gap, touching, contacts.areas))
         place = mortar.cast(place, contacts, closed_gap) if bonds is None else replace(place, bonds=bonds)
         contacts = members.beside(contacts, pose, place.tie_lengths)
         joints, tied = mortar.points(place, contacts), is_member(contacts)
@@ -182,14 +184,16 @@ class _Problem:
         gaps = np.where(joints.give[:, 0] > 0.0, np.maximum(gaps, 0.0), gaps)
         gaps[tied] = slack(contacts[tied], len(model.ties))
         (strength,) = interfaces.values(assembly, contacts.block_a, contacts.block_b, "compressive_strength")
-        crushing = np.multiply(strength, contacts.areas, out=np.full(len(gaps), np.inf), where=np.isfinite(strength))
+        areas = place.bonds.of(contacts).areas
+        crushing = np.multiply(strength, areas, out=np.full(len(gaps), np.inf), where=np.isfinite(strength))
         crushing /= model.force
         # Members are plastic.
         crushing[tied] = members.strength[contacts.features[tied, 1]]
         # As along the path an open joint with a rest of its strength holds, and does not push. Where it may close it is
         # there twice: as one that holds, and as an open one.
         apart = gaps > closed_gap
-        once, closing = np.flatnonzero(~apart | (joints.tension > 0.0)), np.flatnonzero(apart & (gaps <= reach))
+        closes = apart & (gaps <= reach) & (displacement > 0.0)
+        once, closing = np.flatnonzero(~apart | (joints.tension > 0.0)), np.flatnonzero(closes)
         number, is_open = np.append(once, closing), np.repeat([False, True], [len(once), len(closing)])
         contacts, gaps = contacts[number], gaps[number]
         crushing = np.where(is_open | (gaps <= closed_gap), crushing[number], 0.0)

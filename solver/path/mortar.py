@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.assembly import find_contacts
 from solver.geometry.contacts import Contacts, matched_contacts, successors
+from solver.kinematics import Pose, moved_vertices
 from solver.program.model import Model
 from solver.results.increment import Bonds, State
 from solver.tolerances import COMPUTED_GAP, DRAWN_GAP
@@ -54,15 +56,28 @@ class Mortar:
 
     def __init__(self, model: Model) -> None:
         self.model, self.present = model, model.interfaces.mortar
+        #: [m]: what is accepted of a drawing as a joint.
+        self.accepted = max(COMPUTED_GAP * model.length, DRAWN_GAP * float(model.assembly.widths.min()))
+
+    def touching(self, pose: Pose, closed: Contacts, gap: float) -> np.ndarray:
+        """(n,) array [m²]: areas of faces between points up to a gap [m] alone; at hinges of the pose those drawn."""
+        assembly, areas = self.model.assembly, np.zeros(len(closed))
+        for vertices, reach in ((assembly.vertices, self.accepted), (moved_vertices(assembly, pose), gap)):
+            found = find_contacts(assembly, vertices, reach)
+            wide = found[found.areas > 0.0]
+            number, same = matched_contacts(closed, wide)
+            areas[same] = wide.areas[number[same]]
+        return areas
 
     def cast(self, place: Place, contacts: Contacts, closed_gap: float | None = None) -> Place:
         """The place with all of its closed joints whole: with gaps up to this one [m], or what drawings may have."""
         if not self.present:
             return place
-        # What is accepted of a drawing as a joint is filled.
-        accepted = max(COMPUTED_GAP * self.model.length, DRAWN_GAP * float(self.model.assembly.widths.min()))
-        closed = contacts[contacts.gaps <= (accepted if closed_gap is None else closed_gap)]
-        whole = Bonds(closed.features[:, :3], closed.areas, np.ones(len(closed)), np.zeros(len(closed)))
+        gap = self.accepted if closed_gap is None else closed_gap
+        closed = contacts[contacts.gaps <= gap]
+        areas = self.touching(place.pose, closed, gap)
+        # A corner alone gives as the face does that opens there, and has none of its strength.
+        whole = Bonds(closed.features[:, :3], np.where(areas > 0.0, areas, closed.areas), np.sign(areas), 0.0 * areas)
         joints = self.points(replace(place, bonds=whole), closed)
         filled = (joints.strength > 0.0).any(axis=1) | (joints.give > 0.0).any(axis=1)
         return replace(place, bonds=replace(whole, rest=np.where(filled, closed.gaps, 0.0)))

@@ -261,6 +261,56 @@ def test_a_bent_face_is_shared_out_alike_in_any_order():
     np.testing.assert_allclose(areas, [areas[0]] * len(areas), rtol=1e-12)
 
 
+#: A stone 1 m wide on a bed; the faces beside it part by 10 degrees, 0.4 m long on either side.
+PART = 0.4 * np.tan(np.radians(10.0))
+
+
+def stone_on_a_bed(width, dimension, up, **law):
+    """Limit load [100 kN], besides its weight, of what lifts or presses the stone, with or without a bed."""
+    x, y = np.array([-0.5, -0.1, 0.1, 0.5]), np.array([PART, 0.0, 0.0, PART])
+    if not width:
+        x, y = x[[0, 1, 3]], y[[0, 1, 3]]
+    outlines = [[*np.column_stack([x, y]), (0.5, 1.0), (-0.5, 1.0)], rectangle(-2.0, -0.5, 2.0, 0.0)]
+    if dimension == 2:
+        assembly = solver.Assembly.from_outlines(outlines, roles=["free", "fixed"])
+    else:
+        assembly = solver.Assembly.from_solids([prism(outline) for outline in outlines], roles=["free", "fixed"])
+    live = np.zeros_like(solver.weight_fraction(assembly, np.zeros(dimension)))
+    live[0, 1] = 1e5 if up else -1e5
+    # Above the corner or the middle of the bed.
+    at = [0.0 if width else -0.1, assembly.centroids[0, 1], *assembly.centroids[0, 2:]]
+    live = solver.point_load(assembly, 0, live[0, :dimension], point=at)
+    return solver.limit_load(
+        assembly, loads=solver.Loads(0.0 * live, live), interfaces=solver.Interfaces(solver.InterfaceLaw(0.6, **law))
+    ).multiplier
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("width", [0.2, 0.0], ids=["a bed", "an edge"])
+def test_joints_have_the_strength_of_what_touches(dimension, width):
+    """Faces that part beside a bed of 0.2 m had their halves of it, too, in the plane: 3 times the strength.
+
+    What touches along an edge alone has none.
+    """
+    glued = stone_on_a_bed(width, dimension, True, cohesion=1e5, tensile_strength=1e5)
+    assert glued == pytest.approx(width, rel=1e-6, abs=1e-9)
+    assert stone_on_a_bed(width, dimension, False, compressive_strength=1e5) == pytest.approx(width, rel=1e-6, abs=1e-9)
+
+
+def test_a_hinge_crushes_at_its_half_of_the_face_that_is_drawn():
+    """Of a block that has tilted one corner touches: it carries P = σ A / 2."""
+    assembly, interfaces, _ = block(compressive_strength=1e5)
+    tilt, drawn_at = 0.01, solver.Pose.initial(assembly)
+    turn = np.array([[np.cos(tilt), -np.sin(tilt)], [np.sin(tilt), np.cos(tilt)]])
+    positions, rotations = drawn_at.positions.copy(), drawn_at.rotations.copy()
+    positions[0], rotations[0] = turn @ positions[0], tilt
+    # Above the corner, seen from the centroid.
+    live = solver.point_load(assembly, 0, (0.0, -1.0), point=assembly.centroids[0] - positions[0])
+    turned = solver.Pose(positions, rotations)
+    found = solver.limit_load(assembly, loads=solver.Loads(0.0 * live, live), interfaces=interfaces, pose=turned)
+    assert found.multiplier == pytest.approx(1e5 * AREA / 2.0, rel=1e-6)
+
+
 def test_a_strong_joint_is_a_dry_joint():
     wall = generators.build("wall", {"bricks": 4, "courses": 5})
     live = solver.weight_fraction(wall, (1.0, 0.0), np.flatnonzero(wall.free))
