@@ -8,6 +8,8 @@ from typing import Self
 
 import numpy as np
 
+from solver.tolerances import GEOMETRY_TOLERANCE
+
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .portions import alike
 
@@ -82,11 +84,11 @@ class Outlines(Bodies):
 
     @cached_property
     def convex_vertex(self) -> np.ndarray:
-        """(n_vertices,) bool array: false at re-entrant corners, which have no contact points of their own."""
-        to_next = self.vertices[self.next_vertex] - self.vertices
-        from_previous = self.vertices - self.vertices[self.previous_vertex]
-        cross = from_previous[:, 0] * to_next[:, 1] - from_previous[:, 1] * to_next[:, 0]
-        return cross > 0.0
+        """(n_vertices,) bool array: false at straight and re-entrant corners, which have no contact points."""
+        along = (self.vertices[self.next_vertex] - self.vertices) / self.edge_lengths[:, None]
+        before = along[self.previous_vertex]
+        # Straight to more than rounding.
+        return before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0] > GEOMETRY_TOLERANCE
 
     @cached_property
     def widths(self) -> np.ndarray:
