@@ -39,12 +39,6 @@ FLOWS = ("associative", "non-associative")
 #: What faces of blocks in space resist when they turn in their own plane.
 TORSIONS = ("points", "uniform")
 
-#: What a limit load that has not converged is worth.
-UNPROVED = (
-    ": the value is that of the program that came nearest and no limit load; "
-    'flow = "associative" gives a proved upper bound of it'
-)
-
 #: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the
 #: structure.
 SWINGING_FRAMES, SWING = 30, 0.05
@@ -260,19 +254,22 @@ class LimitLoadKind(AnalysisKind):
         path, state, said = response.path, response.governing, self.summary(response)
         if state is None or said["limit_load_multiplier"] is None:
             return []
+        converged = said["limit_load_status"] != solver.LimitStatus.NOT_CONVERGED
         low, high = said["limit_load_bounds"]
         kind = "bounds" if said["limit_load_flow"] == "associative" else "values, no bounds,"
+        known = f", static and kinematic {kind} differ by {high - low:.1e}" if converged else ""
         lines = [
-            f"load multiplier      {state.load_multiplier:12.6g}     {said['limit_load_flow']} friction, static and "
-            f"kinematic {kind} differ by {high - low:.1e}",
+            f"load multiplier      {state.load_multiplier:12.6g}     {said['limit_load_flow']} friction{known}",
         ]
         # Moments have no resultant.
         if state.reaction:
             share = state.reaction / response.total_weight
             lines.append(f"live load            {state.reaction:12.6g} N   {share:.6f} W")
         if said["limit_load_status"] != solver.LimitStatus.FOUND:
-            unproved = said["limit_load_status"] == solver.LimitStatus.NOT_CONVERGED
-            lines.append(f"status: {said['limit_load_status']}{UNPROVED if unproved else ''}")
+            worth = "" if converged else ": no limit load, but the value of the program that came nearest"
+            if not converged and high is not None:
+                worth += f', at most that of flow = "associative", {high:.6g}, a proved upper bound'
+            lines.append(f"status: {said['limit_load_status']}{worth}")
         if "limit_load_torsion" in said:
             by = "friction at their points" if said["limit_load_torsion"] == "points" else "a uniform pressure"
             lines.append(f"torsion of the faces: that of {by}")
@@ -319,7 +316,9 @@ class LimitLoadKind(AnalysisKind):
         limit = governing_limit(response)
         rows.append(("load multiplier α", f"{state.load_multiplier:.6g}"))
         if limit is not None:
-            rows.append(("static, kinematic value", f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))
+            unproved = limit.status is solver.LimitStatus.NOT_CONVERGED
+            what = "value, associative upper bound" if unproved else "static, kinematic value"
+            rows.append((what, f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))
             rows.append(("friction", limit.flow))
             if response.assembly.dimension == 3:
                 rows.append(("torsion of the faces", limit.torsion))

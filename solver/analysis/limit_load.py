@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,7 @@ from solver.program.non_associative import non_associative_limit
 from solver.program.static_program import ProgramState, StaticProgram
 from solver.program.strength import ForceLimits
 from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces
-from solver.programs.problem import Unbounded
+from solver.programs.problem import SolveError, Unbounded
 from solver.results.certificate import Certificate, carrying_gap, largest_penetration
 from solver.results.increment import Bonds, State
 from solver.results.response import LimitLoad, LimitStatus
@@ -103,8 +104,9 @@ def find_limit_load(
     the power of the loads is what friction takes: a complete solution for friction without dilatancy, never above the
     associative value. It is not proved to be the least: such a structure may have several limit loads, depending on how
     it was loaded, and may fall below this one. Its two values agree where it has converged, but are no bounds.
-    Convergence is not proved either; "not converged" says so and gives the program that came nearest. Where it finds no
-    limit, forces that a program adds are within friction and the associative program is unbounded, so is this one.
+    Convergence is not proved either; "not converged" says so and gives the program that came nearest, or associative
+    flow where that carries less, whose value is then the upper bound. Where it finds no limit, forces that a program
+    adds are within friction and the associative program is unbounded, so is this one.
     """
     _check_options(assembly, flow, torsion, ties)
     check_blocks(assembly, overlap_tolerance)
@@ -138,9 +140,16 @@ def find_limit_load(
         if flow == "associative":
             return problem.result(program.bound(-1.0, balanced), status, flow)
         state, converged = non_associative_limit(program, problem.at_rest(balanced), balanced)
-        return problem.result(state, status if converged else LimitStatus.NOT_CONVERGED, flow)
     except Unbounded:
         return problem.result(balanced, LimitStatus.UNBOUNDED, flow)
+    if converged:
+        return problem.result(state, status, flow)
+    most = np.inf
+    with suppress(SolveError, Unbounded):
+        associative = program.bound(-1.0, balanced)
+        most, state = associative.multiplier * program.unit, min(state, associative, key=lambda of: of.multiplier)
+    nearest = problem.result(state, LimitStatus.NOT_CONVERGED, flow)
+    return replace(nearest, bounds=(nearest.multiplier, most))
 
 
 def _check_options(assembly: Assembly, flow: str, torsion: str, ties: Sequence[Tie]) -> None:

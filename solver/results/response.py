@@ -348,7 +348,7 @@ class LimitLoad(HasState, Shown):
     bounds : (float, float)
         Static value, from forces in equilibrium within friction, and kinematic value, from the power balance of the
         mechanism, - dead · velocity / live · velocity (plus friction where it is not associative). For associative
-        flow they enclose the limit load.
+        flow they enclose the limit load. Not converged: the multiplier, and that of associative flow, an upper bound.
     certificate : Certificate
     status : LimitStatus
     flow : str
@@ -446,7 +446,10 @@ class LimitLoad(HasState, Shown):
         if self.status is LimitStatus.UNBOUNDED:
             return "unbounded: no live load of this pattern brings the structure down"
         law = "" if self.torsion == "points" else f", {self.torsion} torsion"
-        text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction{law}, bounds differ by {self.gap:.1e})"
+        known = f", bounds differ by {self.gap:.1e}"
+        if self.status is LimitStatus.NOT_CONVERGED:
+            known = f", at most {self.bounds[1]:.6g}" if np.isfinite(self.bounds[1]) else ""
+        text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction{law}{known})"
         text += f", {counted(len(moving), 'block')} moving" + (
             "" if self.status is LimitStatus.FOUND else f", {self.status}"
         )

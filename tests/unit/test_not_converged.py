@@ -31,8 +31,23 @@ def test_the_upper_bound_is_named(tmp_path, monkeypatch, capsys):
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
     assert main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out"), "--no-pictures"]) == 3
     (said,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("status"))
-    assert "not converged" in said
-    assert 'flow = "associative" gives a proved upper bound' in said
+    assert "not converged: no limit load" in said
+    bound = solver.limit_load(generators.build("arch", {"voussoirs": 5}), acceleration=(1, 0)).multiplier
+    assert f'at most that of flow = "associative", {bound:.6g}, a proved upper bound' in said
+
+
+@pytest.mark.parametrize(("push", "bounded"), [((0.5, 1.0), True), ((0.0, -1.0), False)])
+def test_no_value_is_above_the_associative_one(push, bounded, monkeypatch):
+    """The first program of this wall has 0.735 where its associative limit load is 0.545."""
+    monkeypatch.setattr("solver.program.non_associative.PROGRAMS", 1)
+    built = generators.build("wall", {"bricks": 3, "courses": 3}) if bounded else generators.build("arch", {})
+    structure = solver.Structure(built, friction_coefficient=0.6)
+    upper = structure.limit_load(acceleration=push).multiplier
+    found = structure.limit_load(acceleration=push, flow="non-associative")
+    assert found.status is solver.LimitStatus.NOT_CONVERGED
+    assert found.bounds == (found.multiplier, pytest.approx(upper))
+    assert found.multiplier <= found.bounds[1]
+    assert ("at most" in str(found)) is bounded is bool(np.isfinite(upper))
 
 
 @pytest.mark.slow
