@@ -95,12 +95,23 @@ def _clipped(
     if parts.whole:
         return clipped
     narrow = ((wide <= end[:, 0]) & (long > 4.0 * end[:, 0]))[:, None]
-    return _with_reentrant_corners(
-        parts,
-        clipped,
-        (narrow & used_a, np.abs(a_in_b) <= tight, corner_a, face_b, edge_b),
-        (narrow & used_b, np.abs(b_in_a) <= tight, corner_b, face_a, edge_a),
-    )
+    sides = [
+        (narrow & used, np.abs(inside) <= tight, _hold_all(owner, points, start, direction, end), corner, face, edge)
+        for used, inside, start, direction, corner, face, edge in (
+            (used_a, a_in_b, b, along_b / long_b[..., None], corner_a, face_b, edge_b),
+            (used_b, b_in_a, a, along_a / long_a[..., None], corner_b, face_a, edge_a),
+        )
+    ]
+    return _with_reentrant_corners(parts, clipped, *sides)
+
+
+def _hold_all(
+    owner: np.ndarray, points: np.ndarray, start: np.ndarray, direction: np.ndarray, end: np.ndarray
+) -> np.ndarray:
+    """(n, n_corners) bool array: edges along which all lies that is covered."""
+    far = np.zeros(start.shape[:2])
+    np.maximum.at(far, owner, np.abs(_inside(points[:, None], start[owner], direction[owner])[:, 0]))
+    return far <= end
 
 
 def _with_reentrant_corners(
@@ -109,11 +120,11 @@ def _with_reentrant_corners(
     """Add the corners, of those used, at the end of a face at which its block was cut: they touch it, and cover none.
 
     Where a face ends at an edge of its block, an edge that only lies along that one may leave it; in a re-entrant
-    corner it may not.
+    corner, where all that is covered lies along the cut, it may not.
     """
     owners, features = [clipped.owner], [clipped.features]
-    for used, on_edge, corner, face, edge in sides:
-        at_cut = (on_edge & parts.cut_edges[edge][:, None]).any(axis=2)
+    for used, on_edge, holds_all, corner, face, edge in sides:
+        at_cut = (on_edge & (holds_all & parts.cut_edges[edge])[:, None]).any(axis=2)
         pair, p = np.nonzero(used & at_cut & ~parts.made[parts.solids.corners[corner]])
         owners.append(pair)
         features.append(feature_rows(ON_FACE, parts.solids.corners[corner[pair, p]], face[pair], -1))

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.optimize import linprog
 from scipy.spatial import HalfspaceIntersection
 from structures import box, hull_of, turn_by
@@ -314,3 +315,22 @@ def test_contact_points_do_not_depend_on_how_corners_are_numbered(bonded):
         found.append(np.column_stack([points, contacts.areas])[order])
     assert found[0].shape == found[1].shape
     np.testing.assert_allclose(found[1], found[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, np.pi / 2])
+def test_a_stone_beside_a_ledge_is_not_held_by_the_corner_in_which_that_ends(turn):
+    """Pressed onto a face by four times its weight, with air below it: it slides down at 4 μ - 1."""
+    cells = [(0, 0, 1), (1, 0, 1), (0, 1, 1), (0, 0, 2), (1, 0, 2)]
+    whole = trimesh.boolean.union([trimesh.creation.box(bounds=[cell, np.add(cell, 1)]) for cell in cells])
+    c, s = np.cos(turn), np.sin(turn)
+    way = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    corners, faces = box((1, 1, 2), (2, 2, 3))
+    solids = [(np.asarray(whole.vertices) @ way, whole.faces.tolist()), (corners @ way, faces)]
+    assembly = solver.Assembly.from_solids(solids, roles=["fixed", "free"])
+    dead = solver.self_weight(assembly).dead.copy()
+    weight = -dead[1, 2]
+    dead[1, :3] += 4.0 * weight * np.array([0.0, -1.0, 0.0]) @ way
+    live = np.zeros_like(dead)
+    live[1, 2] = -weight
+    structure = solver.Structure(assembly, friction_coefficient=0.5, loads=solver.Loads(dead, live))
+    assert structure.limit_load().multiplier == pytest.approx(1.0, rel=1e-6)
