@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,9 +16,10 @@ from blockvis.text import rounded_length
 from solver import mechanics
 
 from .assemble import as_simplified
+from .facing import facing_tolerance
 from .inspect import Inspection
 from .layout import Layout
-from .outlines import largest_piece, rectangle, ring_of, touching, without_collinear
+from .outlines import largest_piece, pieces_of, rectangle, ring_of, touching, without_collinear
 from .repair import repaired
 from .solids import size_of
 
@@ -28,6 +31,9 @@ EXPOSED = 0.3
 
 #: A foot that slopes more than this (24 degrees) is a springer's; ground lies under edges up to the steepest.
 SLOPE, STEEPEST = 0.45, 1.0
+
+#: Of a bed this part at either end may be left without ground, which stands off there from a lower stone beside it.
+STAND_OFF = 0.05
 
 #: A foot narrower than this fraction of its block, in space of its plan, is a point or an edge.
 NARROW = 0.2
@@ -159,10 +165,10 @@ def _laid(found: Inspection) -> Ground:
     supports: list[Mapping[str, Any]] = []
     if beds and layout.dimension == 3:
         is_level = np.ptp([foot.level for foot in beds]) < 1e-3 * depth
-        supports = _slab(found, beds, split, depth) if is_level and not springers else _pads(beds, split)
+        supports = _slab(found, beds, split, depth) if is_level and not springers else _pads(found, beds, split)
     elif beds:
         # Closing simplifies what it closes: as drawn, a stone may reach lower.
-        supports = _bedded([*outlines, *_as_simplified(found)], feet, split, depth)
+        supports = _bedded([*outlines, *_as_simplified(found)], feet, split, depth, _opening(found))
     where = "on the right" if split.axis == 0 else "on the far side"
     said = f"stands on one side and settles {where}"
     if roles:
@@ -194,7 +200,8 @@ def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> lis
     high = np.array([ring.max(axis=0) for ring in outlines])
     height = float(np.median(high[:, 1] - low[:, 1]))
     near = 1e-3 * height + _opening(found)
-    beside = touching(np.array([shapely.Polygon(ring) for ring in outlines]), near)
+    shapes = np.array([shapely.Polygon(ring) for ring in outlines])
+    beside = touching(shapes, near)
     arch = _springers_of_arch(beside, low[:, 1])
     feet: list[_Foot] = []
     springers: set[int] = set()
@@ -212,7 +219,7 @@ def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> lis
             springers.add(k)
             bed = None
         else:
-            taken = [(low[j, 0], high[j, 0]) for j in np.flatnonzero(low[:, 1] < low[k, 1])]
+            taken = _beneath(edges, np.delete(shapes, k))
             taken += [(foot.bed[0, 0], foot.bed[-1, 0]) for foot in feet if foot.bed is not None]
             bed = _widest_free(edges, taken)
             if bed is None:
@@ -278,6 +285,16 @@ def _slope(bed: np.ndarray, width: float) -> float:
     return rise / run if run > NARROW * width else np.inf
 
 
+def _beneath(bed: np.ndarray, shapes: np.ndarray) -> list[tuple[float, float]]:
+    """Find the intervals of x of what lies beneath a bed, as the toes of stones that themselves lie higher."""
+    if len(bed) < 2:
+        return []
+    floor = float(shapely.bounds(shapes)[:, 1].min(initial=bed[:, 1].min())) - 1.0
+    column = shapely.Polygon([*bed, [bed[-1, 0], floor], [bed[0, 0], floor]])
+    found = pieces_of(shapely.intersection(shapes[shapely.intersects(shapes, column)], column))
+    return [(left, right) for left, _, right, _ in (piece.bounds for piece in found)]
+
+
 def _widest_free(bed: np.ndarray, taken: Iterable[tuple[float, float]]) -> np.ndarray | None:
     """Cut the widest part of a bed that no interval of x takes; None where less is left than a foot needs."""
     start, end = float(bed[0, 0]), float(bed[-1, 0])
@@ -295,7 +312,7 @@ def _widest_free(bed: np.ndarray, taken: Iterable[tuple[float, float]]) -> np.nd
 
 
 def _bedded(
-    outlines: Sequence[np.ndarray], feet: Sequence[_Foot], split: _Split, depth: float
+    outlines: Sequence[np.ndarray], feet: Sequence[_Foot], split: _Split, depth: float, opening: float
 ) -> list[Mapping[str, Any]]:
     """Lay two halves whose top follows the beds, with a step half-way between each and the next."""
     beds = sorted((foot.bed for foot in feet if foot.bed is not None), key=lambda bed: float(bed[0, 0]))
@@ -306,15 +323,11 @@ def _bedded(
             middle = 0.5 * float(bed[-1, 0] + following[0, 0])
             top += [np.array([middle, bed[-1, 1]]), np.array([middle, following[0, 1]])]
     top.append(beds[-1][-1] + [depth, 0.0])
-    floor = min(foot.level for foot in feet) - depth
+    floor = min(float(ring[:, 1].min()) for ring in outlines) - depth
     (start, _), (end, _) = top[0], top[-1]
     line = shapely.simplify(shapely.LineString(top), STRAIGHT * depth)
     ground = shapely.Polygon([[start, floor], [end, floor], *shapely.get_coordinates(line)[::-1]])
-    # What leans over its neighbour's bed, and a springer between, keep their place. Ground above them, or as steep
-    # beside them as friction holds, would hold them down.
-    level = max(float(ring[:, 1].max()) for ring in outlines) + depth
-    reach = [ring for ring in outlines if shapely.Polygon(ring).intersection(ground).area > (STRAIGHT * depth) ** 2]
-    ground = ground.difference(shapely.union_all([_above(ring, level) for ring in reach]))
+    ground = _dug(ground, outlines, [np.array(top[:1]), *beds, np.array(top[-1:])], opening, STRAIGHT * depth)
     halves: list[Mapping[str, Any]] = []
     for name, role, left, right in (
         ("ground left", mechanics.FIXED, start, split.at),
@@ -330,11 +343,48 @@ def _bedded(
     return halves
 
 
+def _dug(
+    ground: shapely.Polygon, outlines: Sequence[np.ndarray], beds: Sequence[np.ndarray], mortar: float, least: float
+) -> shapely.Geometry:
+    """Dig pits about what reaches into the ground, and beside a foot that is lower than the next.
+
+    A wall of ground at the side of a stone would hold it by friction, and ground above it hold it down. So a pit is as
+    wide beside a stone as it is deep; where joints are closed by up to ``mortar`` [m] it is by two of them wider and
+    deeper, which no run fills, and begins below the stone as drawn. Of a bed it takes no more than an end. ``beds``
+    begin and end with the ends of the ground; what reaches in by up to ``least`` [m] does not count.
+    """
+    (_, floor, _, top), pits = ground.bounds, []
+    reach = shapely.union_all([shapely.Polygon(ring) for ring in outlines if ring[:, 1].min() < top])
+    reach = reach.intersection(ground)
+    for bed, following in pairwise(beds):
+        (start, left), (end, right) = bed[-1].tolist(), following[0].tolist()
+        low, high = sorted((left, right))
+        into = []
+        for one, level in ((bed, left), (following, right)):
+            width = float(np.ptp(one[:, 0]))
+            higher = min(STAND_OFF * width + 2.0 * mortar, width / 3.0)
+            into.append(0.0 if high - low <= least else higher if level > low else 0.5 * mortar)
+        near, far = start - into[0], end + into[1]
+        between = shapely.box(near, floor, far, top)
+        around = [part.bounds for part in pieces_of(reach.intersection(between))]
+        if end - start < 2.0 * (high - low + 2.0 * mortar):
+            # The step half-way is too near.
+            beside = near if left == low else far
+            around.append((beside, low, beside, high))
+        for first, bottom, last, _ in around:
+            if high - bottom > least:
+                deep = high - bottom + 2.0 * mortar
+                level = max(high - deep, 0.5 * (bottom + floor))
+                pits.append(shapely.box(max(first - deep, near), level, min(last + deep, far), top))
+        reach = reach.difference(between)
+    pits += [_above(ring_of(part), top) for part in pieces_of(reach) if part.area > least**2]
+    return ground.difference(shapely.union_all(pits))
+
+
 def _above(ring: np.ndarray, level: float) -> shapely.Geometry:
-    """Fill all that lies above an outline, up to a level [m], and beside it what would be steeper than ground is."""
-    ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
-    x, reach = ends[..., 0], (level - ends[..., 1]) / STEEPEST
-    raised = np.stack([np.hstack([x - reach, x + reach]), np.full((len(ring), 4), level)], axis=2)
+    """Fill all that lies above an outline, up to a level [m]."""
+    ends = np.hstack([ring, np.roll(ring, -1, axis=0)]).reshape(-1, 2, 2)
+    raised = ends * [1.0, 0.0] + [0.0, level]
     return shapely.union_all(shapely.convex_hull(shapely.multipoints(np.concatenate([ends, raised], axis=1))))
 
 
@@ -388,16 +438,39 @@ def _slab(found: Inspection, beds: Sequence[_Foot], split: _Split, depth: float)
     return halves
 
 
-def _pads(beds: Sequence[_Foot], split: _Split) -> list[Mapping[str, Any]]:
-    """Lay a pad under each block of the lowest course: what is level has one height only."""
+def _pads(found: Inspection, beds: Sequence[_Foot], split: _Split) -> list[Mapping[str, Any]]:
+    """Lay a pad under each block of the lowest course: what is level has one height only.
+
+    It stands off from what is lower beside it, which it would hold by friction, as the ground in the plane does.
+    """
+    layout = found.layout
+    corners = [layout.corners(i) for i in found.kept]
+    low, high = (np.array([pick(points[:, 2]) for points in corners]) for pick in (np.min, np.max))
+    # Faces nearer than that would be moved onto each other.
+    opening = 1.01 * facing_tolerance([layout.solids[i] for i in found.kept], found.joint_thickness)
     pads: list[Mapping[str, Any]] = []
     for number, foot in enumerate(beds, 1):
         assert foot.bed is not None
+        bed = shapely.Polygon(foot.bed)
         role = mechanics.MOVING if split.moves(foot) else mechanics.FIXED
         thick = rounded_length(0.5 * float(np.ptp(foot.bed, axis=0).max()))
         levels = [foot.level - thick, foot.level]
-        pads.append({"name": f"ground {number}", "role": role, "outline": foot.bed.tolist(), "levels": levels})
+        most, plan = STAND_OFF * math.sqrt(bed.area) + opening, bed
+        for j in np.flatnonzero((low < levels[1] - STRAIGHT * thick) & (high > levels[0])):
+            off = min(levels[1] - low[j] + opening, most)
+            plan = plan.difference(_below(corners[j], levels[1]).buffer(off, join_style="mitre"))
+        # Of what is all around the bed, as no hull can be, the run tells that it overlaps.
+        outline = ring_of(largest_piece(plan if plan.area > EXPOSED * bed.area else bed))
+        pads.append({"name": f"ground {number}", "role": role, "outline": outline.tolist(), "levels": levels})
     return pads
+
+
+def _below(points: np.ndarray, level: float) -> shapely.Geometry:
+    """Hull in plan of what of the hull of (n, 3) points is below a level [m]."""
+    low, high = points[points[:, 2] <= level, None], points[None, points[:, 2] > level]
+    share = (level - low[..., 2:]) / (high[..., 2:] - low[..., 2:])
+    section = (1.0 - share) * low + share * high
+    return shapely.MultiPoint([*low[:, 0, :2], *section.reshape(-1, 3)[:, :2]]).convex_hull
 
 
 def _split(feet: Sequence[_Foot], opening: float) -> _Split:
