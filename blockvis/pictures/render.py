@@ -216,7 +216,7 @@ def _mechanism_note(response: solver.Response, n: int) -> str:
         return f"{response.stop}: the motion that would follow   ·   {bodies}"
     loss = loss_of(response)
     what = "collapse mechanism" if loss is None or not loss.local else "local loss"
-    falls = "" if loss is None else f"   ·   {100.0 * loss.share:.3g} % of W fall"
+    falls = "" if loss is None else f"   ·   {100.0 * loss.share:.3g} % of the weight fall"
     return f"{what}   ·   {_collapse_place(response, response.collapse)}   ·   {bodies}{falls}"
 
 

@@ -247,7 +247,7 @@ def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path)
         title = f"{place + 1}: {runs}; median {median:.3g} {unit}"
         if not np.isnan(share):
             percent = f"{100 * share:.2g}" if share < 0.095 else f"{100 * share:.0f}"
-            title += f"; {percent} % of W fall" + ", a local loss" * (share < LOCAL)
+            title += f"; {percent} % of the weight fall" + ", a local loss" * (share < LOCAL)
         axes.set_title(textwrap.fill(title, 48), fontsize=0.95 * TEXT, loc="left")
         words = textwrap.wrap(one, 54)[:3]
         axes.text(

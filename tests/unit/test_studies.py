@@ -695,8 +695,8 @@ def test_values_stand_where_their_means_are(tmp_path, monkeypatch):
             "matplotlib.axes.Axes.annotate",
             lambda axes, words, at, xytext, **look: beside.update({words: (at[0], xytext[0])}),
         )
-        saved, kept = pictures._saved, []
-        patched.setattr(pictures, "_saved", lambda figure, file: kept.append(figure) or saved(figure, file))
+        saved, kept = pictures.saved, []
+        patched.setattr(pictures, "saved", lambda figure, *file: kept.append(figure) or saved(figure, *file))
         pictures.draw_sensitivity(study, table, tmp_path / "sensitivity.svg")
     low, high = beside["12"], beside["10"]
     assert low[0] <= rows.mean() < swing.low <= high[0]
@@ -705,7 +705,7 @@ def test_values_stand_where_their_means_are(tmp_path, monkeypatch):
     assert left.x1 < right.x0
     kept[0].clear()
     with monkeypatch.context() as patched:
-        patched.setattr(pictures, "_saved", lambda figure, file: kept.append(figure))
+        patched.setattr(pictures, "saved", lambda figure, *file: kept.append(figure))
         pictures.draw_scatter(study, table, tmp_path / "scatter.svg")
     assert all(tick == round(tick) for tick in kept[-1].axes[0].get_xticks().tolist()), "whole stones"
 
