@@ -50,6 +50,10 @@ GEOJSON = (
 #: What a file without a coordinate system draws so many of its widths away from 0 is a park or a country in degrees.
 FAR = 50.0
 
+#: Numbers of Mercators of the world, of EPSG and of Esri, and what names call them: others begin at a chosen scale.
+MERCATORS = "(3857|3785|3395|900913|102100|102113|54004)"
+OF_THE_WORLD = "(Pseudo|Web|World|Global|Google|Visualisation CRS /)"
+
 #: Radius of the earth on the maps of the web [m], and how much they stretch lengths from which on it counts.
 RADIUS, STRETCHED = 6378137.0, 1.001
 
@@ -79,8 +83,8 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     says = name if re.search(r"CRS84|4326$", name) else ""
     known = [one for one in features if one is not None]
     lengths, skipped = "crs" in content and crs is None, {NO_GEOMETRY: len(features) - len(known)}
-    web = _is_web_mercator(name)
-    return layout_of_features(known, path, reading, degrees=says, lengths=lengths, web=web, skipped=skipped)
+    mercator = _is_mercator(name)
+    return layout_of_features(known, path, reading, degrees=says, lengths=lengths, mercator=mercator, skipped=skipped)
 
 
 def _geojson_features(content: Mapping[str, Any]) -> list[Any]:
@@ -146,8 +150,8 @@ def _read_shapefile(path: Path, reading: Reading) -> Layout:
             features.append(Feature(shape(drawn.__geo_interface__), row))
     text = projection.read_text(encoding="utf-8", errors="replace") if projection else ""
     unit, degrees = _unit_of_system(text)
-    web = _is_web_mercator(text)
-    return layout_of_features(features, path, reading, unit=unit, degrees=degrees, web=web, skipped=skipped)
+    mercator = _is_mercator(text)
+    return layout_of_features(features, path, reading, unit=unit, degrees=degrees, mercator=mercator, skipped=skipped)
 
 
 def _read_geopackage(path: Path, reading: Reading) -> Layout:
@@ -172,8 +176,8 @@ def _read_geopackage(path: Path, reading: Reading) -> Layout:
     # What is left out as asked is counted with the rest, but not what lies in another system.
     features = [feature for layer in layers if layer.system in systems for feature in layer.features]
     skipped = {NO_GEOMETRY: sum(layer.empty for layer in layers if layer.system in systems)}
-    web = _is_web_mercator(text)
-    found = layout_of_features(features, path, reading, unit=unit, degrees=degrees, web=web, skipped=skipped)
+    mercator = _is_mercator(text)
+    found = layout_of_features(features, path, reading, unit=unit, degrees=degrees, mercator=mercator, skipped=skipped)
     other = [LeftOut("asked", np.zeros((0, 2)), "", one.name) for one in layers if one.system not in systems]
     return replace(found, left_out=(*found.left_out, *other))
 
@@ -246,25 +250,29 @@ def _unit_of_system(text: str) -> tuple[str, str]:
     return unit_of(metres, 1e-5) or (f"{metres:.9g} m" if 0.0 < metres < math.inf else ""), ""
 
 
-def _is_web_mercator(text: str) -> bool:
-    """Whether a coordinate system, by its words or its number, is that of the maps of the web."""
-    return re.search(r"Pseudo[- _]Mercator|Web[- _]Mercator|EPSG\W+(3857|900913)\b", text) is not None
+def _is_mercator(text: str) -> bool:
+    """Whether a coordinate system, by its words or its number, is a Mercator of the world, as of maps of the web."""
+    return re.search(rf"{OF_THE_WORLD}[- _]+Mercator|\b{MERCATORS}[\]\"\s]*$", text, re.IGNORECASE) is not None
 
 
-def _true_unit(features: Sequence[Feature]) -> tuple[str, list[Note]]:
-    """Find how long a metre of the maps of the web is where the features lie, with a note; "m" where it is one."""
-    import shapely
+def _true_unit(found: Drawing, reading: Reading) -> tuple[str, list[Note]]:
+    """Find how long a metre of a Mercator of the world is where a drawing lies, with a note; "m" where it is one.
 
-    _, south, _, north = shapely.total_bounds([one.geometry for one in features])
-    middle = 0.5 * (south + north) / RADIUS
+    What is left out as asked, as a scale bar, does not count, and what lies far from the rest does not matter.
+    """
+    wanted = found.wants(reading)
+    # Before it is turned into its plane: (n, 3).
+    middles = [float(one.points[:, 1].mean()) for one in found.strokes if wanted(one)]
+    north = float(np.median(middles)) / RADIUS if middles else 0.0
     # Beyond is no map.
-    stretch = math.cosh(middle) if abs(middle) <= math.pi else 1.0
+    stretch = math.cosh(north) if abs(north) <= math.pi else 1.0
     if stretch < STRETCHED:
         return "m", []
-    latitude = math.degrees(math.atan(math.sinh(middle)))
+    latitude = math.degrees(math.atan(math.sinh(north)))
     said = (
-        f"unit: the file is in EPSG:3857, which draws lengths {stretch:.4g} times as long at {abs(latitude):.2f}° "
-        f"{'N' if latitude > 0.0 else 'S'}: a unit of it is {1.0 / stretch:.6g} m, within 0.7 %; reproject it for more"
+        f"unit: the file is in a Mercator of the world, as EPSG:3857, which draws lengths {stretch:.4g} times as long "
+        f"at {abs(latitude):.0f}° {'N' if latitude > 0.0 else 'S'}: a unit of it is {1.0 / stretch:.6g} m, within "
+        f"0.7 %; reproject it for more"
     )
     return f"{1.0 / stretch:.9g} m", [Note(UNIT, said)]
 
@@ -277,13 +285,13 @@ def layout_of_features(
     unit: str = "",
     degrees: str = "",
     lengths: bool = False,
-    web: bool = False,
+    mercator: bool = False,
     skipped: Mapping[str, int] | None = None,
 ) -> Layout:
     """Make a layout of polygons, and of the faces between lines.
 
     ``unit`` is "" where the file does not say it, ``degrees`` the name of a system of longitude and latitude;
-    ``lengths`` says whether the file says that it has no system, ``web`` whether it is in that of the maps of the web,
+    ``lengths`` says whether the file says that it has no system, ``mercator`` whether it is in a Mercator of the world,
     and ``skipped`` counts by its kind what is no outline.
     """
     found, rows = Drawing(skipped=Counter(skipped or {})), _rows(features)
@@ -294,15 +302,14 @@ def layout_of_features(
         if len(parts := found.outlines[first:]) > 1:
             named = [{**row, "name": f"{row['name']} {k + 1}"} for k in range(len(parts))]
             found.outlines[first:] = [replace(one, row=own) for one, own in zip(parts, named, strict=True)]
+    true, stretched = _true_unit(found, reading) if mercator and reading.unit is None else (unit, [])
     turn, notes = found.turn(reading)
     found.notes += notes
     if roles:
         listed = ", ".join(f"'{role}'" for role in roles)
         found.notes.append(Note(CHANGED, f"roles were left out ({listed}): roles are {', '.join(mechanics.ROLES)}"))
     _check_degrees(found, path, reading, degrees, far=not (unit or degrees or lengths) and (turn == np.eye(3)).all())
-    if web and reading.unit is None:
-        unit, stretched = _true_unit(features)
-        found.notes += stretched
+    found.notes += stretched
     with_faces(
         found,
         reading,
@@ -310,9 +317,9 @@ def layout_of_features(
         row_of=lambda layers, name: _row(name, layers[-1], {}),
         in_place=True,
     )
-    refuse_open(found, "polygon", "one polygon", unit)
+    refuse_open(found, "polygon", "one polygon", true)
     found.notes += passed_over(found.skipped)
-    return found.layout(unit)
+    return found.layout(true)
 
 
 def _add(geometry: Any, row: dict[str, Any], found: Drawing) -> None:

@@ -319,7 +319,7 @@ def test_a_unit_that_has_no_name_here_is_read_by_its_length(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("north", "scale", "told"), [(5621521.0, 0.5**0.5, "1.414 times as long at 45.00° N"), (3.0, 1.0, "")]
+    ("north", "scale", "told"), [(5621521.0, 0.5**0.5, "1.414 times as long at 45° N"), (3.0, 1.0, "")]
 )
 def test_metres_of_maps_of_the_web_are_as_long_as_they_are_there(tmp_path, north, scale, told):
     rings = [np.add(ring, [1378000.0, north]).tolist() for ring in SQUARES]
@@ -333,3 +333,51 @@ def test_metres_of_maps_of_the_web_are_as_long_as_they_are_there(tmp_path, north
     words = 'PROJCS["WGS 84 / Pseudo-Mercator",UNIT["metre",1],AUTHORITY["EPSG","3857"]]'
     shapes = write_shapefile(tmp_path / "plan.shp", rings, words)
     np.testing.assert_allclose(blockvis.read_layout(shapes).sizes ** 2, 0.08 * scale**2, rtol=1e-5)
+
+
+def on_the_web(path, *features, system="urn:ogc:def:crs:EPSG::3857"):
+    stones = [polygon(np.add(ring, [1378000.0, 5621521.0]).tolist(), layer="stones") for ring in SQUARES]
+    return geojson(path, [*stones, *features], crs={"type": "name", "properties": {"name": system}})
+
+
+@pytest.mark.parametrize(
+    ("system", "stretched"),
+    [
+        ("http://www.opengis.net/def/crs/EPSG/0/3857", True),
+        ("urn:ogc:def:crs:EPSG:9.9.1:3857", True),
+        ("EPSG:102100", True),
+        ("urn:ogc:def:crs:ESRI::102113", True),
+        ("EPSG:900913", True),
+        ("EPSG:3785", True),
+        ("urn:ogc:def:crs:EPSG::3395", True),
+        ("urn:ogc:def:crs:EPSG::32632", False),
+        ("urn:ogc:def:crs:EPSG:3857:25832", False),
+    ],
+)
+def test_a_mercator_of_the_world_is_known_by_each_of_its_numbers(tmp_path, system, stretched):
+    sizes = blockvis.read_layout(on_the_web(tmp_path / "plan.geojson", system=system)).sizes
+    np.testing.assert_allclose(sizes**2, 0.04 if stretched else 0.08, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "stretched"),
+    [
+        ("WGS_1984_Web_Mercator_Auxiliary_Sphere", True),
+        ("WGS_1984_World_Mercator", True),
+        ("WGS 84 / World Mercator", True),
+        ("Popular Visualisation CRS / Mercator", True),
+        ("Transverse_Mercator", False),
+    ],
+)
+def test_a_mercator_of_the_world_is_known_by_its_words(tmp_path, name, stretched):
+    rings = [np.add(ring, [1378000.0, 5621521.0]).tolist() for ring in SQUARES]
+    path = write_shapefile(tmp_path / "plan.shp", rings, f'PROJCS["{name}",UNIT["Meter",1.0]]')
+    np.testing.assert_allclose(blockvis.read_layout(path).sizes ** 2, 0.04 if stretched else 0.08, rtol=1e-5)
+
+
+@pytest.mark.parametrize("options", [{"ignore": ("title",)}, {"only": ("stones",)}, {}])
+def test_a_title_at_the_equator_does_not_move_the_plan_there(tmp_path, options):
+    """The latitude was the middle of all that is in the file, and lengths were 29 % too large."""
+    title = polygon(SQUARES[0], layer="title")
+    layout = blockvis.read_layout(on_the_web(tmp_path / "plan.geojson", title, title, title), **options)
+    np.testing.assert_allclose(layout.sizes[:4] ** 2, 0.04, rtol=1e-5)
