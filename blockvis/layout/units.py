@@ -50,7 +50,7 @@ USUAL = 0.25
 IMPERIAL, METRIC, RARE = ("in", "ft", "yd"), ("mm", "cm", "m"), ("dm", "in", "ft")
 
 #: 1 : these are the scales of drawings of masonry, the commonest first.
-SCALES = (50, 20, 100, 10, 25)
+SCALES = (50, 20, 100, 10, 25, 200, 500, 1000)
 
 
 def metres_per(unit: str) -> float:
@@ -147,20 +147,23 @@ def units_instead(unit: str, size: float, *, page: bool = False) -> list[str]:
     """List the units that make blocks masonry whose unit is doubted, the likeliest first; none without doubt.
 
     The size [m] is the root of the area of the median block, as read in the unit. What is too small on a ``page``,
-    whose unit is that of the paper, is drawn at a scale.
+    whose unit is that of the paper, is drawn at a scale, and one is always found.
 
     Examples
     --------
     >>> units_instead("m", 130.0)
     ['mm', 'cm']
     >>> units_instead("pt", 0.0076, page=True)
-    ['50 pt', '20 pt', '100 pt', '10 pt', '25 pt']
+    ['50 pt', '20 pt', '25 pt', '100 pt', '10 pt', '200 pt']
     """
     if size <= 0.0 or DOUBTED[0] <= size <= DOUBTED[1]:
         return []
     if page and size < DOUBTED[0]:
         number, name = _NUMBER_OF.fullmatch(unit).groups()  # type: ignore[union-attr]
         common = [scale for scale in SCALES if COMMON[0] <= scale * size <= COMMON[1]]
+        # Of scales that are as likely but for a factor of two the commonest is first; a map has none of these.
+        common.sort(key=lambda scale: int(abs(np.log2(scale * size / USUAL))))
+        common = common or [10 ** round(np.log10(USUAL / size))]
         return [f"{scale * float(number or 1.0):.9g} {name}" for scale in common]
     return _masonry_units(size / metres_per(unit), (*RARE, "km"))
 

@@ -61,9 +61,9 @@ def test_inches_of_a_template_that_make_blocks_too_large_are_doubted(tmp_path, s
     assert all(f"by --unit {metric}" in note for note in told)
 
 
-def page(folder):
-    """Stones of 0.5 by 0.3 m at 1:50 on a page of points, as of a PDF."""
-    size = 72 / 25.4 * 1000 / 50
+def page(folder, scale=50):
+    """Stones of 0.5 by 0.3 m at 1 : scale on a page of points, as of a PDF."""
+    size = 72 / 25.4 * 1000 / scale
     stones = "".join(
         f'<rect x="{100 + 0.5 * k * size}" y="9" width="{0.5 * size}" height="{0.3 * size}"/>' for k in range(4)
     )
@@ -87,6 +87,13 @@ def test_no_unit_is_made_up_for_a_page_at_a_scale(tmp_path, capsys):
     assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 2
     assert 'give [geometry] unit = "50 pt", or unit = "pt" if it is right' in capsys.readouterr().err
     assert read(drawing, unit="50 pt").areas == pytest.approx([0.15] * 4)
+
+
+@pytest.mark.parametrize("scale", [200, 500, 1000, 10000])
+def test_plans_at_small_scales_are_refused_with_theirs(tmp_path, capsys, scale):
+    """At 1:1000 stones were read as drawn, of 0.4 mm; at 1:200 half of their size was the most that was proposed."""
+    assert main(["new", str(page(tmp_path, scale)), "-o", str(tmp_path / "a.toml")], outputs=()) == 2
+    assert f" {scale} pt would make it 0.387 m" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
