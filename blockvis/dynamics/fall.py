@@ -21,8 +21,8 @@ from .ground import ground_below, on_ground
 #: What films, files and pages call it.
 CAPTION = "fall: rigid-body dynamics, restitution 0"
 
-#: Poses kept per second, and seconds after which the fall is cut off.
-RATE, LONGEST = 25, 4.0
+#: Poses kept per second, and where the fall is cut off, in the time in which the topmost corner falls to the ground.
+RATE, LONGEST = 25, 10.0
 
 #: Blocks whose √(size / g) is shorter than this part of a pose, of less than 2 μm, have fallen before the first.
 BRIEFEST = 0.01
@@ -114,15 +114,15 @@ class Fall:
 
 def fall_of(
     response: solver.Response,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float, float], None] | None = None,
     watch: Callable[[Engine], None] | None = None,
 ) -> Fall | None:
-    """Let a collapsed structure fall from its last equilibrium until all blocks rest.
+    """Let a collapsed structure fall from its last equilibrium until all blocks rest, or for :data:`LONGEST`.
 
     Parameters
     ----------
     progress : callable, optional
-        Called with the seconds [s] of the fall that are worked out.
+        Called with the seconds [s] of the fall that are worked out, and those after which it is cut off.
     watch : callable, optional
         Called with the engine at the start and at each pose that is kept, anew for each push that is tried.
 
@@ -153,6 +153,13 @@ def fall_of(
             break
         push *= 2.0
     return best
+
+
+def still_moving(assembly: solver.Assembly, fall: Fall) -> np.ndarray:
+    """Numbers of the blocks that move at the end of a fall, which is cut off there, (n,) array."""
+    before, end = (mechanics.moved_vertices(assembly, fall.pose(k)) for k in (max(len(fall) - 2, 0), -1))
+    speeds = np.maximum.reduceat(np.linalg.norm(end - before, axis=1), assembly.shapes.offsets[:-1]) * RATE
+    return np.flatnonzero(speeds > STILL * np.sqrt(solver.GRAVITY * assembly.block_size))
 
 
 def may_fall(response: solver.Response) -> bool:
@@ -193,16 +200,18 @@ def _falling_mass(response: solver.Response) -> float:
 def _followed(
     response: solver.Response,
     push: float,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[float, float], None] | None,
     watch: Callable[[Engine], None] | None,
 ) -> Fall:
     """Follow the blocks until all rest or the time is over."""
     engine, ground = engine_of(response, push)
+    height = float(engine.corners[engine.free[engine.assembly.block_of_vertex], -1].max()) - ground
+    longest = LONGEST * float(np.sqrt(2.0 * height / solver.GRAVITY)) + RESTING
     poses, tied = [engine.pose], [(engine.tensions, engine.rest)]
     calm, still = 0, STILL * float(np.sqrt(solver.GRAVITY * response.assembly.block_size))
     if watch is not None:
         watch(engine)
-    for number in range(1, round(LONGEST * RATE) + 1):
+    for number in range(1, round(longest * RATE) + 1):
         try:
             engine.advance(1.0 / RATE)
         except mechanics.NotSolved as failure:
@@ -211,7 +220,7 @@ def _followed(
         poses.append(engine.pose)
         tied.append((engine.tensions, engine.rest))
         if progress is not None:
-            progress(number / RATE)
+            progress(number / RATE, longest)
         if watch is not None:
             watch(engine)
         calm = calm + 1 if engine.fastest < still else 0
@@ -237,13 +246,13 @@ def engine_of(response: solver.Response, push: float) -> tuple[Engine, float]:
     assert response.collapse is not None
     last, end = response.path[-1].pose, response.increments[-1]
     assembly = response.assembly.with_roles(np.where(end.removed, mechanics.FIXED, response.assembly.roles))
-    ground = ground_below(assembly, last, end.removed)
+    ground, material = ground_below(assembly, last, end.removed)
     beyond = response.increments[min(len(response.path), len(response.increments) - 1)].pose
     places, turns = (
         np.where(response.assembly.free[:, None], here, there)
         for here, there in ((last.positions, beyond.positions), (last.rotations, beyond.rotations))
     )
-    whole, pose = on_ground(assembly, solver.Pose(places, turns), ground)
+    whole, pose = on_ground(assembly, solver.Pose(places, turns), ground, material)
     still = np.zeros((1, response.loads.dead.shape[1]))
     loads = np.append(response.dead_at(end, last), still, axis=0)
     velocity = np.append(push * response.collapse.mechanism, still, axis=0)

@@ -17,10 +17,11 @@ STEEP = 0.3
 CLEARANCE = 1e-3
 
 
-def ground_below(assembly: solver.Assembly, pose: solver.Pose, removed: np.ndarray) -> float:
-    """Height of the ground [m]: of the lowest place where something may lie, and below what is free.
+def ground_below(assembly: solver.Assembly, pose: solver.Pose, removed: np.ndarray) -> tuple[float, str]:
+    """Height of the ground [m]: of the lowest place where something may lie, and below what is free; and its material.
 
     Places are upward faces of supports, and the feet of supports that are taller than wide: piers stand on the ground.
+    The material is that of the support with the lowest place, of several as low the widest; empty without supports.
     Blocks of ``removed``, an (n_blocks,) bool array, are not there.
     """
     corners, drawn, offsets = mechanics.moved_vertices(assembly, pose), assembly.vertices, assembly.shapes.offsets[:-1]
@@ -38,21 +39,26 @@ def ground_below(assembly: solver.Assembly, pose: solver.Pose, removed: np.ndarr
         normals, owner = solids.faces(corners).normals, solids.block_of_face
         heights = np.minimum.reduceat(corners[solids.corners, 2], solids.face_offsets[:-1])
     upward = supports[owner] & (normals[:, -1] > STEEP * np.linalg.norm(normals[:, :-1], axis=1))
-    places = [corners[free[assembly.block_of_vertex], -1], lowest[piers, -1], heights[upward]]
-    return float(np.concatenate(places).min()) - CLEARANCE * assembly.block_size
+    places, clearance = np.where(piers, lowest[:, -1], np.inf), CLEARANCE * assembly.block_size
+    np.minimum.at(places, owner[upward], heights[upward])
+    widest = np.where(supports & (places <= places.min() + clearance), extents[:, :-1].prod(axis=1), -1.0)
+    # Of two as wide the name decides: the order of blocks says nothing.
+    _, material = max(zip(widest, assembly.materials, strict=True)) if supports.any() else (0.0, "")
+    return float(min(places.min(), corners[free[assembly.block_of_vertex], -1].min())) - clearance, material
 
 
-def on_ground(assembly: solver.Assembly, pose: solver.Pose, ground: float) -> tuple[solver.Assembly, solver.Pose]:
+def on_ground(
+    assembly: solver.Assembly, pose: solver.Pose, ground: float, material: str = ""
+) -> tuple[solver.Assembly, solver.Pose]:
     """Add a slab as wide as anything can get, its upper face at the height of the ground [m], as the last block."""
     corners, d = mechanics.moved_vertices(assembly, pose), assembly.dimension
     middle, size = corners.mean(axis=0), 4.0 * float(np.ptp(corners, axis=0).max())
     low = np.append(middle[:-1] - size, ground - 0.5 * assembly.block_size)
     high = np.append(middle[:-1] + size, ground)
     slab = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(d)] for k in range(2**d)])
-    supports = np.flatnonzero(~assembly.free)
     names = [*assembly.names, GROUND]
     roles = [*(mechanics.FREE if free else mechanics.FIXED for free in assembly.free), mechanics.FIXED]
-    materials = [*assembly.materials, assembly.materials[int(supports[0])] if len(supports) else ""]
+    materials = [*assembly.materials, material]
     density = np.append(assembly.density, 1.0)
     if d == 2:
         outlines = [*(assembly.outline(block) for block in range(assembly.n_blocks)), slab[[0, 1, 3, 2]]]

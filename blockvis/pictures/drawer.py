@@ -376,9 +376,10 @@ class Drawer:
         )
 
     def _moves(self, time: float) -> bool:
-        """Whether something moves visibly from a time [s] of the fall on."""
+        """Whether something moves visibly from a time [s] of the fall on, or in the last moment that is known of it."""
         assert self.fall is not None
-        now, then = (mechanics.moved_vertices(self.assembly, self.fall.at(t)) for t in (time, time + MOMENT))
+        start = max(min(time, float(self.fall.times[-1]) - MOMENT), 0.0)
+        now, then = (mechanics.moved_vertices(self.assembly, self.fall.at(t)) for t in (start, start + MOMENT))
         return bool(np.linalg.norm(then - now, axis=1).max(initial=0.0) > VISIBLE * self.scene.pixel)
 
     def show_motion(self, swing: Swing) -> None:

@@ -70,13 +70,13 @@ class FilmProcess:
         self._path = path
         self._worker.say("draw", (response, path, falls, fall, look))
 
-    def fall(self, progress: Callable[[float], None]) -> Fall | None:
-        """Wait for the fall, ``progress`` called with the seconds of it that are worked out.
+    def fall(self, progress: Callable[[float, float], None]) -> Fall | None:
+        """Wait for the fall, ``progress`` called as by :func:`fall_of`.
 
         Raises :class:`FilmFailed` if the process ends before.
         """
         while (heard := self._hear("falling", "fall"))[0] == "falling":
-            progress(heard[1])
+            progress(*heard[1])
         found: Fall | None = heard[1]
         return found
 
@@ -172,7 +172,7 @@ def _draw(
     from .render import animate
 
     if falls:
-        fall = fall_of(response, lambda seconds: say("falling", seconds))
+        fall = fall_of(response, lambda *seconds: say("falling", seconds))
         say("fall", fall)
     if response.path:
         draw_curve(response, path.with_name("curve.png"), band=stored_range(path.parent))

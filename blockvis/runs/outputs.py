@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import solver
 from blockvis.cases.contents import Case
-from blockvis.dynamics.fall import NEVER_STOOD, STANDS, Fall, fall_of, may_fall
+from blockvis.dynamics.fall import NEVER_STOOD, STANDS, Fall, fall_of, may_fall, still_moving
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.fall_files import stored_fall, write_fall
 from blockvis.results.folder import ResultsFolder
@@ -227,11 +227,14 @@ def _fall(response: solver.Response, film: FilmProcess | None) -> Fall | None:
 
 
 def _told(response: solver.Response, fall: Fall | None) -> Fall | None:
-    """Give a fall; say so where a collapse has none, or where it leaves out what holds blocks together."""
+    """Give a fall; say so where a collapse has none, where it is cut off, or leaves out what holds blocks together."""
     if fall is None and may_fall(response):
         warnings.warn(f"{STANDS}: no fall is shown", stacklevel=2)
     if response.collapse is not None and not response.path:
         warnings.warn(NEVER_STOOD, stacklevel=2)
+    if fall is not None and len(moving := still_moving(response.assembly, fall)):
+        end = f"{response.assembly.listed(moving, 4)} still move{'s' if len(moving) == 1 else ''}"
+        warnings.warn(f"the fall is followed for {fall.times[-1]:g} s, at whose end {end}", stacklevel=2)
     if fall is not None and (response.path[-1].state.intact > 0.0).any():
         said = "the fall leaves mortar out: blocks whose joints are whole at the last equilibrium come apart in it"
         warnings.warn(said, stacklevel=2)

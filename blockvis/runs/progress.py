@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 import solver
-from blockvis.dynamics.fall import LONGEST
 from blockvis.kinds.kind import Course
 from solver import mechanics
 from solver.mechanics import counted
@@ -60,10 +59,10 @@ class DrawingProgress:
     def __init__(self) -> None:
         self._line = _Line()
 
-    def fall(self, time: float) -> None:
-        """Show how far the fall is worked out [s]."""
+    def fall(self, time: float, longest: float) -> None:
+        """Show how far the fall is worked out, and how far it is followed [s]."""
         if self._line.due:
-            self._line.write(f"fall, {time:.1f} s of at most {LONGEST:g} s", time / LONGEST)
+            self._line.write(f"fall, {time:.1f} s of at most {longest:.1f} s", time / longest)
 
     def frame(self, done: int, total: int) -> None:
         """Show how many frames are drawn."""

@@ -1,8 +1,9 @@
 """The fall after the last equilibrium: where blocks come to rest, in the plane and in space, and what it changes."""
 
+import re
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, permutations
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ import solver
 from blockvis.cli import main
 from blockvis.dynamics import fall as fall_module
 from blockvis.dynamics.engine import Engine
-from blockvis.dynamics.fall import CAPTION, Fall, fall_of
+from blockvis.dynamics.fall import CAPTION, Fall, fall_of, still_moving
 from blockvis.dynamics.ground import ground_below, on_ground
 from blockvis.results.fall_files import stored_fall, write_fall
 from solver import mechanics
@@ -85,8 +86,57 @@ def test_a_lintel_falls_to_the_floor_whether_its_abutments_are_taller_or_wider(w
     else:
         solids = [box((x0, 0.0, z0), (x1, 0.5, z1)) for x0, z0, x1, z1 in rectangles]
         assembly = solver.Assembly.from_solids(solids, roles=roles)
-    ground = ground_below(assembly, solver.Pose.initial(assembly), removed)
-    assert ground == pytest.approx(-3.0, abs=2e-3)
+    height, _ = ground_below(assembly, solver.Pose.initial(assembly), removed)
+    assert height == pytest.approx(-3.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("order", list(permutations(range(4))))
+def test_the_ground_is_of_the_support_that_gave_its_height_and_not_of_what_was_taken_away(order):
+    """A block on a slab of stone, beside it as high a pad, and a prop that has gone, in any order."""
+    given = [
+        (rectangle(0.0, 0.0, 0.6, 1.2), "free", "brick"),
+        (rectangle(-1.0, -0.4, 0.6, 0.0), "moving", "stone"),
+        (rectangle(-6.0, -0.4, -5.5, 0.0), "fixed", "teflon"),
+        (rectangle(-2.0, -2.0, -1.8, -1.5), "fixed", "timber"),
+    ]
+    outlines, roles, materials = zip(*(given[k] for k in order), strict=True)
+    assembly = solver.Assembly.from_outlines(outlines, roles=roles, materials=materials)
+    removed = np.array([material == "timber" for material in materials])
+    assert ground_below(assembly, solver.Pose.initial(assembly), removed) == (pytest.approx(-1e-3, abs=1e-3), "stone")
+    nothing = np.array([role != "free" for role in roles])
+    assert ground_below(assembly, solver.Pose.initial(assembly), nothing)[1] == ""
+
+
+def overturned(outlines, changes=(), materials=None, **laws):
+    """Blocks on a support that tilts about its right corner at 0, 0, until they fall over it."""
+    tilt = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.2, limit=1.5, tolerance=1e-2)
+    roles = ["free"] * (len(outlines) - 1) + ["moving"]
+    assembly = solver.Assembly.from_outlines(outlines, roles=roles, materials=materials)
+    controls = solver.Controls(falling_frames=1)
+    return solver.Structure(assembly, **laws).settle(tilt, changes=changes, controls=controls)
+
+
+@pytest.mark.slow
+def test_what_falls_rests_on_ground_of_the_support_whatever_was_taken_away_before():
+    """The prop of teflon comes first, and is taken away before anything moves."""
+    outlines = [rectangle(-1.0, 0, -0.8, 0.3), rectangle(-0.6, 0.0, 0.0, 1.2), rectangle(-1.8, -0.4, 0.0, 0.0)]
+    laws = solver.Interfaces(solver.InterfaceLaw(0.6), {("teflon", "stone"): solver.InterfaceLaw(0.02)})
+    change = solver.PhaseChange(0, np.array([True, False, False]))
+    response = overturned(outlines, [change], ["teflon", "stone", "stone"], interfaces=laws)
+    assert response.stop is solver.Status.COLLAPSED
+    fall = fall_of(response)
+    assert not len(still_moving(response.assembly, fall))
+    assert fall.positions[-1, 1, 0] < 0.8
+
+
+@pytest.mark.slow
+def test_a_tower_is_followed_until_it_lies():
+    """As long as its height takes to fall: 4 s after the last equilibrium one of 32 m has begun to."""
+    response = overturned([rectangle(-5.0, 0.0, 0.0, 32.0), rectangle(-6.0, -1.0, 0.0, 0.0)], friction_coefficient=0.6)
+    fall = fall_of(response)
+    assert fall.times[-1] > 4.0
+    assert not len(still_moving(response.assembly, fall))
+    assert fall.positions[-1, 0, 1] < 3.0
 
 
 def pulled_apart(outlines, friction):
@@ -130,7 +180,7 @@ def test_blocks_never_overlap_by_a_hundredth(structure):
 def test_blocks_come_to_rest_on_something(structure):
     response, fall = structure(), fallen(structure)
     assembly = response.assembly
-    assert fall.times[-1] < fall_module.LONGEST
+    assert not len(still_moving(assembly, fall))
     np.testing.assert_allclose(fall.positions[-1], fall.positions[-2], atol=1e-3 * assembly.block_size)
     blocks = outlines(assembly, fall.pose(len(fall) - 1))
     for k in np.flatnonzero(assembly.free):
@@ -375,6 +425,21 @@ def test_a_run_writes_the_fall_and_nothing_else_knows_of_it(tmp_path, monkeypatc
     assert not (tmp_path / "with" / "report.html").exists()
 
 
+@pytest.mark.slow
+def test_a_run_says_which_blocks_still_move_where_their_fall_is_cut_off(tmp_path, monkeypatch, capsys):
+    case = tmp_path / "case.toml"
+    case.write_text(
+        '[geometry]\nlayout = "column"\nparameters = { blocks = 1, width = 0.4 }\n[material]\n'
+        "friction_coefficient = 0.6\n[settlement]\nrotation_centre = [0.2, 0.0]\nrotation = -1.0\nincrement = 0.1\n"
+        "limit = 1.5\n",
+        encoding="utf-8",
+    )
+    monkeypatch.setattr(fall_module, "LONGEST", 1.0)
+    assert main(["run", str(case), "-o", str(tmp_path / "out"), "--no-pictures", "--no-check-steps"]) == 0
+    told = capsys.readouterr().err
+    assert re.search(r"note: the fall is followed for 0\.\d+ s, at whose end 'block 1' still moves\n", told), told
+
+
 def test_bent_blocks_fall_in_one_piece():
     """An L that stands on its short leg next to nothing tips over and lies on its long one."""
     shape = [[0.0, 0.0], [0.3, 0.0], [0.3, 1.0], [1.2, 1.0], [1.2, 1.3], [0.0, 1.3]]
@@ -542,7 +607,7 @@ def engine_of(velocity, shift=(0.0, 0.0, 0.0)):
     pose.positions[3] += shift
     motion, loads = np.zeros((5, 6)), np.zeros((5, 6))
     motion[3], loads[:4] = velocity, response.loads.dead
-    below = ground_below(response.assembly, pose, np.zeros(4, dtype=bool))
+    below, _ = ground_below(response.assembly, pose, np.zeros(4, dtype=bool))
     whole, pose = on_ground(response.assembly, pose, below - 1.0)
     return Engine(whole, loads, response.interfaces, pose, motion)
 

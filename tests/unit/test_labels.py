@@ -307,6 +307,11 @@ def test_what_lies_still_has_no_badge_of_falling(words):
     badges = [said["badge"] for said in words if said["title"].startswith("Fall")]
     assert FALL_BADGE in badges
     assert badges[-2:] == ["", ""]
+    # Where it is cut off it moves at its end.
+    half = len(fall) // 2
+    short = replace(fall, times=fall.times[:half], positions=fall.positions[:half], rotations=fall.rotations[:half])
+    Drawer(response, Look(colour_by="mechanism"), SMALL, response.path, fall=short).falling_picture(99.0)
+    assert words[-1]["badge"] == FALL_BADGE
     pixels = np.asarray(last).astype(int)
     assert not (np.abs(pixels - palette.WARNING) <= 8).all(axis=2).any()
 
