@@ -160,7 +160,7 @@ class Key:
     @property
     def choices(self) -> tuple[str, ...]:
         """The texts among which the value must be; empty for other keys."""
-        return tuple(self.kind.schema.get("enum", ()))
+        return tuple(choice for choice in self.kind.schema.get("enum", ()) if isinstance(choice, str))
 
 
 @dataclass(frozen=True)

@@ -68,8 +68,8 @@ class Profile:
         Its upright part is that of one where the profile is straight, the part along x where it is level.
         """
         values = self.value(np.linspace(low, high, 101))
-        level = np.linspace(values[0], values[-1] if direction[0] == 0.0 else values[0], 101)
-        return bool(np.abs(values - level).max() > STRAIGHT * self.largest)
+        along = np.stack([np.full(101, values[0]), np.linspace(values[0], values[-1], 101)])
+        return bool((np.abs(np.asarray(direction)[:, None] * (values - along)) > STRAIGHT * self.largest).any())
 
     def motions(self, bearings: np.ndarray, direction: Sequence[float]) -> np.ndarray:
         """(n, 3) array: the motion of ground in its middle along a unit vector, and its tilt.

@@ -79,7 +79,7 @@ parameters = { blocks = 2 }
     blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=())
     assert missing(keys_of(json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8")))) == []
     tables = list((tmp_path / "out").glob("*.csv"))
-    assert kind not in ("moving load", "capacity") or len(tables) == 3
+    assert kind not in ("moving load", "capacity") or len(tables) == 4
     for table in tables:
         header = next(csv.reader(table.read_text(encoding="utf-8").splitlines()))
         columns = [re.sub(r" \[.*\]$", "", column) for column in header]

@@ -352,7 +352,10 @@ def test_a_straight_profile_along_x_strains_the_ground(tmp_path):
     np.testing.assert_allclose(
         [ends[f"ground {k}"][0, 0] for k in range(1, 9)], 1e-3 * (np.arange(8) - 3.5) / 4.0, atol=1e-12
     )
-    assert "ground" in profile_of(text, "{ points = [[0.0, 0.0], [4.0, 1.0]] }", tmp_path)[0].names
+    for motion in ("direction = [0.0, -1.0]", "direction = [1e-17, -1.0]"):
+        # What cos(90°) leaves of a direction strains nothing.
+        assembly, _ = profile_of(text, "{ points = [[0.0, 0.0], [4.0, 1.0]] }", tmp_path, motion)
+        assert "ground" in assembly.names
 
 
 @pytest.mark.filterwarnings("ignore:the ground follows")
