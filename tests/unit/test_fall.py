@@ -18,7 +18,7 @@ import solver
 from blockvis.cli import main
 from blockvis.dynamics import fall as fall_module
 from blockvis.dynamics.engine import Engine
-from blockvis.dynamics.fall import CAPTION, Fall, fall_of, still_moving
+from blockvis.dynamics.fall import CAPTION, Fall, fall_of
 from blockvis.dynamics.ground import ground_below, on_ground
 from blockvis.results.fall_files import stored_fall, write_fall
 from solver import mechanics
@@ -125,7 +125,7 @@ def test_what_falls_rests_on_ground_of_the_support_whatever_was_taken_away_befor
     response = overturned(outlines, [change], ["teflon", "stone", "stone"], interfaces=laws)
     assert response.stop is solver.Status.COLLAPSED
     fall = fall_of(response)
-    assert not len(still_moving(response.assembly, fall))
+    assert not len(fall_module.still_moving(response.assembly, fall))
     assert fall.positions[-1, 1, 0] < 0.8
 
 
@@ -135,7 +135,7 @@ def test_a_tower_is_followed_until_it_lies():
     response = overturned([rectangle(-5.0, 0.0, 0.0, 32.0), rectangle(-6.0, -1.0, 0.0, 0.0)], friction_coefficient=0.6)
     fall = fall_of(response)
     assert fall.times[-1] > 4.0
-    assert not len(still_moving(response.assembly, fall))
+    assert not len(fall_module.still_moving(response.assembly, fall))
     assert fall.positions[-1, 0, 1] < 3.0
 
 
@@ -180,7 +180,7 @@ def test_blocks_never_overlap_by_a_hundredth(structure):
 def test_blocks_come_to_rest_on_something(structure):
     response, fall = structure(), fallen(structure)
     assembly = response.assembly
-    assert not len(still_moving(assembly, fall))
+    assert not len(fall_module.still_moving(assembly, fall))
     np.testing.assert_allclose(fall.positions[-1], fall.positions[-2], atol=1e-3 * assembly.block_size)
     blocks = outlines(assembly, fall.pose(len(fall) - 1))
     for k in np.flatnonzero(assembly.free):
