@@ -27,6 +27,9 @@ STATE_WORDS = ("absent", "slack", "elastic", "yielding", "broken")
 #: Part of the largest force of a joint, or of a tie, below which a tie is told to carry nothing: rounding.
 NEGLIGIBLE = 1e-6
 
+#: Part of its prestress that a tie has as it begins, below which that is told: blocks that stand leave it all.
+KEPT = 0.9
+
 #: Ties whose force is drawn over the settlement: more would not be told apart.
 MOST_CURVES = 6
 
@@ -99,6 +102,7 @@ class TieCourse:
     breaks_at: float | None = None
     yields_in_phase: int | None = None
     breaks_in_phase: int | None = None
+    first_force: float = 0.0  #: [N] At the first equilibrium in which it is there.
     last_force: float = 0.0  #: [N] At the last equilibrium.
     last_state: str = STATE_WORDS[mechanics.ABSENT]  #: Of that equilibrium.
 
@@ -136,9 +140,12 @@ def _after(
     # A tie that yields has carried the same, up to rounding, since it began to.
     if larger := abs(force) - abs(before.largest_force) > least:
         found["largest_force"] = float(force)
+    begins = before.last_state == STATE_WORDS[mechanics.ABSENT] and state != mechanics.ABSENT
     # One that never carries is told where it begins to be there.
-    if larger or (before.last_state == STATE_WORDS[mechanics.ABSENT] and state != mechanics.ABSENT):
+    if larger or begins:
         found |= {"largest_force_at": at, "phase": phase}
+    if begins:
+        found["first_force"] = float(force)
     for word, when in (("yields", mechanics.YIELDING), ("breaks", mechanics.BROKEN)):
         if state == when and getattr(before, f"{word}_at") is None:
             found |= {f"{word}_at": at, f"{word}_in_phase": phase}
@@ -204,6 +211,10 @@ def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, s
     # A limit load is found anew at each settlement, the path goes on between two.
     when = "under the limit load" if response.limits else "or before"
     fate = [f"{word} at {where} {when}" for word, where in told]
+    prestress = next(tie.prestress for tie in response.ties if tie.name == course.name)
+    if not response.limits and abs(course.first_force) < KEPT * prestress:
+        left = force_text(abs(course.first_force))
+        fate.insert(0, f"the blocks leave {left} of its prestress of {force_text(prestress)}")
     # What yields and breaks was told.
     said = {"yielding": course.yields_at, "broken": course.breaks_at}.get(course.last_state)
     if said is None:

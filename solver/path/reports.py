@@ -152,10 +152,10 @@ class Reports:
 
     def settled(self, start: Pose, end: Pose) -> str:
         """Message of blocks that do not stand as drawn and came to rest nearby."""
-        return (
-            f"{self.jump(start, end)}: as drawn the blocks do not stand; look for gaps between them (joint_thickness) "
-            "or a missing support"
-        )
+        pull = ", ".join(f"'{t.name}' {t.prestress:g} N" for t in self.model.ties if t.prestress and t.phase == 1)
+        prestress = f"at the prestress ({pull}), " if pull else ""
+        look = f"look {prestress}for gaps between them (joint_thickness) or a missing support"
+        return f"{self.jump(start, end)}: as drawn the blocks do not stand; {look}"
 
     def nothing_carried(self, place: Place, as_drawn: bool) -> str:
         """Message of a pushover without a start, with what members carry there: as drawn their prestress alone."""

@@ -338,6 +338,32 @@ def test_a_broken_tie_has_carried_its_strength_and_a_slack_one_carries_nothing(t
     assert abs(idle["largest_force"]) < 0.1
 
 
+@pytest.mark.parametrize(("prestress", "phase"), [(1e4, 1), (1e4, 2), (1e3, 1)])
+def test_a_prestress_that_tips_what_it_holds_is_told_with_what_is_left_of_it(tmp_path, capsys, prestress, phase):
+    """Of a stay to the ground at 1.5 m there is W b/2 where the pier of 0.5 m leans; with less it stands."""
+    (tmp_path / "piers.json").write_text(BLOCKS, encoding="utf-8")
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nfile = "piers.json"\n[material]\nfriction_coefficient = 2.0\n[[ties]]\nname = "stay"\n'
+        "from = [0.25, 1.5]\nto = { fixed = [-1.0, 1.5] }\nstiffness = 1e6\n"
+        f"prestress = {prestress}\nphase = {phase}\n"
+        + phase
+        * "[[settlement]]\ndirection = [1, 0]\nlimit = 1e-3\nincrement = 1e-3\n",
+        encoding="utf-8",
+    )
+    arguments = ["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out"), "--no-pictures", "--no-check-steps"]
+    assert main(arguments) == 0
+    told = capsys.readouterr()
+    (stay,) = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["ties"]
+    held = 2000.0 * solver.GRAVITY * 0.25 / 1.5
+    assert stay["first_force"] == pytest.approx(min(prestress, held), rel=0.03)
+    left = re.search(r": the blocks leave 3\.\d+ kN of its prestress of 10 kN, elastic", told.out)
+    assert (left is not None) == (prestress > held)
+    # From the second settlement on it is not as drawn.
+    moved = re.findall(r"as drawn the blocks do not stand; look (.*) or a missing", told.err)
+    from_drawing = ["at the prestress ('stay' 10000 N), for gaps between them (joint_thickness)"]
+    assert moved == (from_drawing if prestress > held and phase == 1 else [])
+
+
 def test_a_picture_draws_the_tie_in_the_colour_of_its_state(run, tmp_path):
     picture = Image.open(
         blockvis.draw_still(run.response, run.response.path[-1], tmp_path / "last.png", size=(480, 360))
