@@ -204,18 +204,8 @@ class Structure(Shown):
         The path is that of a settlement, see :mod:`solver.path.path`, with the multiplier as one more unknown and the
         control displacement as one more equation.
         """
-        increments = pushover_increments(
-            self.assembly,
-            control,
-            loads=self.loads,
-            interfaces=self.interfaces,
-            controls=controls,
-            pose=pose,
-            ties=self.ties,
-            ties_at=ties_at if ties_at is None else checked(ties_at, TieForces, "ties_at"),
-            bonds_at=bonds_at if bonds_at is None else checked(bonds_at, Bonds, "bonds_at"),
-            fallen=fallen,
-        )
+        given = self._standing(pose, ties_at, bonds_at, fallen) | {"loads": self.loads, "interfaces": self.interfaces}
+        increments = pushover_increments(self.assembly, control, controls=controls, **given)
         kind = {"analysis": "pushover", "parameter": CONTROL_DISPLACEMENT, "measured": LOAD_MULTIPLIER}
         return self._response(increments, on_increment, settlements=(), control=control, **kind)
 
@@ -288,21 +278,9 @@ class Structure(Shown):
         of the model, and an upper bound for every other flow rule with the same friction.
         """
         under = self if acceleration is None else self.with_live(acceleration=acceleration)
-        found = find_limit_load(
-            self.assembly,
-            self.interfaces,
-            under.loads,
-            pose=pose,
-            flow=flow,
-            closed_gap=closed_gap,
-            displacement=displacement,
-            overlap_tolerance=overlap_tolerance,
-            torsion=torsion,
-            ties=self.ties,
-            ties_at=ties_at if ties_at is None else checked(ties_at, TieForces, "ties_at"),
-            bonds_at=bonds_at if bonds_at is None else checked(bonds_at, Bonds, "bonds_at"),
-            fallen=fallen,
-        )
+        given = self._standing(pose, ties_at, bonds_at, fallen) | {"flow": flow, "torsion": torsion}
+        given |= {"closed_gap": closed_gap, "displacement": displacement, "overlap_tolerance": overlap_tolerance}
+        found = find_limit_load(self.assembly, self.interfaces, under.loads, **given)
         return replace(found, analysed=(self.assembly, self.interfaces, under.loads, self.ties))
 
     def envelope(
@@ -334,6 +312,14 @@ class Structure(Shown):
         given |= {"ties_at": ties_at, "bonds_at": bonds_at, "fallen": fallen}
         limits = (self.with_live(live(float(x))).limit_load(**given) for x in positions)
         return Envelope(positions, tuple(limits))
+
+    def _standing(
+        self, pose: Pose | None, ties_at: TieForces | None, bonds_at: Bonds | None, fallen: np.ndarray | None
+    ) -> dict[str, Any]:
+        """Arguments of an analysis that begins at an increment, which these tell of."""
+        ties_at = ties_at if ties_at is None else checked(ties_at, TieForces, "ties_at")
+        bonds_at = bonds_at if bonds_at is None else checked(bonds_at, Bonds, "bonds_at")
+        return {"pose": pose, "ties": self.ties, "ties_at": ties_at, "bonds_at": bonds_at, "fallen": fallen}
 
     def _response(
         self, increments: Increments, on_increment: Callable[[Increment], None] | None, **analysed: Any

@@ -46,11 +46,7 @@ def edge_force(assembly: Assembly, block: int, edge: int, pressure: float) -> Po
 
 
 def surface_pressure(
-    assembly: Assembly,
-    pressure: float,
-    direction: Sequence[float] = (0.0, -1.0),
-    *,
-    blocks: ArrayLike | None = None,
+    assembly: Assembly, pressure: float, direction: Sequence[float] = (0.0, -1.0), *, blocks: ArrayLike | None = None
 ) -> np.ndarray:
     """Load the faces that a direction meets first with a uniform pressure: :func:`surface_forces` as drawn.
 

@@ -42,9 +42,6 @@ from solver.ties import (
 from solver.tolerances import COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION, USED_UP
 from solver.words import checked, counted, plain
 
-#: Largest gap, in block sizes, of a contact point that may close within a displacement.
-REACH = 0.25
-
 
 def find_limit_load(
     assembly: Assembly,
@@ -75,11 +72,10 @@ def find_limit_load(
     bounds are recomputed from the forces and from the mechanism. In space the forces of a point are in its round cone
     |T| ≤ μ N, and the program is a conic one.
 
-    Cohesion c and compressive strength σ of the interfaces, off by default, give each contact point its part A of the
-    face between two blocks (half the distance to its neighbours, times the thickness): |T| ≤ μ N + c A and
-    -τ A ≤ N ≤ σ A with the tensile strength τ. A face of two corners thus carries moments up to σ A b / 2 with all of
-    its force at the ends: more than the stress block of a continuous face, so that crushing at a toe is found later
-    than it comes. What crushes moves by the same flow rule.
+    Cohesion c and compressive strength σ, off by default, give each contact point its part A of the face that touches
+    there (half the distance to its neighbours, times the thickness): |T| ≤ μ N + c A and -τ A ≤ N ≤ σ A with the
+    tensile strength τ. With all of its force at its ends a face carries larger moments than the stress block of a
+    continuous one, so that crushing at a toe is found later than it comes. What crushes moves by the same flow rule.
 
     At the pose of an increment its bonds say what is closed: gaps count from those at which elastic joints have no
     force, and points with tension left hold at any gap, as in the bounds of a path. The give that the forces of the
@@ -87,26 +83,21 @@ def find_limit_load(
 
     With a displacement δ, points that are open by a gap g carry at a price: maximise α - Σ g N / w, where w is δ times
     the sum of the live forces; its dual has N(q) + g ≥ μ |T(q)| and live · q = w. That is the first program of a
-    pushover with an increment δ. At closed joints it is the limit load, whatever δ is; the two values then enclose the
-    optimum of this program.
+    pushover with an increment δ, and at closed joints the limit load, whatever δ is.
 
-    Under a uniform pressure the shear force T and the torsion M of a face, about the centroid of the polygon that its
-    contact points span, are limited together, besides the forces at its points: |(T, M / r)| ≤ μ N with N the sum over
-    its points and r the mean distance of the polygon from its centroid, which is exact for T alone and for M alone.
+    Under a uniform pressure |(T, M / r)| ≤ μ N, too, of the resultants of a face about the centroid of the polygon that
+    its points span, r their mean distance from it: exact for the shear force T alone and for the torsion M alone.
 
     Non-associative flow is a sequence of such programs in the manner of Gilbert, Casapulla & Ahmed (2006),
     https://doi.org/10.1016/j.compstruc.2006.02.005: the friction cone of each point is replaced by |T| ≤ μ N⁰ with N⁰
     out of the normal forces of the programs before, and among equal multipliers the forces nearest to N⁰ are taken.
-    Ours has no dilatancy from the first program on and begins with the structure at rest, its forces of least elastic
-    energy under the dead load; what carries nothing there is asked last, so that a block that just fits between floor
-    and ceiling slides at μ, without the prestress that makes its associative limit load unbounded. Where it converges
-    (N = N⁰) the forces obey Coulomb friction and balance the loads, the mechanism does not lift where it slides, and
-    the power of the loads is what friction takes: a complete solution for friction without dilatancy, never above the
-    associative value. It is not proved to be the least: such a structure may have several limit loads, depending on how
-    it was loaded, and may fall below this one. Its two values agree where it has converged, but are no bounds.
-    Convergence is not proved either; "not converged" says so and gives the program that came nearest, or associative
-    flow where that carries less, whose value is then the upper bound. Where it finds no limit, forces that a program
-    adds are within friction and the associative program is unbounded, so is this one.
+    Ours has no dilatancy from the first program on and begins with the forces of least elastic energy under the dead
+    load; what carries nothing there is asked last, so that a block that just fits between floor and ceiling slides at
+    μ, without the prestress that makes its associative limit load unbounded. Where it converges (N = N⁰) it is a
+    complete solution for friction without dilatancy, the power of the loads what friction takes, and never above the
+    associative value. It is not proved to be the least, and its two values are no bounds. Not converged, the program
+    that came nearest is given, or associative flow where that carries less, whose value is then the upper bound. Where
+    forces that a program adds are within friction and the associative program is unbounded, so is this one.
     """
     _check_options(assembly, flow, torsion, ties)
     check_blocks(assembly, overlap_tolerance)
@@ -179,12 +170,9 @@ class _Problem:
     ) -> None:
         assembly, interfaces, members, d = model.assembly, model.interfaces, Members(model), model.dimension
         # Open points close within a displacement, and hold with what is left of their strength.
-        reach = max(closed_gap, REACH * model.length) if displacement > 0.0 or bonds is not None else closed_gap
+        reach = max(closed_gap, model.length / 4.0) if displacement > 0.0 or bonds is not None else closed_gap
         contacts = model.standing(find_contacts(assembly, moved_vertices(assembly, pose), reach))
         mortar, place = Mortar(model), members.installed(Place.unloaded(pose), 0, ties_at)
-        if bonds is None and not interfaces.dry:
-            touching = mortar.touching(pose, contacts, closed_gap)
-            contacts = replace(contacts, areas=np.where(contacts.gaps <= closed_gap, touching, contacts.areas))
         place = mortar.cast(place, contacts, closed_gap) if bonds is None else replace(place, bonds=bonds)
         contacts = members.beside(contacts, pose, place.tie_lengths)
         joints, tied = mortar.points(place, contacts), is_member(contacts)
@@ -193,7 +181,9 @@ class _Problem:
         gaps = np.where(joints.give[:, 0] > 0.0, np.maximum(gaps, 0.0), gaps)
         gaps[tied] = slack(contacts[tied], len(model.ties))
         (strength,) = interfaces.values(assembly, contacts.block_a, contacts.block_b, "compressive_strength")
-        areas = place.bonds.of(contacts).areas
+        whole = place.bonds.of(contacts)
+        # What touches alone crushes at once.
+        areas = np.where((bonds is None) & (contacts.gaps <= closed_gap), whole.left, 1.0) * whole.areas
         crushing = np.multiply(strength, areas, out=np.full(len(gaps), np.inf), where=np.isfinite(strength))
         crushing /= model.force
         # Members are plastic.

@@ -110,15 +110,7 @@ def facing_parts(placed: PlacedParts, reach: float, useful: np.ndarray, widths: 
     cosine_i, cosine_j = dot(normals[lead_i], normals[opposed_j]), dot(normals[lead_j], normals[opposed_i])
     equal = np.abs(apart_i - apart_j) <= SAME_SEPARATION * width
     i_leads = np.where(equal, cosine_i <= cosine_j, apart_i > apart_j)
-    return FacingParts(
-        i=i,
-        j=j,
-        lead_i=lead_i,
-        lead_j=lead_j,
-        apart_i=apart_i,
-        apart_j=apart_j,
-        face_i=np.where(i_leads, lead_i, opposed_i),
-        face_j=np.where(i_leads, opposed_j, lead_j),
-        width=width,
-        cosine=np.where(i_leads, cosine_i, cosine_j),
-    )[(apart_j <= reach) & ~inside]
+    faces = np.where(i_leads, lead_i, opposed_i), np.where(i_leads, opposed_j, lead_j)
+    cosine = np.where(i_leads, cosine_i, cosine_j)
+    found = FacingParts(i, j, lead_i, lead_j, apart_i, apart_j, *faces, width, cosine)
+    return found[(apart_j <= reach) & ~inside]

@@ -84,10 +84,9 @@ class Outlines(Bodies):
 
     @cached_property
     def convex_vertex(self) -> np.ndarray:
-        """(n_vertices,) bool array: false at straight and re-entrant corners, which have no contact points."""
+        """(n_vertices,) bool array: false at re-entrant corners and, to rounding, straight ones: no contact points."""
         along = (self.vertices[self.next_vertex] - self.vertices) / self.edge_lengths[:, None]
         before = along[self.previous_vertex]
-        # Straight to more than rounding.
         return before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0] > GEOMETRY_TOLERANCE
 
     @cached_property

@@ -150,8 +150,7 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
         kept = ~slides_past & ~sliver & ~behind
         inside = near(contacts)
         # What touches along a line alone has no area.
-        wide = np.bincount(corners.owner, inside, minlength=len(pair)) > 2
-        contacts = replace(contacts, areas=wide[corners.owner] * contacts.areas)
+        contacts = replace(contacts, areas=(np.bincount(corners.owner, inside) > 2)[corners.owner] * contacts.areas)
         resolved[pair[corners.owner[kept & inside & np.isfinite(corners.widths)]]] = True
         kept = np.flatnonzero(kept if not parts.whole else kept & inside)
         found.append(contacts[kept])

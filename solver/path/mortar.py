@@ -56,28 +56,24 @@ class Mortar:
 
     def __init__(self, model: Model) -> None:
         self.model, self.present = model, model.interfaces.mortar
-        #: [m]: what is accepted of a drawing as a joint.
-        self.accepted = max(COMPUTED_GAP * model.length, DRAWN_GAP * float(model.assembly.widths.min()))
-
-    def touching(self, pose: Pose, closed: Contacts, gap: float) -> np.ndarray:
-        """(n,) array [m²]: areas of faces between points up to a gap [m] alone; at hinges of the pose those drawn."""
-        assembly, areas = self.model.assembly, np.zeros(len(closed))
-        for vertices, reach in ((assembly.vertices, self.accepted), (moved_vertices(assembly, pose), gap)):
-            found = find_contacts(assembly, vertices, reach)
-            wide = found[found.areas > 0.0]
-            number, same = matched_contacts(closed, wide)
-            areas[same] = wide.areas[number[same]]
-        return areas
 
     def cast(self, place: Place, contacts: Contacts, closed_gap: float | None = None) -> Place:
         """The place with all of its closed joints whole: with gaps up to this one [m], or what drawings may have."""
-        if not self.present:
+        assembly = self.model.assembly
+        if not self.present and self.model.interfaces.dry:
             return place
-        gap = self.accepted if closed_gap is None else closed_gap
+        # What is accepted of a drawing as a joint is filled.
+        accepted = max(COMPUTED_GAP * self.model.length, DRAWN_GAP * float(assembly.widths.min()))
+        gap = accepted if closed_gap is None else closed_gap
         closed = contacts[contacts.gaps <= gap]
-        areas = self.touching(place.pose, closed, gap)
-        # A corner alone gives as the face does that opens there, and has none of its strength.
-        whole = Bonds(closed.features[:, :3], np.where(areas > 0.0, areas, closed.areas), np.sign(areas), 0.0 * areas)
+        areas, left = closed.areas.copy(), np.zeros(len(closed))
+        # Of faces between closed points; a hinge keeps its part of the drawn one. A corner that touches alone gives as
+        # the face does that opens there, and has nothing of its strength.
+        for pose, reach in ((Pose.initial(assembly), accepted), (place.pose, gap)):
+            found = find_contacts(assembly, moved_vertices(assembly, pose), reach)
+            number, same = matched_contacts(closed, wide := found[found.areas > 0.0])
+            areas[same], left[same] = wide.areas[number[same]], 1.0
+        whole = Bonds(closed.features[:, :3], areas, left, np.zeros(len(closed)))
         joints = self.points(replace(place, bonds=whole), closed)
         filled = (joints.strength > 0.0).any(axis=1) | (joints.give > 0.0).any(axis=1)
         return replace(place, bonds=replace(whole, rest=np.where(filled, closed.gaps, 0.0)))

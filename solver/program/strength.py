@@ -46,12 +46,7 @@ class Admissible:
 
     @classmethod
     def of(
-        cls,
-        friction: np.ndarray,
-        cohesion: np.ndarray,
-        crushing: np.ndarray,
-        size: int,
-        faces: Faces | None = None,
+        cls, friction: np.ndarray, cohesion: np.ndarray, crushing: np.ndarray, size: int, faces: Faces | None = None
     ) -> Admissible:
         """All (N, T) with 0 ≤ N ≤ crushing and |T| ≤ friction · N + cohesion, (n,) arrays each.
 

@@ -449,10 +449,9 @@ class LimitLoad(HasState, Shown):
         known = f", bounds differ by {self.gap:.1e}"
         if self.status is LimitStatus.NOT_CONVERGED:
             known = f", at most {self.bounds[1]:.6g}" if np.isfinite(self.bounds[1]) else ""
+        doubt = "" if self.status is LimitStatus.FOUND else f", {self.status}"
         text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction{law}{known})"
-        text += f", {counted(len(moving), 'block')} moving" + (
-            "" if self.status is LimitStatus.FOUND else f", {self.status}"
-        )
+        text += f", {counted(len(moving), 'block')} moving{doubt}"
         return f"{text}; {self.caveat}" if self.caveat else text
 
 
