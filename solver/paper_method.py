@@ -313,8 +313,8 @@ class _Phase:
         return Ending(Status.LIMIT_REACHED, words), current.pose
 
     def increment(self, current: _Equilibrium, step: float, upper_bound: float) -> Increment:
-        place, ended = Place.unloaded(current.pose, current.s), current.s >= self.phase.limit
-        checkpoint = PathState(self.number, self.start, place, step, upper_bound, ended=ended)
+        place = Place.unloaded(current.pose, current.s)
+        checkpoint = PathState(self.number, self.start, place, step, upper_bound, reported=current.s)
         solution = self.reported(current.solution, current.s, current.reaction, Status.EQUILIBRIUM)
         return replace(solution, least=current.reaction, checkpoint=checkpoint)
 

@@ -202,7 +202,7 @@ class Path:
             ending = yield from self._report_start(state)
             if ending is not None:
                 return ending
-        while not self.state.ended:
+        while self.state.reported < self.driver.limit * (1.0 - 1e-12):
             # What blocks that drop come to may be at a stop that has not been reported.
             self.state, outcome = self.advance(self.state, self.driver.next_stop(self.state.reported))
             if outcome.stop in (Status.EQUILIBRIUM, Status.FALLING):
@@ -306,7 +306,7 @@ class Path:
             state = self._continue_from(state, resting)
         check = check if carries else self._check(resting, reaction)
         resting, peak = replace(resting, works=place.works), max(state.peak, resting.multiplier)
-        self.state = replace(state, history=(resting,), ended=place.s >= self.driver.limit * (1.0 - 1e-12), peak=peak)
+        self.state = replace(state, history=(resting,), peak=peak)
         yield self._report(check)
 
     def _report_peak(self, state: PathState) -> Iterator[Increment]:

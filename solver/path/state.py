@@ -49,7 +49,6 @@ class PathState:
     refined: bool = False  #: whether the upper bound was found with reduced viscosity
     refine_until: float = -np.inf  #: [m or rad]: up to here the viscosity stays reduced
     history: tuple[Place, ...] = ()  #: places before, oldest first, to go back to from one without equilibrium
-    ended: bool = False  #: whether the phase has reached its limit
     reported: float = -np.inf  #: [m or rad], parameter of the last increment
     peak: float = 0.0  #: multiplier above which a peak is reported
     fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))  #: (n_blocks,), as in :class:`State`
