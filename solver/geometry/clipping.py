@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.tolerances import CORNER_TOLERANCE
 
-from .convex_parts import ConvexParts, PlacedParts
+from .convex_parts import A_LITTLE, ENDS, GOES_ON, PlacedParts
 from .outlines import next_vertices
 from .portions import alike
 from .separations import SMALLEST_SINE
@@ -22,7 +22,7 @@ class ClippedCorners(NamedTuple):
     owner: np.ndarray  #: (n,) int: the pair of faces
     features: np.ndarray  #: (n, 4) int
     areas: np.ndarray  #: (n,) [m²]: tributary area of each corner in its polygon
-    widths: np.ndarray  #: (n,) [m], of the polygon; infinite at a corner in a re-entrant corner
+    widths: np.ndarray  #: (n,) [m], of the polygon; infinite at the end of a line along a cut
 
 
 def clipped_faces(placed: PlacedParts, face_a: np.ndarray, face_b: np.ndarray) -> ClippedCorners:
@@ -56,11 +56,11 @@ def _clipped(
     )
     along_a, along_b = np.roll(a, -1, axis=1) - a, np.roll(b, -1, axis=1) - b
     long_a, long_b = (np.maximum(np.hypot(d[..., 0], d[..., 1]), 1e-300) for d in (along_a, along_b))
+    unit_a, unit_b = along_a / long_a[..., None], along_b / long_b[..., None]
     end = CORNER_TOLERANCE * np.minimum(solids.shortest_edges[face_a], solids.shortest_edges[face_b])[:, None]
 
     # How far each corner is inside each edge of the other polygon: (n, corners, edges).
-    a_in_b = _inside(a, b, along_b / long_b[..., None])
-    b_in_a = _inside(b, a, along_a / long_a[..., None])
+    a_in_b, b_in_a = _inside(a, b, unit_b), _inside(b, a, unit_a)
     used_a, used_b = a_in_b.min(axis=2) >= -end, b_in_a.min(axis=2) >= -end
     apart = np.abs(a[:, :, None] - b[:, None]).max(axis=3)
     both = (apart <= 2.0 * end[..., None]) & used_a[:, :, None] & used_b[:, None]
@@ -68,11 +68,13 @@ def _clipped(
     tight = end[..., None]
     crosses, on_a, on_b = _crossings(a_in_b, b_in_a, (long_a, long_b), (used_a, used_b), tight)
     pair, p, q = np.nonzero(both)
-    on_corner = (
-        pair,
-        feature_rows(ON_CORNER, corner_a[pair, p], corner_b[pair, q], -1),
-        (a[pair, p] + b[pair, q]) / 2.0,
-    )
+    own, other = corner_a[pair, p], corner_b[pair, q]
+    # Where the face of one block alone goes on, the corner of the other is on that face.
+    goes_a, goes_b = parts.goes_on[own], parts.goes_on[other]
+    vertex, face = solids.corners[np.where(goes_b, own, other)], np.where(goes_b, face_b[pair], face_a[pair])
+    alone = (goes_a != goes_b)[:, None]
+    features = np.where(alone, feature_rows(ON_FACE, vertex, face, -1), feature_rows(ON_CORNER, own, other, -1))
+    on_corner = pair, features, (a[pair, p] + b[pair, q]) / 2.0
     alone_a, alone_b = used_a & ~both.any(axis=2), used_b & ~both.any(axis=1)
     vertex_a = _on_face(placed, end, alone_a, a, a_in_b, corner_a, face_b, edge_b)
     vertex_b = _on_face(placed, end, alone_b, b, b_in_a, corner_b, face_a, edge_a)
@@ -89,49 +91,42 @@ def _clipped(
         a[pair, p] + u[:, None] * along_a[pair, p],
     )
     owner, features, points = map(np.concatenate, zip(on_corner, vertex_a, vertex_b, across, strict=True))
-    areas, wide, long = corner_areas(owner, points, len(face_a))
+    areas, wide, long, middle = corner_areas(owner, points, len(face_a))
     kept = wide[owner] > end[owner, 0]
     clipped = ClippedCorners(owner[kept], features[kept], areas[kept], wide[owner[kept]])
     if parts.whole:
         return clipped
-    narrow = ((wide <= end[:, 0]) & (long > 4.0 * end[:, 0]))[:, None]
-    sides = [
-        (narrow & used, np.abs(inside) <= tight, _hold_all(owner, points, start, direction, end), corner, face, edge)
-        for used, inside, start, direction, corner, face, edge in (
-            (used_a, a_in_b, b, along_b / long_b[..., None], corner_a, face_b, edge_b),
-            (used_b, b_in_a, a, along_a / long_a[..., None], corner_b, face_a, edge_a),
-        )
-    ]
-    return _with_reentrant_corners(parts, clipped, *sides)
+    line, lines = (wide <= end[:, 0]) & (long > 100.0 * end[:, 0]), []
+    middles = origin[:, 0] + middle[:, :1] * x + middle[:, 1:] * y
+    for edge, start, direction in ((edge_b, b, unit_b), (edge_a, a, unit_a)):
+        # The edge along which all lies that is covered.
+        off = np.zeros(edge.shape)
+        np.maximum.at(off, owner, np.abs(_inside(points[:, None], start[owner], direction[owner])[:, 0]))
+        line &= off.min(axis=1) <= end[:, 0]
+        lines.append(edge[np.arange(len(edge)), off.argmin(axis=1)])
+    of_a = _line_ends(placed, line, middles, used_a, corner_a, *vertex_b[:2], face_b, *lines)
+    of_b = _line_ends(placed, line, middles, used_b, corner_b, *vertex_a[:2], face_a, *lines[::-1])
+    return ClippedCorners(*map(np.concatenate, zip(clipped, of_a, of_b, strict=True)))
 
 
-def _hold_all(
-    owner: np.ndarray, points: np.ndarray, start: np.ndarray, direction: np.ndarray, end: np.ndarray
-) -> np.ndarray:
-    """(n, n_corners) bool array: edges along which all lies that is covered."""
-    far = np.zeros(start.shape[:2])
-    np.maximum.at(far, owner, np.abs(_inside(points[:, None], start[owner], direction[owner])[:, 0]))
-    return far <= end
+def _line_ends(placed: PlacedParts, line: np.ndarray, middles: np.ndarray, *side: np.ndarray) -> ClippedCorners:
+    """Find the ends of lines in which faces, (n,), are touched along edges beyond which these go on.
 
-
-def _with_reentrant_corners(
-    parts: ConvexParts, clipped: ClippedCorners, *sides: tuple[np.ndarray, ...]
-) -> ClippedCorners:
-    """Add the corners, of those used, at the end of a face at which its block was cut: they touch it, and cover none.
-
-    Where a face ends at an edge of its block, an edge that only lies along that one may leave it; in a re-entrant
-    corner, where all that is covered lies along the cut, it may not.
+    Where a face ends at an edge of its block, an edge that only lies along that one may leave it. In a re-entrant
+    corner it may not: the face holds it, at its own corners and where it crosses the sides of the face.
     """
-    owners, features = [clipped.owner], [clipped.features]
-    for used, on_edge, holds_all, corner, face, edge in sides:
-        at_cut = (on_edge & (holds_all & parts.cut_edges[edge])[:, None]).any(axis=2)
-        pair, p = np.nonzero(used & at_cut & ~parts.made[parts.solids.corners[corner]])
-        owners.append(pair)
-        features.append(feature_rows(ON_FACE, parts.solids.corners[corner[pair, p]], face[pair], -1))
-    owner = np.concatenate(owners)
-    zeros = np.zeros(len(owner) - len(clipped.owner))
-    areas, widths = np.append(clipped.areas, zeros), np.append(clipped.widths, zeros + np.inf)
-    return ClippedCorners(owner, np.concatenate(features), areas, widths)
+    corners, (used, corner, owner, features, face, edge, along) = placed.solids.corners, side
+    pair, p = np.nonzero(used & line[:, None])
+    owner, end, code = np.column_stack([owner, features[:, [1, 3]]])[line[owner] & (features[:, 3] >= 0)].T
+    own, other, crossed = corners[corner[pair, p]], along[owner], code % len(corners)
+    direction = placed.along(other)
+    place = dot(placed.vertices[end] - placed.starts(other), direction) / dot(direction, direction)
+    across = feature_rows(ACROSS, other, crossed, places_of(place, corners[crossed] != end))
+    features = np.concatenate([feature_rows(ON_FACE, own, face[pair], -1), across])
+    pair, at = np.append(pair, owner), placed.vertices[np.append(own, end)]
+    kept = placed.kinds_at(edge[pair], at + A_LITTLE * (middles[pair] - at)) == GOES_ON
+    zeros = np.zeros(np.count_nonzero(kept))
+    return ClippedCorners(pair[kept], features[kept], zeros, zeros + np.inf)
 
 
 def _crossings(
@@ -175,7 +170,7 @@ def _on_face(
     edge: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Owners, features and points of corners on faces, with the edges that cross where they are on the boundary."""
-    solids, cut = placed.solids, placed.parts.cut_edges
+    solids = placed.solids
     pair, p = np.nonzero(alone)
     depths = inside[pair, p]
     own, other = corner[pair, p], edge[pair, depths.argmin(axis=1)]
@@ -185,14 +180,15 @@ def _on_face(
     sine = np.sqrt(dot(crossing, crossing))
     steepest = sine.argmax(axis=1)
     row = np.arange(len(own))
+    crossed, at = candidates[row, steepest], placed.starts(own)
     on_boundary = (depths.min(axis=1) <= end[pair, 0]) & (sine[row, steepest] >= SMALLEST_SINE)
-    on_boundary &= ~cut[other] & ~cut[candidates[row, steepest]]
-    code = np.where(on_boundary, other * np.int64(len(solids.corners)) + candidates[row, steepest], -1)
+    on_boundary &= (placed.kinds_at(other, at) == ENDS) & (placed.kinds_at(crossed, at) == ENDS)
+    code = np.where(on_boundary, other * np.int64(len(solids.corners)) + crossed, -1)
     return pair, feature_rows(ON_FACE, solids.corners[own], face[pair], code), points[pair, p]
 
 
-def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Tributary areas (n,) [m²] of corners (n, 2), in any order, of convex polygons; their widths, lengths (count,)."""
+def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, ...]:
+    """Tributary areas (n,) [m²] of corners (n, 2), in any order, of convex polygons; their widths, lengths, middles."""
     number = np.bincount(owner, minlength=count)
     total = np.stack([np.bincount(owner, points[:, k], minlength=count) for k in (0, 1)], axis=1)
     middle = total / np.maximum(number, 1)[:, None]
@@ -210,4 +206,4 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
     area = np.bincount(owner, shares, minlength=count)
     far = np.zeros(count)
     np.maximum.at(far, owner, np.hypot(arms[:, 0], arms[:, 1]))
-    return np.maximum(shares, 0.0), area / np.maximum(2.0 * far, 1e-300), 2.0 * far
+    return np.maximum(shares, 0.0), area / np.maximum(2.0 * far, 1e-300), 2.0 * far, middle

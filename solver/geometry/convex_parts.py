@@ -8,10 +8,11 @@ from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import qr
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from solver.tolerances import DRAWN_GAP
+from solver.tolerances import CORNER_TOLERANCE, DRAWN_GAP
 
 from .flat_faces import ONE_WAY, merged_faces
 from .portions import alike
@@ -26,7 +27,7 @@ REENTRANT = 1e-4
 #: Points nearer to a plane than this fraction of the diagonal of their block are on it.
 ON_PLANE = 1e-6
 
-#: Corners of parts farther than this fraction of that diagonal from all corners of their block are made by a cut.
+#: Points nearer than this fraction of that diagonal to an edge or a face of their block are on it.
 ON_CORNER = 5e-6
 
 #: Parts whose volumes do not add up to that of their block within this fraction of it are no parts of it.
@@ -47,6 +48,12 @@ SAME_VOLUME = 1e-6
 #: A part with less than this fraction of the cube over the diagonal of its block is what rounding has left at a cut.
 SMALLEST_PART = 1e-10
 
+#: Kinds of a piece of an edge of a face of a part: there the face is inside the block, ends at its edge, or goes on.
+INSIDE, ENDS, GOES_ON = 0.0, 1.0, 2.0
+
+#: Whether a face goes on beyond an edge is asked this part of the way from there to its middle.
+A_LITTLE = 1e-3
+
 #: Blocks whose parts are kept: an assembly is made anew with each change of roles, imperfections or joints.
 MOST_KEPT = 2000
 
@@ -64,13 +71,13 @@ class ConvexParts:
     weights: np.ndarray  #: (n_corners, 4): with these weights
     inner: np.ndarray  #: (n_faces,) bool: faces of the parts inside their block, where it was cut
     plane: np.ndarray  #: (n_faces,) int: the same for faces into which one face of a block was cut
-    made: np.ndarray  #: (n_corners,) bool: corners that the cuts have made, none of the block
+    pieces: np.ndarray  #: (n_corners, n_pieces, 3): of each edge from corner to corner of the block: first, last, kind
 
     @cached_property
-    def cut_edges(self) -> np.ndarray:
-        """(n_corners,) bool array: edges at a face inside the block, which are none of the block, or not as sharp."""
-        face = self.solids.face_of_corner
-        return self.inner[face] | self.inner[face[self.solids.twins]]
+    def goes_on(self) -> np.ndarray:
+        """(n_corners,) bool array: corners of faces beyond which the face of the block goes on."""
+        kind = self.pieces[..., 2] == GOES_ON
+        return kind[:, 0] | kind[self.solids.previous_corner, -1]
 
     @property
     def whole(self) -> bool:
@@ -119,6 +126,15 @@ class PlacedParts:
         heights = dot(normals[:, :, None], corners[:, None]).min(axis=2)
         return heights - dot(normals, self.faces.middles[face] - origin)
 
+    def kinds_at(self, edges: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """(n,) array: kinds of edges where points (n, 3) [m] are along them, the larger at the end of two pieces."""
+        along = self.along(edges)
+        place = dot(points - self.starts(edges), along) / dot(along, along)
+        place = np.clip(place, 2.0 * CORNER_TOLERANCE, 1.0 - 2.0 * CORNER_TOLERANCE)[:, None]
+        first, last, kind = np.moveaxis(self.parts.pieces[edges], -1, 0)
+        here = (first - CORNER_TOLERANCE <= place) & (place <= last + CORNER_TOLERANCE)
+        return np.where(here, kind, INSIDE).max(axis=1)
+
     def outward(self, edges: np.ndarray) -> np.ndarray:
         """(..., 3) array: sum of the outward normals of the two faces at each edge."""
         face = self.solids.face_of_corner
@@ -136,39 +152,31 @@ def convex_parts(solids: Solids) -> ConvexParts:
     cut through a re-entrant edge and the third corner that leave two pieces whose convex hulls hold the least volume,
     until each piece is convex.
     """
-    bent = np.flatnonzero(_out_of_faces(solids) > DRAWN_GAP * solids.widths)
-    if len(bent) == 0:
-        none = np.zeros((0, 4))
-        n_faces, n_corners = len(solids.block_of_face), len(solids.vertices)
-        inner, made = np.zeros(n_faces, dtype=bool), np.zeros(n_corners, dtype=bool)
-        return ConvexParts(solids, np.arange(len(solids)), none.astype(np.int64), none, inner, np.arange(n_faces), made)
-    surfaces, sources, weights, block_of_part, drawn_faces, made_corners = [], [], [], [], [], []
-    is_bent = np.isin(np.arange(len(solids)), bent)
+    bent = _out_of_faces(solids) > DRAWN_GAP * solids.widths
+    if not bent.any():
+        none, n_faces, ends = np.zeros((0, 4)), len(solids.block_of_face), np.array([0.0, 1.0, ENDS])
+        of_faces = np.zeros(n_faces, dtype=bool), np.arange(n_faces), np.tile(ends, (len(solids.corners), 1, 1))
+        return ConvexParts(solids, np.arange(len(solids)), none.astype(np.int64), none, *of_faces)
+    surfaces, sources, weights, block_of_part, drawn_faces = [], [], [], [], []
+    pieces: list[np.ndarray] = []
     for block in range(len(solids)):
         own, loops = solids.surface(block)
-        start = int(solids.offsets[block])
-        parts = [(own, loops, list(range(len(loops))))]
-        if is_bent[block]:
-            frame = _spread_corners(own)
+        frame = _spread_corners(own)
+        parts = [(own, loops, [(k, np.tile([0.0, 1.0, ENDS], (len(loop), 1, 1))) for k, loop in enumerate(loops)])]
+        if bent[block]:
             try:
                 parts = _parts_of(own.tobytes(), tuple(map(tuple, loops)))
             except ValueError as error:
                 raise NoParts(block, str(error)) from None
-        for corners, around, drawn in parts:
-            drawn_faces += [(block, number) for number in drawn]
+        for corners, around, faces in parts:
+            drawn_faces += [(block, number) for number, _ in faces]
+            pieces += [of_edges for _, of_edges in faces]
             surfaces.append((corners, around))
             block_of_part.append(block)
-            far = ON_CORNER * float(np.linalg.norm(np.ptp(own, axis=0)))
-            made_corners.append(np.abs(corners[:, None] - own).max(axis=2).min(axis=1) > far)
-            if is_bent[block]:
-                arms = np.linalg.solve((own[frame[1:]] - own[frame[0]]).T, (corners - own[frame[0]]).T).T
-                sources.append(np.tile(start + frame, (len(corners), 1)))
-                weights.append(np.column_stack([1.0 - arms.sum(axis=1), arms]))
-            else:
-                number = start + np.arange(len(corners))
-                sources.append(np.tile(number[:, None], (1, 4)))
-                weights.append(np.tile([1.0, 0.0, 0.0, 0.0], (len(corners), 1)))
-    drawn_face = np.array(drawn_faces)
+            arms = np.linalg.solve((own[frame[1:]] - own[frame[0]]).T, (corners - own[frame[0]]).T).T
+            sources.append(np.tile(int(solids.offsets[block]) + frame, (len(corners), 1)))
+            weights.append(np.column_stack([1.0 - arms.sum(axis=1), arms]))
+    drawn_face, n = np.array(drawn_faces), max(k.shape[1] for k in pieces)
     return ConvexParts(
         Solids.of_surfaces(surfaces),
         np.array(block_of_part),
@@ -176,7 +184,7 @@ def convex_parts(solids: Solids) -> ConvexParts:
         np.concatenate(weights),
         drawn_face[:, 1] < 0,
         np.unique(drawn_face, axis=0, return_inverse=True)[1].ravel(),
-        np.concatenate(made_corners),
+        np.concatenate([np.pad(k, ((0, 0), (0, n - k.shape[1]), (0, 0)), mode="edge") for k in pieces]),
     )
 
 
@@ -194,12 +202,7 @@ def _out_of_faces(solids: Solids) -> np.ndarray:
 def _spread_corners(vertices: np.ndarray) -> np.ndarray:
     """(4,) int array: four corners far from a common plane."""
     first = int(np.linalg.norm(vertices - vertices.mean(axis=0), axis=1).argmax())
-    arms = vertices - vertices[first]
-    second = int(np.linalg.norm(arms, axis=1).argmax())
-    area = np.cross(arms, arms[second])
-    third = int(np.linalg.norm(area, axis=1).argmax())
-    fourth = int(np.abs(arms @ area[third]).argmax())
-    return np.array([first, second, third, fourth])
+    return np.append(first, qr((vertices - vertices[first]).T, mode="r", pivoting=True)[1][:3])
 
 
 @dataclass(frozen=True)
@@ -264,13 +267,16 @@ def _body(points: np.ndarray, triangles: np.ndarray) -> Manifold:
 
 
 @lru_cache(maxsize=MOST_KEPT)
-def _parts_of(points: bytes, faces: tuple[tuple[int, ...], ...]) -> list[tuple[np.ndarray, list[list[int]], list[int]]]:
-    """Corners and faces of each part of a block; the block's face in which each lies, below 0 and its own inside."""
+def _parts_of(
+    points: bytes, faces: tuple[tuple[int, ...], ...]
+) -> list[tuple[np.ndarray, list[list[int]], list[tuple[int, np.ndarray]]]]:
+    """Corners and faces of each part of a block; for each its face there, below 0 inside, and pieces of the edges."""
     vertices, loops = np.frombuffer(points).reshape(-1, 3), [list(face) for face in faces]
     origin, size = vertices[0], float(np.linalg.norm(np.ptp(vertices, axis=0)))
     drawn = Solids.of_surfaces([((vertices - origin) / size, loops)])
     planes, flatness = drawn.faces(drawn.vertices), DRAWN_GAP * float(drawn.widths[0])
     whole = _whole(drawn.vertices, loops, planes.normals)
+    edges = _bent_edges(whole, planes.normals, 1.0)
     queue, parts, total, number, inside = [whole], [], 0.0, _flat_faces(whole), count(1)
     while queue:
         piece = queue.pop()
@@ -280,8 +286,9 @@ def _parts_of(points: bytes, faces: tuple[tuple[int, ...], ...]) -> list[tuple[n
         else:
             corners, rings, volume = _hull(_drawn_corners(piece.corners, drawn.vertices), flatness)
             total += volume
-            faces_of = [_drawn_face(corners[ring], whole, number, flatness) for ring in rings]
-            parts.append((corners * size + origin, rings, [k if k >= 0 else -next(inside) for k in faces_of]))
+            drawn_in = [_drawn_face(corners[ring], whole, number, edges, flatness) for ring in rings]
+            drawn_in = [(k if k >= 0 else -next(inside), pieces) for k, pieces in drawn_in]
+            parts.append((corners * size + origin, rings, drawn_in))
         if len(queue) + len(parts) > MOST_PARTS:
             raise ValueError(f"has more than {MOST_PARTS} convex parts; simplify its surface")
     volume = drawn.volumes[0]
@@ -348,8 +355,13 @@ def _flat_faces(whole: _Piece) -> np.ndarray:
     return np.asarray(connected_components(coo_array((np.ones(len(k)), (own[k], beyond[k])), shape=(n, n)))[1])
 
 
-def _drawn_face(face: np.ndarray, whole: _Piece, number: np.ndarray, flatness: float) -> int:
-    """Find the number, of those of all triangles of a block, of what lies in a face of a part; -1 inside the block."""
+def _drawn_face(
+    face: np.ndarray, whole: _Piece, number: np.ndarray, edges: np.ndarray, flatness: float
+) -> tuple[int, np.ndarray]:
+    """Find the number, of those of all triangles of a block, of what lies in a face of a part; -1 inside the block.
+
+    And the pieces of its edges, (n_corners, n_pieces, 3); the convex edges of the block are (n, 2, 3).
+    """
     arms = face - face[0]
     normal = unit(cross(arms[1:-1], arms[2:]).sum(axis=0))
     same = (np.abs((whole.points[whole.triangles] - face.mean(axis=0)) @ normal) <= 2.0 * flatness).all(axis=1)
@@ -361,7 +373,22 @@ def _drawn_face(face: np.ndarray, whole: _Piece, number: np.ndarray, flatness: f
         outward = unit(cross(np.roll(ring, -1, axis=1) - ring, normal))
         inside = dot(ring[:, :, None] - other[:, None], outward[:, :, None]).max(axis=2)
         apart |= (inside <= ON_PLANE).any(axis=1)
-    return int(number[same][~apart][0]) if not apart.all() else -1
+    # Pieces of edges go from corner to corner of the block.
+    start, along = face[:, None], (np.roll(face, -1, axis=0) - face)[:, None]
+    arms = whole.points - start
+    place = dot(arms, along) / dot(along, along)
+    between = np.abs(arms - place[..., None] * along).max(axis=2) <= ON_CORNER
+    between &= np.abs(place - 0.5) < 0.5 - CORNER_TOLERANCE
+    ends = np.sort(np.where(between, place, 1.0), axis=1)[:, : between.sum(axis=1).max()]
+    first, last = np.pad(ends, ((0, 0), (1, 0))), np.pad(ends, ((0, 0), (0, 1)), constant_values=1.0)
+    middle = start + (first + last)[..., None] / 2.0 * along
+    beside = middle + A_LITTLE * (face.mean(axis=0) - middle)
+    drawn = (dot(beside[:, :, None, None] - own, outward).max(axis=3) <= ON_PLANE).any(axis=2)
+    arms, along = middle[:, :, None] - edges[:, 0], edges[:, 1] - edges[:, 0]
+    nearest = np.clip(dot(arms, along) / dot(along, along), 0.0, 1.0)[..., None] * along
+    on_edge = (np.abs(arms - nearest).max(axis=3) <= ON_CORNER).any(axis=2)
+    kind = np.where(drawn, np.where(on_edge, ENDS, GOES_ON), INSIDE)
+    return int(number[same][~apart][0]) if not apart.all() else -1, np.dstack([first, last, kind])
 
 
 def _hull(points: np.ndarray, flatness: float) -> tuple[np.ndarray, list[list[int]], float]:
@@ -401,7 +428,7 @@ def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray
         return None
     starts = piece.points[piece.triangles]
     ends = np.roll(starts, -1, axis=1)
-    edges = _reentrant_edges(piece, planes.normals)
+    edges = _bent_edges(piece, planes.normals, -1.0)
     length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     widths = np.linalg.norm(ends - starts, axis=2)
     opposite = np.roll(starts, 1, axis=1).reshape(-1, 3)[piece.twins].reshape(-1, 3, 3)
@@ -436,15 +463,15 @@ def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray
     return best
 
 
-def _reentrant_edges(piece: _Piece, normals: np.ndarray) -> np.ndarray:
-    """(n, 2, 3) array: ends of edges, longest first, where faces of the block, (n_faces, 3) normals, turn inwards."""
+def _bent_edges(piece: _Piece, normals: np.ndarray, sense: float) -> np.ndarray:
+    """(n, 2, 3) array: ends of edges, longest first, where faces with these normals turn outwards; -1.0 for inwards."""
     edges, face, twin = piece.edges, np.repeat(piece.face, 3), piece.twins
     k = np.flatnonzero((edges[:, 0] < edges[:, 1]) & (face < len(normals)) & (face[twin] < len(normals)))
     ends = piece.points[edges[k]]
     along = ends[:, 1] - ends[:, 0]
     length = np.sqrt(dot(along, along))
     turn = dot(cross(normals[face[k]], normals[face[twin[k]]]), along)
-    bent = np.flatnonzero(turn < -REENTRANT * length)
+    bent = np.flatnonzero(sense * turn > REENTRANT * length)
     return ends[bent[np.argsort(-length[bent], kind="stable")]]
 
 

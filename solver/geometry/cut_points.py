@@ -1,4 +1,4 @@
-"""Contact points that are there only because a block was cut into convex parts."""
+"""Contact points between others, in faces of blocks that were cut into convex parts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from .broad_phase import expand_ranges
 from .clipping import corner_areas
 from .contacts import Contacts
 from .convex_parts import ConvexParts
-from .spatial_features import ACROSS, ON_FACE
 
 #: Points are on a line where the angle between others is this near to a half turn.
 STRAIGHT = 1e-3
@@ -19,7 +18,7 @@ STRAIGHT = 1e-3
 def without_points_of_cuts(
     parts: ConvexParts, contacts: Contacts, planes: np.ndarray, near: float
 ) -> tuple[Contacts, np.ndarray]:
-    """Leave out points at cuts that lie between others in the same two faces.
+    """Leave out points that lie between others in the same two faces, where one of these was cut.
 
     With the numbers that the remaining points had, (n_remaining,) int. Points up to ``near`` [m] apart are at one
     place; ``planes``, (n, 2) int, are those of the two faces between which each was found, -1 where it was not.
@@ -30,34 +29,22 @@ def without_points_of_cuts(
     """
     from scipy.spatial import cKDTree
 
-    solids, (kind, first, second, _) = parts.solids, contacts.features.T
-    cut, made, corners = parts.cut_edges, parts.made, solids.corners
-    edge = np.where(kind == ON_FACE, 0, first)
-    of_cut = np.where(
-        kind == ON_FACE,
-        made[np.where(kind == ON_FACE, first, 0)],
-        np.where(kind == ACROSS, cut[edge] | cut[second], made[corners[edge]] & made[corners[second]]),
-    )
     in_several = (np.bincount(parts.plane)[planes] > 1).any(axis=1)
     _, group = np.unique(planes, axis=0, return_inverse=True)
-    chosen = np.flatnonzero(np.isin(group, group[of_cut | in_several]) & (planes[:, 0] >= 0))
+    chosen = np.flatnonzero(np.isin(group, group[in_several]) & (planes[:, 0] >= 0))
     chosen = chosen[np.argsort(group[chosen], kind="stable")]
     _, start, group_of, counts = np.unique(group[chosen], return_index=True, return_inverse=True, return_counts=True)
-    # A part that has a face of its block in the plane of the cut has no edge at it; the part beyond the cut has.
     pairs = cKDTree(contacts.points[chosen]).query_pairs(near, output_type="ndarray")
     pairs = pairs[group_of[pairs[:, 0]] == group_of[pairs[:, 1]]]
-    beside = chosen[np.concatenate([pairs[of_cut[chosen[pairs[:, k]]], 1 - k] for k in (0, 1)])]
-    of_cut[beside[kind[beside] == ACROSS]] = True
     # In the plane of the first point of each group, from there.
     origin, frame = contacts.points[chosen[start]][group_of], contacts.frames[chosen[start]][group_of]
     places = np.einsum("ni,nki->nk", contacts.points[chosen] - origin, frame[:, 1:])
 
-    # The widest angle at each point without another point, elsewhere, that is at no cut.
+    # The widest angle at each point without another point elsewhere.
     owner, position = expand_ranges(counts[group_of])
-    other = start[group_of][owner] + position
-    arms_to = places[other] - places[owner]
-    seen = ~of_cut[chosen[other]] & (np.abs(arms_to).max(axis=1) > near)
-    owner, angles = owner[seen], np.arctan2(arms_to[seen, 1], arms_to[seen, 0])
+    arms_to = places[start[group_of][owner] + position] - places[owner]
+    elsewhere = np.abs(arms_to).max(axis=1) > near
+    owner, angles = owner[elsewhere], np.arctan2(arms_to[elsewhere, 1], arms_to[elsewhere, 0])
     order = np.lexsort((angles, owner))
     owner, angles = owner[order], angles[order]
     lowest, highest = np.full(len(chosen), np.pi), np.full(len(chosen), -np.pi)
@@ -66,12 +53,12 @@ def without_points_of_cuts(
     widest = lowest - highest + 2.0 * np.pi
     next_to = np.flatnonzero(np.diff(owner) == 0)
     np.maximum.at(widest, owner[next_to], np.diff(angles)[next_to])
-    between = of_cut[chosen] & (widest <= np.pi + STRAIGHT)
+    between = widest <= np.pi + STRAIGHT
 
     # Each place once, though several parts have a corner there.
-    spans = ~between & (widest >= np.pi - STRAIGHT)
+    spans = ~between
     spans[pairs[spans[pairs].all(axis=1)].max(axis=1)] = False
-    shares, _, _ = corner_areas(group_of[spans], places[spans], len(counts))
+    shares, *_ = corner_areas(group_of[spans], places[spans], len(counts))
     share_sum = np.bincount(group_of[spans], shares, minlength=len(counts))
     per_share = np.bincount(group_of, contacts.areas[chosen]) / np.maximum(share_sum, 1e-300)
     areas = contacts.areas.copy()

@@ -12,9 +12,9 @@ from scipy.sparse.csgraph import connected_components
 from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import expand_ranges
-from .clipping import ClippedCorners, clipped_faces
+from .clipping import clipped_faces
 from .contacts import SAME_NORMAL, STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
-from .convex_parts import PlacedParts
+from .convex_parts import ENDS, PlacedParts
 from .cut_points import without_points_of_cuts
 from .entering import Movement, across, entered
 from .facing import FacingParts, facing_parts, near_parts
@@ -121,17 +121,16 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
 
     shallow = pairs.apart >= -PENETRATION_FRACTION * pairs.width
     # Flanks of steep tips hardly face each other.
-    face_each_other = pairs.cosine <= -0.05
-    # Other faces are tried where those that oppose each other best do not cover each other.
-    numbers = np.flatnonzero(shallow & face_each_other)
+    numbers = np.flatnonzero(shallow & (pairs.cosine <= -0.05))
     facing, every, nearest = pairs[numbers], np.arange(len(numbers)), np.full(len(pairs.i), np.inf)
     # With each point the planes of both faces, and whether it is near.
     found: list[Contacts] = []
     labels: list[np.ndarray] = []
+    at_cut = np.bincount(solids.face_of_corner, parts.goes_on) > 0
     resolved, largest = np.zeros(len(every), dtype=bool), np.zeros(len(every))
     _, joint = np.unique(block_of_part[facing.i] * len(widths) + block_of_part[facing.j], return_inverse=True)
-    rounds = chain([(every, facing.face_i, facing.face_j)], facing.other_faces(placed))
-    for pair, face_i, face_j in rounds:
+    # Other faces are tried where those that oppose each other best do not cover each other.
+    for pair, face_i, face_j in chain([(every, facing.face_i, facing.face_j)], facing.other_faces(placed)):
         unresolved = ~resolved[pair]
         pair, face_i, face_j = pair[unresolved], face_i[unresolved], face_j[unresolved]
         corners = clipped_faces(placed, face_i, face_j)
@@ -139,11 +138,13 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
         lowest = np.full(len(pair), np.inf)
         np.minimum.at(lowest, corners.owner, contacts.gaps)
         nearest[numbers[pair]] = np.minimum(nearest[numbers[pair]], lowest)
-        strip = corners.widths < 0.5 * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
-        np.maximum.at(largest, joint[pair], np.bincount(corners.owner, corners.areas, minlength=len(pair)))
-        sliver = _slivers(placed, face_i, face_j, corners, largest[joint[pair]])
+        strip = corners.widths / np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
         # What overlaps on a strip at a large gap slides past before it would touch.
-        slides_past = strip & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
+        slides_past = (strip < 0.5) & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
+        area = np.bincount(corners.owner, corners.areas, minlength=len(pair))
+        np.maximum.at(largest, joint[pair], area)
+        small = (area < SLIVER * largest[joint[pair]]) & (at_cut[face_i] | at_cut[face_j])
+        sliver = small[corners.owner] & (strip < SLIVER)
         # Edges that cross behind a plane that separates their parts do not touch.
         owner = pair[corners.owner]
         behind = contacts.gaps < facing.apart[owner] - 1e-3 * facing.width[owner]
@@ -151,18 +152,17 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
         inside = near(contacts)
         # What touches along a line alone has no area.
         contacts = replace(contacts, areas=(np.bincount(corners.owner, inside) > 2)[corners.owner] * contacts.areas)
-        resolved[pair[corners.owner[kept & inside & np.isfinite(corners.widths)]]] = True
+        resolved[pair[corners.owner[kept & inside]]] = True
         kept = np.flatnonzero(kept if not parts.whole else kept & inside)
         found.append(contacts[kept])
         owner = corners.owner[kept]
         labels.append(np.stack([parts.plane[face_i[owner]], parts.plane[face_j[owner]], inside[kept]], axis=1))
     # Where a plane separates parts and points of both are as near as that, no tips or edges touch.
-    slack = SAME_PLACE * pairs.width
-    others = (pairs.apart < -slack) | (nearest > pairs.apart + slack)
+    others = (pairs.apart < -SAME_PLACE * pairs.width) | (nearest > pairs.apart + SAME_PLACE * pairs.width)
     tips = measured_points(placed, _tips(placed, pairs[others & shallow], reach))
     crossed = measured_points(placed, _crossed_edges(placed, pairs[others], reach))
-    of_cuts = parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)
-    single = joined_contacts([tips[~parts.made[tips.features[:, 1]]], crossed[~of_cuts]])
+    of_cuts = np.any([placed.kinds_at(edge, crossed.points) != ENDS for edge in crossed.features.T[1:3]], axis=0)
+    single = joined_contacts([tips, crossed[~of_cuts]])
     single = single[near(single)]
     contacts = joined_contacts([*found, single])
     label = np.concatenate([*labels, np.tile([-1, -1, 1], (len(single), 1))])
@@ -173,18 +173,6 @@ def find_points(placed: PlacedParts, reach: float, useful: np.ndarray, widths: n
     contacts = contacts[np.lexsort(contacts.features.T[[2, 1, 0]])]
     # Parts of one block may have a point in common, and tips and edges across each other a corner of a polygon.
     return _without_duplicates(contacts, at_one_place)
-
-
-def _slivers(
-    placed: PlacedParts, face_i: np.ndarray, face_j: np.ndarray, corners: ClippedCorners, largest: np.ndarray
-) -> np.ndarray:
-    """(n,) bool array: corners of slivers at cuts, beside the largest polygon, (n_pairs,) [m²], of the same blocks."""
-    solids = placed.solids
-    area = np.bincount(corners.owner, corners.areas, minlength=len(face_i))
-    at_cut = np.bincount(solids.face_of_corner, placed.parts.cut_edges) > 0
-    small = (area < SLIVER * largest) & (at_cut[face_i] | at_cut[face_j])
-    narrow = SLIVER * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])
-    return small[corners.owner] & (corners.widths < narrow[corners.owner])
 
 
 def _without_duplicates(contacts: Contacts, near: float) -> Contacts:

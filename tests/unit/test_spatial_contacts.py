@@ -4,10 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import trimesh
 from scipy.optimize import linprog
 from scipy.spatial import HalfspaceIntersection
-from structures import box, hull_of, turn_by
+from structures import box, hull_of, of_cubes, turn_by
 
 import solver
 from blockvis import generators
@@ -317,20 +316,50 @@ def test_contact_points_do_not_depend_on_how_corners_are_numbered(bonded):
     np.testing.assert_allclose(found[1], found[0], atol=1e-9)
 
 
+def about_z(turn):
+    """Rows turned about the vertical axis."""
+    return turn_by([0.0, 0.0, turn]).T
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.3, np.pi / 2])
 def test_a_stone_beside_a_ledge_is_not_held_by_the_corner_in_which_that_ends(turn):
     """Pressed onto a face by four times its weight, with air below it: it slides down at 4 μ - 1."""
-    cells = [(0, 0, 1), (1, 0, 1), (0, 1, 1), (0, 0, 2), (1, 0, 2)]
-    whole = trimesh.boolean.union([trimesh.creation.box(bounds=[cell, np.add(cell, 1)]) for cell in cells])
-    c, s = np.cos(turn), np.sin(turn)
-    way = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    corners, faces = box((1, 1, 2), (2, 2, 3))
-    solids = [(np.asarray(whole.vertices) @ way, whole.faces.tolist()), (corners @ way, faces)]
+    corners, faces = of_cubes([(0, 0, 1), (1, 0, 1), (0, 1, 1), (0, 0, 2), (1, 0, 2)])
+    stone, sides = box((1, 1, 2), (2, 2, 3))
+    solids = [(corners @ about_z(turn), faces), (stone @ about_z(turn), sides)]
     assembly = solver.Assembly.from_solids(solids, roles=["fixed", "free"])
     dead = solver.self_weight(assembly).dead.copy()
     weight = -dead[1, 2]
-    dead[1, :3] += 4.0 * weight * np.array([0.0, -1.0, 0.0]) @ way
+    dead[1, :3] += 4.0 * weight * np.array([0.0, -1.0, 0.0]) @ about_z(turn)
     live = np.zeros_like(dead)
     live[1, 2] = -weight
     structure = solver.Structure(assembly, friction_coefficient=0.5, loads=solver.Loads(dead, live))
     assert structure.limit_load().multiplier == pytest.approx(1.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_a_stone_over_a_pit_of_its_size_is_not_held_by_the_ledges_beside_it(turn):
+    """Without friction nothing holds it, though its lower edges lie along those of the ledges."""
+    pit = [(x, y, 0) for x in range(3) for y in range(3) if (x, y) != (1, 1)]
+    corners, faces = of_cubes([*pit, *((x, y, 1) for x in range(3) for y in (0, 2))])
+    stone, sides = box((1, 1, 1), (2, 2, 2))
+    solids = [(corners @ about_z(turn), faces), (stone @ about_z(turn), sides)]
+    assembly = solver.Assembly.from_solids(solids, roles=["fixed", "free"])
+    found = solver.Structure(assembly, friction_coefficient=0.0).limit_load(acceleration=(1, 0, 0))
+    assert found.status == "no equilibrium"
+
+
+@pytest.mark.parametrize("foot", [(0, 0, 0), (0, 1, 0)])
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_a_stone_that_leans_over_the_top_of_another_slides_however_that_is_cut(foot, turn):
+    """A quarter is left out of the plate below: where it is cut ends the stone, whose side overhangs by 31 degrees."""
+    plate, faces = of_cubes({(x, y, 0) for x in (0, 1) for y in (0, 1)} - {foot})
+    stone, sides = of_cubes([(1, 1, 1)])
+    stone = np.where(stone[:, 2:] > 1.0, stone - [0.0, 0.3, 0.5], stone)
+    solids = [(plate @ about_z(turn), faces), (stone @ about_z(turn), sides)]
+    structure = solver.Structure(
+        solver.Assembly.from_solids(solids, roles=["fixed", "free"]), friction_coefficient=0.15
+    )
+    for way in ((0, -1, 0), (0, 1, 0), (1, 0, 0)):
+        found = structure.limit_load(acceleration=tuple(np.array(way) @ about_z(turn)))
+        assert found.multiplier == pytest.approx(0.15, rel=1e-6)

@@ -452,3 +452,23 @@ def test_a_bed_that_bends_by_less_than_a_degree_bears_on_both_faces(bend, first)
     assert limit(space, push(space, 0.0), 0.1).multiplier == pytest.approx(multiplier, rel=EXACT)
     if rise > 0.0:
         assert multiplier == pytest.approx(0.1, rel=EXACT)
+
+
+@pytest.mark.parametrize("ends", [(0.0, 1.0), (0.2, 0.8), (-0.2, 1.2), (-0.2, 0.5)])
+def test_a_slab_on_a_slope_is_held_by_the_ledge_at_its_foot(ends):
+    """Of one block, cut where they meet; the foot is as long as the ledge, shorter or longer, as in the plane."""
+    c, s = np.cos(np.radians(40.0)), np.sin(np.radians(40.0))
+    base = [(-1.0, 0.0), (2.0 * c, 0.0), (2.0 * c, 1.0 + 2.0 * s), (0.0, 1.0), (-1.0, 1.0)]
+    slab = [
+        (0.0, 1.0),
+        (1.5 * c, 1.0 + 1.5 * s),
+        (1.5 * c - 0.3 * s, 1.0 + 1.5 * s + 0.3 * c),
+        (-0.3 * s, 1.0 + 0.3 * c),
+    ]
+    plane = solver.Assembly.from_outlines([base, slab], roles=["fixed", "free"])
+    solids = [along_y(base, 0.0, 1.0), along_y(slab, *ends)]
+    space = solver.Assembly.from_solids(solids, roles=["fixed", "free"])
+    for sense in (1.0, -1.0):
+        expected = solver.Structure(plane, friction_coefficient=0.3).limit_load(acceleration=(sense, 0.0))
+        found = solver.Structure(space, friction_coefficient=0.3).limit_load(acceleration=(sense, 0.0, 0.0))
+        assert found.multiplier == pytest.approx(expected.multiplier, rel=1e-6)
