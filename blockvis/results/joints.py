@@ -25,8 +25,8 @@ class Faces:
     on_a: np.ndarray
     on_b: np.ndarray
     gaps: np.ndarray  #: (n_points,) array [m]: distance of the two faces at each corner, along the normal.
-    along: np.ndarray  #: (n_points, d) array [m]: movement of block a along the face of block b there.
-    normals: np.ndarray  #: (n_joints, d) array: unit normal from block b into block a, turned with block b.
+    along: np.ndarray  #: (n_points, d) array [m]: movement of block a along the faces there.
+    normals: np.ndarray  #: (n_joints, d) array: unit normal from block b into block a, half-way between both faces.
 
 
 def carried_faces(
@@ -40,7 +40,9 @@ def carried_faces(
     on_a, on_b = (
         mechanics.carried(rings.points, block[rings.ring], initial, pose) for block in (joints.block_a, joints.block_b)
     )
-    normals = mechanics.turned(joints.normals, pose.rotations[joints.block_b])
+    # Half-way, so that it is the same joint whichever block comes first.
+    normals = sum(mechanics.turned(joints.normals, pose.rotations[block]) for block in (joints.block_a, joints.block_b))
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     apart, normal = on_a - on_b, normals[rings.ring]
     if fallen is not None:
         apart[(fallen[joints.block_a] | fallen[joints.block_b])[rings.ring]] = 0.0
@@ -95,7 +97,7 @@ class JointStates:
     #: (n_points,) array [m]: distance of the two faces at each corner, along the normal; 0 for later joints.
     gaps: np.ndarray
     opening: np.ndarray  #: (n,) array [m]: the largest of them.
-    #: (n, d) array [m]: of block a along the face of block b, at the corner that is open least; 0 for later joints.
+    #: (n, d) array [m]: of block a along the faces, at the corner that is open least; 0 for later joints.
     along: np.ndarray
     force: np.ndarray  #: (n, d) array [N]: resultant on block a; 0 in frames of a fall, where there is no equilibrium.
 
@@ -106,7 +108,7 @@ class JointStates:
 
     @property
     def slip(self) -> np.ndarray:
-        """(n,) array [m]: along the tangent of block b, a quarter turn from the normal; in space its size."""
+        """(n,) array [m]: along the tangent of the faces, a quarter turn from the normal; in space its size."""
         return _signed(self.along, self.normals)
 
     @property

@@ -37,8 +37,28 @@ def test_a_block_that_slides_has_slip_and_one_that_rocks_has_opening():
     c, s = np.cos(0.1), np.sin(0.1)
     assembly, rocked = stacked(shift=(0.5 * c - 0.5 * s - 0.5, 0.5 * s + 0.5 * c - 0.5), turn=0.1)
     joint = posed(assembly, rocked).joints()
-    assert joint["opening"][0] == pytest.approx(np.sin(0.1), rel=1e-9)
+    assert joint["opening"][0] == pytest.approx(2.0 * np.sin(0.05), rel=1e-9)
     assert joint["slip"][0] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_opening_and_slip_are_the_same_whichever_block_comes_first(dimension):
+    """A block that has slid half of its length on another, and turned there."""
+    found = []
+    for order in ([0, 1], [1, 0]):
+        if dimension == 2:
+            blocks, roles = [rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2)], ["fixed", "free"]
+            assembly = solver.Assembly.from_outlines([blocks[k] for k in order], roles=[roles[k] for k in order])
+            shift, turn = [0.5, 0.2], [0.4]
+        else:
+            solids, roles = [box((0, 0, 0), (1, 1, 1)), box((0, 0, 1), (1, 1, 2))], ["fixed", "free"]
+            assembly = solver.Assembly.from_solids([solids[k] for k in order], roles=[roles[k] for k in order])
+            shift, turn = [0.5, 0.1, 0.2], [0.1, 0.4, 0.2]
+        free = assembly.free[:, None]
+        pose = solver.Pose(assembly.centroids + free * shift, free * turn)
+        joint = posed(assembly, pose).joints()
+        found.append((joint["opening"][0], abs(joint["slip"][0])))
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
 
 
 def test_joints_carry_the_weight_above_them():
