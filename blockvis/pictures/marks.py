@@ -127,9 +127,8 @@ def cracks_between(
     now, drawn = carried_faces(assembly, joints, pose, fallen), carried_faces(assembly, joints, shown)
     turn = np.linalg.norm(pose.rotations[joints.block_a] - pose.rotations[joints.block_b], axis=1)
     extent = joints.sizes ** (1.0 / (assembly.dimension - 1))
-    # Faces in space that have slid far over each other still have a crack between them.
-    apart = now.gaps if assembly.dimension == 3 else np.linalg.norm(now.on_a - now.on_b, axis=1)
-    nearest = -rings.largest(-apart)
+    # Faces that have slid far over each other still have a crack between them.
+    nearest = -rings.largest(-now.gaps)
     parted = nearest >= np.minimum(extent, WIDEST * size)
     # A line in the plane has one edge, a polygon in space as many as corners.
     start = rings.offsets[:-1] if assembly.dimension == 2 else np.arange(len(rings.points))
