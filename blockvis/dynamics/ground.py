@@ -43,8 +43,9 @@ def ground_below(assembly: solver.Assembly, pose: solver.Pose, removed: np.ndarr
     np.minimum.at(places, owner[upward], heights[upward])
     widest = np.where(supports & (places <= places.min() + clearance), extents[:, :-1].prod(axis=1), -1.0)
     # Of two as wide the name decides: the order of blocks says nothing.
-    _, material = max(zip(widest, assembly.materials, strict=True)) if supports.any() else (0.0, "")
-    return float(min(places.min(), corners[free[assembly.block_of_vertex], -1].min())) - clearance, material
+    wide = widest >= widest.max() - CLEARANCE * abs(widest.max())
+    material = max(np.array(assembly.materials)[wide]) if supports.any() else ""
+    return float(min(places.min(), corners[free[assembly.block_of_vertex], -1].min())) - clearance, str(material)
 
 
 def on_ground(

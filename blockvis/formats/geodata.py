@@ -304,6 +304,10 @@ def layout_of_features(
             found.outlines[first:] = [replace(one, row=own) for one, own in zip(parts, named, strict=True)]
     true, stretched = _true_unit(found, reading) if mercator and reading.unit is None else (unit, [])
     turn, notes = found.turn(reading)
+    if stretched and not (turn == np.eye(3)).all():
+        raise ValueError(
+            "its polygons stand upright in a Mercator, which stretches lengths but no heights; reproject it"
+        )
     found.notes += notes
     if roles:
         listed = ", ".join(f"'{role}'" for role in roles)

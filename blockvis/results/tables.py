@@ -121,17 +121,19 @@ def finite(value: float) -> float | None:
 def _removed(response: solver.Response) -> list[dict[str, Any]]:
     """Blocks and ties that are taken away before each settlement, its number from 1, and the blocks' weight."""
     names, weights = response.assembly.names, response.assembly.masses * solver.GRAVITY
-    there, removed = np.ones(len(names), dtype=bool), list[dict[str, Any]]()
+    there, removed, ties = np.ones(len(names), dtype=bool), list[dict[str, Any]](), {tie.name for tie in response.ties}
     for change in sorted(response.changes, key=lambda change: change.phase):
         taken = np.flatnonzero(there & (False if change.removed is None else change.removed))
         there[taken] = False
-        tied = [tie.name for tie in response.ties if set(tie.blocks) & set(taken.tolist())]
+        ties.difference_update(change.ties)
+        tied = [tie.name for tie in response.ties if tie.name in ties and set(tie.blocks) & set(taken.tolist())]
+        ties.difference_update(tied)
         if len(taken) or change.ties:
             removed.append(
                 {
                     "phase": change.phase + 1,
                     "blocks": [names[k] for k in taken],
-                    "ties": [*change.ties, *(name for name in tied if name not in change.ties)],
+                    "ties": [*change.ties, *tied],
                     "weight": float(weights[taken].sum()),
                 }
             )

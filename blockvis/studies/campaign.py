@@ -96,7 +96,7 @@ def study(
         raise ValueError(f"workers is {workers}; give at least 1")
     for run in plan.keep:
         if not 0 <= run < plan.n_runs:
-            raise ValueError(f"{plan.source}: keep names run {run}; runs are numbered from 0 to {plan.n_runs - 1}")
+            raise ValueError(f"keep names run {run}; runs of {plan.source} are numbered from 0 to {plan.n_runs - 1}")
     folder = Path(f"{plan.source.stem}-study") if folder is None else Path(folder)
     with ExitStack() as ends:
         if scheduler is None:

@@ -72,7 +72,9 @@ def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
         return []
     for parameter in study.parameters:
         x = table[parameter.name].to_numpy(dtype=float if parameter.numeric else object)
-        if parameter.distribution is None:
+        # A grid has each value with all of the others.
+        grouped = parameter.distribution is None or study.method == "grid"
+        if grouped:
             groups = [np.flatnonzero(x == value) for value in dict.fromkeys(x.tolist())]
             # Texts have no order but that of their outcomes.
             groups.sort(key=lambda rows: float((x if parameter.numeric else y)[rows].mean()))
@@ -82,7 +84,7 @@ def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
         if len(groups) < 2:
             continue
         lowest, highest = groups[0], groups[-1]
-        values = [x[k].mean() if parameter.distribution else x[k[0]] for k in (lowest, highest)]
+        values = [x[k[0]] if grouped else x[k].mean() for k in (lowest, highest)]
         low_value, high_value = (float(value) if parameter.numeric else str(value) for value in values)
         low, high = y[lowest], y[highest]
         means = float(low.mean()), float(high.mean())

@@ -151,7 +151,7 @@ class Path:
             fell_at = np.where(removed, -np.inf, state.fell_at if len(state.fell_at) else np.nan)
             self._remove_blocks(fell_at)
             state = replace(state, fell_at=fell_at)
-            self.reports.notes = [(0.0, self.reports.taken_away(removed))]
+            self.reports.notes = [(0.0, self.reports.taken_away(removed, np.isnan(state.place.tie_lengths[:, 0])))]
         if ties:
             lengths = state.place.tie_lengths.copy()
             lengths[[tie.name in ties for tie in self.model.ties]] = np.nan

@@ -187,11 +187,11 @@ class Reports:
             "the path goes on without"
         )
 
-    def taken_away(self, removed: np.ndarray) -> str:
-        """Message that names the blocks that are taken away."""
+    def taken_away(self, removed: np.ndarray, absent: np.ndarray) -> str:
+        """Message that names the blocks that are taken away, and the ties that go with them; these are not there."""
         assembly = self.model.assembly
         weight = float(assembly.masses[removed & assembly.free].sum()) * GRAVITY
-        gone = [tie.name for tie in self.model.ties if not held_ties([tie], removed).all()]
+        gone = [self.model.ties[k].name for k in np.flatnonzero(~held_ties(self.model.ties, removed) & ~absent)]
         with_it = f", and with it {', '.join(map(repr, gone))}" if gone else ""
         named = self._named(np.flatnonzero(removed))
         return f"{named} taken away before settlement {self.number + 1}, {weight:.4g} N{with_it}"

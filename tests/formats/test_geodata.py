@@ -359,6 +359,15 @@ def test_a_mercator_of_the_world_is_known_by_each_of_its_numbers(tmp_path, syste
     np.testing.assert_allclose(sizes**2, 0.04 if stretched else 0.08, rtol=1e-5)
 
 
+def test_an_upright_drawing_in_a_mercator_is_refused(tmp_path):
+    """It stretches lengths on the map, but no heights."""
+    rings = [[[1378000.0 + x, 5621521.0, z] for x, z in ring] for ring in SQUARES]
+    system = {"type": "name", "properties": {"name": "EPSG:3857"}}
+    path = geojson(tmp_path / "elevation.geojson", [polygon(ring, layer="stones") for ring in rings], crs=system)
+    with pytest.raises(ValueError, match=r"elevation\.geojson.*stand upright in a Mercator.*reproject it"):
+        blockvis.read_layout(path)
+
+
 @pytest.mark.parametrize(
     ("name", "stretched"),
     [

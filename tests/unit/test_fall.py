@@ -107,6 +107,14 @@ def test_the_ground_is_of_the_support_that_gave_its_height_and_not_of_what_was_t
     assert ground_below(assembly, solver.Pose.initial(assembly), nothing)[1] == ""
 
 
+@pytest.mark.parametrize("start", [0.0, 0.1, 3.3, 1000.3])
+def test_the_ground_of_two_supports_as_wide_goes_by_their_names_wherever_they_are_drawn(start):
+    drawn = [rectangle(start + x, -0.3, start + x + 0.7, 0.0) for x in (0.0, 2.0)]
+    outlines, roles = [*drawn, rectangle(start, 0.0, start + 0.7, 1.0)], ["fixed", "fixed", "free"]
+    assembly = solver.Assembly.from_outlines(outlines, roles=roles, materials=["brick", "timber", "stone"])
+    assert ground_below(assembly, solver.Pose.initial(assembly), np.zeros(3, dtype=bool))[1] == "timber"
+
+
 def overturned(outlines, changes=(), materials=None, **laws):
     """Blocks on a support that tilts about its right corner at 0, 0, until they fall over it."""
     tilt = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.2, limit=1.5, tolerance=1e-2)

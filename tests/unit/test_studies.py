@@ -630,6 +630,20 @@ def test_swings_compare_the_lowest_and_the_highest_fifth():
     assert second.high - second.low == pytest.approx(0.8, abs=3 * np.sqrt(2 * 4 / 12 / 51))
 
 
+@pytest.mark.parametrize("points", [3, 4, 5])
+def test_swings_of_a_grid_are_between_the_ends_of_its_parameters(points):
+    """Also of one with a distribution, whatever the number of its points: the other has each value beside each."""
+    given = {"distribution": "uniform", "lower": 1000.0, "upper": 2000.0, "points": points}
+    parameters = {"material.density": given, "material.friction_coefficient": [0.4, 0.5, 0.6, 0.7, 0.8]}
+    study = _study("grid", parameters=parameters)
+    table = _table(study, np.zeros(study.n_runs))
+    table["collapse_displacement"] = table["material.friction_coefficient"]
+    friction, density = swings(study, table)
+    assert (friction.low, friction.high) == pytest.approx((0.4, 0.8))
+    assert (density.low, density.high) == pytest.approx((0.6, 0.6))
+    assert density.low_value < density.high_value
+
+
 @pytest.mark.slow
 def test_a_study_in_which_nothing_collapses_says_nothing_of_a_collapse(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(CASE.replace("limit = 0.3", "limit = 0.001"), encoding="utf-8")
