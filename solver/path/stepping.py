@@ -71,6 +71,9 @@ OPEN = 1e-6
 #: hardly moves; movement, in block sizes, in which it has come to rest; and steps after which it does not.
 STANDSTILL, SHORT, STANDING, STANDSTILLS = 1e3, 1e-3, 1e-7, 300
 
+#: Part of the viscosity at the start of a phase; it grows as the memory of velocities fills.
+STARTING = 0.1
+
 #: Damping of steps in time, in units of mass · √(g / block size): critical for a block that rocks.
 DAMPING = 2.0
 
@@ -511,7 +514,9 @@ class Stepper:
     ) -> tuple[np.ndarray, np.ndarray]:
         """(n_dof,) arrays: force per movement by viscosity or inertia, and the movement that has none of it."""
         weights, kept = self.weights[self.free].ravel(), 1.0
-        resisting = VISCOSITY * viscosity * self.unit / length * weights
+        # It is beyond the velocity that blocks had: at the start they have none, and all of it would choose the hinges.
+        found = min(max(place.s / (VELOCITY_MEMORY * self.unit), STARTING), 1.0)
+        resisting = VISCOSITY * found * viscosity * self.unit / length * weights
         if in_time:
             resisting, kept = (1.0 / length**2 + DAMPING / length) * weights, 1.0 / (1.0 + DAMPING * length)
         if place.velocity is None:

@@ -6,6 +6,7 @@ code; two or three codes agree to eight digits. Minimum thickness: Milankovitch 
 
 import numpy as np
 import pytest
+from structures import rectangle
 
 import solver
 from blockvis import generators
@@ -121,3 +122,29 @@ def test_pointed_arch_keeps_the_hinge_at_its_apex():
     rotations = response.path[-1].pose.rotations[arch.free, 0]
     assert rotations == pytest.approx(-rotations[::-1], abs=1e-3)
     assert rotations.min() == pytest.approx(-0.1192, abs=1e-3)
+
+
+def on_a_buttress_that_leans():
+    """An arch of ten voussoirs on a fixed springer and on a buttress, 0.8 × 3 m, with the ground under it."""
+    inner, outer, angles = 0.875, 1.125, np.linspace(np.pi, 0.0, 11)
+    rings = [radius * np.column_stack([np.cos(angles), np.sin(angles)]) for radius in (inner, outer)]
+    outlines = [np.array([rings[0][k + 1], rings[1][k + 1], rings[1][k], rings[0][k]]) for k in range(10)]
+    outlines += [rectangle(inner, -3.0, inner + 0.8, 0.0), rectangle(-outer, -0.3, -inner, 0.0)]
+    outlines += [rectangle(inner - 0.5, -3.3, inner + 0.8, -3.0)]
+    return solver.Assembly.from_outlines(outlines, roles=["free"] * 11 + ["fixed", "moving"])
+
+
+@pytest.mark.parametrize("increment", [0.02, pytest.param(0.01, **THOROUGH), pytest.param(0.005, **THOROUGH)])
+def test_an_arch_on_a_buttress_that_leans_begins_on_hinges_that_have_an_equilibrium(increment):
+    """The buttress turns about its outer toe; the hinges next to them have none up to 0.00606 rad, and end at 0.1089.
+
+    Reference: exact three-hinge kinematics with the thrust inside all other joints, which leaves the tenth at the end.
+    """
+    leans = solver.Settlement(
+        rotation_centre=(1.675, -3.0), rotation=-1, increment=increment, limit=1.0, tolerance=1e-5
+    )
+    controls = solver.Controls(falling_frames=0)
+    response = solver.settle(on_a_buttress_that_leans(), leans, friction_coefficient=0.8, controls=controls)
+    assert response.collapse.displacement == pytest.approx(0.0758507, rel=2e-4)
+    if increment == 0.01:
+        assert response.reaction[1] == pytest.approx(-16833.91, rel=1e-5)

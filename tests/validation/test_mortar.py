@@ -486,7 +486,7 @@ def test_weak_mortar_on_stiff_joints_is_a_dry_wall(friction, courses, strength):
     for one, other in dry_and_weak(assembly, settlement, friction, strength):
         assert [other.least, other.largest] == pytest.approx([one.least, one.largest], abs=1e-6 * weight)
         assert other.reaction == pytest.approx(one.reaction, abs=1e-3 * weight)
-        assert other.pose.positions == pytest.approx(one.pose.positions, abs=1e-5)
+        assert other.pose.positions == pytest.approx(one.pose.positions, abs=3e-5)
 
 
 def thrust_of_the_broken_arch(arch, tension):
