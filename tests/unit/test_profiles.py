@@ -174,7 +174,8 @@ def test_how_deep_the_ground_is_drawn_counts_for_nothing(tmp_path):
         goes = mechanics.carried(top, np.array([piece, piece]), drawn, after)[:, 1]
         np.testing.assert_allclose(goes, [0.002 * np.exp(-0.5 * ((x - 0.3) / 0.3) ** 2) for x in ends], atol=1e-6)
     np.testing.assert_allclose(found[0][0], found[1][0], atol=1e-12)
-    np.testing.assert_allclose(found[0][1], found[1][1], atol=2e-5)
+    # Bricks slide: 5 % of the settlement, as between two step tolerances.
+    np.testing.assert_allclose(found[0][1], found[1][1], atol=1e-4)
     assert found[0][2] == pytest.approx(found[1][2], rel=5e-3)
 
 
