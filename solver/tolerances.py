@@ -102,10 +102,7 @@ USED_UP = 1e-6
 #: Relative velocity from which on a contact point opens or slips.
 SMALLEST_RATE = 1e-6
 
-#: Relative velocity of the contact points between blocks of one macro-block.
-TOGETHER = 1e-3
-
-#: Velocity from which on blocks and joints count as moving.
+#: Velocity from which on blocks and joints count as moving, and blocks as parts of their own.
 NOTICEABLE = 1e-2
 
 #: Opening of a sliding point beyond friction times slip, as a fraction of it.

@@ -318,9 +318,11 @@ class _Plot:
         above = len(beside) > 0 and head - beside.max() > beside.min() - foot
         # Other runs may go on for long.
         left = middle >= sum(axes.get_xlim()) / 2.0
+        factor, unit = parameter_unit(self.response)
+        first, last = (factor * end for end in collapse.bracket)
         told = (
-            f"{what} at {collapse.displacement:.5g} {collapse.unit}{in_phase(self.response, phase)}\n"
-            f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(self.response)}"
+            f"{what} at {factor * collapse.displacement:.5g} {unit}{in_phase(self.response, phase)}\n"
+            f"[{first:.6g}, {last:.6g}]{_counts(self.response)}"
         )
         place, offset = (middle, 0.96 if above else 0.04), (-6 if left else 6, 0)
         style = {"ha": "right" if left else "left", "va": "top" if above else "bottom", "color": RED, "bbox": PATCH}

@@ -58,7 +58,7 @@ DOT = 1.0 / 70.0
 #: Blocks in space are so transparent where forces are drawn inside them.
 GLASS = 0.35
 
-#: Length of the arrows at the supports, as a part of the larger side of the picture, in the plane and in space.
+#: Length of the arrows at the supports, as a part of the larger side of what is drawn, in the plane and in space.
 ARROW, ARROW_IN_SPACE = 0.055, 0.09
 
 #: Arrows of a mechanism of many parts stand apart by this fraction of the picture, in the plane and in space.
@@ -179,7 +179,7 @@ class Drawer:
             self.panel = CurvePanel(response, (beside, self.sheet.inside_size[1]), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         whole = frame.fitted(*self.sheet.inside_size) if self._flat else frame
-        self._arrow = (ARROW if self._flat else ARROW_IN_SPACE) * float(whole.size.max())
+        self._arrow = (ARROW if self._flat else ARROW_IN_SPACE) * float(frame.size.max())
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
         heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
         ends = np.concatenate([self.live.tails, heads, *self._arrow_ends(frame, extra), tied, self._turned_out(whole)])
@@ -272,10 +272,10 @@ class Drawer:
             yield from self._settlement_arrows(increment, pose, frame if self._flat else None)
 
     def _turned_out(self, frame: Frame) -> np.ndarray:
-        """(n, d) array [m]: at last, the corners of moving supports that a frame holds at first: they stay in it."""
-        poses = (magnified(self.assembly, self.increments[k].pose, self.look.magnification) for k in (0, -1))
-        first, last = (mechanics.moved_vertices(self.assembly, pose) for pose in poses)
-        places = self._projected(first)
+        """(n, d) array [m]: at last, the corners of moving supports that a frame holds as drawn: they stay in it."""
+        pose = magnified(self.assembly, self.increments[-1].pose, self.look.magnification)
+        last = mechanics.moved_vertices(self.assembly, pose)
+        places = self._projected(self.assembly.vertices)
         held = ((frame.low < places) & (places < frame.high)).all(axis=1)
         return last[held & self.assembly.moving[self.assembly.block_of_vertex]]
 
@@ -340,7 +340,8 @@ class Drawer:
             dots = self._draw_joints(increment, shown)
             self._draw_forces(increment, shown)
             self._draw_bearings(shown)
-            if self.response.settlements:
+            # In the mechanism of a live load supports stand still.
+            if self.response.settlements and not (increment.load_multiplier and self._acts(increment)):
                 seen = self.scene.frame if self._flat else None
                 self._draw_arrows("arrow", *self._settlement_arrows(increment, shown, seen), palette.SETTLEMENT)
             self._draw_live_load(increment, shown, dots)

@@ -18,7 +18,7 @@ from blockvis.results.increments import numbered
 from blockvis.system.atomic_files import atomic_file
 from solver import mechanics
 
-from .captions import MECHANISM_BADGE, in_one_unit, parameter_unit, phase_words
+from .captions import MECHANISM_BADGE, in_one_unit, loss_words, parameter_unit, phase_words
 from .drawer import Drawer, Look
 from .film import film_of, poster_of
 from .swing import MOST_PARTS, shown_increments, swing_of
@@ -213,7 +213,8 @@ def _mechanism_note(response: solver.Response, n: int) -> str:
         if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM:
             when = f"before any {response.parameter.name}" if response.measured.is_force else "under the dead load"
             return f"no equilibrium {when}   ·   {bodies}"
-        return f"{response.stop}: the motion that would follow   ·   {bodies}"
+        gone = loss_words(response.path[-1]) if response.path else []
+        return "   ·   ".join([f"{response.stop}: the motion that would follow", bodies, *gone])
     loss = loss_of(response)
     what = "collapse mechanism" if loss is None or not loss.local else "local loss"
     falls = "" if loss is None else f"   ·   {100.0 * loss.share:.3g} % of the weight fall"

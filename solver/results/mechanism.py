@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from solver.assembly import Assembly
 from solver.geometry.contacts import Contacts
 from solver.kinematics import motion_size, relative_velocities
-from solver.tolerances import CLOSED, NOTICEABLE, TOGETHER
+from solver.tolerances import CLOSED, NOTICEABLE
 
 from .increment import Increment, at_rest, carries, slides
 
@@ -71,7 +71,7 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     apart = np.zeros(len(pairs))
     np.maximum.at(apart, joint, np.abs(rates).max(axis=1))
     apart = np.maximum(apart, np.abs(spins[pairs[:, 0]] - spins[pairs[:, 1]]).max(axis=1))
-    a, b = pairs[apart < TOGETHER * fastest].T
+    a, b = pairs[apart < NOTICEABLE * fastest].T
     part = connected_components(sp.coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[1]
     # Corners, not centroids: a block may turn about its own centroid.
     moves = motion_size(increment.velocity, assembly.block_size) > NOTICEABLE * fastest

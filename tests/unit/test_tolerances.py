@@ -20,7 +20,7 @@ ORDERS = {
     "drawings": (t.DRAWN_GAP, t.OVERLAP, t.PENETRATION_FRACTION),
     "corners": (t.FEASIBILITY_TOLERANCE, t.CORNER_TOLERANCE),
     "forces": (t.SMALLEST_FORCE, t.CARRYING_FRACTION),
-    "motions": (t.SMALLEST_RATE, t.TOGETHER, t.NOTICEABLE),
+    "motions": (t.SMALLEST_RATE, t.NOTICEABLE),
 }
 
 

@@ -8,6 +8,7 @@ import pytest
 from structures import rectangle
 
 import solver
+from blockvis import generators
 from solver import mechanics
 
 pytestmark = pytest.mark.path
@@ -301,3 +302,13 @@ def test_a_block_on_a_corner_and_a_support_that_moves_off_turns_by_their_hinges(
     turned = [abs(float(i.pose.rotations[0, 0])) for i in response.path if i.parameter > 0.63]
     by_hand = np.arccos(1.2 / (0.6 + response.settlement[response.settlement > 0.63]))
     assert turned == pytest.approx(by_hand.tolist(), rel=0.02)
+
+
+@pytest.mark.parametrize("stones", [5, pytest.param(25, marks=pytest.mark.thorough)])
+def test_a_column_that_tips_is_one_body_about_one_hinge(stones):
+    """It overturns at atan(b/h), however many stones it has and whatever its joints give."""
+    column = generators.column(blocks=stones, width=1.0, block_height=10.0 / stones)
+    turn = solver.Settlement(rotation_centre=(0.5, 0.0), rotation=1, increment=0.02, limit=0.5)
+    response = solver.settle(column, turn, friction_coefficient=0.6, controls=solver.Controls(falling_frames=0))
+    assert response.collapse.displacement == pytest.approx(np.arctan(0.1), rel=1e-3)
+    assert "1 macro-block; hinge at block 1 | ground" in str(response.collapse)
