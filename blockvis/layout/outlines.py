@@ -240,9 +240,9 @@ def outlines_of_cells(
     edges: list[list[tuple[int, int]]] = [[] for _ in names]
     for i in once:
         edges[block[i]].append((int(start[i]), int(end[i])))
-    rings = []
+    rings, n_cells = [], np.bincount(owner, minlength=len(names))
     for b, name in enumerate(names):
-        ring, problem = _ring(points, edges[b], name)
+        ring, problem = _ring(points, edges[b], name, whole=n_cells[b] == 1)
         if problem is not None:
             if unusable is None:
                 raise ValueError(problem.message)
@@ -251,8 +251,10 @@ def outlines_of_cells(
     return rings
 
 
-def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> tuple[np.ndarray, LeftOut | None]:
-    """Outline of a block, and why it cannot be used if so."""
+def _ring(
+    points: np.ndarray, edges: list[tuple[int, int]], name: str, whole: bool
+) -> tuple[np.ndarray, LeftOut | None]:
+    """Outline of a block, which may be one whole cell, and why it cannot be used if so."""
     loops, crossing = loops_of(edges)
     if crossing is not None:
         x, y = points[crossing]
@@ -268,8 +270,11 @@ def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> tuple[
             f"block '{name}' has no outline: each of its edges belongs to two cells; its cells are in the file twice"
         )
         return np.zeros((0, 2)), LeftOut("no outline", np.zeros((0, 2)), message, serious=True)
-    rings = sorted((points[loop] for loop in loops), key=lambda ring: -abs(ring_area(ring)))
-    ring = without_collinear(rings[0] if ring_area(rings[0]) > 0 else rings[0][::-1])
+    loops.sort(key=lambda loop: -abs(ring_area(points[loop])))
+    rings = [points[loop] for loop in loops]
+    # The first corner stays the first, from which edges are counted; of several cells it is the first point.
+    ring = np.roll(rings[0], 0 if whole else -int(np.argmin(loops[0])), axis=0)
+    ring = without_collinear(ring if ring_area(ring) > 0 else np.roll(ring[::-1], 1, axis=0))
     if len(rings) == 1:
         return ring, None
     if len(filled(rings)) == 1:

@@ -39,6 +39,20 @@ def layout():
 
 
 @pytest.mark.parametrize("suffix", WRITTEN)
+@pytest.mark.parametrize("turn", [1, -1], ids=["counter-clockwise", "clockwise"])
+def test_the_first_corner_stays_the_first_from_which_edges_are_counted(suffix, turn, tmp_path):
+    """Bent and convex outlines, whichever way they are drawn and in whatever triangles a file has them."""
+    rings = [[[0, 0], [2, 0], [1.9, 1], [0.2, 1]], [[2, 0], [4, 0], [4, 2], [3, 2], [3, 1], [2, 1]]]
+    drawn = [{"name": f"{k}", "outline": [ring[0], *ring[1:][::turn]]} for k, ring in enumerate(rings)]
+    (tmp_path / "drawn.json").write_text(json.dumps({"unit": "m", "blocks": drawn}), encoding="utf-8")
+    write_layout(read_layout(tmp_path / "drawn.json"), tmp_path / f"again{suffix}")
+    again = read(tmp_path / f"again{suffix}")
+    for ring in rings:
+        (number,) = np.flatnonzero(np.isclose(again.areas, 1.85 if len(ring) == 4 else 3.0))
+        np.testing.assert_allclose(again.outline(number), ring, atol=1e-12)
+
+
+@pytest.mark.parametrize("suffix", WRITTEN)
 def test_everything_comes_back(layout, suffix, tmp_path):
     path = tmp_path / f"layout{suffix}"
     save_layout(layout, path)
