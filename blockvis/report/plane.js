@@ -38,14 +38,13 @@
     const ends = [[e[4 * j], e[4 * j + 1]], [e[4 * j + 2], e[4 * j + 3]]];
     const [a0, a1] = ends.map((p) => carried(at, a, ...p)), [b0, b1] = ends.map((p) => carried(at, b, ...p));
     const length = norm(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]);
-    // The outward normal of block b: its face runs from the first end to the second.
-    const nx = (b1[1] - b0[1]) / length, ny = -(b1[0] - b0[0]) / length;
+    // Half-way between the faces, out of that of block b: they run from the first end to the second.
+    const x = b1[0] - b0[0] + a1[0] - a0[0], y = b1[1] - b0[1] + a1[1] - a0[1], both = norm(x, y) || 1, nx = y / both, ny = -x / both;
     const across = [[a0, b0], [a1, b1]].map(([p, r]) => (p[0] - r[0]) * nx + (p[1] - r[1]) * ny);
     const along = [[a0, b0], [a1, b1]].map(([p, r]) => (p[1] - r[1]) * nx - (p[0] - r[0]) * ny);
     const closer = Math.abs(across[0]) <= Math.abs(across[1]) ? 0 : 1;
-    const apart = Math.min(norm(a0[0] - b0[0], a0[1] - b0[1]), norm(a1[0] - b1[0], a1[1] - b1[1]));
     const [opening, slip] = joined(a, b) ? [Math.max(...across), along[closer]] : [0, 0];
-    return { a, b, a0, a1, b0, b1, length, nx, ny, opening, slip, apart, bent: Math.abs(at[3 * a + 2] - at[3 * b + 2]) };
+    return { a, b, a0, a1, b0, b1, length, nx, ny, opening, slip, nearest: Math.min(...across), bent: Math.abs(at[3 * a + 2] - at[3 * b + 2]) };
   }
 
   function fitted(w, h) {
@@ -143,7 +142,7 @@
     for (let j = 0; j < joints.n; j++) {
       const f = faces(shown, j), m = state.magnify;
       // Blocks that have parted have no joint any more: what lies between them is air.
-      if (f.opening < model.smallest_opening * m || f.apart > m * Math.min(f.length, widest)) continue;
+      if (f.opening < model.smallest_opening * m || f.nearest > m * Math.min(f.length, widest)) continue;
       state.cracks++;
       // A wedge that gapes is open to the room: its faces have the colour.
       if (f.bent > m * steepest) { lines.push([...f.a0, ...f.a1], [...f.b0, ...f.b1]); continue; }

@@ -53,7 +53,8 @@
   function faces(at, j) {
     const a = joints.blocks[2 * j], b = joints.blocks[2 * j + 1], onA = [], onB = [], gaps = [];
     const m = at === pose ? turns.pose : turns.shown, n0 = joints.normals.slice(3 * j, 3 * j + 3);
-    const normal = [0, 3, 6].map((r) => m[9 * b + r] * n0[0] + m[9 * b + r + 1] * n0[1] + m[9 * b + r + 2] * n0[2]);
+    const turned = (k) => [0, 3, 6].map((r) => m[9 * k + r] * n0[0] + m[9 * k + r + 1] * n0[1] + m[9 * k + r + 2] * n0[2]);
+    const ofB = turned(b), sum = turned(a).map((v, r) => v + ofB[r]), both = norm(...sum) || 1, normal = sum.map((v) => v / both);
     let closest = 0;
     for (let i = joints.first[j]; i < joints.first[j + 1]; i++) {
       const p = joints.points.slice(3 * i, 3 * i + 3);

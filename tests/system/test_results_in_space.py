@@ -137,11 +137,11 @@ def test_joints_open_on_one_side_and_carry_the_weight():
     opened = 0
     for pair in hinges.tolist():
         here = states.gaps[states.rings.ring == pairs.index(pair)]
-        # Closed along the line about which it turns, open by thickness times angle on the other side.
+        # Closed along the line about which it turns, open by the chord of thickness and angle on the other side.
         assert np.sort(np.abs(here))[:2].max() < 1e-6
         a, b = (last.pose.rotations[block, 1] for block in pair)
         opened = max(opened, here.max())
-        assert here.max() == pytest.approx(0.2 * np.sin(abs(a - b)), abs=1e-4)
+        assert here.max() == pytest.approx(0.4 * np.sin(abs(a - b) / 2.0), abs=1e-4)
     assert opened > 0.05
 
 
@@ -398,7 +398,7 @@ def test_a_crack_is_labelled_in_the_view_that_shows_most_of_it(tmp_path, monkeyp
     ((places, words),) = written
     wide = [word.endswith("15 mm") for word in words]
     assert sum(wide) > 3
-    assert places[wide, 1].min() > 240.0, "at the springing, not at the crown"
+    assert places[wide, 1].min() > 200.0, "at the springing, not at the crown"
 
 
 @pytest.mark.slow
