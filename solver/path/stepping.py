@@ -71,7 +71,7 @@ OPEN = 1e-6
 #: hardly moves; movement, in block sizes, in which it has come to rest; and steps after which it does not.
 STANDSTILL, SHORT, STANDING, STANDSTILLS = 1e3, 1e-3, 1e-7, 300
 
-#: Part of the viscosity at the start of a phase; it grows as the memory of velocities fills.
+#: Part of the viscosity at the start of a settlement; it grows as the memory of velocities fills.
 STARTING = 0.1
 
 #: Damping of steps in time, in units of mass · √(g / block size): critical for a block that rocks.
@@ -515,7 +515,8 @@ class Stepper:
         """(n_dof,) arrays: force per movement by viscosity or inertia, and the movement that has none of it."""
         weights, kept = self.weights[self.free].ravel(), 1.0
         # It is beyond the velocity that blocks had: at the start they have none, and all of it would choose the hinges.
-        found = min(max(place.s / (VELOCITY_MEMORY * self.unit), STARTING), 1.0)
+        # A pushover begins with the mechanism of its limit load.
+        found = 1.0 if self.model.has_live else min(max(place.s / (VELOCITY_MEMORY * self.unit), STARTING), 1.0)
         resisting = VISCOSITY * found * viscosity * self.unit / length * weights
         if in_time:
             resisting, kept = (1.0 / length**2 + DAMPING / length) * weights, 1.0 / (1.0 + DAMPING * length)
