@@ -116,7 +116,9 @@ def _chains(ids: np.ndarray, points: np.ndarray, nodes: np.ndarray) -> list[tupl
     """Divide an outline at its nodes, or at two corners far apart."""
     cuts = np.flatnonzero(nodes[ids])
     if len(cuts) < 2:
-        start = int(cuts[0]) if len(cuts) else int(np.argmin(ids))
+        # Without a node it begins at a far corner, wherever it was drawn from.
+        corner = points[ids[cuts[0]]] if len(cuts) else points[ids].mean(axis=0)
+        start = int(cuts[0]) if len(cuts) else int(np.argmax(np.hypot(*(points[ids] - corner).T)))
         far = int(np.argmax(np.hypot(*(points[ids] - points[ids[start]]).T)))
         cuts = np.unique([start, far])
     ids = np.roll(ids, -cuts[0])

@@ -43,6 +43,17 @@ def test_a_corner_of_one_block_on_the_edge_of_another_stays_there(tmp_path):
     assert min(found[1][:, 1]) == min(found[2][:, 1]) == 1.0
 
 
+@pytest.mark.filterwarnings("ignore:outlines were finer")
+@pytest.mark.parametrize(("first", "mirror"), [(1, 1), (70, 1), (150, -1)])
+def test_the_first_corner_and_the_direction_say_nothing(tmp_path, first, mirror):
+    t = np.linspace(0.0, np.pi, 200)
+    ring = np.vstack([[[0.0, 0.0], [1.0, 0.0]], np.stack([0.5 + 0.5 * np.cos(t), 1.0 + 0.25 * np.sin(t)], axis=1)])
+    (plain,), _ = simplified(tmp_path, [ring])
+    (other,), _ = simplified(tmp_path, [np.roll(ring, first, axis=0)[::mirror]])
+    assert len(plain) < 20
+    assert sorted(map(tuple, other.round(9))) == sorted(map(tuple, plain.round(9)))
+
+
 @pytest.mark.filterwarnings("error")
 def test_a_few_corners_are_left_alone(tmp_path):
     assert simplified(tmp_path, split_square(12))[1] == 28
