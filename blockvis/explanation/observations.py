@@ -226,11 +226,18 @@ def _of_rows(
     columns = _columns(header, where, "xyz"[: assembly.dimension])
     joints = initial_joints(assembly)
     widths, points, given = list[_Width](), list[_Point](), list[_Cells]()
+    first = dict[tuple[Any, ...], int]()
     for number, row in rows:
         given.append(cells := _Cells(row, columns, f"{where}, {counted} {number}"))
         width = cells.length("width")
         if width is not None:
             place, named, whole, label = _place(cells, assembly, joints)
+            before = first.setdefault((whole, *place.tolist()), number)
+            if before != number:
+                # Readings of one crack share what the model errs by there.
+                raise cells.error(
+                    "width", f"is of {label}, as that of {counted} {before} is; give one width for each place, of one date"
+                )
             if width > WIDEST * assembly.block_size:
                 raise cells.error(
                     "width",

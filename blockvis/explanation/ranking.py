@@ -160,6 +160,9 @@ def unexplained(comparison: Comparison, causes: Sequence[Cause], trials: Sequenc
     best, at = causes[0].best, causes[0].at
     misfit, far = comparison.misfits(best.widths[[at]], best.displacements[[at]])
     by_best, points_by_best = np.abs(misfit[0]) > EXPLAINED, far[0] > EXPLAINED
+    # A crack of middling width is within three standard deviations of none at all, which include those of the model.
+    missed = widths - best.widths[at] > EXPLAINED * comparison.observations.uncertainties
+    by_best |= missed & (best.widths[at] < MADE * widths)
     reached, nearest = np.zeros(len(widths)), np.full(len(points_by_best), np.inf)
     for trial in trials:
         possible = np.isfinite(trial.log_likelihood)

@@ -292,6 +292,19 @@ def test_a_joint_that_was_seen_closed_and_opens_is_unexplained():
     assert not by_none.any()
 
 
+def test_a_crack_of_the_usual_width_that_is_not_made_is_unexplained():
+    """None at all is within three standard deviations of it, which are those of the model for the most part."""
+    rows = [{"joint": f"voussoir {k} | voussoir {k + 1}", "width": 0.004} for k in (2, 3)]
+    compared = comparison(rows)
+    openings = np.zeros((1, len(compared.joints.block_a), 2))
+    openings[0, compared.own[0]] = 0.004
+    widths = compared.widths(flat(openings))
+    best = SimpleNamespace(widths=widths, displacements=np.zeros((1, 0, 2)), log_likelihood=np.zeros(1))
+    assert (np.abs(compared.misfits(widths, best.displacements)[0]) < 3.0).all()
+    by_best, *_ = ranking.unexplained(compared, [SimpleNamespace(best=best, at=0)], [best])
+    assert by_best.tolist() == [False, True]
+
+
 def test_what_was_measured_is_a_stray_no_likelier_where_more_is_looked_at():
     found = []
     for farthest in (0.03, 0.3):

@@ -93,10 +93,11 @@ def test_a_support_that_is_cut_is_named_by_its_name_or_its_pieces():
         outlines, names=["ground 1", "ground 2", "one", "two"], roles=["fixed", "fixed", "free", "free"]
     )
     wall = replace(wall, drawn_names=("ground", "ground", "one", "two"))
-    rows = [{"joint": f"two | {name}", "width": 0.001} for name in ("ground 2", "ground")]
-    found = read_observations([*rows, {"block": "ground", "dx": 0.001, "dy": 0.0}], wall)
-    np.testing.assert_allclose(found.places, [[1.5, 0.0], [1.5, 0.0]])
-    np.testing.assert_allclose(found.points, [[1.0, -0.5]])
+    for name in ("ground 2", "ground"):
+        row = {"joint": f"two | {name}", "width": 0.001}
+        found = read_observations([row, {"block": "ground", "dx": 0.001, "dy": 0.0}], wall)
+        np.testing.assert_allclose(found.places, [[1.5, 0.0]])
+        np.testing.assert_allclose(found.points, [[1.0, -0.5]])
     with pytest.raises(ValueError, match="'grounds' is no block"):
         read_observations([{"joint": "two | grounds", "width": 0.001}], wall)
 
@@ -110,6 +111,10 @@ def test_a_support_that_is_cut_is_named_by_its_name_or_its_pieces():
             r"line 2: uncertainty is 0.3 m, and the largest .* 0.0062 m: .* name the column uncertainty \[mm\]",
         ),
         ("joint,width\n", "has no observation"),
+        (
+            "date,joint,width [mm]\n2024,voussoir 1 | voussoir 2,1.3\n2025,voussoir 2 | voussoir 1,3.3\n",
+            r"line 3: width \[mm\] is of voussoir 2 \| voussoir 1, as that of line 2 is; give one width for each place",
+        ),
         ("joint\nvoussoir 3 | voussoir 4\n", "has no column 'width'; its columns are 'joint'"),
         ("width\n0.003\n", "has no column 'joint'"),
         ("block_a,width\nvoussoir 3,0.003\n", "has no column 'block_b'"),
