@@ -74,7 +74,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         **_joint_counts(response),
         **_loss(response),
         "losses": [{**asdict(loss), "phase": loss.phase + 1} for loss in response.losses],
-        "removed": _removed(response),
+        "removed": removals(response),
         "analysis": response.analysis,
         "parameter": response.parameter.name,
         **own,
@@ -118,22 +118,21 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _removed(response: solver.Response) -> list[dict[str, Any]]:
+def removals(response: solver.Response) -> list[dict[str, Any]]:
     """Blocks and ties that are taken away before each settlement, its number from 1, and the blocks' weight."""
     names, weights = response.assembly.names, response.assembly.masses * solver.GRAVITY
-    there, removed, ties = np.ones(len(names), dtype=bool), list[dict[str, Any]](), {tie.name for tie in response.ties}
+    there, removed, ties = np.ones(len(names), dtype=bool), list[dict[str, Any]](), list(response.ties)
     for change in sorted(response.changes, key=lambda change: change.phase):
         taken = np.flatnonzero(there & (False if change.removed is None else change.removed))
         there[taken] = False
-        ties.difference_update(change.ties)
-        tied = [tie.name for tie in response.ties if tie.name in ties and set(tie.blocks) & set(taken.tolist())]
-        ties.difference_update(tied)
-        if len(taken) or change.ties:
+        gone = [tie for tie in ties if tie.name in change.ties or set(tie.blocks) & set(taken.tolist())]
+        ties = [tie for tie in ties if tie not in gone]
+        if len(taken) or gone:
             removed.append(
                 {
                     "phase": change.phase + 1,
                     "blocks": [names[k] for k in taken],
-                    "ties": [*change.ties, *tied],
+                    "ties": [tie.name for tie in gone],
                     "weight": float(weights[taken].sum()),
                 }
             )

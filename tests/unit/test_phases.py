@@ -443,12 +443,16 @@ def run_told(folder: Path, case: str, capsys: pytest.CaptureFixture[str]) -> tup
     return capsys.readouterr().out, json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
 
 
-def test_a_tie_that_is_taken_away_is_named_in_the_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_tie_that_is_named_twice_is_taken_away_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     iron = '[[ties]]\nname = "iron"\nfrom = { block = "left springer", point = [-1, 0] }\n'
     iron += 'to = { block = "right springer", point = [1, 0] }\nstiffness = 1e5\n'
     steps = SPREADING.replace("increment = 0.05\nlimit = 0.1", "increment = 0.002\nlimit = 0.002")
-    _, summary = run_told(tmp_path, ARCH + 2 * steps + iron + '[[remove]]\nphase = 2\nties = "iron"\n', capsys)
+    away = '[[remove]]\nphase = 2\nties = ["iron", "i*"]\n[[remove]]\nphase = 2\nties = "iron"\n'
+    away += '[[remove]]\nphase = 3\nties = "iron"\n'
+    _, summary = run_told(tmp_path, ARCH + 3 * steps + iron + away, capsys)
     assert summary["removed"] == [{"phase": 2, "blocks": [], "ties": ["iron"], "weight": 0.0}]
+    curve = blockvis.draw_curve(blockvis.open_results(tmp_path / "out"), tmp_path / "curve.svg")
+    assert curve.read_text(encoding="utf-8").count("'iron' taken away") == 1
 
 
 def test_a_block_named_twice_is_taken_away_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
