@@ -90,12 +90,13 @@ class Table:
 
     def whole(self, key: str, least: int, most: int | None = None) -> int | None:
         """Read a whole number of at least ``least``, and at most ``most``."""
-        value = self.number(key)
-        if value is not None and (value != int(value) or value < least or (most is not None and value > most)):
+        value = self.take(key)
+        if value is None:
+            return None
+        if not is_number(value) or value != int(value) or value < least or (most is not None and value > most):
             limits = f"of at least {least}" if most is None else f"from {least} to {most}"
-            raise self.error(key, f"is {value:g}; give a whole number {limits}")
-        # A double has not every large whole number, and a seed must not become another one.
-        return None if value is None else int(self.values[key])
+            raise self.error(key, f"is {shortened(value)}; give a whole number {limits}")
+        return int(value)
 
     def table(self, key: str) -> Table:
         """Read a table; a missing one is empty."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,6 +10,9 @@ import numpy as np
 
 #: Methods of sampling; "saltelli" is for Sobol' indices of first order and total.
 METHODS = ("grid", "latin hypercube", "sobol", "random", "saltelli")
+
+#: Most runs of one study: their table is made in memory.
+MOST_RUNS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -38,15 +42,19 @@ def designed(method: str, runs: int, levels: Sequence[int], repeats: int, seed: 
     study has N (factors + 2) runs, and where it is ``scattered``, by imperfections, their seed is a column: A. Saltelli
     et al., Variance based sensitivity analysis of model output, Computer Physics Communications 181 (2010) 259-270,
     https://doi.org/10.1016/j.cpc.2009.09.018: for each point of two independent samples A and B the rows A, A with one
-    column from B for each factor, B. Raises ``ValueError`` for a Sobol' sequence of runs that are no power of 2.
+    column from B for each factor, B. Raises ``ValueError`` for a Sobol' sequence of runs that are no power of 2, and
+    for more than :data:`MOST_RUNS`.
 
     Examples
     --------
     >>> designed("grid", 1, [2, 3], 1, 0, scattered=False).probabilities.shape
     (6, 2)
     """
-    n = len(levels)
-    if method == "grid":
+    n, grid = len(levels), method == "grid"
+    total = repeats * math.prod(levels) if grid else runs * (n + scattered + 2 if method == "saltelli" else 1)
+    if total > MOST_RUNS:
+        raise ValueError(f"makes {total:,} runs; at most {MOST_RUNS:,} make one study")
+    if grid:
         axes = [(np.arange(k) + 0.5) / k for k in levels]
         points = np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=1) if n else np.zeros((1, 0))
         points = np.repeat(points, repeats, axis=0)

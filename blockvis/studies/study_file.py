@@ -34,9 +34,6 @@ RESERVED = (
     "increments", "programs", "seconds", "seed", "message",
 )  # fmt: skip
 
-#: Most runs of one study: their table is made in memory.
-MOST_RUNS = 1_000_000
-
 #: Number of runs of which one has to be built before any run starts.
 TRIED = 8
 
@@ -96,7 +93,10 @@ class Study:
     def design(self) -> Design:
         """The runs: probabilities of the parameters, and seeds."""
         levels = [p.n_levels for p in self.parameters]
-        return designed(self.method, self.runs, levels, self.repeats, self.seed, scattered=self.n_seeded > 0)
+        try:
+            return designed(self.method, self.runs, levels, self.repeats, self.seed, scattered=self.n_seeded > 0)
+        except ValueError as error:
+            raise ValueError(f"{self.source}: [study] {error}") from None
 
     @property
     def n_runs(self) -> int:
@@ -220,12 +220,6 @@ def _check(study: Study, where: str) -> None:
         )
     if study.method == "grid":
         _check_grid(study, where)
-    try:
-        n = study.n_runs
-    except ValueError as error:
-        raise ValueError(f"{where}[study] {error}") from None
-    if n > MOST_RUNS:
-        raise ValueError(f"{where}the study has {n:,} runs; at most {MOST_RUNS:,} make one study")
     drawn = next((p for p in study.parameters if p.points and study.method != "grid"), None)
     if drawn is not None:
         raise ValueError(f'{where}[parameters] "{drawn.path}": points belong to a grid; give [study] runs')
@@ -235,8 +229,10 @@ def _check(study: Study, where: str) -> None:
 
 def _check_grid(study: Study, where: str) -> None:
     for p in study.parameters:
-        if p.distribution is not None and p.points < 2:
-            raise ValueError(f'{where}[parameters] "{p.path}": a grid needs points, the number of values to take')
+        if p.distribution is not None and not p.points:
+            raise ValueError(
+                f'{where}[parameters] "{p.path}": a grid needs points, the number of values to take, at least 2'
+            )
         if len(p.weights) and np.ptp(p.weights) > 0.0:
             raise ValueError(f'{where}[parameters] "{p.path}": a grid takes every value once; weights are for samples')
     if study.repeats > 1 and not study.n_seeded:
@@ -330,7 +326,7 @@ def _parameter(path: str, table: Table) -> Parameter:
     name = given["name"] or path
     if not listed:
         drawn = distribution_of(given, table)
-        return Parameter(path, name, given["also"], drawn, (), np.zeros(0), given["points"])
+        return Parameter(path, name, given["also"], drawn, (), np.zeros(0), given["points"] or 0)
     values = given["values"]
     weights = np.ones(len(values)) if given["weights"] is None else np.array(given["weights"])
     if len(weights) != len(values):

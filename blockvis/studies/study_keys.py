@@ -107,7 +107,13 @@ DRAWN = Section(
         *_COMMON_KEYS,
         replace(DISTRIBUTION_KEYS[0], remedy=f"choose from {', '.join(KINDS)}, or give values"),
         *DISTRIBUTION_KEYS[1:],
-        Key("points", whole(0), "Number of values of the distribution that a grid takes", 5, default=0),
+        Key(
+            "points",
+            whole(2),
+            "Number of values of the distribution that a grid takes",
+            5,
+            otherwise="the study is no grid",
+        ),
     ),
     forms=FORMS,
 )
