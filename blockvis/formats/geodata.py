@@ -23,7 +23,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches, passed_over
 from blockvis.layout.notes import CHANGED, UNIT, Note
 from blockvis.layout.outlines import ring_area
-from blockvis.layout.units import DOUBTED, unit_of
+from blockvis.layout.units import DOUBTED, metres_per, unit_of
 from blockvis.system.extras import require
 from solver import mechanics
 
@@ -50,12 +50,11 @@ GEOJSON = (
 #: What a file without a coordinate system draws so many of its widths away from 0 is a park or a country in degrees.
 FAR = 50.0
 
-#: Numbers of Mercators of the world, of EPSG and of Esri, and what names call them: others begin at a chosen scale.
-MERCATORS = "(3857|3785|3395|900913|102100|102113|54004)"
-OF_THE_WORLD = "(Pseudo|Web|World|Global|Google|Visualisation CRS /)"
+#: Numbers, of EPSG and of Esri, of Mercators that are true to scale at the equator.
+MERCATORS = "(3857|3785|3395|3832|900913|102100|102113|53004|54004)"
 
-#: Radius of the earth on the maps of the web [m], and how much they stretch lengths from which on it counts.
-RADIUS, STRETCHED = 6378137.0, 1.001
+#: Radius of the earth on the maps of the web [m], and by which part lengths are off that take it for a sphere.
+RADIUS, OFF = 6378137.0, 0.007
 
 #: What is counted of features that draw nothing.
 NO_GEOMETRY = "features without geometry"
@@ -83,7 +82,7 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     says = name if re.search(r"CRS84|4326$", name) else ""
     known = [one for one in features if one is not None]
     lengths, skipped = "crs" in content and crs is None, {NO_GEOMETRY: len(features) - len(known)}
-    mercator = _is_mercator(name)
+    mercator = _mercator(name)
     return layout_of_features(known, path, reading, degrees=says, lengths=lengths, mercator=mercator, skipped=skipped)
 
 
@@ -150,7 +149,7 @@ def _read_shapefile(path: Path, reading: Reading) -> Layout:
             features.append(Feature(shape(drawn.__geo_interface__), row))
     text = projection.read_text(encoding="utf-8", errors="replace") if projection else ""
     unit, degrees = _unit_of_system(text)
-    mercator = _is_mercator(text)
+    mercator = _mercator(text)
     return layout_of_features(features, path, reading, unit=unit, degrees=degrees, mercator=mercator, skipped=skipped)
 
 
@@ -176,7 +175,7 @@ def _read_geopackage(path: Path, reading: Reading) -> Layout:
     # What is left out as asked is counted with the rest, but not what lies in another system.
     features = [feature for layer in layers if layer.system in systems for feature in layer.features]
     skipped = {NO_GEOMETRY: sum(layer.empty for layer in layers if layer.system in systems)}
-    mercator = _is_mercator(text)
+    mercator = _mercator(text)
     found = layout_of_features(features, path, reading, unit=unit, degrees=degrees, mercator=mercator, skipped=skipped)
     other = [LeftOut("asked", np.zeros((0, 2)), "", one.name) for one in layers if one.system not in systems]
     return replace(found, left_out=(*found.left_out, *other))
@@ -250,31 +249,39 @@ def _unit_of_system(text: str) -> tuple[str, str]:
     return unit_of(metres, 1e-5) or (f"{metres:.9g} m" if 0.0 < metres < math.inf else ""), ""
 
 
-def _is_mercator(text: str) -> bool:
-    """Whether a coordinate system, by its words or its number, is a Mercator of the world, as of maps of the web."""
-    return re.search(rf"{OF_THE_WORLD}[- _]+Mercator|\b{MERCATORS}[\]\"\s]*$", text, re.IGNORECASE) is not None
+def _mercator(text: str) -> tuple[float, float] | None:
+    """Find the scale of a Mercator at the equator and its northing there, by words or number; None if it is none."""
+    # Transverse and oblique ones are true along a line through the drawing.
+    if re.search(r'\b(PROJECTION|METHOD)\s*\[\s*"(Mercator|Popular)', text, re.IGNORECASE) is None:
+        return (1.0, 0.0) if re.search(rf"\b{MERCATORS}$", text) else None
+    found = re.findall(r'\bPARAMETER\s*\[\s*"([^"]*)"\s*,\s*([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)', text)
+    given = {name.lower().replace("_", " "): float(value) for name, value in found}
+    parallel = given.get("standard parallel 1", given.get("latitude of 1st standard parallel", 0.0))
+    scale = given.get("scale factor", given.get("scale factor at natural origin", 1.0))
+    return scale * math.cos(math.radians(parallel)), given.get("false northing", 0.0)
 
 
-def _true_unit(found: Drawing, reading: Reading) -> tuple[str, list[Note]]:
-    """Find how long a metre of a Mercator of the world is where a drawing lies, with a note; "m" where it is one.
+def _true_unit(found: Drawing, reading: Reading, unit: str, mercator: tuple[float, float]) -> tuple[str, list[Note]]:
+    """Find how long the unit of a Mercator is where a drawing lies, with a note; the unit itself where it is as long.
 
     What is left out as asked, as a scale bar, does not count, and what lies far from the rest does not matter.
     """
+    (scale, start), metres = mercator, metres_per(unit or "m")
     wanted = found.wants(reading)
     # Before it is turned into its plane: (n, 3).
     middles = [float(one.points[:, 1].mean()) for one in found.strokes if wanted(one)]
-    north = float(np.median(middles)) / RADIUS if middles else 0.0
+    north = (float(np.median(middles)) - start) * metres / (scale * RADIUS) if middles and scale > 0.0 else math.inf
     # Beyond is no map.
-    stretch = math.cosh(north) if abs(north) <= math.pi else 1.0
-    if stretch < STRETCHED:
-        return "m", []
+    stretch = scale * math.cosh(north) if abs(north) <= math.pi else 1.0
+    if abs(stretch - 1.0) < OFF:
+        return unit or "m", []
     latitude = math.degrees(math.atan(math.sinh(north)))
     said = (
-        f"unit: the file is in a Mercator of the world, as EPSG:3857, which draws lengths {stretch:.4g} times as long "
-        f"at {abs(latitude):.0f}° {'N' if latitude > 0.0 else 'S'}: a unit of it is {1.0 / stretch:.6g} m, within "
-        f"0.7 %; reproject it for more"
+        f"unit: the file is in a Mercator, as EPSG:3857 is, which draws lengths {stretch:.4g} times as long at "
+        f"{abs(latitude):.0f}° {'N' if latitude > 0.0 else 'S'}: a unit of it is {metres / stretch:.6g} m, within "
+        f"{100.0 * OFF:.1g} %; reproject it for more"
     )
-    return f"{1.0 / stretch:.9g} m", [Note(UNIT, said)]
+    return f"{metres / stretch:.9g} m", [Note(UNIT, said)]
 
 
 def layout_of_features(
@@ -285,14 +292,14 @@ def layout_of_features(
     unit: str = "",
     degrees: str = "",
     lengths: bool = False,
-    mercator: bool = False,
+    mercator: tuple[float, float] | None = None,
     skipped: Mapping[str, int] | None = None,
 ) -> Layout:
     """Make a layout of polygons, and of the faces between lines.
 
     ``unit`` is "" where the file does not say it, ``degrees`` the name of a system of longitude and latitude;
-    ``lengths`` says whether the file says that it has no system, ``mercator`` whether it is in a Mercator of the world,
-    and ``skipped`` counts by its kind what is no outline.
+    ``lengths`` says whether the file says that it has no system, ``mercator`` is the scale of a Mercator at the equator
+    and its northing there, and ``skipped`` counts by its kind what is no outline.
     """
     found, rows = Drawing(skipped=Counter(skipped or {})), _rows(features)
     roles = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)
@@ -302,7 +309,7 @@ def layout_of_features(
         if len(parts := found.outlines[first:]) > 1:
             named = [{**row, "name": f"{row['name']} {k + 1}"} for k in range(len(parts))]
             found.outlines[first:] = [replace(one, row=own) for one, own in zip(parts, named, strict=True)]
-    true, stretched = _true_unit(found, reading) if mercator and reading.unit is None else (unit, [])
+    true, stretched = _true_unit(found, reading, unit, mercator) if mercator and reading.unit is None else (unit, [])
     turn, notes = found.turn(reading)
     if stretched and not (turn == np.eye(3)).all():
         raise ValueError(
