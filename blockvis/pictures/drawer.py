@@ -333,7 +333,7 @@ class Drawer:
             increment = without_removed(increment, self.response.increments[-1].state.fell_at)
         self.scene.hide(increment.removed)
         self.scene.pose(shown, self._block_colours(increment.pose, increment))
-        dots = np.zeros((0, self.assembly.dimension))
+        dots, falling = np.zeros((0, self.assembly.dimension)), increment.status == solver.Status.FALLING
         if blocks_only:
             self.scene.clear(*OF_STATICS)
         else:
@@ -341,14 +341,15 @@ class Drawer:
             self._draw_forces(increment, shown)
             self._draw_bearings(shown)
             # In the mechanism of a live load supports stand still.
-            if self.response.settlements and not (increment.load_multiplier and self._acts(increment)):
+            if self.response.settlements and not (
+                increment.load_multiplier and (falling or self._drawn_at is not None)
+            ):
                 seen = self.scene.frame if self._flat else None
                 self._draw_arrows("arrow", *self._settlement_arrows(increment, shown, seen), palette.SETTLEMENT)
             self._draw_live_load(increment, shown, dots)
             if self.response.loads.fills:
                 self.scene.backfill(fill_bodies(self.response, shown, increment.fallen))
         self.scene.ties(self.ties.strands(increment, shown, DASH * self.sheet.size[1] / 1080.0 * self.scene.pixel))
-        falling = increment.status == solver.Status.FALLING
         failed = self.response.stop == solver.Status.SOLVER_FAILED
         head, detail = caption_of(self.response, increment, self.look.magnification)
         picture = self.scene.image()

@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 from structures import BENT, alike, arch_response, box, parted, partly_unbounded, pixels, rectangle, report_of, wall
 
+import blockvis
 import solver
 from blockvis import animate, draw_mechanism, draw_still, generators
 from blockvis.pictures import palette
@@ -97,6 +98,20 @@ def test_arrows_of_supports_are_drawn_whole(space, tmp_path):
     picture = pixels(draw_still(response, -1, tmp_path / "still.png", forces="none", **options))
     lengths = np.ptp(np.argwhere(alike(picture, palette.SETTLEMENT)), axis=0)
     assert lengths.max() >= (35 if space else 42), lengths
+
+
+def test_supports_that_settle_under_a_live_load_have_arrows_whatever_the_colours(tmp_path):
+    case = '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 5 }\n[material]\nfriction_coefficient = 0.8\n'
+    case += "[settlement]\ndirection = [1, 0]\nincrement = 0.002\nlimit = 0.004\n"
+    case += '[analysis]\nkind = "limit load"\ndisplacement = 0\n[[loads]]\nkind = "live"\nweight_fraction = [0.1, 0]\n'
+    (tmp_path / "case.toml").write_text(case, encoding="utf-8")
+    response = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=()).response
+    stills = [
+        pixels(draw_still(response, 1, tmp_path / "still.png", size=SMALL, forces="none", colour_by=colours))
+        for colours in ("material", "mechanism")
+    ]
+    one, other = (int(alike(picture, palette.SETTLEMENT, 30).sum()) for picture in stills)
+    assert one == other > 20
 
 
 def test_bent_blocks_are_filled_without_triangle_lines():
