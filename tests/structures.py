@@ -122,6 +122,20 @@ def stacked(shift=(0.0, 0.0), turn: float = 0.0) -> tuple[solver.Assembly, solve
     return assembly, solver.Pose(assembly.centroids + np.array([(0.0, 0.0), shift]), np.array([[0.0], [turn]]))
 
 
+def two_cubes(order=(0, 1)) -> solver.Assembly:
+    """A cube of 1 m that is free, on one that is fixed, in either order."""
+    solids, roles = [box((0, 0, 0), (1, 1, 1)), box((0, 0, 1), (1, 1, 2))], ["fixed", "free"]
+    return solver.Assembly.from_solids([solids[k] for k in order], roles=[roles[k] for k in order])
+
+
+def twisted(order, corner, angle) -> tuple[solver.Assembly, solver.Pose]:
+    """Two cubes, and the pose with the upper one turned by an angle [rad] about the vertical through (x, y) [m]."""
+    assembly, turn, foot = two_cubes(order), np.array([0.0, 0.0, angle]), np.array([*corner, 1.0])
+    free, turned = assembly.free[:, None], mechanics.rotation_matrices(np.array([turn]))[0]
+    places = np.where(free, (assembly.centroids - foot) @ turned.T + foot, assembly.centroids)
+    return assembly, solver.Pose(places, free * turn)
+
+
 @cache
 def moved_and_turned() -> solver.Response:
     """An arch whose springer moves by a millimetre, in the first settlement, and turns by a milliradian."""

@@ -41,9 +41,8 @@
     // Half-way between the faces, out of that of block b: they run from the first end to the second.
     const x = b1[0] - b0[0] + a1[0] - a0[0], y = b1[1] - b0[1] + a1[1] - a0[1], both = norm(x, y) || 1, nx = y / both, ny = -x / both;
     const across = [[a0, b0], [a1, b1]].map(([p, r]) => (p[0] - r[0]) * nx + (p[1] - r[1]) * ny);
-    const along = [[a0, b0], [a1, b1]].map(([p, r]) => (p[1] - r[1]) * nx - (p[0] - r[0]) * ny);
-    const closer = Math.abs(across[0]) <= Math.abs(across[1]) ? 0 : 1;
-    const [opening, slip] = joined(a, b) ? [Math.max(...across), along[closer]] : [0, 0];
+    // Both ends slip alike.
+    const [opening, slip] = joined(a, b) ? [Math.max(...across), (a0[1] - b0[1]) * nx - (a0[0] - b0[0]) * ny] : [0, 0];
     return { a, b, a0, a1, b0, b1, length, nx, ny, opening, slip, nearest: Math.min(...across), bent: Math.abs(at[3 * a + 2] - at[3 * b + 2]) };
   }
 

@@ -51,20 +51,18 @@
 
   // The faces of a joint at a pose: corners on both blocks, gaps there, opening, slip, normal from block b into block a.
   function faces(at, j) {
-    const a = joints.blocks[2 * j], b = joints.blocks[2 * j + 1], onA = [], onB = [], gaps = [];
+    const a = joints.blocks[2 * j], b = joints.blocks[2 * j + 1], onA = [], onB = [], gaps = [], slips = [];
     const m = at === pose ? turns.pose : turns.shown, n0 = joints.normals.slice(3 * j, 3 * j + 3);
     const turned = (k) => [0, 3, 6].map((r) => m[9 * k + r] * n0[0] + m[9 * k + r + 1] * n0[1] + m[9 * k + r + 2] * n0[2]);
     const ofB = turned(b), sum = turned(a).map((v, r) => v + ofB[r]), both = norm(...sum) || 1, normal = sum.map((v) => v / both);
-    let closest = 0;
     for (let i = joints.first[j]; i < joints.first[j + 1]; i++) {
       const p = joints.points.slice(3 * i, 3 * i + 3);
       onA.push(carried(at, a, ...p)); onB.push(carried(at, b, ...p));
-      gaps.push(dot(minus(onA.at(-1), onB.at(-1)), normal));
-      if (Math.abs(gaps.at(-1)) < Math.abs(gaps[closest])) closest = gaps.length - 1;
+      const apart = minus(onA.at(-1), onB.at(-1)), gap = dot(apart, normal);
+      gaps.push(gap); slips.push(norm(...apart.map((v, r) => v - gap * normal[r])));
     }
-    const along = minus(onA[closest], onB[closest]), out = gaps[closest];
     const bent = norm(...[3, 4, 5].map((i) => at[6 * a + i] - at[6 * b + i]));
-    const [opening, slip] = joined(a, b) ? [Math.max(...gaps), norm(along[0] - out * normal[0], along[1] - out * normal[1], along[2] - out * normal[2])] : [0, 0];
+    const [opening, slip] = joined(a, b) ? [Math.max(...gaps), Math.max(...slips)] : [0, 0];
     return { a, b, onA, onB, gaps, normal, opening, nearest: Math.min(...gaps), slip, bent };
   }
 

@@ -25,7 +25,7 @@ class Faces:
     on_a: np.ndarray
     on_b: np.ndarray
     gaps: np.ndarray  #: (n_points,) array [m]: distance of the two faces at each corner, along the normal.
-    along: np.ndarray  #: (n_points, d) array [m]: movement of block a along the faces there.
+    apart: np.ndarray  #: (n_points, d) array [m]: movement of block a against block b there.
     normals: np.ndarray  #: (n_joints, d) array: unit normal from block b into block a, half-way between both faces.
 
 
@@ -46,8 +46,7 @@ def carried_faces(
     apart, normal = on_a - on_b, normals[rings.ring]
     if fallen is not None:
         apart[(fallen[joints.block_a] | fallen[joints.block_b])[rings.ring]] = 0.0
-    gaps = (apart * normal).sum(axis=1)
-    return Faces(on_a, on_b, gaps, apart - gaps[:, None] * normal, normals)
+    return Faces(on_a, on_b, (apart * normal).sum(axis=1), apart, normals)
 
 
 def end_openings(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> np.ndarray:
@@ -59,25 +58,20 @@ def opening_and_slip(
     assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, fallen: np.ndarray | None = None
 ) -> np.ndarray:
     """(n_joints, 2) array [m]: opening and slip of the joints of the layout; arguments as of :func:`carried_faces`."""
-    faces = carried_faces(assembly, joints, pose, fallen)
-    opening, along = _openings_and_slips(joints, faces)
-    return np.stack([opening, _signed(along, faces.normals)], axis=1)
+    return _openings_and_slips(joints, carried_faces(assembly, joints, pose, fallen))
 
 
-def _openings_and_slips(joints: InitialJoints, faces: Faces) -> tuple[np.ndarray, np.ndarray]:
-    """Find opening (n_joints,) and movement along the face (n_joints, d) [m], at the corner that is open least."""
-    rings = joints.rings
-    if not len(joints):
-        return np.zeros(0), np.zeros((0, rings.points.shape[1]))
-    order = np.lexsort((np.abs(faces.gaps), rings.ring))
-    return rings.largest(faces.gaps), faces.along[order[rings.offsets[:-1]]]
+def _openings_and_slips(joints: InitialJoints, faces: Faces) -> np.ndarray:
+    """Find the largest opening and slip of each joint, (n_joints, 2) [m]; in the plane both ends slip alike."""
+    slips = _along(faces.apart, faces.normals[joints.rings.ring])
+    return np.stack([joints.rings.largest(faces.gaps), joints.rings.largest(slips)], axis=1)
 
 
-def _signed(along: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(n,) array: parts of vectors (n, d) along the tangents of the plane; in space their sizes."""
-    if along.shape[1] == 3:
-        return np.asarray(np.linalg.norm(along, axis=1))
-    return along[:, 1] * normals[:, 0] - along[:, 0] * normals[:, 1]
+def _along(vectors: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(n,) array: parts of vectors (n, d) along the tangents of the plane; in space the sizes of those along faces."""
+    if vectors.shape[1] == 3:
+        return np.asarray(np.linalg.norm(vectors - (vectors * normals).sum(axis=1)[:, None] * normals, axis=1))
+    return vectors[:, 1] * normals[:, 0] - vectors[:, 0] * normals[:, 1]
 
 
 @dataclass(frozen=True)
@@ -97,19 +91,15 @@ class JointStates:
     #: (n_points,) array [m]: distance of the two faces at each corner, along the normal; 0 for later joints.
     gaps: np.ndarray
     opening: np.ndarray  #: (n,) array [m]: the largest of them.
-    #: (n, d) array [m]: of block a along the faces, at the corner that is open least; 0 for later joints.
-    along: np.ndarray
+    #: (n,) array [m]: along the tangent of the faces, a quarter turn from the normal; in space the largest size at a
+    #: corner; 0 for later joints.
+    slip: np.ndarray
     force: np.ndarray  #: (n, d) array [N]: resultant on block a; 0 in frames of a fall, where there is no equilibrium.
 
     @property
     def ends(self) -> np.ndarray:
         """(n, 2, 2) array [m]: of the joints in the plane, where they are now."""
         return self.rings.points.reshape(-1, 2, 2)
-
-    @property
-    def slip(self) -> np.ndarray:
-        """(n,) array [m]: along the tangent of the faces, a quarter turn from the normal; in space its size."""
-        return _signed(self.along, self.normals)
 
     @property
     def normal_force(self) -> np.ndarray:
@@ -119,7 +109,7 @@ class JointStates:
     @property
     def shear_force(self) -> np.ndarray:
         """(n,) array [N]: along the tangent; in space the size of the force along the face."""
-        return _signed(self.force - self.normal_force[:, None] * self.normals, self.normals)
+        return _along(self.force, self.normals)
 
 
 def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment) -> JointStates:
@@ -127,7 +117,7 @@ def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: so
     contacts = increment.contacts
     faces = carried_faces(assembly, joints, increment.pose, increment.fallen)
     rings = joints.rings.at((faces.on_a + faces.on_b) / 2.0)
-    opening, along = _openings_and_slips(joints, faces)
+    moved = _openings_and_slips(joints, faces)
     block_a, block_b, normals, gaps = joints.block_a, joints.block_b, faces.normals, faces.gaps
     joint = _nearest_face(contacts, joints, rings, normals)
     later = np.flatnonzero(joint < 0)
@@ -136,10 +126,8 @@ def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: so
         joint[later] = len(joints) + which
         block_a, block_b = np.concatenate([block_a, found.block_a]), np.concatenate([block_b, found.block_b])
         rings, normals = rings.joined(found.rings), np.concatenate([normals, found.normals])
-        gaps, opening, along = (
-            np.concatenate([of, np.zeros((count, *of.shape[1:]))])
-            for of, count in ((gaps, len(found.rings.points)), (opening, len(found)), (along, len(found)))
-        )
+        gaps = np.concatenate([gaps, np.zeros(len(found.rings.points))])
+        moved = np.concatenate([moved, np.zeros((len(found), 2))])
     force = np.zeros((len(block_a), assembly.dimension))
     if increment.status != solver.Status.FALLING and len(contacts):
         side = np.where(contacts.block_a == block_a[joint], 1.0, -1.0)
@@ -151,8 +139,8 @@ def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: so
         rings=rings,
         normals=normals,
         gaps=gaps,
-        opening=opening,
-        along=along,
+        opening=moved[:, 0],
+        slip=moved[:, 1],
         force=force,
     )
 

@@ -19,6 +19,8 @@ from structures import (
     rectangle,
     report_of,
     stacked,
+    twisted,
+    two_cubes,
     wall,
 )
 
@@ -51,14 +53,21 @@ def test_opening_and_slip_are_the_same_whichever_block_comes_first(dimension):
             assembly = solver.Assembly.from_outlines([blocks[k] for k in order], roles=[roles[k] for k in order])
             shift, turn = [0.5, 0.2], [0.4]
         else:
-            solids, roles = [box((0, 0, 0), (1, 1, 1)), box((0, 0, 1), (1, 1, 2))], ["fixed", "free"]
-            assembly = solver.Assembly.from_solids([solids[k] for k in order], roles=[roles[k] for k in order])
+            assembly = two_cubes(order)
             shift, turn = [0.5, 0.1, 0.2], [0.1, 0.4, 0.2]
         free = assembly.free[:, None]
         pose = solver.Pose(assembly.centroids + free * shift, free * turn)
         joint = posed(assembly, pose).joints()
         found.append((joint["opening"][0], abs(joint["slip"][0])))
     assert found[1] == pytest.approx(found[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_a_stone_that_twists_slips_by_as_much_as_its_farthest_corner(order):
+    for corner in [(0, 0), (1, 0), (1, 1), (0, 1)]:
+        joint = posed(*twisted(order, corner, np.pi / 4.0)).joints()
+        assert joint["opening"][0] == pytest.approx(0.0, abs=1e-12)
+        assert joint["slip"][0] == pytest.approx(2.0 * np.sqrt(2.0) * np.sin(np.pi / 8.0))
 
 
 def test_joints_carry_the_weight_above_them():
