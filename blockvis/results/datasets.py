@@ -234,15 +234,15 @@ def _cells(offsets: np.ndarray, members: np.ndarray) -> vtkCellArray:
 
 
 def _slip(assembly: solver.Assembly, increment: solver.Increment) -> np.ndarray:
-    """(n_contacts, 3) array [m]: how far block a has moved along block b at each contact point since the layout."""
+    """(n_contacts, 3) array [m]: how far block a has moved along block b at each contact point since the layout.
+
+    It is measured half-way between both faces, as slips of joints are.
+    """
     contacts, initial = increment.contacts, solver.Pose.initial(assembly)
-    on_a, on_b = (
-        mechanics.carried(contacts.points, block, increment.pose, initial)
-        for block in (contacts.block_a, contacts.block_b)
-    )
-    # What now lies together was apart by so much, seen with the axes of the layout.
-    moved = mechanics.turned(on_b - on_a, increment.pose.rotations[contacts.block_b])
-    normal = contacts.frames[:, 0]
+    blocks, states = (contacts.block_a, contacts.block_b), joint_states(assembly, initial_joints(assembly), increment)
+    drawn = mechanics.carried_between(contacts.points, *blocks, increment.pose, initial)
+    on_a, on_b = (mechanics.carried(drawn, block, initial, increment.pose) for block in blocks)
+    moved, normal = on_a - on_b, states.normals[states.of_contact]
     return np.asarray(moved - (moved * normal).sum(axis=1)[:, None] * normal)
 
 

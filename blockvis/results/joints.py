@@ -94,6 +94,7 @@ class JointStates:
     #: (n,) array [m]: along the tangent of the faces, a quarter turn from the normal; in space the largest size at a
     #: corner; 0 for later joints.
     slip: np.ndarray
+    of_contact: np.ndarray  #: (n_contacts,) int array: the joint that each contact point of the increment belongs to.
     force: np.ndarray  #: (n, d) array [N]: resultant on block a; 0 in frames of a fall, where there is no equilibrium.
 
     @property
@@ -141,6 +142,7 @@ def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: so
         gaps=gaps,
         opening=moved[:, 0],
         slip=moved[:, 1],
+        of_contact=joint,
         force=force,
     )
 

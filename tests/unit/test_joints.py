@@ -70,6 +70,17 @@ def test_a_stone_that_twists_slips_by_as_much_as_its_farthest_corner(order):
         assert joint["slip"][0] == pytest.approx(2.0 * np.sqrt(2.0) * np.sin(np.pi / 8.0))
 
 
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_slips_at_contact_points_are_measured_half_way_between_the_faces(order):
+    """There a stone that twists has moved square to its arms, whichever block comes first."""
+    response = posed(*twisted(order, (0, 0), np.pi / 4.0))
+    contacts = response.contacts()
+    assert contacts.n_points >= 4
+    of_upper = np.where(response.assembly.free[contacts["block_a"]], 1.0, -1.0)[:, None] * contacts["slip"]
+    square = np.cross([0.0, 0.0, 1.0], contacts.points - [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(of_upper, np.sin(np.pi / 4.0) * square, atol=1e-9)
+
+
 def test_joints_carry_the_weight_above_them():
     response = arch_response()
     for k in (0, len(response.path) - 1):
