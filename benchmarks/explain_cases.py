@@ -35,7 +35,7 @@ from blockvis.explanation.candidates import (
     scaled_motions,
     unit_vector,
 )
-from blockvis.results.joints import end_openings, initial_joints
+from blockvis.results.joints import carried_faces, initial_joints
 from blockvis.text import as_toml
 from solver import mechanics
 
@@ -203,7 +203,7 @@ def observed(structure: Structure, case: Case, seed: int) -> Rows:
     if response.stop is not solver.Status.LIMIT_REACHED:
         raise NoCase(f"{case} is no case: {response.message}")
     joints = initial_joints(assembly)
-    ends = end_openings(assembly, joints, response.path[-1].pose)
+    ends = carried_faces(assembly, joints, response.path[-1].pose).gaps.reshape(-1, 2)
     random = np.random.default_rng(seed)
     rows, closed = [], 0
     for line, both in zip(joints.ends, ends, strict=True):

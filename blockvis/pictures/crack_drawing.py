@@ -14,7 +14,7 @@ import solver
 from blockvis.layout.sights import Cut, Sight
 from blockvis.results.cracks import Crack, cracks_of, main_cracks, slid_joints
 from blockvis.results.joint_faces import InitialJoints, initial_joints
-from blockvis.results.joints import end_openings, opening_and_slip
+from blockvis.results.joints import carried_faces, opening_and_slip
 from blockvis.text import width_text
 from solver import mechanics
 
@@ -102,7 +102,7 @@ def _drawn_in_plane(
 ) -> tuple[Image.Image, list[Key], float]:
     """Draw the cracks of blocks in the plane; returns the picture, its legend and the size of a pixel [m]."""
     main = main_cracks(cracks)
-    openings = np.maximum(end_openings(assembly, joints, increment.pose), 0.0)
+    openings = np.maximum(carried_faces(assembly, joints, increment.pose).gaps.reshape(-1, 2), 0.0)
     widest = cracks[0].width if cracks else 1.0
     fill = palette.block_colours(assembly.materials, assembly.free)
     fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)

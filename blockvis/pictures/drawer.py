@@ -14,7 +14,7 @@ import solver
 from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.layout.sights import Cut, Sight
 from blockvis.results.cracks import cracks_of, main_cracks
-from blockvis.results.joints import carried_faces, end_openings, initial_joints
+from blockvis.results.joint_faces import initial_joints
 from blockvis.text import force_text, rounded_length, width_text
 from solver import mechanics
 
@@ -589,11 +589,12 @@ class Drawer:
         """Write the forces of ties, and the widths of the widest crack lines, beside them, where there is room."""
         points, words, colours = self.ties.labels(increment, shown)
         if widths:
-            cracks = main_cracks(cracks_of(self.assembly, increment.pose, increment.fallen))
-            faces = carried_faces(self.assembly, self.joints, shown)
-            widest = [int(crack.joints[0]) for crack in cracks]
-            ends = end_openings(self.assembly, self.joints, increment.pose)[widest].argmax(axis=1)
-            points = np.concatenate([points, (faces.on_a + faces.on_b).reshape(-1, 2, 2)[widest, ends] / 2.0])
+            # Between blocks that have parted no crack is drawn.
+            found = marks_of(self.assembly, self.joints, increment, shown)
+            cracks = cracks_of(self.assembly, increment.pose, increment.fallen)
+            cracks = main_cracks([crack for crack in cracks if crack.joints[0] in found.joints])
+            widest = np.searchsorted(found.joints, [crack.joints[0] for crack in cracks])
+            points = np.concatenate([points, found.middles[widest, found.openings[widest].argmax(axis=1)]])
             words += [width_text(crack.width) for crack in cracks]
             colours += [palette.OPEN] * len(cracks)
         if words:

@@ -82,6 +82,7 @@ class Marks:
     openings: np.ndarray  #: (n, 2) array [m]: distance of the faces at both ends of each, unmagnified.
     #: (n,) bool array: which are open so wide that there is air between the faces, which alone are marked.
     gapes: np.ndarray
+    joints: np.ndarray  #: (n,) int array, ascending: the joint of each.
     sliding: np.ndarray  #: (n, 2, d) array [m]: ends of each sliding joint, in space of the edges around it.
     exposed: list[np.ndarray]  #: (k, 3) arrays [m]: faces in space that slide, of both blocks.
     #: (n, 2, d) array [m]: ends of the line about which each hinge turns; the same twice for a point, as in the plane.
@@ -118,8 +119,8 @@ def marks_of(
 
 def cracks_between(
     assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose, fallen: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cracks at a pose, where it is shown, their openings and which of them gape, as :class:`Marks` has them.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Cracks at a pose, where it is shown, their openings, which gape and their joints, as :class:`Marks` has them.
 
     Joints of blocks that have fallen (n_blocks,) are no cracks.
     """
@@ -150,7 +151,7 @@ def cracks_between(
     gapes = turn[joint] > STEEPEST
     if assembly.dimension == 3:
         gapes |= parted[joint]
-    return np.stack([first[0], last[0], last[1], first[1]], axis=1), openings, gapes
+    return np.stack([first[0], last[0], last[1], first[1]], axis=1), openings, gapes, joint
 
 
 def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

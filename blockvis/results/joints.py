@@ -49,11 +49,6 @@ def carried_faces(
     return Faces(on_a, on_b, (apart * normal).sum(axis=1), apart, normals)
 
 
-def end_openings(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> np.ndarray:
-    """(n_joints, 2) array [m]: distance of the faces of joints in the plane at their ends, along the normal."""
-    return carried_faces(assembly, joints, pose).gaps.reshape(-1, 2)
-
-
 def opening_and_slip(
     assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, fallen: np.ndarray | None = None
 ) -> np.ndarray:

@@ -12,6 +12,7 @@ from blockvis.pictures.cracks_in_space import class_limits
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.results.cracks import cracks_of, main_cracks
 from blockvis.text import width_text
+from solver import mechanics
 
 SIZE = (640, 360)
 
@@ -109,21 +110,37 @@ def test_cracks_that_a_section_cuts_away_are_not_shown(tmp_path, monkeypatch):
 def test_labels_stand_at_the_widest_point_of_a_joint(monkeypatch):
     """A joint that opens at one end has its label there, not at its middle."""
     seen = []
-    from blockvis.pictures import drawer as drawing
-
-    monkeypatch.setattr(drawing, "write_labels", lambda picture, places, *_: seen.extend(places))
+    monkeypatch.setattr("blockvis.pictures.drawer.write_labels", lambda picture, places, *_: seen.extend(places))
     response = arch_response()
     last = response.path[-1]
     drawer = Drawer(response, Look(), SIZE, (last,))
     drawer.picture(last, widths=True)
     found = main_cracks(cracks_of(response.assembly, last.pose))
     joints = drawer.joints
-    faces = drawing.carried_faces(response.assembly, joints, last.pose)
-    on_a, on_b = faces.on_a.reshape(-1, 2, 2), faces.on_b.reshape(-1, 2, 2)
+    start, ends = solver.Pose.initial(response.assembly), joints.rings
+    on_a, on_b = (
+        mechanics.carried(ends.points, block[ends.ring], start, last.pose).reshape(-1, 2, 2)
+        for block in (joints.block_a, joints.block_b)
+    )
     for crack, place in zip(found, seen, strict=True):
         gap = np.linalg.norm((on_a - on_b)[crack.joints[0]], axis=1)
         widest = (on_a + on_b)[crack.joints[0], gap.argmax()] / 2.0
         np.testing.assert_allclose(place, drawer.scene.at_pixel(widest[None])[0], atol=0.01)
+
+
+def test_cracks_that_are_not_drawn_have_no_label(monkeypatch):
+    """Between two blocks of a row that have parted by most of a block is air, and no crack."""
+    written = []
+    monkeypatch.setattr(
+        "blockvis.pictures.drawer.write_labels", lambda picture, places, words, *_: written.extend(words)
+    )
+    places = [(-1, -1, 9, 0), (0, 0, 2, 1), (2, 0, 4, 1), (4, 0, 6, 1)]
+    assembly = solver.Assembly.from_outlines([rectangle(*place) for place in places], roles=["fixed"] + 3 * ["free"])
+    shift = np.array([[0, 0], [-0.06, 0], [0, 0], [1.6, 0]])
+    response = posed(assembly, solver.Pose(assembly.centroids + shift, np.zeros((4, 1))))
+    (only,) = response.increments
+    Drawer(response, Look(), SIZE, (only,)).picture(only, widths=True)
+    assert written == ["60 mm"]
 
 
 def details(monkeypatch):

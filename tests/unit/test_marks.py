@@ -103,7 +103,7 @@ def test_of_a_wedge_that_gapes_only_the_faces_are_marked():
         c, s = np.cos(turn), np.sin(turn)
         # Rocked about the lower left corner.
         assembly, pose = stacked(shift=(0.5 * c - 0.5 * s - 0.5, 0.5 * s + 0.5 * c - 0.5), turn=turn)
-        found, _, gapes = all_cracks(assembly, pose)
+        found, _, gapes, _ = all_cracks(assembly, pose)
         return np.count_nonzero(~gapes), found[gapes]
 
     assert marked(0.3)[0] == 1
@@ -128,7 +128,7 @@ def four_blocks(apart):
 @given(st.floats(0.01, 0.2))
 def test_the_pocket_where_four_cracks_meet_is_air(apart):
     assembly, pose = four_blocks(apart)
-    found, openings, _ = all_cracks(assembly, pose)
+    found, openings, *_ = all_cracks(assembly, pose)
     assert len(found) == 4
     np.testing.assert_allclose(openings, 2.0 * apart, rtol=1e-9)
     covered = shapely.union_all([shapely.Polygon(crack) for crack in found])

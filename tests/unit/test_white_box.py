@@ -30,7 +30,7 @@ WHITE_BOX = {
     "system/test_study_campaign.py": 7,
     "unit/test_case_keys.py": 7,
     "unit/test_closed_joints.py": 11,
-    "unit/test_crack_drawing.py": 10,
+    "unit/test_crack_drawing.py": 9,
     "unit/test_dimensions.py": 12,
     "unit/test_explanation.py": 20,
     "unit/test_fall.py": 9,
