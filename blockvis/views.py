@@ -50,6 +50,7 @@ def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.Unstru
     """Make a dataset of blocks, joints, contact points or ties of an increment, below 0 from the end of the path."""
     import pyvista as pv
 
+    from .results.about import quantities_in
     from .results.datasets import block_grid, contact_grid, joint_grid, tie_grid
     from .results.increments import numbered
     from .results.mechanism_arrays import as_shown
@@ -59,12 +60,13 @@ def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.Unstru
     if response.path and k < 0:
         increment = numbered(response.path, k)
     increment, falls = as_shown(response, increment)
+    quantities = quantities_in(response, increment.phase)
     if of == "blocks":
-        grid = block_grid(assembly, increment, shape=shape, falls=falls)
+        grid = block_grid(assembly, increment, quantities, shape=shape, falls=falls)
     elif of == "members":
-        grid = tie_grid(response.ties, assembly, increment, shape=shape)
+        grid = tie_grid(response.ties, assembly, increment, quantities, shape=shape)
     else:
-        grid = (joint_grid if of == "joints" else contact_grid)(assembly, increment, shape=shape)
+        grid = (joint_grid if of == "joints" else contact_grid)(assembly, increment, quantities, shape=shape)
     return pv.UnstructuredGrid(grid)
 
 

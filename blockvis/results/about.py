@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import solver
 from blockvis.dynamics.fall import with_mechanism
@@ -81,10 +82,49 @@ def told_reaction(value: float, response: solver.Response, moment: bool) -> floa
     return value if abs(value) > NOTHING * reaction_size(response, moment) else 0.0
 
 
-def unit_in(response: solver.Response, phase: int) -> str:
+class Measured(Protocol):
+    """What runs over a parameter and is measured: a response, or the course of one to come."""
+
+    @property
+    def parameter(self) -> mechanics.Quantity:
+        """What its increments run over."""
+
+    @property
+    def measured(self) -> mechanics.Quantity:
+        """What is measured along them."""
+
+    @property
+    def settlements(self) -> tuple[solver.Settlement, ...]:
+        """Whose phases the parameter belongs to."""
+
+
+def unit_in(course: Measured, phase: int) -> str:
     """Give the unit of the parameter in a phase, by its number from 0: "m" or "rad" of a settlement."""
-    settlements = response.settlements
-    return settlements[min(phase, len(settlements) - 1)].unit if settlements else response.parameter.unit
+    settlements = course.settlements
+    return settlements[min(phase, len(settlements) - 1)].unit if settlements else course.parameter.unit
+
+
+@dataclass(frozen=True)
+class Quantities:
+    """What the increments of a phase run over, and what their reaction is: that of live loads is a force."""
+
+    parameter: mechanics.Quantity = mechanics.SETTLEMENT
+    reaction: mechanics.Quantity = mechanics.REACTION
+
+
+STATIC = Quantities()
+
+
+def quantities_in(course: Measured, phase: int) -> Quantities:
+    """Give the quantities of a phase, by its number from 0."""
+    unit = unit_in(course, phase)
+    reaction = mechanics.reaction_to(unit) if course.measured.is_force else mechanics.REACTION
+    return Quantities(replace(course.parameter, unit=unit), reaction)
+
+
+def quantities_of(course: Measured) -> tuple[Quantities, ...]:
+    """Give the quantities of each phase; of what has no settlement those of the whole."""
+    return tuple(quantities_in(course, phase) for phase in range(max(len(course.settlements), 1)))
 
 
 def collapse_phase(response: solver.Response) -> int | None:

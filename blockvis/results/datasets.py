@@ -24,9 +24,11 @@ import solver
 from blockvis.system.vtk_files import string_array
 from solver import mechanics
 
+from .about import STATIC, Quantities
 from .joint_faces import Rings, initial_joints, lengths_of
 from .joints import joint_states
 from .mechanism_arrays import block_motion, next_places, part_of_friction
+from .tables import own_columns
 from .ties import STATE_WORDS, ties_at
 
 #: Numbers of the roles in the cell array ``role``; their names are in the field array ``role_names``.
@@ -36,17 +38,19 @@ ROLE_NUMBERS = {role: number for number, role in enumerate(mechanics.ROLES)}
 #: What the points of a dataset of blocks show: where the blocks are, or where the layout has them.
 SHAPES = ("moved", "undeformed")
 
-#: Units of the arrays; those that are not here are names, numbers of blocks or states, or have no unit.
+#: Units of the arrays that are alike in all results; those that are not here are names, numbers of blocks or states, or
+#: have no unit.
 UNITS = {
     "displacement": "m", "reference": "m", "to_reference": "m", "mechanism": "m", "translation": "m", "rotation": "rad",
     "force": "N", "normal_force": "N", "shear_force": "N", "shear": "N", "gap": "m", "opening": "m", "slip": "m",
-    "length": "m", "area": "m²", "elongation": "m",
+    "length": "m", "area": "m²", "elongation": "m", "time": "s",
 }  # fmt: skip
 
 
 def block_grid(
     assembly: solver.Assembly,
     increment: solver.Increment | None = None,
+    quantities: Quantities = STATIC,
     *,
     shape: str = "moved",
     falls: np.ndarray | None = None,
@@ -88,13 +92,20 @@ def block_grid(
     ahead = None if increment is None else next_places(assembly, increment, corners, assembly.block_of_vertex)
     _give_shape(grid, assembly.vertices, shape, ahead)
     add_arrays(grid.GetFieldData(), {"role_names": mechanics.ROLES, "material_names": materials})
+    units: dict[str, str] = {}
     if increment is not None:
         fallen, motion = increment.fallen, block_motion(assembly, increment, falls)
         add_arrays(grid.GetCellData(), {"fallen": fallen.astype(np.int32), **motion})
-    return _described(grid, increment)
+        # A turn does its work on a moment; a mechanism goes by its largest movement, and frames by none of both.
+        per = "rad" if quantities.reaction.unit == "N·m" and falls is None else "m"
+        if increment.status == solver.Status.EQUILIBRIUM:
+            units = {"mechanism_velocity": f"m/{per}", "mechanism_rotation": f"rad/{per}"}
+    return _described(grid, increment, quantities, units)
 
 
-def joint_grid(assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved") -> vtkUnstructuredGrid:
+def joint_grid(
+    assembly: solver.Assembly, increment: solver.Increment, quantities: Quantities = STATIC, *, shape: str = "moved"
+) -> vtkUnstructuredGrid:
     """Make a grid of the joints of one increment: a line for each, in space a face, midway between its two faces."""
     states = joint_states(assembly, initial_joints(assembly), increment)
     rings, in_space = states.rings, assembly.dimension == 3
@@ -124,11 +135,11 @@ def joint_grid(assembly: solver.Assembly, increment: solver.Increment, *, shape:
             "joint": [f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True)],
         },
     )
-    return _described(grid, increment)
+    return _described(grid, increment, quantities)
 
 
 def contact_grid(
-    assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
+    assembly: solver.Assembly, increment: solver.Increment, quantities: Quantities = STATIC, *, shape: str = "moved"
 ) -> vtkUnstructuredGrid:
     """Make a grid of the contact points of one increment, one vertex cell each; in a fall their forces are 0."""
     contacts, states = increment.contacts, increment.states
@@ -160,11 +171,16 @@ def contact_grid(
         points |= {"shear": shear, "slip": _slip(assembly, increment)}
     add_arrays(grid.GetPointData(), points)
     add_arrays(grid.GetFieldData(), {"state_names": [state.name.lower() for state in mechanics.ContactState]})
-    return _described(grid, increment)
+    return _described(grid, increment, quantities)
 
 
 def tie_grid(
-    ties: Sequence[solver.Tie], assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
+    ties: Sequence[solver.Tie],
+    assembly: solver.Assembly,
+    increment: solver.Increment,
+    quantities: Quantities = STATIC,
+    *,
+    shape: str = "moved",
 ) -> vtkUnstructuredGrid:
     """Make a grid of the ties, props and bars of one increment: a line for each, from end to end."""
     found, d = ties_at(ties, assembly, increment), assembly.dimension
@@ -180,24 +196,25 @@ def tie_grid(
     add_arrays(grid.GetCellData(), cells)
     grid.GetCellData().SetActiveScalars("force")
     add_arrays(grid.GetFieldData(), {"state_names": STATE_WORDS})
-    return _described(grid, increment)
+    return _described(grid, increment, quantities)
 
 
 def grids_of(
     assembly: solver.Assembly,
     increment: solver.Increment,
     ties: Sequence[solver.Tie],
+    quantities: Quantities,
     *,
     shape: str = "moved",
     falls: np.ndarray | None = None,
 ) -> dict[str, vtkUnstructuredGrid]:
     """Make all grids of an increment by their kinds; that of ties where there are any."""
     grids = {
-        "blocks": block_grid(assembly, increment, shape=shape, falls=falls),
-        "contacts": contact_grid(assembly, increment, shape=shape),
-        "joints": joint_grid(assembly, increment, shape=shape),
+        "blocks": block_grid(assembly, increment, quantities, shape=shape, falls=falls),
+        "contacts": contact_grid(assembly, increment, quantities, shape=shape),
+        "joints": joint_grid(assembly, increment, quantities, shape=shape),
     }
-    return grids | ({"ties": tie_grid(ties, assembly, increment, shape=shape)} if ties else {})
+    return grids | ({"ties": tie_grid(ties, assembly, increment, quantities, shape=shape)} if ties else {})
 
 
 def _grid_of_cells(points: np.ndarray, offsets: np.ndarray, kind: int | np.ndarray) -> vtkUnstructuredGrid:
@@ -261,18 +278,27 @@ def _grid_between(
     return grid
 
 
-def _described(grid: vtkUnstructuredGrid, increment: solver.Increment | None) -> vtkUnstructuredGrid:
-    """Write the numbers of an increment, if any, into the field arrays of a grid, and the units of its arrays."""
+def _described(
+    grid: vtkUnstructuredGrid,
+    increment: solver.Increment | None,
+    quantities: Quantities,
+    units: Mapping[str, str] | None = None,
+) -> vtkUnstructuredGrid:
+    """Write the numbers of an increment, if any, into the field arrays of a grid, and the units of its arrays.
+
+    ``units`` are those that depend on the increment, by the names of the arrays.
+    """
+    own = dict.fromkeys(("settlement", *own_columns(quantities.parameter)), quantities.parameter.unit)
     if increment is not None:
         numbers: dict[str, np.ndarray | Iterable[str]] = {
-            "settlement": np.array([increment.parameter]),
+            **{name: np.array([increment.parameter]) for name in own},
             "phase": np.array([increment.phase]),
             "load_multiplier": np.array([increment.load_multiplier]),
             "reaction": np.array([increment.reaction]),
             "status": [str(increment.status)],
         }
         add_arrays(grid.GetFieldData(), numbers)
-    _state_units(grid)
+    state_units(grid, {**own, "reaction": quantities.reaction.unit, **(units or {})})
     return grid
 
 
@@ -307,15 +333,15 @@ def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str, ah
     grid.GetPointData().SetActiveVectors(next(iter(arrays)))
 
 
-def _state_units(grid: vtkUnstructuredGrid) -> None:
-    """Write the unit of each array into its metadata and into the field array ``units``."""
-    listed = []
-    for attributes in (grid.GetPointData(), grid.GetCellData()):
+def state_units(grid: vtkUnstructuredGrid, own: Mapping[str, str]) -> None:
+    """Write the unit of each array into its metadata and into the field array ``units``; ``own`` beside the common."""
+    listed, units = [], {**UNITS, **own}
+    for attributes in (grid.GetPointData(), grid.GetCellData(), grid.GetFieldData()):
         for k in range(attributes.GetNumberOfArrays()):
             array = attributes.GetAbstractArray(k)
-            if array.GetName() in UNITS:
-                array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), UNITS[array.GetName()])
-                listed.append(f"{array.GetName()} [{UNITS[array.GetName()]}]")
+            if array.GetName() in units:
+                array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), units[array.GetName()])
+                listed.append(f"{array.GetName()} [{units[array.GetName()]}]")
     add_arrays(grid.GetFieldData(), {"units": dict.fromkeys(listed)})
 
 

@@ -46,7 +46,7 @@ def fall_grid(
     response: solver.Response, fall: Fall, time: float, shape: str, falls: np.ndarray | None
 ) -> vtkUnstructuredGrid:
     """Make a grid of the blocks, of which ``falls`` (n_blocks,) are taken, at a time [s]; without it of the ties."""
-    from .datasets import add_arrays, block_grid, tie_grid
+    from .datasets import add_arrays, block_grid, state_units, tie_grid
 
     state = falling_increment(response, fall, time)
     if falls is None:
@@ -57,6 +57,7 @@ def fall_grid(
     for name in ("settlement", "load_multiplier", "reaction"):
         grid.GetFieldData().RemoveArray(name)
     add_arrays(grid.GetFieldData(), {"time": np.array([time])})
+    state_units(grid, {})
     return grid
 
 

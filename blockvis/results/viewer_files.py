@@ -12,6 +12,7 @@ import numpy as np
 import solver
 from blockvis.system.vtk_files import is_complete, write_pvd, write_vtu
 
+from .about import STATIC, Quantities
 from .mechanism_arrays import as_shown
 from .ties import TIES, stored_ties
 
@@ -21,10 +22,11 @@ GRIDS, TIE_GRID = ("blocks", "contacts", "joints"), "ties"
 
 @dataclass(frozen=True)
 class ViewerFormat:
-    """How the VTU files of a results folder are written."""
+    """How the VTU files of a results folder are written, and what their numbers are."""
 
     shape: str = "moved"  #: {"moved", "undeformed"}: of the blocks; see :func:`blockvis.results.datasets.block_grid`.
     strings: bool = True
+    quantities: tuple[Quantities, ...] = (STATIC,)  #: Of each phase; of later ones those of the last.
 
 
 #: As viewers show them best.
@@ -105,7 +107,8 @@ def write_grids(
     from .datasets import grids_of
 
     ties = stored_ties(folder)
-    for kind, grid in grids_of(assembly, increment, ties, shape=vtu.shape, falls=falls).items():
+    quantities = vtu.quantities[min(increment.phase, len(vtu.quantities) - 1)]
+    for kind, grid in grids_of(assembly, increment, ties, quantities, shape=vtu.shape, falls=falls).items():
         write_vtu(grid, grid_file(folder, kind, number), strings=vtu.strings, durable=False)
 
 

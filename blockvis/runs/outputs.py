@@ -13,6 +13,7 @@ import solver
 from blockvis.cases.contents import Case
 from blockvis.dynamics.fall import NEVER_STOOD, STANDS, Fall, fall_of, may_fall, still_moving
 from blockvis.kinds.kinds import KINDS
+from blockvis.results.about import quantities_of
 from blockvis.results.fall_files import stored_fall, write_fall
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.reaction_range import stored_range
@@ -170,7 +171,7 @@ def write_report_of(response: solver.Response, folder: Path, fall: Fall | None) 
 
 def viewer_format(case: Case) -> ViewerFormat:
     """Say how a case has its VTU files written."""
-    return ViewerFormat(case.vtu, case.vtu_strings)
+    return ViewerFormat(case.vtu, case.vtu_strings, quantities_of(KINDS[case.analysis].course(case)))
 
 
 def _underlay(case: Case) -> Underlay | None:

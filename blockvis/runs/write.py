@@ -7,8 +7,10 @@ from pathlib import Path
 import solver
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.paraview import write_paraview_macro
+from blockvis.results.about import quantities_of
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.increments import folder_of
+from blockvis.results.viewer_files import ViewerFormat
 
 
 def write(response: solver.Response, folder: str | Path, *, overwrite: bool = False) -> Path:
@@ -31,7 +33,12 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
     if any(source is not None and source.resolve() == Path(folder).resolve() for source in sources):
         raise ValueError(f"the response is read from '{folder}' itself; write it to another folder")
     results = ResultsFolder(
-        folder, response.assembly, overwrite=overwrite, parameter=response.parameter, ties=response.ties
+        folder,
+        response.assembly,
+        overwrite=overwrite,
+        parameter=response.parameter,
+        vtu=ViewerFormat(quantities=quantities_of(response)),
+        ties=response.ties,
     )
     for increment in response.increments:
         results.add(increment)

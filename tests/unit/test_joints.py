@@ -174,6 +174,43 @@ def test_units_are_in_the_files(tmp_path):
     assert (out / "joints.pvd").read_text(encoding="utf-8").count("joints_") == len(arch_response().path)
 
 
+def test_files_tell_the_units_of_their_phase(tmp_path):
+    """Of a rotation the parameter is an angle, its reaction a moment; the mechanism of a collapse is per m."""
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nlayout = "arch"\n[analysis]\nfalling_frames = 1\n'
+        "[[settlement]]\ndirection = [1, 0]\nincrement = 0.01\nlimit = 0.01\n"
+        "[[settlement]]\nrotation_centre = [1.0, 0.0]\nrotation = -1.0\nincrement = 0.05\nlimit = 0.5\n",
+        encoding="utf-8",
+    )
+    run = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=())
+    last, about = len(run.response.path) - 1, ("settlement", "reaction", "mechanism_velocity", "mechanism_rotation")
+    for k, units in {
+        0: ("m", "N", "m/m", "rad/m"),
+        last - 1: ("rad", "N·m", "m/rad", "rad/rad"),
+        last: ("rad", "N·m", "m/m", "rad/m"),
+        last + 1: ("rad", "N·m"),
+    }.items():
+        file = pv.read(run.folder / "increments" / f"blocks_{k:05d}.vtu")
+        told = [f"{name} [{unit}]" for name, unit in zip(about, units, strict=False)]
+        for grid in (file, run.response.mesh(k)):
+            assert [unit for unit in grid.field_data["units"] if unit.startswith(about)] == [*told[2:], *told[:2]]
+    assert "settlement [rad]" in list(run.response.joints(last).field_data["units"])
+
+
+def test_files_have_the_place_of_a_load_that_moves(tmp_path):
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nlayout = "arch"\n[analysis]\nkind = "limit load"\n'
+        '[[loads]]\nkind = "live"\nforce = [0, -1]\npositions = [-0.5, 0.5, 3]\n',
+        encoding="utf-8",
+    )
+    run = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=())
+    for part in ("blocks", "joints", "contacts"):
+        for k, place in enumerate([-0.5, 0.0, 0.5]):
+            numbers = pv.read(run.folder / "increments" / f"{part}_{k:05d}.vtu").field_data
+            assert numbers["load_position"][0] == place
+            assert "load_position [m]" in list(numbers["units"])
+
+
 def test_a_case_chooses_the_undeformed_shape_and_files_that_meshio_reads(tmp_path):
     text = (
         '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.05\nlimit = 0.05\n'
