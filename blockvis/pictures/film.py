@@ -16,7 +16,8 @@ from solver import mechanics
 from .captions import matters
 from .drawer import Drawer
 
-#: Seconds for which the last equilibrium and the end of the film are held, and those for which a loss is told.
+#: Seconds for which the last equilibrium and the end of the film are held, and those for which a loss is told, or a
+#: phase at least takes.
 PAUSE, END, TOLD = 0.5, 0.8, 1.0
 
 #: Nothing moves from one frame of a fall to the next where no corner moves by more than this [pixels].
@@ -28,7 +29,7 @@ Draw: TypeAlias = Callable[[], Image.Image]
 def film_of(
     drawer: Drawer, fps: float, seconds: float, progress: Callable[[int, int], None] | None = None
 ) -> Iterator[Image.Image]:
-    """Plan a film: even motion along the path, in so many seconds, a pause, then the fall.
+    """Plan a film: even motion along each phase of the path, in so many seconds, a pause, then the fall.
 
     Gives its frames, drawn as they are asked for; what stands still is drawn once. ``progress`` is called with the
     frames drawn and their number.
@@ -143,7 +144,7 @@ def _ties_between(before: mechanics.TieForces, after: mechanics.TieForces, part:
 
 
 def _along(drawer: Drawer, path: list[solver.Increment], n: int, pause: int, told: int) -> list[Draw]:
-    """List what draws ``n`` states at even steps of the parameter; losses are ``told`` for so many.
+    """List what draws ``n`` states at even steps of the parameter; losses and phases are ``told`` for so many.
 
     States that stand by themselves stand equally long, for no more than a pause.
     """
@@ -154,11 +155,23 @@ def _along(drawer: Drawer, path: list[solver.Increment], n: int, pause: int, tol
         draws: list[Draw] = [partial(drawer.picture, increment) for increment in path]
         each = int(np.clip(round(n / len(path)), 1, pause))
         return [draw for draw in draws for _ in range(each)]
-    places = np.linspace(total[0], total[-1], n)
+    places = _places(path, total, n, min(max(2, told), n))
     return [
         partial(_drawn_at, drawer, path, total, float(at), words)
         for at, words in zip(places, _losses_told(drawer.response, path, total, places, told), strict=True)
     ]
+
+
+def _places(path: Sequence[solver.Increment], total: np.ndarray, n: int, least: int) -> np.ndarray:
+    """(m,) array: parameters over all phases [m or rad] of ``n`` frames, more where a phase has fewer than ``least``.
+
+    Those of a path (n_increments,) are ``total``. A phase that is short beside the others would flash by.
+    """
+    ends = total[[k for k, one in enumerate(path) if one is path[-1] or path[k + 1].phase != one.phase]]
+    lengths = np.diff(ends, prepend=total[0])
+    spare = max(n - len(ends) * least, 0)
+    frames = np.cumsum(least + spare * lengths / lengths.sum()).round()
+    return np.interp(np.arange(frames[-1]), [0.0, *(frames - 1.0)], [total[0], *ends])
 
 
 def _drawn_at(

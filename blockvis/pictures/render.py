@@ -161,9 +161,9 @@ def animate(
 ) -> Path:
     """Write the settlement and the fall as a film.
 
-    The settlement grows evenly over ``seconds``, the last equilibrium holds for a moment, then the fall follows in
-    real time: rigid-body dynamics without restitution. With a magnification the mechanism is followed step by step
-    instead, marked as pseudo-time.
+    The settlement grows evenly over ``seconds``, each phase for one at least; the last equilibrium holds for a moment,
+    then the fall follows in real time: rigid-body dynamics without restitution. With a magnification the mechanism is
+    followed step by step instead, marked as pseudo-time.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def animate(
     fps : float
         Frames per second; a .gif has 50 at most.
     seconds : float [s]
-        Length of the part in equilibrium.
+        Length of the part in equilibrium; of more phases than that as many.
     magnification, colour_by, forces, joints, curve
         As in :func:`draw_still`.
     fall : Fall, optional

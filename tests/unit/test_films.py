@@ -5,7 +5,7 @@ import subprocess
 import sys
 import weakref
 from dataclasses import replace
-from itertools import pairwise, repeat
+from itertools import chain, pairwise, repeat
 from types import SimpleNamespace
 
 import imageio_ffmpeg
@@ -60,6 +60,22 @@ def sideways_block(steps=3):
     loads = solver.Loads(solver.self_weight(assembly).dead, live)
     control = solver.ControlDisplacement("block", (1, 0), increment=0.02, limit=0.02 * steps)
     return solver.pushover(assembly, control, loads=loads, friction_coefficient=2.0)
+
+
+@pytest.mark.parametrize(("seconds", "frames"), [(4.0, [10, 20, 10]), (1.0, [10, 10, 10]), (0.5, [5, 5, 5])])
+def test_a_short_phase_takes_a_second_of_the_film(seconds, frames):
+    path = arch_response().path
+    phases = [[replace(i, phase=k, parameter=part * i.parameter) for i in path] for k, part in enumerate((1e-3, 1, 0))]
+    response = replace(arch_response(), increments=tuple(chain(*phases)), collapse=None)
+    drawer = Drawer(response, Look(forces="none"), SIZE, response.path)
+    shown = []
+    drawer.picture = lambda state, badge=None: shown.append((state.phase, state.parameter))
+    film = list(film_of(drawer, 10.0, seconds))
+    assert len(film) == sum(frames) + 8
+    # The last frame of a phase is where the next begins.
+    counts = [sum(phase == k for phase, _ in shown[: sum(frames)]) for k in range(3)]
+    assert np.abs(np.subtract(counts, frames)).max() <= 1, counts
+    assert shown[0] == (0, 0.0)
 
 
 @pytest.mark.slow
