@@ -160,6 +160,17 @@ def rounded_length(largest: float) -> float:
     return float(f"{max(m for m in (1.0, 2.0, 5.0) if m * power <= largest * (1 + 1e-9)) * power:.6g}")
 
 
+def bar_text(length: float) -> str:
+    """Write the length of a scale bar [m]: below 0.1 m in mm.
+
+    Examples
+    --------
+    >>> bar_text(0.1), bar_text(0.02)
+    ('0.1 m', '20 mm')
+    """
+    return f"{length:g} m" if length >= 0.1 else f"{1e3 * length:g} mm"
+
+
 def as_toml(value: Any) -> str:
     r"""Write a value as TOML has it; numbers with twelve digits, which leaves out the rounding of converted lengths.
 

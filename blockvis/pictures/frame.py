@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw, ImageFont
 
 import solver
-from blockvis.text import rounded_length
+from blockvis.text import bar_text, rounded_length
 from solver import mechanics
 
 from . import palette
@@ -154,7 +154,7 @@ class Sheet:
         for end in (x, x + pixels - thick + 1):
             draw.rectangle((end, y - tick, end + thick - 1, y + tick), fill=palette.INK)
         font = _font(round(0.9 * self.text))
-        label = f"{length:g} m"
+        label = bar_text(length)
         draw.text((x + pixels / 2, y - tick - 0.15 * self.text), label, palette.INK, font, anchor="mb")
         return int(max(x + pixels, x + pixels / 2 + draw.textlength(label, font) / 2))
 

@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator
 
 import solver
 from blockvis.layout.joints.facing_edges import Facing
-from blockvis.text import rounded_length
+from blockvis.text import bar_text, rounded_length
 from solver import mechanics
 
 from . import palette
@@ -173,7 +173,7 @@ def _in_space(figure: Any, contents: Contents) -> _Canvas:
     axes.imshow(picture, extent=(left, right, bottom, top), interpolation="antialiased")
     axes.set_axis_off()
     length = rounded_length(0.2 * (right - left))
-    scale = f"{length:g} m" if contents.unit == "m" else f"{length:g} [{contents.unit}]"
+    scale = bar_text(length) if contents.unit == "m" else f"{length:g} [{contents.unit}]"
     x, y = left + 0.02 * (right - left), bottom + 0.02 * (top - bottom)
     axes.plot([x, x + length], [y, y], color=palette.hexadecimal(palette.INK), linewidth=2.5, solid_capstyle="butt")
     axes.text(x + length / 2.0, y, f"{scale}\n", ha="center", va="bottom", fontsize=8, linespacing=0.4)

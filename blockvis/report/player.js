@@ -151,7 +151,8 @@
     pen.beginPath(); pen.moveTo(x, y - 5); pen.lineTo(x, y + 5); pen.moveTo(x, y); pen.lineTo(x + wide, y);
     pen.moveTo(x + wide, y - 5); pen.lineTo(x + wide, y + 5); pen.stroke();
     pen.font = `14px ${FONT}`; pen.textAlign = "center"; pen.textBaseline = "bottom";
-    pen.fillText(`${+length.toPrecision(3)} m`, x + wide / 2, y - 5);
+    const small = length < 0.0999, label = +(small ? 1e3 * length : length).toPrecision(3);
+    pen.fillText(`${label} ${small ? "mm" : "m"}`, x + wide / 2, y - 5);
     const falling = model.frames[Math.min(Math.round(state.frame), nFrames - 1)].falling;
     if (!layers.forces || falling || state.magnify !== 1) return;
     const start = x + wide + 34, [force, text] = model.force_scale, bar = force * model.force_length * state.view.scale;

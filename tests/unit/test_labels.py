@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 from structures import arch_response, box, dropped_brick, parted, rectangle, wall
 
 import solver
@@ -341,3 +341,12 @@ def test_the_mechanism_of_what_falls_as_a_stone_is_taken_away_names_stone_and_ph
     assert said["title"] == "Settlement 0.00 mm"
     assert "   'voussoir 3' taken away   ·   falls before anything moves   ·   2 moving parts   " in said["detail"]
     assert said["detail"].endswith("50 % of the weight fall   ·   phase 2 of 2")
+
+
+@pytest.mark.parametrize(("pixel", "said"), [(1e-3, "0.1 m"), (1e-4, "10 mm"), (1e-2, "1 m")])
+def test_scale_bars_below_a_tenth_of_a_metre_are_in_mm(monkeypatch, pixel, said):
+    written = []
+    monkeypatch.setattr(ImageDraw.ImageDraw, "text", lambda self, place, text, *rest, **more: written.append(text))
+    sheet = Sheet((640, 360))
+    sheet.composed(Image.new("RGB", sheet.inside_size), title="", detail="", pixel=pixel)
+    assert said in written
