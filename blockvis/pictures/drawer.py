@@ -34,7 +34,7 @@ from .marks import (
     thrust_line,
 )
 from .scene import OF_STATICS
-from .solid_view import View, heights_over, hiding_supports, plane_of, views_of
+from .solid_view import View, heights_over, hiding_supports, into_sight, kept_blocks, plane_of, views_of
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 from .ties import DASH, DrawnTies
 from .underlay import Underlay
@@ -177,13 +177,13 @@ class Drawer:
             from .curves import CurvePanel
 
             self.panel = CurvePanel(response, (beside, self.sheet.inside_size[1]), self.sheet.text)
-        self.live = LiveLoads(response, increments, float(frame.size.max()))
+        self.live = LiveLoads(response, increments, float(frame.size.max()), self._plane)
         whole = frame.fitted(*self.sheet.inside_size) if self._flat else frame
         self._arrow = (ARROW if self._flat else ARROW_IN_SPACE) * float(frame.size.max())
         tied = self.ties.ends([increments[0].pose, increments[-1].pose])
         heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
-        ends = np.concatenate([self.live.tails, heads, *self._arrow_ends(frame, extra), tied, self._turned_out(whole)])
-        ends = ends[heights_over(self._plane, ends) >= 0.0]
+        ends = np.concatenate([heads, *self._arrow_ends(frame, extra), tied, self._turned_out(whole)])
+        ends = np.concatenate([self.live.tails, ends[heights_over(self._plane, ends) >= 0.0]])
         frame = self._with_floor(frame.holding(self._projected(ends)))
         # Supports in the plane are hatched, and an outline stays where those that move were.
         self.fill = palette.role_colours(assembly, not self._flat and bool(response.settlements))
@@ -399,7 +399,7 @@ class Drawer:
             tips[k] = mechanics.carried(tails[[k]], blocks[:1], pose, swing.displaced)[0]
         # Arrows are as long as ever, where the blocks are drawn after a part of it.
         tips = tails + (tips - tails) / swing.share
-        into = self._into_sight(tails)
+        into = into_sight(self._plane, tails)
         tails, tips = tails + into, tips + into
         lengths = np.linalg.norm(self._projected(tips - tails)[:, :2], axis=1)
         shown = lengths >= min(SPECK * float(self.scene.frame.size.max()), lengths.max(initial=0.0))
@@ -410,7 +410,7 @@ class Drawer:
 
     def _blocks_with_arrows(self, swing: Swing) -> list[np.ndarray]:
         """List the blocks that each arrow of a mechanism stands for: a part, or one of those in a cell of a grid."""
-        kept = self._kept(swing.increment.pose)
+        kept = kept_blocks(self._plane, self.assembly, swing.increment.pose)
         if swing.n_parts <= MOST_PARTS:
             parts = [np.flatnonzero(swing.parts == part) for part in range(swing.n_parts)]
             return [part for part in parts if kept[part].any()]
@@ -426,26 +426,13 @@ class Drawer:
         _, first = np.unique(cell, axis=0, return_index=True)
         return [moves[[k]] for k in first]
 
-    def _kept(self, pose: solver.Pose) -> np.ndarray:
-        """(n_blocks,) bool array: blocks of which a section leaves something."""
-        inside = heights_over(self._plane, mechanics.moved_vertices(self.assembly, pose)) > 0.0
-        return np.bincount(self.assembly.block_of_vertex, inside, self.assembly.n_blocks) > 0
-
-    def _into_sight(self, points: np.ndarray) -> np.ndarray:
-        """(n, d) array [m]: the way from points (n, d) [m] to the plane of a section, of those that it leaves out."""
-        if self._plane is None:
-            return np.zeros_like(points)
-        depths = np.minimum(heights_over(self._plane, points), 0.0)
-        return np.asarray(-depths[:, None] * self._plane[1])
-
     def keys(self) -> list[Key]:
         """Return what is marked in any of the increments, each with its place in the legends of all pictures."""
         if self._keys is None:
             keys = [*self._keys_of_tints(), *self._keys_of_joints(), *self._keys_of_forces(), *self.ties.keys()]
             if not self._flat and self.response.settlements:
-                moving = self.assembly.moving & (
-                    self._kept(self.increments[0].pose) | self._kept(self.increments[-1].pose)
-                )
+                kept = [kept_blocks(self._plane, self.assembly, self.increments[k].pose) for k in (0, -1)]
+                moving = self.assembly.moving & (kept[0] | kept[1])
                 solid = moving & ~hiding_supports(self.assembly, self._views[0])
                 if moving.any():
                     keys.append(Key("area" if solid.any() else "line", "moving support", palette.MOVING))
@@ -670,9 +657,9 @@ class Drawer:
             return np.zeros((0, self.assembly.dimension)), np.zeros((0, self.assembly.dimension))
         phase = phases[min(increment.phase, len(phases) - 1)]
         blocks, places, directions = settlement_arrows(self.assembly, phase, shown, seen)
-        kept = self._kept(shown)[blocks]
+        kept = kept_blocks(self._plane, self.assembly, shown)[blocks]
         places, directions = places[kept], directions[kept]
-        places = places + self._into_sight(places)
+        places = places + into_sight(self._plane, places)
         half = 0.5 * self._arrow * directions
         return (places - half, places + half) if self._flat else (places, places + 2.0 * half)
 

@@ -14,6 +14,7 @@ from blockvis.text import force_text
 from solver import mechanics
 
 from .marks import leaving
+from .solid_view import into_sight, kept_blocks
 
 #: Loads below this fraction of the largest are rounding.
 ROUNDING = 1e-5
@@ -108,10 +109,17 @@ def _of_ties(response: solver.Response, increment: solver.Increment) -> np.ndarr
 class LiveLoads:
     """The live loads of some increments as arrows to one scale, which end where the loads act.
 
-    The increments are gone through once; ``extent`` [m] is that of the picture.
+    The increments are gone through once; ``extent`` [m] is that of the picture, and a plane (2, 3), a point [m] and a
+    normal, cuts its blocks open.
     """
 
-    def __init__(self, response: solver.Response, increments: Iterable[solver.Increment], extent: float) -> None:
+    def __init__(
+        self,
+        response: solver.Response,
+        increments: Iterable[solver.Increment],
+        extent: float,
+        plane: np.ndarray | None = None,
+    ) -> None:
         self._dimension = response.assembly.dimension
         self._swinging = bool(response.limits) and response.collapse is None
         self._loads: dict[tuple[int, float], LiveLoad] = {}
@@ -123,7 +131,8 @@ class LiveLoads:
                 place = _place(increment)
                 if place not in self._loads:
                     state = states.get(place, increment)
-                    self._loads[place] = live_load_of(response, state, extent)
+                    load = live_load_of(response, state, extent)
+                    self._loads[place] = _in_section(load, response.assembly, plane)
                     self._multipliers[place] = state.load_multiplier
         self._places = not response.parameter.is_path and len(self._loads) > 1
         if self._places:
@@ -174,6 +183,14 @@ class LiveLoads:
         before = max(place for place in self._loads if place <= _place(increment))
         multiplier = self._multipliers[before]
         return self._loads[before], increment.load_multiplier / multiplier if multiplier else 1.0
+
+
+def _in_section(load: LiveLoad, assembly: solver.Assembly, plane: np.ndarray | None) -> LiveLoad:
+    """Leave out the loads of blocks that a section leaves out; those on cut-off parts of others act on its plane."""
+    kept = kept_blocks(plane, assembly, load.pose)[load.blocks]
+    points = load.points[kept]
+    points = points + into_sight(plane, points)
+    return replace(load, points=points, forces=load.forces[kept], blocks=load.blocks[kept])
 
 
 def _place(increment: solver.Increment) -> tuple[int, float]:

@@ -25,8 +25,8 @@ from .frame import Frame, framed, room_in
 from .marks import Marks, arrow_shapes
 from .painting import painted
 from .scene import Scene
-from .solid_view import ABOVE, AROUND, View, heights_over, showing_faces
-from .surface import IN_PLANE, section_of, sharp_edges, triangles_of
+from .solid_view import ABOVE, AROUND, View, showing_faces
+from .surface import section_of, sharp_edges, triangles_of
 from .swing import MOST_PARTS, Swing
 from .ties import DASH, Strands, dashed
 
@@ -284,9 +284,6 @@ class SolidScene(Scene):
 
     def arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
         """Draw arrows from tails (n, 3) [m] to tips (n, 3) [m] over all: none is hidden behind its own support."""
-        near = IN_PLANE * float(np.ptp(self.assembly.vertices, axis=0).max())
-        kept = heights_over(self._cut, tails) >= -near
-        tails, tips = tails[kept], tips[kept]
         # Of many supports those behind the structure would seem to push what is in front of them.
         self._overlays[f"{layer} top"] = _Arrows(tails, tips, colour, self._support if layer == "arrow" else None)
 

@@ -140,6 +140,19 @@ def heights_over(plane: np.ndarray | None, points: np.ndarray) -> np.ndarray:
     return np.full(len(points), np.inf) if plane is None else np.asarray((points - plane[0]) @ plane[1])
 
 
+def kept_blocks(plane: np.ndarray | None, assembly: solver.Assembly, pose: solver.Pose) -> np.ndarray:
+    """(n_blocks,) bool array: blocks of which a section at a plane leaves something; all where there is none."""
+    inside = heights_over(plane, mechanics.moved_vertices(assembly, pose)) > 0.0
+    return np.bincount(assembly.block_of_vertex, inside, assembly.n_blocks) > 0
+
+
+def into_sight(plane: np.ndarray | None, points: np.ndarray) -> np.ndarray:
+    """(n, d) array [m]: the way from points (n, d) [m] to the plane of a section, of those that it leaves out."""
+    if plane is None:
+        return np.zeros_like(points)
+    return np.asarray(-np.minimum(heights_over(plane, points), 0.0)[:, None] * plane[1])
+
+
 def _size(assembly: solver.Assembly) -> np.ndarray:
     """(3,) array [m]: extents of the free blocks, or of all where there are none."""
     corners = assembly.vertices[assembly.free[assembly.block_of_vertex]]

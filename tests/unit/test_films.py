@@ -232,6 +232,20 @@ def test_each_of_few_loads_has_an_arrow_of_its_own(dimension):
     assert "neighbours" not in loads.words
 
 
+@pytest.mark.parametrize(
+    ("view", "cut", "tips"), [("right", 2.95, [0.0, 1.0, 2.0]), ("left", 2.25, [2.25, 3.0, 4.0, 5.0])]
+)
+def test_a_section_shows_the_loads_of_blocks_that_it_leaves(monkeypatch, tmp_path, view, cut, tips):
+    """An arrow was drawn where it began in what is left: beside a stone that is cut away, or not at one that stays."""
+    drawn = []
+    monkeypatch.setattr("blockvis.pictures.solid_scene._Arrows", lambda *arrows: drawn.append(arrows))
+    monkeypatch.setattr("blockvis.pictures.solid_scene.SolidScene._shapes", lambda self, arrows: [])
+    limit = row_of(6, 3, np.ones(6))
+    blockvis.draw_still(limit.response, 0, tmp_path / "cut.png", section=f"x = {cut}", view=view, size=SIZE)
+    ((_, ends, *_),) = drawn
+    np.testing.assert_allclose(np.sort(ends[:, 0]), tips, atol=1e-6)
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_the_legend_tells_where_not_each_load_has_an_arrow(dimension):
     forces = np.where(np.arange(120) == 77, 150.0, 100.0)
