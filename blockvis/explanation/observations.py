@@ -235,9 +235,8 @@ def _of_rows(
             before = first.setdefault((whole, *place.tolist()), number)
             if before != number:
                 # Readings of one crack share what the model errs by there.
-                raise cells.error(
-                    "width", f"is of {label}, as that of {counted} {before} is; give one width for each place, of one date"
-                )
+                said = f"is of {label}, as that of {counted} {before} is; give one width for each place, of one date"
+                raise cells.error("width", said)
             if width > WIDEST * assembly.block_size:
                 raise cells.error(
                     "width",
