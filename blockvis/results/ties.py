@@ -102,7 +102,7 @@ class TieCourse:
     breaks_at: float | None = None
     yields_in_phase: int | None = None
     breaks_in_phase: int | None = None
-    first_force: float = 0.0  #: [N] At the first equilibrium in which it is there.
+    first_force: float | None = None  #: [N] At the first equilibrium in which it is there; None where it never is.
     last_force: float = 0.0  #: [N] At the last equilibrium.
     last_state: str = STATE_WORDS[mechanics.ABSENT]  #: Of that equilibrium.
 
@@ -202,6 +202,8 @@ def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, s
         # States that stand by themselves have no before.
         load = f", load at x = {course.largest_force_at:.6g} m" if len(response.path) > 1 else ""
         return name, carried(course.last_force), f"{course.last_state}{load}"
+    if course.first_force is None:
+        return name, "never installed", ""
     # It breaks between two increments.
     at = "by" if (course.largest_force_at, course.phase) == (course.breaks_at, course.breaks_in_phase) else "at"
     where = f" {at} {place(course.largest_force_at, course.phase)}" if course.largest_force else ""

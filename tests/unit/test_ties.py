@@ -364,6 +364,21 @@ def test_a_prestress_that_tips_what_it_holds_is_told_with_what_is_left_of_it(tmp
     assert moved == (from_drawing if prestress > held and phase == 1 else [])
 
 
+def test_a_tie_of_a_settlement_that_is_not_reached_is_told_so(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nlayout = "arch"\n[[ties]]\nname = "late"\nfrom = [-0.95, 0.1]\nto = [0.95, 0.1]\n'
+        "stiffness = 1e7\nprestress = 1000.0\nphase = 2\n"
+        + 2
+        * "[[settlement]]\ndirection = [1, 0]\nincrement = 0.05\nlimit = 0.5\n",
+        encoding="utf-8",
+    )
+    arguments = ["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out"), "--no-pictures", "--no-check-steps"]
+    assert main(arguments) == 0
+    assert "late (tie): never installed\n" in capsys.readouterr().out
+    (late,) = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["ties"]
+    assert (late["first_force"], late["last_state"]) == (None, "absent")
+
+
 def test_a_picture_draws_the_tie_in_the_colour_of_its_state(run, tmp_path):
     picture = Image.open(
         blockvis.draw_still(run.response, run.response.path[-1], tmp_path / "last.png", size=(480, 360))
