@@ -190,10 +190,11 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
     assembly = solver.Assembly.from_outlines(layout.outlines, names=layout.names)
     width = float(np.median(assembly.widths))
     outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
-    finer = simplified(outlines, default_tolerance(outlines))[1]
-    proposal = proposed(outlines, laid=np.array(layout.laid))
+    # Joints are measured as a run closes them.
+    simple, finer = simplified(outlines, default_tolerance(outlines))
+    proposal = proposed(simple, laid=np.array(layout.laid))
     smallest = SMALLEST_JOINT * width
-    shares = open_shares(outlines, proposal.stretches, smallest)
+    shares = open_shares(simple, proposal.stretches, smallest)
     is_mortar = shares[0] >= MORTAR_SHARE or shares[1] >= OPPOSITE_SHARE
     return {
         "sizes": assembly.areas,

@@ -65,9 +65,9 @@ class Gaps:
     @property
     def local(self) -> np.ndarray:
         """(n,) array [m]: distance of each point from the nearest one of another block that it faces, or infinite."""
-        found = np.full(len(self.points), np.inf)
+        found, across_gaps = np.full(len(self.points), np.inf), self.triangles[np.isfinite(self.widths)]
         for one, other in ((0, 1), (1, 2), (2, 0)):
-            a, b = self.triangles[:, one], self.triangles[:, other]
+            a, b = across_gaps[:, one], across_gaps[:, other]
             across = self.owner[a] != self.owner[b]
             length = np.hypot(*(self.points[a] - self.points[b]).T)
             for end in (a, b):
