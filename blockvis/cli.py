@@ -894,6 +894,7 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     """Write a results folder as one file: a series, an animation, or the blocks where they are at the end."""
     import numpy as np
 
+    from solver import mechanics
     from solver.mechanics import counted
 
     from .pictures.captions import loss_words
@@ -907,7 +908,7 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
             f"--{given[0].replace('_', '-')} is of layout files; '{options.source}' holds results: leave it out"
         )
     response = open_results(options.source)
-    gone = ", ".join(loss_words(response.path[-1])) if response.path else ""
+    gone = loss_words(response.path[-1]) if response.path else []
     if target.suffix.lower() == ".vtkhdf":
         from .results.vtkhdf import write_vtkhdf
 
@@ -919,7 +920,7 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
         from .pictures.animated_glb import write_animated_glb
 
         write_animated_glb(response, target, known_fall(response))
-        vanishing = f"; vanishing on the way: {gone}" if gone else ""
+        vanishing = f"; vanishing on the way: {', '.join(gone)}" if gone else ""
         print(f"{counted(response.assembly.n_blocks, 'block')} that move written to {target}{vanishing}")
         return 0
     from .formats.read import write_layout
@@ -932,7 +933,10 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
     write_layout(layout, target)
     unit, phase = unit_in(response, last.phase), in_phase(response, last.phase)
     where = f"{response.parameter.name} {last.parameter:.6g} {unit}".rstrip() + phase
-    left_out = f"; left out: {gone}" if gone else ""
+    # Layouts are blocks alone.
+    tied = int((last.ties.states != mechanics.ABSENT).sum())
+    gone += [counted(tied, "tie")] if tied else []
+    left_out = f"; left out: {', '.join(gone)}" if gone else ""
     print(f"{counted(layout.n_blocks, 'block')} written to {target}, as they are at {where}{left_out}")
     return 0
 

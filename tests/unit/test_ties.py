@@ -287,7 +287,9 @@ def test_a_folder_with_ties_opens_with_them_and_viewers_get_lines(run):
 
 
 @pytest.mark.slow
-def test_ties_are_a_dataset_a_block_of_the_series_and_a_rod_of_the_animation(run, tmp_path):
+def test_ties_are_a_dataset_a_block_of_the_series_and_a_rod_of_the_animation(run, tmp_path, capsys):
+    assert main(["convert", str(run.folder), str(tmp_path / "blocks.dxf")]) == 0
+    assert "; left out: 1 tie\n" in capsys.readouterr().out
     pyvista = pytest.importorskip("pyvista")
     lines = run.response.members(-1)
     assert (lines.n_cells, str(lines["name"][0])) == (1, "iron")
