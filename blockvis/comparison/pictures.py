@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from blockvis.pictures import palette
 from blockvis.pictures.captions import (
     drops_at_start,
     force_unit,
+    new_motions,
     parameter_label,
     parameter_unit,
     state_text,
@@ -55,7 +57,7 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
     per_length, _ = parameter_unit(longest)
     responses = [side.response for side in comparison.sides]
     largest = max(responses, key=lambda response: float(np.nan_to_num(np.abs(response.values)).max()))
-    factor, _ = force_unit(largest)
+    (factor, _), grey = force_unit(largest), palette.hexadecimal(palette.FAINT)
     for side, colour, line in zip(comparison.sides, COLOURS, LINES, strict=True):
         response, ink = side.response, palette.hexadecimal(colour)
         x, y = response.parameters * per_length, response.values / factor
@@ -63,11 +65,17 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
         # The drop from rest is no part of the path, as in the curve of one run.
         first = 1 if drops_at_start(response) else 0
         axes.plot(x[: 2 * first], y[: 2 * first], ":", color=ink, linewidth=1.5)
-        axes.plot(x[first:], y[first:], line, marker=marker, color=ink, linewidth=2.0, label=f" {side.label}")
+        axes.plot([], [], line, marker=marker, color=ink, linewidth=2.0, label=f" {side.label}")
+        # One reaction is along another motion than the next.
+        for start, stop in pairwise([first, *new_motions(response), len(x)]):
+            axes.plot(x[start:stop], y[start:stop], line, marker=marker, color=ink, linewidth=2.0)
+            if start > first:
+                axes.axvline(x[start - 1], color=grey, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1)
         if response.collapse is not None:
             axes.plot(x[-1:], y[-1:], "X", color=ink, markersize=9)
             axes.axvline(x[-1], color=ink, linewidth=1.0, linestyle=":")
-    axes.set_xlabel(parameter_label(longest) or "limit load", fontsize=TEXT)
+    below = "\nfrom a dotted line on, reaction along another motion" if any(map(new_motions, responses)) else ""
+    axes.set_xlabel((parameter_label(longest) or "limit load") + below, fontsize=TEXT)
     axes.set_ylabel(value_label(largest), fontsize=TEXT)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     axes.ticklabel_format(useOffset=False, style="plain")
