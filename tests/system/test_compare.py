@@ -59,14 +59,14 @@ def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_p
 def test_curves_are_not_joined_where_the_supports_move_otherwise(tmp_path):
     """From out to in the reaction changes its sign."""
     there = solver.Settlement((1, 0), increment=0.01, limit=0.02)
-    path = [there, replace(there, direction=(-1, 0))]
-    response = solver.Structure(generators.arch(), friction_coefficient=2.0).settle(path)
+    structure = solver.Structure(generators.arch(), friction_coefficient=2.0)
+    response = structure.settle([there, replace(there, direction=(-1, 0))])
     assert response.values[2] * response.values[3] < 0.0
-    folders = [str(blockvis.write(response, tmp_path / name)) for name in ("one", "two")]
+    both = {"one": response, "two": structure.settle(there)}
+    folders = [str(blockvis.write(one, tmp_path / name)) for name, one in both.items()]
     assert main(["compare", *folders, "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
     curve = (np.abs(pixels(tmp_path / "both" / "curves.png") - np.array((20, 92, 168))).sum(axis=2) == 0)[150:]
-    assert curve.any()
-    assert curve.any(axis=1).sum() < 0.5 * np.ptp(np.flatnonzero(curve.any(axis=1)))
+    assert 0 < curve.any(axis=1).sum() < 0.2 * len(curve)
 
 
 def test_a_crack_of_one_run_has_the_opening_of_its_joint_in_the_other(other, tmp_path):
