@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.tolerances import CORNER_TOLERANCE, DRAWN_GAP, PENETRATION_FRACTION
+from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .contacts import STEEPEST_LANDING, Contacts
@@ -83,53 +83,48 @@ def measured_points(
 def _areas(shapes: Outlines, contacts: Contacts) -> np.ndarray:
     """(n,) array [m²]: tributary area of each contact point of the faces between blocks.
 
-    A face is where a bent side of one block lies over one of another; it touches where their straight parts do. Half
-    the distance to the neighbours along it times the smaller thickness; a corner may end two faces. Open contact points
-    count too: a face has its whole length however it has turned.
+    A face is where a side of one block lies over a side of another. Half the distance to the neighbours along it times
+    the smaller thickness; a corner may end two faces. Open contact points count too: a face has its whole length
+    however it has turned.
     """
     vertex, edge, corner = corners_and_edges(contacts.features)
-    sides, n = _sides_of_edges(shapes), np.int64(len(shapes.vertices))
-    facing = _facing_edge(shapes, vertex, edge, corner)
-    over = np.stack([facing, np.where(corner < 0, shapes.previous_vertex[vertex], facing)], axis=1)
-    low, high = np.sort(np.broadcast_arrays(sides[:, over], sides[:, edge, None]), axis=0)
-    face, part = (np.unique(pairs, return_inverse=True)[1] for pairs in (low * n + high).reshape(2, -1))
+    over, side = np.stack([vertex, shapes.previous_vertex[vertex]], axis=1), _side_of_edge(shapes)
+    on_corner = corner >= 0
+    over[on_corner] = _facing_edge(shapes, vertex[on_corner], edge[on_corner], corner[on_corner])[:, None]
+    low, high = np.sort([side[over], np.broadcast_to(side[edge][:, None], over.shape)], axis=0).astype(np.int64)
+    _, face = np.unique((low * len(side) + high).ravel(), return_inverse=True)
     # Along the mean of its edges, whichever of the two blocks they are of and comes first.
     point = np.repeat(np.arange(len(contacts)), 2)
-    tangent = np.where(sides[0, edge][point] == low[0].ravel(), 1.0, -1.0)[:, None] * contacts.frames[point, 1]
+    tangent = np.where(side[edge][point] == low.ravel(), 1.0, -1.0)[:, None] * contacts.frames[point, 1]
     direction = np.stack([np.bincount(face, tangent[:, axis]) for axis in (0, 1)], axis=1)[face]
     along = dot(contacts.points[point], _unit(direction))
-    order = np.lexsort((along, part))
-    step = np.where(np.diff(part[order]) == 0, np.diff(along[order]), 0.0)
-    before, behind = (np.bincount(point[ends], step / 2.0, len(contacts)) for ends in (order[1:], order[:-1]))
-    # A corner in a bend of the side that it stands on has two points there; a corner on a corner has one.
-    standing = vertex * 2 * n + np.where(corner < 0, sides[0, edge], n + corner)
-    _, corner_of = np.unique(standing, return_inverse=True)
-    length = (np.bincount(corner_of, before + behind) / np.bincount(corner_of))[corner_of]
-    return length * np.minimum(shapes.thickness[contacts.block_a], shapes.thickness[contacts.block_b])
+    order = np.lexsort((along, face))
+    step = np.where(np.diff(face[order]) == 0, np.diff(along[order]), 0.0)
+    length = np.zeros(len(point))
+    length[order] = (np.append(step, 0.0) + np.append(0.0, step)) / 2.0
+    # A corner at a bend of the side that it stands on has two points there; a corner on a corner has one.
+    standing = np.where(on_corner, len(side) + np.arange(len(contacts)), vertex)[point]
+    _, corner_of = np.unique(face * (len(side) + len(contacts)) + standing, return_inverse=True)
+    length = (np.bincount(corner_of, length) / np.bincount(corner_of))[corner_of]
+    thickness = np.minimum(shapes.thickness[contacts.block_a], shapes.thickness[contacts.block_b])
+    return length.reshape(-1, 2).sum(axis=1) * thickness
 
 
-def _sides_of_edges(shapes: Outlines) -> np.ndarray:
-    """(2, n_vertices) int array: first edge of the bent side that each edge is a part of, and of its straight part.
+def _side_of_edge(shapes: Outlines) -> np.ndarray:
+    """(n_vertices,) int array: first edge of the side that each edge is a part of.
 
-    A slightly re-entrant corner, which has no contact point of its own, does not end a bent side; it ends a straight
-    part where it is farther from the line between the ends of the side than what touches may be in a drawing.
+    A straight or slightly re-entrant corner, which has no contact point of its own, does not end a side.
     """
-    vertices, previous = shapes.vertices, shapes.previous_vertex
-    along = _unit(vertices[shapes.next_vertex] - vertices)
-    ends = shapes.convex_vertex | (dot(along[previous], along) < np.sqrt(1.0 - LARGEST_TILT**2))
-    bent, stop = _first_edges(shapes, ends), np.zeros(len(ends), dtype=np.int64)
-    stop[bent[previous[ends]]] = np.flatnonzero(ends)
-    chord, arm = _unit(vertices[stop[bent]] - vertices[bent]), vertices - vertices[bent]
-    depth = np.abs(chord[:, 0] * arm[:, 1] - chord[:, 1] * arm[:, 0])
-    ends = ends | (depth > DRAWN_GAP * shapes.widths[shapes.block_of_vertex])
-    return np.stack([bent, _first_edges(shapes, ends)])
-
-
-def _first_edges(shapes: Outlines, ends: np.ndarray) -> np.ndarray:
-    """(n_vertices,) int array: first edge of the side of each edge, where sides end at these corners, bool."""
-    side = np.maximum.accumulate(np.where(ends, np.arange(len(ends)), shapes.offsets[shapes.block_of_vertex]))
+    first, last = shapes.offsets[:-1], shapes.offsets[1:] - 1
+    along = _unit(shapes.vertices[shapes.next_vertex] - shapes.vertices)
+    before = along[shapes.previous_vertex]
+    turn = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
+    ends = shapes.convex_vertex | (turn < -LARGEST_TILT) | (dot(before, along) < 0.0)
+    number = np.arange(len(ends))
+    side = np.maximum.accumulate(np.where(ends, number, first[shapes.block_of_vertex]))
     # The side at the first corner may begin before it.
-    return np.where(ends[side], side, side[shapes.offsets[shapes.block_of_vertex + 1] - 1])
+    wraps = ~ends[side]
+    return np.where(wraps, side[last][shapes.block_of_vertex], side)
 
 
 def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
@@ -144,9 +139,10 @@ def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np
     faces run the same way the pair is a corner on a corner, kept once; where they part, the blocks are
     diagonal neighbours and do not touch.
     """
-    pairs = np.stack(box_pairs(vertices, shapes.offsets, reach))
-    pairs = pairs[:, useful[pairs].any(axis=0)]
-    pair_a, pair_b = np.hstack([pairs, pairs[::-1]])
+    i, j = box_pairs(vertices, shapes.offsets, reach)
+    chosen = useful[i] | useful[j]
+    i, j = i[chosen], j[chosen]
+    pair_a, pair_b = np.concatenate([i, j]), np.concatenate([j, i])
     vertex, edge = _vertex_edge_candidates(shapes, vertices, pair_a, pair_b, reach)
     vertex, edge, corner = _classified_ends(shapes, vertices, vertex, edge)
     kept = _closest_faces(shapes, vertices, vertex, edge, corner)
@@ -300,12 +296,14 @@ def _classified_ends(
     # At a re-entrant corner there is no corner to touch.
     at_end = (overlap <= end) & shapes.convex_vertex[other]
     # The corner of a face that opens slides past the end of the edge before it would touch it.
-    chosen = parallel | ~shapes.convex_vertex[other] | ((overlap > end) & (gap <= STEEPEST_LANDING * overlap))
+    is_past = ~parallel & shapes.convex_vertex[other] & ((overlap <= end) | (gap > STEEPEST_LANDING * overlap))
     # Both corners lie within the end zone of the other's face, along the bisector.
     halfway = _unit(along_edge + along_facing + 1e-300)
     distance = np.abs(dot(vertices[vertex] - vertices[other], halfway))
     corner = np.where(at_end & parallel & (distance <= end), other, -1)
-    return _without_duplicates(shapes, vertex[chosen], edge[chosen], corner[chosen])
+    chosen = ~is_past
+    vertex, edge, corner = vertex[chosen], edge[chosen], corner[chosen]
+    return _without_duplicates(shapes, vertex, edge, corner)
 
 
 def _closest_faces(
@@ -318,9 +316,11 @@ def _closest_faces(
     """
     kept = np.ones(len(vertex), dtype=bool)
     k = np.flatnonzero(corner >= 0)
-    faces = edge[k], _facing_edge(shapes, vertex[k], edge[k], corner[k])
-    along, facing = (_unit(vertices[shapes.next_vertex[face]] - vertices[face]) for face in faces)
-    closeness = -dot(along, facing)
+    facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
+    following = shapes.next_vertex
+    along = _unit(vertices[following[edge[k]]] - vertices[edge[k]])
+    back = -_unit(vertices[following[facing]] - vertices[facing])
+    closeness = dot(along, back)
     _, pair = np.unique(vertex[k] * np.int64(len(vertices)) + corner[k], return_inverse=True)
     closest = np.full(len(k), -np.inf)
     np.maximum.at(closest, pair, closeness)

@@ -237,7 +237,7 @@ def test_a_stone_that_is_not_convex_is_pulled_off_without_a_warning_of_numpy():
     assert 0.8 < (found.multiplier - 1.0) * mechanics.total_weight(assembly) / 5e3 <= 1.0 + 1e-6
 
 
-@pytest.mark.parametrize("middle", [0.0, -6e-4], ids=["straight", "as far out of line as drawings may be"])
+@pytest.mark.parametrize("middle", [0.0, -0.05], ids=["straight", "slightly re-entrant"])
 def test_a_face_with_a_corner_that_is_none_is_shared_out_whole(middle):
     under = [[0, -1], [2, -1], [2, 0], [1, middle], [0, 0]]
     assembly = solver.Assembly.from_outlines([rectangle(0, 0, 2, 1), under], roles=["free", "fixed"])
@@ -271,43 +271,6 @@ def test_a_bent_face_is_shared_out_alike_in_any_order():
     # Half the length of the face at either end, seen along the mean of its edges.
     np.testing.assert_allclose(areas[0], np.hypot(2.0, 0.8) / np.array([4, 4, 2]), rtol=0.01)
     np.testing.assert_allclose(areas, [areas[0]] * len(areas), rtol=1e-12)
-
-
-def arc(depth, count=40):
-    """Where and how high a hollow between feet of 0.1 m is that rises as an arc, [m]."""
-    x = np.linspace(0.1, 0.9, count)
-    return list(zip(x, depth * (1.0 - ((x - 0.5) / 0.4) ** 2), strict=True))
-
-
-#: What a stone of 1 m on two feet of 0.1 m has between them, and the length that touches [m].
-HOLLOWS = {
-    "a shallow roof": ([(0.1, 0.0), (0.5, 0.04), (0.9, 0.0)], 0.2),
-    "a steep roof": ([(0.1, 0.0), (0.5, 0.4), (0.9, 0.0)], 0.2),
-    "a flat roof": ([(0.1, 0.0), (0.2, 0.02), (0.8, 0.02), (0.9, 0.0)], 0.2),
-    "an arc": (arc(0.1), 0.2),
-    "a third foot": ([(0.1, 0.0), (0.3, 0.03), (0.45, 0.0), (0.55, 0.0), (0.7, 0.03), (0.9, 0.0)], 0.3),
-    "no hollow": ([], 1.0),
-}
-
-
-@pytest.mark.parametrize("name", HOLLOWS)
-@pytest.mark.parametrize("below", [False, True], ids=["in the stone", "in its bed"])
-@pytest.mark.parametrize("first", [0, 1, 3])
-def test_a_hollow_has_no_strength(name, below, first):
-    """It had, where its roof rises by less than 30 degrees: F = W + f A lifts the stone, F = σ A - W crushes it."""
-    hollow, length = HOLLOWS[name]
-    stone = [(0, 0), *hollow, (1, 0), (1, 1), (0, 1)]
-    outlines = [stone, rectangle(0, -1, 1, 0)]
-    if below:
-        outlines = [rectangle(0, -1, 1, 0), stone]
-        outlines = [[(x, -y) for x, y in outline[::-1]] for outline in outlines]
-    outlines = [np.roll(outline, 2 * first, axis=0) for outline in outlines]
-    assembly = solver.Assembly.from_outlines(outlines, roles=["free", "fixed"], thickness=THICKNESS)
-    law = solver.InterfaceLaw(0.6, 1e6, compressive_strength=1e6, tensile_strength=1e5)
-    weight, area = mechanics.total_weight(assembly), length * THICKNESS
-    for up, force in ((1.0, weight + 1e5 * area), (-1.0, 1e6 * area - weight)):
-        lift = solver.point_load(assembly, 0, (0.0, up), point=(0.5, 0.5))
-        assert limit(assembly, solver.Interfaces(law), lift).multiplier == pytest.approx(force, rel=1e-6)
 
 
 #: A stone 1 m wide on a bed; the faces beside it part by 10 degrees, 0.4 m long on either side.
