@@ -51,7 +51,8 @@ GEOJSON = (
 FAR = 50.0
 
 #: Numbers, of EPSG and of Esri, of Mercators that are true to scale at the equator.
-MERCATORS = "(3857|3785|3395|3832|900913|102100|102113|53004|54004)"
+MERCATORS = r"\b(3857|3785|3395|3832|900913|102100|102113|53004|54004)\W*$"
+OF_THE_WORLD = "(Pseudo|Web|World|Global|Google|Visualisation CRS /)"
 
 #: Radius of the earth on the maps of the web [m], and by which part lengths are off that take it for a sphere.
 RADIUS, OFF = 6378137.0, 0.007
@@ -253,7 +254,8 @@ def _mercator(text: str) -> tuple[float, float] | None:
     """Find the scale of a Mercator at the equator and its northing there, by words or number; None if it is none."""
     # Transverse and oblique ones are true along a line through the drawing.
     if re.search(r'\b(PROJECTION|METHOD)\s*\[\s*"(Mercator|Popular)', text, re.IGNORECASE) is None:
-        return (1.0, 0.0) if re.search(rf"\b{MERCATORS}$", text) else None
+        # GeoJSON has a name or a number alone.
+        return (1.0, 0.0) if re.search(rf"{OF_THE_WORLD}[- _]+Mercator|{MERCATORS}", text, re.IGNORECASE) else None
     found = re.findall(r'\bPARAMETER\s*\[\s*"([^"]*)"\s*,\s*([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)', text)
     given = {name.lower().replace("_", " "): float(value) for name, value in found}
     parallel = given.get("standard parallel 1", given.get("latitude of 1st standard parallel", 0.0))
@@ -273,7 +275,7 @@ def _true_unit(found: Drawing, reading: Reading, unit: str, mercator: tuple[floa
     north = (float(np.median(middles)) - start) * metres / (scale * RADIUS) if middles and scale > 0.0 else math.inf
     # Beyond is no map.
     stretch = scale * math.cosh(north) if abs(north) <= math.pi else 1.0
-    if abs(stretch - 1.0) < OFF:
+    if abs(stretch - 1.0) < 1e-3:
         return unit or "m", []
     latitude = math.degrees(math.atan(math.sinh(north)))
     said = (

@@ -352,9 +352,14 @@ def on_the_web(path, *features, system="urn:ogc:def:crs:EPSG::3857"):
         ("urn:ogc:def:crs:EPSG::3395", True),
         ("urn:ogc:def:crs:EPSG::32632", False),
         ("urn:ogc:def:crs:EPSG:3857:25832", False),
+        ("EPSG:3857 ", True),
+        ("WGS 84 / Pseudo-Mercator", True),
+        ("WGS_1984_Web_Mercator_Auxiliary_Sphere", True),
+        ("WGS 84 / World Mercator", True),
+        ("WGS 84 / UTM zone 32N", False),
     ],
 )
-def test_a_mercator_of_the_world_is_known_by_each_of_its_numbers(tmp_path, system, stretched):
+def test_a_mercator_of_the_world_is_known_by_its_number_or_its_words_in_geojson(tmp_path, system, stretched):
     sizes = blockvis.read_layout(on_the_web(tmp_path / "plan.geojson", system=system)).sizes
     np.testing.assert_allclose(sizes**2, 0.04 if stretched else 0.08, rtol=1e-5)
 
