@@ -232,7 +232,9 @@ def _of_rows(
         width = cells.length("width")
         if width is not None:
             place, named, whole, label = _place(cells, assembly, joints)
-            before = first.setdefault((whole, *place.tolist()), number)
+            # Joints may meet at a place.
+            blocks = frozenset() if whole else frozenset(label.split(" at ")[0].split(" | "))
+            before = first.setdefault((blocks, *place.tolist()), number)
             if before != number:
                 # Readings of one crack share what the model errs by there.
                 said = f"is of {label}, as that of {counted} {before} is; give one width for each place, of one date"

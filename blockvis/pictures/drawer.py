@@ -576,14 +576,18 @@ class Drawer:
         """Write the forces of ties, and the widths of the widest crack lines, beside them, where there is room."""
         points, words, colours = self.ties.labels(increment, shown)
         if widths:
-            # Between blocks that have parted no crack is drawn.
+            # Between blocks that have parted no crack is drawn: of one with others the widest of these has the label.
             found = marks_of(self.assembly, self.joints, increment, shown)
             cracks = cracks_of(self.assembly, increment.pose, increment.fallen)
-            cracks = main_cracks([crack for crack in cracks if crack.joints[0] in found.joints])
-            widest = np.searchsorted(found.joints, [crack.joints[0] for crack in cracks])
-            points = np.concatenate([points, found.middles[widest, found.openings[widest].argmax(axis=1)]])
-            words += [width_text(crack.width) for crack in cracks]
-            colours += [palette.OPEN] * len(cracks)
+            drawn = [crack.joints[np.isin(crack.joints, found.joints)] for crack in cracks]
+            main = main_cracks(
+                [replace(crack, joints=own) for crack, own in zip(cracks, drawn, strict=True) if len(own)]
+            )
+            widest = np.searchsorted(found.joints, [crack.joints[0] for crack in main])
+            openings = found.openings[widest]
+            points = np.concatenate([points, found.middles[widest, openings.argmax(axis=1)]])
+            words += [width_text(width) for width in openings.max(axis=1, initial=0.0).tolist()]
+            colours += [palette.OPEN] * len(main)
         if words:
             dots = np.concatenate([dots, *self._along_arrows.values(), self.ties.along(increment, shown)])
             places, dots = self.scene.at_pixel(points), self.scene.at_pixel(dots)

@@ -143,6 +143,20 @@ def test_cracks_that_are_not_drawn_have_no_label(monkeypatch):
     assert written == ["60 mm"]
 
 
+def test_a_crack_whose_widest_joint_has_parted_is_labelled_where_it_is_drawn(monkeypatch):
+    written = []
+    monkeypatch.setattr(
+        "blockvis.pictures.drawer.write_labels", lambda picture, places, words, *_: written.extend(words)
+    )
+    places = [(-1, -1, 9, 0), (0, 0, 2, 1), (2, 0, 4, 1), (0, 1, 2, 2), (2, 1, 4, 2)]
+    assembly = solver.Assembly.from_outlines([rectangle(*place) for place in places], roles=["fixed"] + 4 * ["free"])
+    shift = np.array([[0, 0], [0, 0], [0.5, 0], [0, 0], [1.6, 0]])
+    response = posed(assembly, solver.Pose(assembly.centroids + shift, np.zeros((5, 1))))
+    (only,) = response.increments
+    Drawer(response, Look(), SIZE, (only,)).picture(only, widths=True)
+    assert written == ["500 mm"]
+
+
 def details(monkeypatch):
     """The second lines of the drawings that are made from here on."""
     said = []
