@@ -366,6 +366,7 @@ def test_a_prestress_that_tips_what_it_holds_is_told_with_what_is_left_of_it(tmp
     assert moved == (from_drawing if prestress > held and phase == 1 else [])
 
 
+@pytest.mark.slow
 def test_a_tie_of_a_settlement_that_is_not_reached_is_told_so(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(
         '[geometry]\nlayout = "arch"\n[[ties]]\nname = "late"\nfrom = [-0.95, 0.1]\nto = [0.95, 0.1]\n'
