@@ -27,7 +27,7 @@ def narrowest(joined: sp.csr_array, places: np.ndarray | None) -> tuple[np.ndarr
     orders += [np.argsort(values, kind="stable") for values in _along(places)]
     for order in orders:
         for _ in range(PASSES + 1):
-            position = positions_in(order)
+            position = np.argsort(order)
             of_joined = position[joined.indices]
             best = min(best, (int(np.abs(position[row] - of_joined).max(initial=0)) + 1, order), key=lambda one: one[0])
             ends = np.minimum.reduceat(of_joined, starts) + np.maximum.reduceat(of_joined, starts)
@@ -46,18 +46,13 @@ def _along(places: np.ndarray | None) -> list[np.ndarray]:
     ]
 
 
-def positions_in(order: np.ndarray) -> np.ndarray:
-    """(m,) int array: where in an order each row comes."""
-    return np.argsort(order)
-
-
 def dissected(joined: sp.csr_array, places: np.ndarray | None) -> list[tuple[np.ndarray, int]]:
     """Cut what is joined into parts, until they are small, by the fewest rows near the middle of an order.
 
     Gives the rows, (m,) int, of each part or cut and the cut around it, -1 for the last; parts come before what cuts
     them. Nested dissection, George (1973), https://doi.org/10.1137/0710032.
     """
-    orders = [positions_in(reverse_cuthill_mckee(sp.csr_matrix(joined), symmetric_mode=True)).astype(float)]
+    orders = [np.argsort(reverse_cuthill_mckee(sp.csr_matrix(joined), symmetric_mode=True)).astype(float)]
     return _cut(joined, np.array([*orders, *_along(places)]), np.arange(joined.shape[0]))
 
 
@@ -69,7 +64,7 @@ def _cut(joined: sp.csr_array, orders: np.ndarray, rows: np.ndarray) -> list[tup
     middle = np.arange(n // 3, 2 * n // 3 + 1)
     found = []
     for values in orders[:, rows]:
-        position = positions_in(np.argsort(values, kind="stable"))
+        position = np.argsort(np.argsort(values, kind="stable"))
         last = np.maximum.reduceat(position[between.indices], between.indptr[:-1])
         across = np.cumsum(np.bincount(position + 1, minlength=n + 2) - np.bincount(last + 1, minlength=n + 2))
         at = middle[np.argmin(across[middle] + np.abs(middle - n / 2) / WHOLE)]

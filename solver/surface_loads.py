@@ -89,8 +89,7 @@ def surface_forces(
     strips, depth, block = _first_met(assembly, push, across, removed)
     centre = (strips[:-1] + strips[1:]) / 2.0
     loaded = (block >= 0) & chosen[block]
-    points = centre[loaded, None] * across + depth[loaded, None] * push
-    owner = block[loaded]
+    points, owner = centre[loaded, None] * across + depth[loaded, None] * push, block[loaded]
     forces = (pressure * np.diff(strips)[loaded] * assembly.thickness[owner])[:, None] * push
     return PointForces(owner, forces, points)
 
@@ -119,9 +118,8 @@ def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.
 
 def force_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.0)) -> PointForces:
     """Put a force on the topmost surface at a place, which goes with its block; as :func:`load_on_top`."""
-    down = np.array([0.0, -1.0])
     x = plain(x, "float", "x")
-    strips, _, block = _first_met(assembly, down, np.array([1.0, 0.0]))
+    strips, _, block = _first_met(assembly, np.array([0.0, -1.0]), np.array([1.0, 0.0]))
     k = int(np.clip(np.searchsorted(strips, x) - 1, 0, len(block) - 1))
     if not strips[0] <= x <= strips[-1] or block[k] < 0:
         raise ValueError(

@@ -95,9 +95,8 @@ class _Iterate:
         """Compute the forces out of balance and the mean product."""
         self.u = (self.slope * self.forces + self.offset).T
         self.unbalanced = self.load + self.rows.resultant(self.forces)
-        self.reaction_error = 0.0
-        if self.unit_reaction is not None:
-            self.reaction_error = self.reaction - self._reaction_of(self.forces)
+        given = self.unit_reaction is not None
+        self.reaction_error = self.reaction - self._reaction_of(self.forces) if given else 0.0
         self.mean = float((self.u * self.z).sum() + self.reserve @ self.yielding) / self.count
         self.residual = max(float(np.abs(self.unbalanced).max()), abs(self.reaction_error))
 

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas, lapack
 
-from solver.ordering import dissected, narrowest, positions_in
+from solver.ordering import dissected, narrowest
 
 Solve = Callable[[np.ndarray], np.ndarray]
 
@@ -42,7 +42,7 @@ class Band:
 
     def __init__(self, pairs: np.ndarray, order: np.ndarray, width: int, dof: int) -> None:
         self.order = (order[:, None] * dof + np.arange(dof)).ravel()
-        positions = np.append(positions_in(order), -1)[pairs]
+        positions = np.append(np.argsort(order), -1)[pairs]
         self.shape = (len(order) * dof, width)
         rows = (positions[:, :, None] * dof + np.arange(dof)).reshape(len(pairs), 2 * dof)
         on_support = np.repeat(positions < 0, dof, axis=1)
@@ -99,7 +99,7 @@ class Fronts:
         parts = dissected(joined, places)
         order, sizes = np.concatenate([blocks for blocks, _ in parts]), np.array([len(blocks) for blocks, _ in parts])
         ends, axes = np.cumsum(sizes), np.arange(dof)
-        first, position, beyond = ends - sizes, positions_in(order), _beyond(parts, joined)
+        first, position, beyond = ends - sizes, np.argsort(order), _beyond(parts, joined)
         n, m = sizes * dof, np.array([len(blocks) for blocks in beyond]) * dof
         starts = np.append(0, np.cumsum(n * (n + m)))
         self.order, self.size = (order[:, None] * dof + axes).ravel(), int(starts[-1])
@@ -173,7 +173,7 @@ class Fronts:
 
 def _beyond(parts: list[tuple[np.ndarray, int]], joined: sp.csr_array) -> list[np.ndarray]:
     """Of each part the places, in the order of all, of later blocks that it acts on once those before it are gone."""
-    position, end = positions_in(np.concatenate([blocks for blocks, _ in parts])), 0
+    position, end = np.argsort(np.concatenate([blocks for blocks, _ in parts])), 0
     found: list[np.ndarray] = []
     left: list[list[np.ndarray]] = [[] for _ in parts]
     for k, (blocks, into) in enumerate(parts):

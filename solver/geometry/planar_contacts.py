@@ -139,10 +139,9 @@ def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np
     faces run the same way the pair is a corner on a corner, kept once; where they part, the blocks are
     diagonal neighbours and do not touch.
     """
-    i, j = box_pairs(vertices, shapes.offsets, reach)
-    chosen = useful[i] | useful[j]
-    i, j = i[chosen], j[chosen]
-    pair_a, pair_b = np.concatenate([i, j]), np.concatenate([j, i])
+    pairs = np.stack(box_pairs(vertices, shapes.offsets, reach))
+    pairs = pairs[:, useful[pairs].any(axis=0)]
+    pair_a, pair_b = np.hstack([pairs, pairs[::-1]])
     vertex, edge = _vertex_edge_candidates(shapes, vertices, pair_a, pair_b, reach)
     vertex, edge, corner = _classified_ends(shapes, vertices, vertex, edge)
     kept = _closest_faces(shapes, vertices, vertex, edge, corner)
@@ -296,14 +295,12 @@ def _classified_ends(
     # At a re-entrant corner there is no corner to touch.
     at_end = (overlap <= end) & shapes.convex_vertex[other]
     # The corner of a face that opens slides past the end of the edge before it would touch it.
-    is_past = ~parallel & shapes.convex_vertex[other] & ((overlap <= end) | (gap > STEEPEST_LANDING * overlap))
+    chosen = parallel | ~shapes.convex_vertex[other] | ((overlap > end) & (gap <= STEEPEST_LANDING * overlap))
     # Both corners lie within the end zone of the other's face, along the bisector.
     halfway = _unit(along_edge + along_facing + 1e-300)
     distance = np.abs(dot(vertices[vertex] - vertices[other], halfway))
     corner = np.where(at_end & parallel & (distance <= end), other, -1)
-    chosen = ~is_past
-    vertex, edge, corner = vertex[chosen], edge[chosen], corner[chosen]
-    return _without_duplicates(shapes, vertex, edge, corner)
+    return _without_duplicates(shapes, vertex[chosen], edge[chosen], corner[chosen])
 
 
 def _closest_faces(
@@ -316,11 +313,9 @@ def _closest_faces(
     """
     kept = np.ones(len(vertex), dtype=bool)
     k = np.flatnonzero(corner >= 0)
-    facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
-    following = shapes.next_vertex
-    along = _unit(vertices[following[edge[k]]] - vertices[edge[k]])
-    back = -_unit(vertices[following[facing]] - vertices[facing])
-    closeness = dot(along, back)
+    faces = edge[k], _facing_edge(shapes, vertex[k], edge[k], corner[k])
+    along, facing = (_unit(vertices[shapes.next_vertex[face]] - vertices[face]) for face in faces)
+    closeness = -dot(along, facing)
     _, pair = np.unique(vertex[k] * np.int64(len(vertices)) + corner[k], return_inverse=True)
     closest = np.full(len(k), -np.inf)
     np.maximum.at(closest, pair, closeness)

@@ -285,11 +285,8 @@ class Path:
         place = standing or state.place
         reaction = self._reaction(place)
         check = self.checks.check(place, reaction)
-        carries = (
-            standing is not None
-            and check.bounds.in_equilibrium
-            and (not self.model.has_live or check.bounds.high > 0.0)
-        )
+        carries = standing is not None and check.bounds.in_equilibrium
+        carries &= not self.model.has_live or check.bounds.high > 0.0
         if carries and not self.model.has_live and abs(check.measured - reaction) > self.tolerance * abs(reaction):
             # Joints that close carry along the path while they are wider open than a computed pose leaves them.
             wider = self.checks.check(place, reaction, CLOSING_GAP)

@@ -165,11 +165,10 @@ class Reports:
         told = self.stepper.members.told(contacts, place.forces, place.pose, place.tie_lengths)
         forces = [tie.prestress for tie in ties] if as_drawn else np.abs(told.forces)
         carry = ", ".join(f"{tie.kind} '{tie.name}' {force:g} N" for tie, force in zip(ties, forces, strict=True))
-        more = (
-            "where they carry more before the live load acts, put a settlement before it, of 1e-6 m, in which they do"
-        )
-        told_so = f"as drawn, with the prestress alone ({carry}): {more}"
-        return f"{nothing} {told_so if as_drawn else f'with what ties and props carry there ({carry})'}"
+        if not as_drawn:
+            return f"{nothing} with what ties and props carry there ({carry})"
+        how = "where they carry more before the live load acts, put a settlement before it, of 1e-6 m, in which they do"
+        return f"{nothing} as drawn, with the prestress alone ({carry}): {how}"
 
     def jump(self, start: Pose, end: Pose) -> str:
         """Message that names the blocks of a jump, and how far they moved."""
@@ -181,11 +180,8 @@ class Reports:
 
     def loss(self, fallen: np.ndarray, weight: float, share: float) -> str:
         """Message that names the blocks that have fallen."""
-        falls = "falls" if fallen.sum() == 1 else "fall"
-        return (
-            f"{self._named(np.flatnonzero(fallen))} {falls}, {weight:.4g} N, {100.0 * share:.2g} % of the weight; "
-            "the path goes on without"
-        )
+        fall = f"{self._named(np.flatnonzero(fallen))} {'falls' if fallen.sum() == 1 else 'fall'}"
+        return f"{fall}, {weight:.4g} N, {100.0 * share:.2g} % of the weight; the path goes on without"
 
     def taken_away(self, removed: np.ndarray, absent: np.ndarray) -> str:
         """Message that names the blocks that are taken away, and the ties that go with them; these are not there."""

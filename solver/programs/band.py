@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import lapack
 
-from solver.ordering import narrowest, positions_in
+from solver.ordering import narrowest
 from solver.tolerances import ACCEPTED_ERROR, INTERIOR_TOLERANCE
 
 from .problem import LinearProgram, Solution, Unbounded
@@ -72,7 +72,7 @@ class _Band:
         self._refuse_wide(int(counts.max(initial=0)))
         self.order, self.width = narrowest(_joined(matrix), places)
         self._refuse_wide(self.width)
-        position = positions_in(self.order)
+        position = np.argsort(self.order)
         slots, weights, columns, pairs = [], [], [], []
         for count in np.unique(counts[counts > 0]):
             members = np.flatnonzero(counts == count)
@@ -252,7 +252,7 @@ def _solved_in_pieces(program: LinearProgram, wide: np.ndarray) -> tuple[np.ndar
     """Solve with wide columns cut into pieces along the rows, and equations that all pieces of one are the same."""
     rows, columns = program.matrix.shape
     narrow = np.delete(np.arange(columns), wide)
-    position = positions_in(narrowest(_joined(sp.csc_array(program.matrix[:, narrow])), program.places)[0])
+    position = np.argsort(narrowest(_joined(sp.csc_array(program.matrix[:, narrow])), program.places)[0])
     n = int(position.max()) // PIECE + 1
     each = sp.csc_array((np.ones(rows), (np.arange(rows), position // PIECE)), shape=(rows, n))
     cut = [sp.diags_array(program.matrix[:, [k]].toarray()[:, 0]) @ each for k in wide]
