@@ -285,6 +285,7 @@ def test_films_have_their_frames(tmp_path, suffix, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.slow
 def test_a_gif_of_too_many_frames_per_second_has_fewer_and_lasts_as_long(tmp_path, monkeypatch):
     planned = []
     monkeypatch.setattr("blockvis.pictures.render.film_of", lambda drawer, fps, *rest: planned.append(fps))
