@@ -128,33 +128,26 @@ def test_labels_stand_at_the_widest_point_of_a_joint(monkeypatch):
         np.testing.assert_allclose(place, drawer.scene.at_pixel(widest[None])[0], atol=0.01)
 
 
-def test_cracks_that_are_not_drawn_have_no_label(monkeypatch):
-    """Between two blocks of a row that have parted by most of a block is air, and no crack."""
+ROW = [(-1, -1, 9, 0), (0, 0, 2, 1), (2, 0, 4, 1), (4, 0, 6, 1)]
+COURSES = [(-1, -1, 9, 0), (0, 0, 2, 1), (2, 0, 4, 1), (0, 1, 2, 2), (2, 1, 4, 2)]
+
+
+@pytest.mark.parametrize(
+    ("places", "along", "told"), [(ROW, {1: -0.06, 3: 1.6}, "60"), (COURSES, {2: 0.5, 4: 1.6}, "500")]
+)
+def test_cracks_are_labelled_where_they_are_drawn(monkeypatch, places, along, told):
+    """Between two blocks that have parted by most of a block is air, and no crack."""
     written = []
     monkeypatch.setattr(
         "blockvis.pictures.drawer.write_labels", lambda picture, places, words, *_: written.extend(words)
     )
-    places = [(-1, -1, 9, 0), (0, 0, 2, 1), (2, 0, 4, 1), (4, 0, 6, 1)]
-    assembly = solver.Assembly.from_outlines([rectangle(*place) for place in places], roles=["fixed"] + 3 * ["free"])
-    shift = np.array([[0, 0], [-0.06, 0], [0, 0], [1.6, 0]])
-    response = posed(assembly, solver.Pose(assembly.centroids + shift, np.zeros((4, 1))))
+    roles = ["fixed"] + (len(places) - 1) * ["free"]
+    assembly = solver.Assembly.from_outlines([rectangle(*place) for place in places], roles=roles)
+    shift = np.array([[along.get(k, 0.0), 0.0] for k in range(len(places))])
+    response = posed(assembly, solver.Pose(assembly.centroids + shift, np.zeros((len(places), 1))))
     (only,) = response.increments
     Drawer(response, Look(), SIZE, (only,)).picture(only, widths=True)
-    assert written == ["60 mm"]
-
-
-def test_a_crack_whose_widest_joint_has_parted_is_labelled_where_it_is_drawn(monkeypatch):
-    written = []
-    monkeypatch.setattr(
-        "blockvis.pictures.drawer.write_labels", lambda picture, places, words, *_: written.extend(words)
-    )
-    places = [(-1, -1, 9, 0), (0, 0, 2, 1), (2, 0, 4, 1), (0, 1, 2, 2), (2, 1, 4, 2)]
-    assembly = solver.Assembly.from_outlines([rectangle(*place) for place in places], roles=["fixed"] + 4 * ["free"])
-    shift = np.array([[0, 0], [0, 0], [0.5, 0], [0, 0], [1.6, 0]])
-    response = posed(assembly, solver.Pose(assembly.centroids + shift, np.zeros((5, 1))))
-    (only,) = response.increments
-    Drawer(response, Look(), SIZE, (only,)).picture(only, widths=True)
-    assert written == ["500 mm"]
+    assert written == [f"{told} mm"]
 
 
 def details(monkeypatch):
