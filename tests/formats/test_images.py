@@ -307,6 +307,7 @@ def test_thick_outlines_of_stones_in_mortar_are_lines_too(tmp_path, form):
 
 @pytest.mark.parametrize("form", ["png", "jpg", "transparent"])
 @pytest.mark.parametrize("stone", [255, 0])
+@pytest.mark.slow
 def test_stones_may_be_as_narrow_as_lines_are(tmp_path, form, stone):
     """A facade of many courses, or a slender arch, with a margin: what is around is in one piece, and wide."""
     wall, arch = (Image.new("L", (400, 400), 255 - stone) for _ in range(2))

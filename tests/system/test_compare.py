@@ -56,6 +56,7 @@ def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_p
         assert (np.abs(curves - np.array(colour)).sum(axis=2) == 0).sum() > 1000
 
 
+@pytest.mark.slow
 def test_curves_are_not_joined_where_the_supports_move_otherwise(tmp_path):
     """From out to in the reaction changes its sign."""
     there = solver.Settlement((1, 0), increment=0.01, limit=0.02)
@@ -69,6 +70,7 @@ def test_curves_are_not_joined_where_the_supports_move_otherwise(tmp_path):
     assert 0 < curve.any(axis=1).sum() < 0.2 * len(curve)
 
 
+@pytest.mark.slow
 def test_a_crack_of_one_run_has_the_opening_of_its_joint_in_the_other(other, tmp_path):
     settlement = solver.Settlement((0, -1), increment=0.02, limit=0.06)
     sinking = solver.Structure(generators.arch(), friction_coefficient=2.0).settle(settlement)
@@ -85,6 +87,7 @@ def test_a_crack_of_one_run_has_the_opening_of_its_joint_in_the_other(other, tmp
 
 
 @pytest.mark.parametrize(("opening", "told"), [(1.1846e-3, "1.18 mm"), (3e-13, "0 mm")])
+@pytest.mark.slow
 def test_widths_of_cracks_are_rounded_once(arch_results, other, tmp_path, monkeypatch, opening, told):
     """As the report of each run has them; what rounding leaves of a closed joint is no width."""
     openings = "blockvis.comparison.compared.opening_and_slip"

@@ -172,6 +172,7 @@ def test_the_deformed_layout_is_told_in_the_unit_of_its_settlement(tmp_path, cap
     assert capsys.readouterr().out.endswith(", as they are at settlement 0.001 rad in phase 2\n")
 
 
+@pytest.mark.slow
 def test_an_animation_of_a_load_that_moves_begins_at_0_seconds(tmp_path):
     text = '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 6 }\n[material]\nfriction_coefficient = 0.8\n'
     text += (

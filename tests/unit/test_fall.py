@@ -155,6 +155,7 @@ def pulled_apart(outlines, friction):
     return solver.settle(assembly, apart, friction_coefficient=friction, controls=solver.Controls(falling_frames=1))
 
 
+@pytest.mark.slow
 def test_a_stone_that_turns_and_wedges_in_a_gap_has_fallen():
     """Its centroid sinks by less than a quarter of it."""
     fall = fall_of(pulled_apart([(0, 0, 1, 1), (-1, -6, 0.3, 0), (0.7, -6, 1.4, 0)], 0.1))
@@ -162,6 +163,7 @@ def test_a_stone_that_turns_and_wedges_in_a_gap_has_fallen():
     assert abs(fall.rotations[-1, 0, 0]) == pytest.approx(np.pi / 4.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_what_collapses_onto_the_ground_at_once_is_said_to_rest():
     response = pulled_apart([(0, 0, 2, 0.4), (-2.9, -3, 0.2, 0), (1.8, -3, 4.9, 0)], 0.6)
     assert response.stop is solver.Status.COLLAPSED

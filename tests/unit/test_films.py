@@ -63,6 +63,7 @@ def sideways_block(steps=3):
 
 
 @pytest.mark.parametrize(("seconds", "frames"), [(4.0, [10, 20, 10]), (1.0, [10, 10, 10]), (0.5, [5, 5, 5])])
+@pytest.mark.slow
 def test_a_short_phase_takes_a_second_of_the_film(seconds, frames):
     path = arch_response().path
     phases = [[replace(i, phase=k, parameter=part * i.parameter) for i in path] for k, part in enumerate((1e-3, 1, 0))]
@@ -163,6 +164,7 @@ def test_what_a_limit_load_is_without_bears_no_load():
     assert tips[0, 1] == tails[0, 1]
 
 
+@pytest.mark.slow
 def test_loads_grow_with_their_multiplier_between_increments(tmp_path):
     response = sideways_block()
     loads = LiveLoads(response, response.path, 1.0)
@@ -308,6 +310,7 @@ def test_a_poster_is_where_the_fall_is_fastest(tmp_path):
     assert changes[chosen[0] - 1] > 0.7 * max(changes[5:])
 
 
+@pytest.mark.slow
 def test_the_poster_of_what_does_not_fall_is_its_end(tmp_path):
     poster = tmp_path / "poster.png"
     frames = animate(sideways_block(), tmp_path / "frames", size=SIZE, fps=5, seconds=1.0, poster=poster)
@@ -469,6 +472,7 @@ def test_frames_are_written_as_pictures_into_a_folder(tmp_path):
         ("force = [0, 1000, -1000]\nblocks = 'stone 3-1'\npoint = [0.1, -1.7, 1.0]", (0.1, -0.7), (0.1,)),
     ],
 )
+@pytest.mark.slow
 def test_loads_in_space_are_drawn_where_they_act(load, point, places, tmp_path):
     """Not over the middle of the stone, as long as the vault, and a slanted one on its line."""
     text = """

@@ -84,6 +84,7 @@ limit = 0.2
     assert low - 1e-5 <= np.arctan(2.0 * B / (3.5 * H)) <= high + 1e-5
 
 
+@pytest.mark.slow
 def test_a_pushover_follows_the_point_of_its_live_load():
     """A level force at the top: α F y(top) = W x(centroid), from the toe about which the wall turns."""
     assembly, weight = wall()

@@ -45,6 +45,7 @@ def test_numbers(layout):
 
 
 @pytest.mark.parametrize(("gaps", "proposed"), [((0.0, 0.0, 0.02, 0.02), 0.0), ((0.0, 0.02, 0.04, 0.06), 0.02)])
+@pytest.mark.slow
 def test_a_crack_in_a_wall_whose_joints_touch_is_no_mortar(tmp_path, gaps, proposed):
     brick = np.array([[0, 0], [0.4, 0], [0.4, 0.2], [0, 0.2]])
     # Straight through all courses, or all head joints open on bed joints that touch.

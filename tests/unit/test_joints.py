@@ -174,6 +174,7 @@ def test_units_are_in_the_files(tmp_path):
     assert (out / "joints.pvd").read_text(encoding="utf-8").count("joints_") == len(arch_response().path)
 
 
+@pytest.mark.slow
 def test_files_tell_the_units_of_their_phase(tmp_path):
     """Of a rotation the parameter is an angle, its reaction a moment; the mechanism of a collapse is per m."""
     (tmp_path / "case.toml").write_text(
@@ -324,6 +325,7 @@ def taken_away_before_a_settlement(dimension):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.slow
 def test_joints_of_a_stone_that_is_taken_away_have_no_opening(tmp_path, dimension):
     response = taken_away_before_a_settlement(dimension)
     last = response.path[-1]
@@ -339,6 +341,7 @@ def test_joints_of_a_stone_that_is_taken_away_have_no_opening(tmp_path, dimensio
     assert '"gone":[4]' in page
 
 
+@pytest.mark.slow
 def test_joints_of_a_stone_that_is_lost_open_no_more(tmp_path):
     response = dropped_brick(0.05)
     lost = response.losses[0].settlement

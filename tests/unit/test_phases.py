@@ -67,6 +67,7 @@ def test_what_has_been_taken_away_stays_where_it_was() -> None:
 
 
 @pytest.mark.parametrize("role", ["free", "fixed"])
+@pytest.mark.slow
 def test_what_was_taken_away_is_no_part_of_the_weight_that_a_loss_is_measured_by(role: str) -> None:
     stones = {f"stone {k}": ("free", rectangle(0.5 * k, 0.0, 0.5 * (k + 1), 0.5)) for k in range(4)}
     blocks = {
@@ -112,6 +113,7 @@ def test_a_phase_that_changes_nothing_begins_with_the_equilibrium_at_the_end_of_
 
 
 @pytest.mark.parametrize("law", [solver.InterfaceLaw(0.6, normal_stiffness=2e6), solver.InterfaceLaw(0.6)])
+@pytest.mark.slow
 def test_springs_keep_what_has_compressed_them_when_something_apart_is_taken_away(law: solver.InterfaceLaw) -> None:
     pads = [rectangle(x - 0.05, -0.3, x + 0.05, 0.0) for x in (-1.0, 0.0, 1.0)]
     apart = [rectangle(3.0, 0.0, 3.4, 0.4), rectangle(3.0, -0.3, 3.4, 0.0)]
@@ -125,6 +127,7 @@ def test_springs_keep_what_has_compressed_them_when_something_apart_is_taken_awa
     assert found[1] == pytest.approx(found[0], abs=1e-4 * mechanics.total_weight(assembly))
 
 
+@pytest.mark.slow
 def test_the_capacity_of_a_pose_is_that_of_the_blocks_that_are_left() -> None:
     """A tower against a buttress, pushed with 10 kN at mid-height; without it, it tips at W b/2 = α F h/2."""
     outlines = [rectangle(0, -1, 9, 0), rectangle(2, 0, 3, 3), rectangle(3, 0, 5, 3), rectangle(9, -1, 10, 0)]
@@ -214,6 +217,7 @@ def test_a_structure_that_stands_no_more_collapses_before_the_settlement() -> No
     assert {increment.phase for increment in response.path} == {0}
 
 
+@pytest.mark.slow
 def test_what_only_springs_back_when_a_stone_is_taken_away_does_not_fall(tmp_path: Path) -> None:
     structure = solver.Structure(build("arch on piers", {}), friction_coefficient=0.6)
     aside = solver.Settlement([1.0, 0.0], increment=1e-3, limit=1e-3)
@@ -443,6 +447,7 @@ def run_told(folder: Path, case: str, capsys: pytest.CaptureFixture[str]) -> tup
     return capsys.readouterr().out, json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_a_tie_that_is_named_twice_is_taken_away_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     iron = '[[ties]]\nname = "iron"\nfrom = { block = "left springer", point = [-1, 0] }\n'
     iron += 'to = { block = "right springer", point = [1, 0] }\nstiffness = 1e5\n'

@@ -140,6 +140,7 @@ def test_of_multipliers_that_are_equal_but_for_rounding_the_first_is_the_largest
     assert summary["largest_load_multiplier_at"] == 0.0
 
 
+@pytest.mark.slow
 def test_what_has_fallen_is_marked():
     assembly = block()
     control = solver.ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.05)
@@ -174,6 +175,7 @@ def test_a_tie_of_a_later_phase_is_refused_unless_an_increment_tells_of_it():
     assert found.load_multiplier[-1] == pytest.approx(0.2 + 2 * 500.0 / mechanics.total_weight(assembly), rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_breaks_within_the_first_increment_has_lost_its_capacity_whichever_way_that_is():
     # A block that mortar alone holds to the side of another: pressed down it comes off at 80.4, within 0.1 mm.
     assembly = solver.Assembly.from_outlines(
@@ -193,6 +195,7 @@ def test_what_breaks_within_the_first_increment_has_lost_its_capacity_whichever_
         structure.pushover(replace(down, direction=(0, 1)))
 
 
+@pytest.mark.slow
 def test_the_peak_at_which_a_tie_or_a_joint_breaks_is_told_however_long_increments_are():
     assembly, control = block(), solver.ControlDisplacement("block", (1, 0), increment=0.01, limit=0.03)
     loads, weight = sideways(assembly), mechanics.total_weight(assembly)
@@ -275,6 +278,7 @@ def beside(interfaces=None, pushed_back=0.0, **structure):
 
 
 @pytest.mark.parametrize("pushed_back", [0.0, 0.7])
+@pytest.mark.slow
 def test_a_pushover_begins_at_the_limit_load_of_friction_that_does_not_dilate(pushed_back):
     """It began with the associative one, half as much again, which its path never carries; held by it alone, too."""
     structure, control, (sliding, lifting) = beside(pushed_back=pushed_back)
@@ -325,6 +329,7 @@ def test_the_bounds_at_the_start_of_a_pushover_are_found_once(monkeypatch):
     assert len(found) == len(response.path) == 2
 
 
+@pytest.mark.slow
 def test_far_from_the_origin_a_pushover_is_what_it_is_near():
     # Quarters of metres, which are as exact in both places.
     shift, found = np.array([524288.0, 5242880.0]), []

@@ -83,6 +83,7 @@ def test_the_arrows_of_a_support_turn_with_it(tmp_path):
 
 
 @pytest.mark.parametrize("space", [False, True], ids=["of shallow ground", "magnified in space"])
+@pytest.mark.slow
 def test_arrows_of_supports_are_drawn_whole(space, tmp_path):
     if space:
         solids = [box((-1, -1, -0.4), (1, 1, 0)), box((-0.6, -0.6, 0), (0.6, 0.6, 1))]
@@ -100,6 +101,7 @@ def test_arrows_of_supports_are_drawn_whole(space, tmp_path):
     assert lengths.max() >= (35 if space else 42), lengths
 
 
+@pytest.mark.slow
 def test_supports_that_settle_under_a_live_load_have_arrows_whatever_the_colours(tmp_path):
     case = '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 5 }\n[material]\nfriction_coefficient = 0.8\n'
     case += "[settlement]\ndirection = [1, 0]\nincrement = 0.002\nlimit = 0.004\n"

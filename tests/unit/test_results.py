@@ -261,6 +261,7 @@ def test_files_of_a_folder_that_are_damaged_are_named_with_the_remedy(name, text
     assert message.endswith("); run the case again with --force\n")
 
 
+@pytest.mark.slow
 def test_the_unit_in_the_summary_is_that_of_the_displacement_at_collapse(tmp_path):
     """A stone falls between supports that part, before one of them turns."""
     outlines = [[[-1, -0.5], [0, -0.5], [0, 0], [-1, 0]], [[1, -0.5], [3, -0.5], [3, 0], [1, 0]]]

@@ -172,6 +172,7 @@ def touching(lower, upper, way):
 
 @pytest.mark.parametrize("tilt", [0.1, 0.5, 3.0])
 @pytest.mark.parametrize("corners", [8, 14])
+@pytest.mark.slow
 def test_bodies_that_touch_have_a_point_there(corners, tilt):
     """However tips, edges and faces come to lie on each other; bricks and frustums, or any convex bodies."""
     random = np.random.default_rng(corners)

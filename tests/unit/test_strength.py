@@ -150,6 +150,7 @@ def test_what_crushes_is_told_and_marked_where_it_presses(in_space, tmp_path):
     assert "1 moving part, 1 crushing joint" in blockvis.write_report(response, tmp_path / "r.html").read_text()
 
 
+@pytest.mark.slow
 def test_two_glued_blocks_that_tip_as_one_are_one_macro_block():
     """The joint between them closes by what it gives, at 1e-3 of the fastest corner; it does not part them."""
     outlines = [rectangle(0, 0, 1, 0.5), rectangle(1, 0, 1.6, 0.5), rectangle(-3, -0.5, 1, 0)]

@@ -135,6 +135,7 @@ def on_a_buttress_that_leans():
 
 
 @pytest.mark.parametrize("increment", [0.02, pytest.param(0.01, **THOROUGH), pytest.param(0.005, **THOROUGH)])
+@pytest.mark.slow
 def test_an_arch_on_a_buttress_that_leans_begins_on_hinges_that_have_an_equilibrium(increment):
     """The buttress turns about its outer toe; the hinges next to them have none up to 0.00606 rad, and end at 0.1089.
 

@@ -198,6 +198,7 @@ def test_what_a_settlement_has_torn_off_is_missing_from_limit_load_and_pushover(
 
 @pytest.mark.parametrize("stiffness", [np.inf, 1e8])
 @pytest.mark.parametrize("displacement", [0.0, 1e-4])
+@pytest.mark.slow
 def test_an_open_joint_with_a_rest_of_its_strength_does_not_push(stiffness, displacement):
     """A block on ground that has sunk by 1 mm, glued to what is above it, is lifted by its weight; in a phase, too."""
     give = {"normal_stiffness": stiffness, "fracture_opening": 2e-3, "fracture_slip": 4e-3}
@@ -440,6 +441,7 @@ def dry_and_weak(assembly, settlement, friction, strength):
 
 @pytest.mark.parametrize("tensile_strength", [1e5, 0.0])
 @pytest.mark.parametrize("elastic", [{}, {"normal_stiffness": 1e10, "shear_stiffness": 1e10}])
+@pytest.mark.slow
 def test_mortar_fills_the_gap_that_is_accepted_of_a_drawing(elastic, tensile_strength):
     """Two blocks glued to each other, one support of which sinks: the same with a head joint off as drawn."""
 

@@ -41,6 +41,7 @@ def test_a_rope_takes_what_its_elongation_says_until_the_block_hangs():
 
 @pytest.mark.parametrize("space", [False, True])
 @pytest.mark.parametrize("direction", [(0.0, -1.0), (0.3, -1.0)])
+@pytest.mark.slow
 def test_what_its_support_has_left_hangs_on_its_ties(space, direction):
     """A lintel of 1000 N whose ropes are 0.7 and 0.5 m from its middle; they turn with it, as pendulums do."""
     ends = [((x, 0.5), (x, 1.5)) for x in (0.3, 1.5)]
@@ -247,6 +248,7 @@ def test_impossible_ties_are_refused_in_a_line_that_names_them(change, words):
 
 
 @pytest.mark.parametrize("stiffness", [2e5, 3e5, 4e5])
+@pytest.mark.slow
 def test_a_wall_that_hangs_on_its_tie_is_pushed_back_and_over(stiffness):
     """It hinges where it carries no live load before the tie gives: whether that was below zero was rounding."""
     outlines = [_box(0.0, 0.0, 0.8, 6.0), _box(-3.0, -0.5, 3.0, 0.0)]
