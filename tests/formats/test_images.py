@@ -435,6 +435,7 @@ def test_a_blob_an_empty_image_and_a_photograph_are_refused(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("ending", ["png", "jpg"])
+@pytest.mark.slow
 def test_a_photograph_with_openings_painted_over_is_no_mask_of_them(tmp_path, capsys, ending):
     random = np.random.default_rng(3)
     drawn, n = drawn_wall()

@@ -139,6 +139,7 @@ def arch_as_svg(tmp_path, n, over, ring):
     ("over", "ring"), [(over, ring) for ring in (False, True) for over in (0.0, -1e-6, 1e-6, 1e-4)] + [(2e-3, False)]
 )
 @pytest.mark.parametrize("draw", [arch_as_dxf, arch_as_svg])
+@pytest.mark.slow
 def test_joints_that_end_on_an_arc_cut_it(tmp_path, draw, over, ring):
     for n in (5, 7, 15, 20, 25):
         drawing = read_layout(draw(tmp_path, n, over, ring))
@@ -267,6 +268,7 @@ def pairs_of_lines(space, half, framed):
 
 @pytest.mark.parametrize("framed", [True, False])
 @pytest.mark.parametrize("half", [0, 5, 10])
+@pytest.mark.slow
 def test_mortar_drawn_as_pairs_of_lines_is_no_block(tmp_path, framed, half):
     path = dxf(tmp_path, lambda space: pairs_of_lines(space, half, framed))
     drawing = read_layout(path)

@@ -72,6 +72,7 @@ def test_where_a_program_may_write_either_axis_up_it_is_the_one_on_which_the_blo
 
 @pytest.mark.parametrize("suffix", ["obj", "stl", "ply", "off"])
 @pytest.mark.parametrize("name", ["barrel vault", "dome"])
+@pytest.mark.slow
 def test_where_blocks_stand_along_y_that_is_told_of_files_that_do_not_say_what_is_up(tmp_path, name, suffix):
     layout = layout_of(generators.build(name))
     for up in "yz":

@@ -420,6 +420,7 @@ def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     assert "control displacement [m]" in page
 
 
+@pytest.mark.slow
 def test_the_largest_multiplier_where_joints_give_is_one_that_is_carried(tmp_path, capsys):
     """Springs k A / 2 at the ends of the base: α W h / 2 = (k A b² / 4 - W h / 2) θ until an end lifts at 0.098."""
     text = PUSHED.replace("friction_coefficient = 0.7", "friction_coefficient = 0.7\nnormal_stiffness = 2e6")

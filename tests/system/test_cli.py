@@ -287,6 +287,7 @@ def test_no_initial_equilibrium_has_its_own_exit_code(case, capsys):
     assert "5 no initial equilibrium" in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.slow
 def test_a_pipe_closed_early_is_no_error(case):
     command = f"{sys.executable} -m blockvis info {case.parent / 'arch.msh'} | true"
     done = subprocess.run(

@@ -126,6 +126,7 @@ def test_one_layout_has_one_scale_and_moving_pictures_are_no_videos(name, arch_r
     assert "<video controls" not in page
 
 
+@pytest.mark.slow
 def test_between_rest_and_the_first_increment_no_reaction_is_told(tmp_path, monkeypatch):
     """The reaction leaves that at rest at once: a line from there gave one path two reactions, by its increments."""
     titles, blank, folders = [], Image.new("RGB", (800, 620)), []
@@ -143,6 +144,7 @@ def test_between_rest_and_the_first_increment_no_reaction_is_told(tmp_path, monk
     assert [title.endswith("Reaction –") for title in titles] == [False, True, False, False, False, False]
 
 
+@pytest.mark.slow
 def test_blocks_in_space_are_seen_from_one_side(tmp_path, monkeypatch):
     sights, blank, folders = [], Image.new("RGB", (800, 620)), []
     picture = "blockvis.pictures.drawer.Drawer.picture"

@@ -148,6 +148,7 @@ def prop_taken_away(in_space):
 
 
 @pytest.mark.parametrize("in_space", [False, True])
+@pytest.mark.slow
 def test_blocks_taken_away_are_left_out_of_layouts_and_vanish_from_animations(in_space, tmp_path, capsys):
     folder = blockvis.write(prop_taken_away(in_space), tmp_path / "out")
     deformed = converted(folder, tmp_path / "deformed.json")

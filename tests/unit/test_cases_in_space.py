@@ -207,6 +207,7 @@ def test_new_names_the_supports_of_a_drawing(tmp_path):
     assert int((~found.free).sum()) == 4
 
 
+@pytest.mark.slow
 def test_a_pushover_counts_along_x_by_default(tmp_path):
     """A block of 0.4 by 0.4 by 1 m, pushed along x, tips when α is its slenderness."""
     solids = [box((-1, -1, -0.5), (2, 2, 0)), box((0, 0, 0), (0.4, 0.4, 1))]

@@ -514,6 +514,7 @@ def joints(assembly, least):
 
 @pytest.mark.parametrize("name", SMALL)
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.slow
 def test_a_shaken_drawing_is_faced(name, tmp_path):
     built = generators.build(name, SMALL[name])
     amount = 1e-3 * built.block_size

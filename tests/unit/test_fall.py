@@ -64,6 +64,7 @@ def outlines(assembly, pose):
 EACH = pytest.mark.parametrize("structure", [shipped_arch, pytest.param(panel, marks=pytest.mark.thorough)])
 
 
+@pytest.mark.slow
 def test_what_is_pulled_off_its_bearing_falls():
     """A lintel that has left its pier by a hair: at the last equilibrium a push would turn it back onto it."""
     outlines = [rectangle(0, 0, 2, 0.3), rectangle(-1, -6, 0.3, 0), rectangle(1.7, -6, 2.4, 0)]
@@ -375,6 +376,7 @@ def test_blocks_smaller_than_any_stone_have_no_fall_that_would_never_end():
     assert fall_of(response) is None
 
 
+@pytest.mark.slow
 def test_friction_of_each_pair_of_materials():
     """A brick on a slope of 22°: by the friction of its pair it stays or slides."""
     turn = np.array([[np.cos(0.384), -np.sin(0.384)], [np.sin(0.384), np.cos(0.384)]])

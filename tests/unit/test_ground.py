@@ -124,6 +124,7 @@ OFF_LEVEL = [(0.0, 0.0), (0.004, 0.004), (0.002, 0.002), (0.004, 0.004)]
         pytest.param(OFF_LEVEL, 0.01, 0.2753, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.slow
 def test_a_course_off_level_is_bedded_and_not_held(tmp_path, capsys, bottoms, joint, reaction):
     """Walls of ground of 2 mm beside its stones held them by friction: the first reaction was 0.496 W."""
     rings = wall(bottoms, joint)
@@ -383,6 +384,7 @@ def test_what_does_not_stand_is_named_with_its_cause_and_marked(tmp_path, capsys
         ),
     ],
 )
+@pytest.mark.slow
 def test_blocks_that_fall_for_another_reason_are_not_left_out(tmp_path, capsys, causes, words):
     stones = {
         "hangs": [(3.0, 1.0), (3.4, 1.0), (3.4, 1.2), (3.0, 1.2)],

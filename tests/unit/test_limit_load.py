@@ -299,6 +299,7 @@ def test_what_locks_by_friction_is_unbounded_however_it_is_described(mirrored, s
         ([(-0.07, 0, 0.41, 0.33), (0.09, 0.33, 0.8, 0.98)], [(1320, -4440), (-652, -1621)], 0.43),
     ],
 )
+@pytest.mark.slow
 def test_what_locks_slowly_is_unbounded(stones, forces, friction, in_space, mirror):
     """Resultants on every joint of a column are within its friction and its middle third; forces grow by a third."""
     outlines = [rectangle(-1.0, -0.2, 2.0, 0.0), *(rectangle(*stone) for stone in stones)]

@@ -61,6 +61,7 @@ def test_a_pebble_that_tips_leans_on_the_wall_beside():
 
 
 @BOTH
+@pytest.mark.slow
 def test_a_pebble_that_nothing_catches_is_a_collapse(controls):
     response = solver.settle(
         _bench(wall=False), TILT, friction_coefficient=1.0, controls=replace(controls, local_loss=0.0)

@@ -127,6 +127,7 @@ def test_the_worst_of_some_certificates_passes_over_what_was_not_worked_out():
     assert mechanics.worst_of([]) is None
 
 
+@pytest.mark.slow
 def test_numbers_of_numpy_are_written(tmp_path):
     """Those of np.arange and of data in single precision, which compute like others."""
     block, ground = [[0, 0], [1, 0], [1, 1], [0, 1]], [[-1, -1], [2, -1], [2, 0], [-1, 0]]
@@ -229,6 +230,7 @@ def test_results_opened_by_a_relative_path_are_read_from_another_folder(folder, 
         (np.array([1, 2]), np.array([[2, 1.5], [2, 2.5]])),
     ],
 )
+@pytest.mark.slow
 def test_ties_of_arrays_and_lists_come_back(blocks, points, tmp_path):
     """Analyses took them, and the folder that was written in the end could not be read."""
     rod = solver.Tie("rod", blocks, points, 1e6)

@@ -127,6 +127,7 @@ def test_a_block_heavier_than_its_joint_is_not_carried():
 
 
 @pytest.mark.parametrize("in_space", [False, True])
+@pytest.mark.slow
 def test_what_crushes_is_told_and_marked_where_it_presses(in_space, tmp_path):
     """The block turns about its heel, which keeps its place: a dot there would put the force on the wrong side."""
     _, _, weight = block(2.0)

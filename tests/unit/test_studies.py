@@ -580,6 +580,7 @@ def test_shares_of_the_variance_are_of_collapses_and_not_of_the_limit():
 
 
 @pytest.mark.parametrize("method", ["random", "saltelli"])
+@pytest.mark.slow
 def test_the_interval_of_a_mean_holds_the_truth_as_often_as_it_says(method):
     """The rows of a saltelli design share their imperfections: they are no further draws."""
     parameters = {
@@ -595,6 +596,7 @@ def test_the_interval_of_a_mean_holds_the_truth_as_often_as_it_says(method):
     assert np.mean(inside) > 0.8, "few are compared: not 0.95"
 
 
+@pytest.mark.slow
 def test_first_order_indices_by_exchange_with_imperfections():
     study = _study("saltelli", 256, scattered=True)
     assert study.n_runs == 256 * 5

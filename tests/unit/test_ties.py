@@ -341,6 +341,7 @@ def test_a_broken_tie_has_carried_its_strength_and_a_slack_one_carries_nothing(t
 
 
 @pytest.mark.parametrize(("prestress", "phase"), [(1e4, 1), (1e4, 2), (1e3, 1)])
+@pytest.mark.slow
 def test_a_prestress_that_tips_what_it_holds_is_told_with_what_is_left_of_it(tmp_path, capsys, prestress, phase):
     """Of a stay to the ground at 1.5 m there is W b/2 where the pier of 0.5 m leans; with less it stands."""
     (tmp_path / "piers.json").write_text(BLOCKS, encoding="utf-8")

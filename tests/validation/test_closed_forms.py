@@ -238,6 +238,7 @@ def test_keystone_between_spreading_supports(degrees, friction_coefficient, thru
 @pytest.mark.parametrize(
     ("degrees", "friction_coefficient"), [pytest.param(20, 0.3, marks=pytest.mark.thorough), (30, 0.3)]
 )
+@pytest.mark.slow
 def test_keystone_between_approaching_supports(degrees, friction_coefficient):
     """Slides up at (W/2) cot(β - φ) where β > φ, once friction has followed the thrust that it makes grow."""
     beta, phi = np.radians(degrees), np.arctan(friction_coefficient)

@@ -136,6 +136,7 @@ def test_limit_loads_under_fill_are_those_of_a_block_by_hand() -> None:
     assert resultant == pytest.approx(OWN + UNIT_WEIGHT, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_in_space_an_acceleration_acts_on_the_fill_along_a_pushover() -> None:
     """The same block, 1 m deep, which overturns along y: the limit load, and what is left of it as it leans."""
     solids = [box([0, 0, 0], [1, 1, 2]), box([-1, -1, -1], [2, 2, 0])]

@@ -107,6 +107,7 @@ def joint_forces(increment, assembly, mirror):
 
 
 @pytest.mark.parametrize("description", ["mirrored", "shuffled"])
+@pytest.mark.slow
 def test_a_pushed_wall_has_the_same_joint_forces_however_it_is_described(description):
     """At the limit load as drawn, where courses slide and friction leaves no force open, and after 20 mm."""
     drawn = generators.build("wall", {"bricks": 3, "courses": 4})

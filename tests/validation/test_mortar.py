@@ -252,6 +252,7 @@ def block_on_two_springs(interfaces, sunk=5e-4):
     ],
     ids=["joints", "mortar", "ground"],
 )
+@pytest.mark.slow
 def test_a_block_that_leans_on_springs_tips_about_its_edge(interfaces):
     """α W y = W x about the outer edge of the right pad, from which the centroid is at (-x, y) at rest.
 
@@ -369,6 +370,7 @@ def tilts(courses, times, increment, limit, friction=0.05):
 @pytest.mark.parametrize(
     ("courses", "times", "within"), [(1, 4.0, 2e-3), (10, 4.0, 2e-3), (30, 10.0, 2e-3), (1, 2.0, 0.01)]
 )
+@pytest.mark.slow
 def test_a_tower_on_ground_that_tilts_leans_by_more(courses, times, within):
     """θ = φ / (1 - 1/F), F = k b³/4 / (W h/2): however many courses, and whatever retards them on the path."""
     _, lean = tilts(courses, times, increment=0.001, limit=0.002)

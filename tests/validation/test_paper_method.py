@@ -120,6 +120,7 @@ def test_flat_arch(height):
 
 
 @pytest.mark.parametrize(("width", "height", "mu"), [(1, 2, 0.7), (1, 1, 0.4)])
+@pytest.mark.slow
 def test_block_on_a_tilting_support(width, height, mu):
     """Overturns or slides at θ = atan(min(μ, b/h))."""
     outlines = [rectangle(0, 0, width, height), rectangle(-1, -1, width + 1, 0)]
