@@ -68,7 +68,8 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
         axes.plot([], [], line, marker=marker, color=ink, linewidth=2.0, label=f" {side.label}")
         # One reaction is along another motion than the next.
         for start, stop in pairwise([first, *new_motions(response), len(x)]):
-            axes.plot(x[start:stop], y[start:stop], line, marker=marker, color=ink, linewidth=2.0)
+            alone = "o" if stop == start + 1 else marker
+            axes.plot(x[start:stop], y[start:stop], line, marker=alone, color=ink, linewidth=2.0)
             if start > first:
                 axes.axvline(x[start - 1], color=grey, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1)
         if response.collapse is not None:

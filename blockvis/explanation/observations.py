@@ -231,10 +231,9 @@ def _of_rows(
         given.append(cells := _Cells(row, columns, f"{where}, {counted} {number}"))
         width = cells.length("width")
         if width is not None:
-            place, named, whole, label = _place(cells, assembly, joints)
+            place, joint, whole, label = _place(cells, assembly, joints)
             # Joints may meet at a place.
-            blocks = frozenset() if whole else frozenset(label.split(" at ")[0].split(" | "))
-            before = first.setdefault((blocks, *place.tolist()), number)
+            before = first.setdefault((joint, *place.tolist()), number)
             if before != number:
                 # Readings of one crack share what the model errs by there.
                 said = f"is of {label}, as that of {counted} {before} is; give one width for each place, of one date"
@@ -247,7 +246,9 @@ def _of_rows(
                 )
             uncertainty = cells.length("uncertainty")
             usual = max(WIDTH_UNCERTAINTY * width, LEAST_UNCERTAINTY)
-            widths.append((place, named, whole, width, usual if uncertainty is None else uncertainty, label))
+            widths.append(
+                (place, joint is not None, whole, width, usual if uncertainty is None else uncertainty, label)
+            )
         moved = _displacement(cells, assembly)
         if moved is not None:
             points.append(moved)
@@ -357,10 +358,10 @@ def _between(
     return between
 
 
-def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> tuple[np.ndarray, bool, bool, str]:
+def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> tuple[np.ndarray, int | None, bool, str]:
     """Find the place (d,) [m] of a width: somewhere in the joint between two blocks, or at its coordinates.
 
-    Whether the joint is known, whether the place along it is not, and a label go with it.
+    The joint if it is known, whether the place along it is not, and a label go with it.
     """
     axes = "xyz"[: assembly.dimension]
     if cells.word("joint"):
@@ -379,15 +380,16 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
             joint = int(np.argmin(np.where(between, away[0], np.inf)))
             _check_place(place, float(away[0, joint]), f"'{label}'", cells, assembly)
             nearest_place = weights[0, joint] @ joints.rings.points[corners_of(joints)[joint]]
-            return nearest_place, True, False, f"{label} at {place_text(place)}"
+            return nearest_place, joint, False, f"{label} at {place_text(place)}"
         sizes = joints.sizes[between]
-        return sizes @ joints.rings.middles()[between] / sizes.sum(), True, True, label
+        middle = sizes @ joints.rings.middles()[between] / sizes.sum()
+        return middle, int(np.flatnonzero(between)[0]), True, label
     missing = next((axis for axis in axes if cells.length(axis) is None), None)
     if missing is not None:
         raise cells.error(missing, "is missing; give the place of the crack, or the joint")
     place = np.array([cells.length(axis) for axis in axes], dtype=float)
     _check_place(place, float(on_faces(place[None], joints)[0].min(initial=np.inf)), "any joint", cells, assembly)
-    return place, False, False, place_text(place)
+    return place, None, False, place_text(place)
 
 
 def _check_place(place: np.ndarray, away: float, what: str, cells: _Cells, assembly: solver.Assembly) -> None:

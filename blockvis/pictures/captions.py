@@ -56,9 +56,12 @@ def drops_at_start(response: solver.Response) -> bool:
 
 
 def new_motions(response: solver.Response) -> list[int]:
-    """Rows of the path from which on supports move otherwise than before: the reaction is along their motion."""
+    """Rows of the path from which on supports move otherwise than before: the reaction is along their motion.
+
+    A multiplier is that of the live load, however supports move.
+    """
     path, found = response.path, []
-    for k in range(1, len(path) if response.settlements else 0):
+    for k in range(1, len(path) if response.settlements and response.measured.is_force else 0):
         before, now = (response.settlements[path[row].phase] for row in (k - 1, k))
         steps = {name: getattr(now, name) for name in ("increment", "limit", "tolerance", "stops")}
         if replace(before, **steps) != now:

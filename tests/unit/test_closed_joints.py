@@ -22,7 +22,7 @@ from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.facing import faced, facing_tolerance
 from blockvis.layout.joints.close import close_joints, proposed
 from blockvis.layout.joints.facing_edges import facing_edges, proposed_thickness
-from blockvis.layout.joints.nearest_stone import share_out
+from blockvis.layout.joints.nearest_stone import proposed_gap, share_out
 from blockvis.layout.layout import Layout
 from blockvis.layout.solids import triangles_of
 from solver import mechanics
@@ -175,6 +175,11 @@ def test_proposed_thickness_is_the_widest_joint():
     assert thickness == pytest.approx(0.011)
     assert len(found) > 20
     assert proposed_thickness([brick(0, 0, 1, 1), brick(1, 0, 1, 1)])[0] == 0.0
+
+
+def test_stones_that_touch_have_no_joint_to_close():
+    """Of two points at one place a triangulation keeps one: the joint of width 0 itself, then."""
+    assert proposed_gap(bricks(gap=0.0))[0] == 0.0
 
 
 @pytest.mark.thorough

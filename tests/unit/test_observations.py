@@ -87,6 +87,16 @@ def test_every_row_of_python_may_have_its_own_keys():
         np.testing.assert_allclose(found.displacements, [[0.02, 0.0]])
 
 
+def test_joints_that_meet_at_a_place_are_told_apart_whatever_their_blocks_are_called(tmp_path):
+    outlines = [[(x, y), (x + w, y), (x + w, y + 1), (x, y + 1)] for x, y, w in ((0, 0, 1), (1, 0, 1), (0, 1, 2))]
+    wall = solver.Assembly.from_outlines(outlines, names=["left at a", "left at b", "right"])
+    rows = [
+        {"joint": "right | left at a", "x": 1, "y": 1, "width": 0.01},
+        {"joint": "right | left at b", "x": 1, "y": 1, "width": 0.02},
+    ]
+    assert read_observations(rows, wall).widths == pytest.approx([0.01, 0.02])
+
+
 def test_a_support_that_is_cut_is_named_by_its_name_or_its_pieces():
     outlines = [[(k, y), (k + 1, y), (k + 1, y + 1), (k, y + 1)] for y in (-1, 0) for k in (0, 1)]
     wall = solver.Assembly.from_outlines(

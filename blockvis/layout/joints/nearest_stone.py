@@ -72,6 +72,10 @@ class Gaps:
             length = np.hypot(*(self.points[a] - self.points[b]).T)
             for end in (a, b):
                 np.minimum.at(found, end[across], length[across])
+        # Of points at one place Delaunay keeps one, so that no triangle lies across a joint without width.
+        close = GRID * float(np.ptp(self.points, axis=0).max())
+        pairs = cKDTree(self.points).query_pairs(close, output_type="ndarray")
+        found[pairs[self.owner[pairs[:, 0]] != self.owner[pairs[:, 1]]].ravel()] = 0.0
         return found
 
 
