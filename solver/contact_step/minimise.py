@@ -9,8 +9,7 @@ from .interior import BALANCED, interior_point
 from .problem import ContactProblem, StepSolution
 
 #: Factorisations of Newton's method, and force out of balance, in block weights, were the blocks to go on as before or
-#: after the first one, beyond which it would take more: the interior method, which takes 8 to 14 wherever it starts,
-#: takes over.
+#: after the first one, that foretells more: the interior method, which takes 8 to 14 wherever it starts, takes over.
 NEWTON_FACTORISATIONS, NEAR = 12, 20.0
 
 #: Slopes of the program along a step of Newton's method that are computed at most.

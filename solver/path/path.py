@@ -127,8 +127,7 @@ class Path:
             place = self.stepper.unloaded(start, self.number, ties_at, bonds_at)
             self.tried = PathState(self.number, start, place, FIRST_STEP * self.stepper.unit)
             drawn = bonds_at is None
-            resting = self._at_rest(place, drawn)
-            if resting is None:
+            if (resting := self._at_rest(place, drawn)) is None:
                 # Joints that the drawing leaves open close.
                 closed = self.fall.relaxed(place, JUMP)
                 if closed is not None:
@@ -221,8 +220,7 @@ class Path:
             end, at_rest = self.fall.relax(beyond)
             continued = self._continue_from(self.state, end) if at_rest else self._remove_fallen(self.state, end)
             if continued is None:
-                yield from self._report_last(state)
-                check = self._check(state.place)
+                state, check = yield from self._report_last(state)
                 multiplier = self._multiplier_beyond(state, check, beyond)
                 return (yield from self.fall.collapse(check, beyond, state.upper_bound, multiplier))
             self.state = continued
@@ -328,12 +326,17 @@ class Path:
         self.state = replace(self.state, reported=place.s)
         return replace(increment, checkpoint=self.state)
 
-    def _report_last(self, state: PathState) -> Iterator[Increment]:
-        """The increment at the last equilibrium of the path, unless it has been reported."""
-        if state.place.s > state.reported:
-            velocity = state.place.velocity
-            velocity = self.driver.rate(state.place.s) if velocity is None else velocity
-            yield self.reports.increment(self._check(state.place), velocity, state.place.works)
+    def _report_last(self, state: PathState) -> Generator[Increment, None, tuple[PathState, EquilibriumCheck]]:
+        """Report, unless that is done, and return the last place near an equilibrium: wedges may be far from any."""
+        for place in (state.place, *state.history[::-1]):
+            check, reaction = self._check(place), self._reaction(place)
+            away = min(abs(check.measured - reaction), check.bounds.high - check.bounds.low)
+            if self.model.has_live or place.s <= state.reported or not away > REFUSED * self.tolerance * abs(reaction):
+                break
+        if place.s > state.reported:
+            velocity = self.driver.rate(place.s) if place.velocity is None else place.velocity
+            yield self.reports.increment(check, velocity, place.works)
+        return replace(state, place=place), check
 
     def advance(self, state: PathState, target: float) -> tuple[PathState, Ending]:
         """Advance to a parameter in steps whose length follows from their error.

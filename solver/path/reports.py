@@ -59,8 +59,7 @@ class Reports:
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
         where = f"{self.driver.unit}{f' in phase {self.number + 1}' if self.number else ''}"
-        notes = tuple(f"at {s:.6g} {where}: {words}" for s, words in self.notes)
-        self.notes = []
+        notes, self.notes = tuple(f"at {s:.6g} {where}: {words}" for s, words in self.notes), []
         state = self.stepper.mortar.told(state, place)
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
         return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
@@ -189,8 +188,8 @@ class Reports:
         weight = float(assembly.masses[removed & assembly.free].sum()) * GRAVITY
         gone = [self.model.ties[k].name for k in np.flatnonzero(~held_ties(self.model.ties, removed) & ~absent)]
         with_it = f", and with it {', '.join(map(repr, gone))}" if gone else ""
-        named = self._named(np.flatnonzero(removed))
-        return f"{named} taken away before settlement {self.number + 1}, {weight:.4g} N{with_it}"
+        before = f"taken away before settlement {self.number + 1}"
+        return f"{self._named(np.flatnonzero(removed))} {before}, {weight:.4g} N{with_it}"
 
     def _named(self, blocks: np.ndarray) -> str:
         return f"block{'' if len(blocks) == 1 else 's'} {self.model.assembly.listed(blocks, 4)}"

@@ -25,9 +25,8 @@ PLAIN_PROGRAMS, REMEMBERED = 40, 15
 #: by as much. There rounding may stop it short: then after so many programs that have come no nearer.
 FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE, NO_NEARER = 1e-6, 1e-8, 5
 
-#: Cost of a change of a normal force in multipliers: it only decides between equals.
-#: The second in space, where solutions are interior ones and a smaller cost is lost in their rounding; it is seen in
-#: the motion, which a last program without it gives.
+#: Cost of a change of a normal force in multipliers, which only decides between equals. The second in space, where
+#: rounding of interior solutions hides smaller ones; it is seen in the motion, which a last program without it gives.
 CHANGE_COST, CHANGE_COST_IN_SPACE = 1e-8, 1e-5
 
 #: In the plane: parts of that cost in which points differ, at most, by place along the resultants
