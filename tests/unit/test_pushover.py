@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from structures import rectangle
 
 import blockvis
 import solver
@@ -512,3 +513,17 @@ def test_where_nothing_falls_without_the_live_load_the_mechanism_is_that_of_the_
     monkeypatch.setattr("solver.path.collapse.MECHANISM", 1.0)
     response = pushed_stones(tmp_path, 0.002, 0.04)
     assert response.collapse.mechanism[response.assembly.index("s5"), 0] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("beyond", "increment"),
+    [(0.1, 0.02), *(pytest.param(*case, marks=pytest.mark.thorough) for case in ((0.1, 0.013), (0.1114, 0.02)))],
+)
+def test_a_brick_that_slides_over_an_edge_keeps_its_friction_until_it_tips(beyond, increment):
+    """Both slide as one at α = μ; the front one tips where it stands out by half its length less μ half its height."""
+    outlines = [rectangle(-0.5, -0.2, 0.4 + beyond, 0.0), rectangle(0, 0, 0.2, 0.1), rectangle(0.2, 0, 0.4, 0.1)]
+    pair = solver.Assembly.from_outlines(outlines, names=["ground", "A", "B"], roles=["fixed", "free", "free"])
+    control = solver.ControlDisplacement("A", direction=(1, 0), increment=increment, limit=0.3)
+    response = solver.Structure(pair, friction_coefficient=0.3).with_live(acceleration=(1, 0)).pushover(control)
+    assert response.collapse.displacement == pytest.approx(beyond + 0.1 - 0.3 * 0.05, rel=0.02)
+    assert response.path[-2].measured == pytest.approx(0.3, rel=1e-3)
