@@ -14,8 +14,6 @@ import blockvis
 import solver
 from blockvis import generators
 from blockvis.cli import main
-from blockvis.pictures.captions import new_motions
-from solver import mechanics
 
 CASE = Path(__file__).parents[2] / "examples" / "semicircular_arch.toml"
 SCATTER = 'kind = "density", distribution = "lognormal", deviation = 0.01'
@@ -72,18 +70,19 @@ def test_curves_are_not_joined_where_the_supports_move_otherwise(tmp_path):
     assert 0 < curve.any(axis=1).sum() < 0.2 * len(curve)
 
 
-def test_a_multiplier_is_one_curve_however_supports_move(arch, tmp_path):
-    """It is that of the same live load: curves of limit loads were empty."""
-    there = arch.settlements[0]
-    capacity = replace(
-        arch,
-        settlements=(there, replace(there, direction=(0.0, -1.0))),
-        measured=mechanics.LOAD_MULTIPLIER,
-        increments=tuple(replace(increment, phase=k // 2) for k, increment in enumerate(arch.path[:4])),
-        collapse=None,
-    )
-    assert new_motions(replace(capacity, measured=arch.measured)) == [2]
-    assert new_motions(capacity) == []
+@pytest.mark.slow
+def test_a_multiplier_is_one_curve_however_supports_move(tmp_path):
+    """It is that of the same live load: of limit loads at the end of each motion no curve was drawn."""
+    motions = [f"[[settlement]]\ndirection = {way}\nincrement = 0.01\nlimit = 0.01\n" for way in ("[1, 0]", "[0, -1]")]
+    text = '[geometry]\nlayout = "arch"\n[analysis]\nkind = "limit load"\ncapacity_at = [0.01]\n'
+    live = '[[loads]]\nkind = "live"\nweight_fraction = [0.1, 0.0]\n'
+    (tmp_path / "case.toml").write_text(text + live + "".join(motions), encoding="utf-8")
+    folders = [str(tmp_path / name) for name in ("one", "two")]
+    for folder in folders:
+        assert main(["run", str(tmp_path / "case.toml"), "-o", folder, "--no-pictures"]) == 0
+    assert main(["compare", *folders, "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    curve = (np.abs(pixels(tmp_path / "both" / "curves.png") - np.array((20, 92, 168))).sum(axis=2) == 0)[150:]
+    assert curve.any(axis=0).sum() > 0.1 * curve.shape[1], "between the dashes of the other"
 
 
 @pytest.mark.slow
