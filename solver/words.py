@@ -59,9 +59,9 @@ def checked(value: Any, kind: type[T], what: str) -> T:
 
 
 def numbers_of(value: Any, what: str) -> np.ndarray:
-    """Make an array of numbers; raises ``ValueError`` that says what it was to be where there are others."""
+    """Make an array of numbers, nan where they are masked; raises ``ValueError`` that says what others were to be."""
     try:
-        return np.array(value, dtype=float)
+        return np.array(np.ma.filled(value, np.nan), dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"{what} is {value!r}; give numbers, as many in each row") from None
 

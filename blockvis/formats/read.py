@@ -272,6 +272,8 @@ def write_layout(layout: Layout, path: str | Path) -> None:
 
     What the layout says of its blocks and the format cannot hold is a ``UserWarning``.
     """
+    if not isinstance(layout, Layout):
+        raise TypeError(f"{type(layout).__name__} is no Layout, as read_layout gives; save_layout writes an Assembly")
     if layout.n_blocks == 0:
         raise ValueError(f"there is no block to write to '{path}'")
     _write_by_suffix(layout, Path(path))
@@ -395,6 +397,8 @@ def from_compas(model: Any, **options: Any) -> solver.Assembly:
 
 def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pose | None = None) -> None:
     """Write an assembly to a layout file, its blocks as drawn or as displaced in a pose."""
+    if not isinstance(assembly, solver.Assembly):
+        raise TypeError(f"{type(assembly).__name__} is no solver.Assembly; write_layout writes a Layout")
     write_layout(layout_of(assembly, pose=pose), path)
 
 

@@ -197,3 +197,10 @@ def test_layers_whose_labels_a_program_dropped_are_those_that_were_written(layou
     again = read_layout(path)
     assert again.roles == ("fixed", "moving", "free", "free")
     assert again.notes == ()
+
+
+def test_what_is_written_by_the_other_function_says_so(layout, tmp_path):
+    with pytest.raises(TypeError, match="Assembly is no Layout, as read_layout gives; save_layout writes an Assembly"):
+        write_layout(layout, tmp_path / "a.json")
+    with pytest.raises(TypeError, match=r"str is no solver\.Assembly; write_layout writes a Layout"):
+        save_layout("wall", tmp_path / "a.json")

@@ -127,6 +127,7 @@ REFUSED = {
     "no density": ([SQUARE], {"density": 0}, "density 0"),
     "thickness": ([SQUARE], {"thickness": np.nan}, "thickness nan"),
     "densities": ([SQUARE], {"density": [1, 2]}, "give one number or 1"),
+    "masked": ([SQUARE, U_BLOCK], {"density": np.ma.array([2e3, 1e4], mask=[0, 1])}, "'block 1'.*density nan"),
 }
 
 
