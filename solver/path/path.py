@@ -327,11 +327,12 @@ class Path:
         return replace(increment, checkpoint=self.state)
 
     def _report_last(self, state: PathState) -> Generator[Increment, None, tuple[PathState, EquilibriumCheck]]:
-        """Report, unless that is done, and return the last place near an equilibrium: wedges may be far from any."""
+        """Report, unless that is done, and return the last place that no wedge holds by more than its path carries."""
+        rounding = ACCEPTED_ERROR * self.model.total_load * self.model.force
         for place in (state.place, *state.history[::-1]):
             check, reaction = self._check(place), self._reaction(place)
             away = min(abs(check.measured - reaction), check.bounds.high - check.bounds.low)
-            if self.model.has_live or place.s <= state.reported or not away > REFUSED * self.tolerance * abs(reaction):
+            if self.model.has_live or place.s <= state.reported or not away > max(abs(reaction), rounding):
                 break
         if place.s > state.reported:
             velocity = self.driver.rate(place.s) if place.velocity is None else place.velocity

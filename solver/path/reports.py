@@ -108,8 +108,7 @@ class Reports:
         self, s: float, state: State, measured: float, certificate: Certificate, status: Status
     ) -> Increment:
         """An increment, with the programs since the last one."""
-        pushed = self.model.has_live
-        programs, self.stepper.programs = self.stepper.programs, 0
+        pushed, programs, self.stepper.programs = self.model.has_live, self.stepper.programs, 0
         return Increment(
             parameter=s,
             measured=measured,
