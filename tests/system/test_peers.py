@@ -33,6 +33,7 @@ def test_our_rows_agree_with_the_references():
     assert verdicts == ["right", "right", "right"]
 
 
+@pytest.mark.slow
 def test_a_peer_that_is_missing_is_named():
     missing = [n for n in ("pymunk", "mujoco", "compas_lmgc90", "compas_cra") if importlib.util.find_spec(n) is None]
     if not missing:

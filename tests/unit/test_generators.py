@@ -340,6 +340,7 @@ NO_LENGTHS = ("settling_from", "cavity")
 
 @pytest.mark.parametrize("bad", [-1.0, 0.0, math.nan, math.inf, 1e200, 1e-200, "wide"])
 @pytest.mark.parametrize("name", generators.LAYOUTS)
+@pytest.mark.slow
 def test_every_length_of_every_layout_is_refused_by_its_name_unless_it_is_one(name, bad):
     quantities = [key for key, value in generators.parameters_of(name).items() if isinstance(value, float)]
     for key in set(quantities).difference(NO_LENGTHS):

@@ -255,6 +255,7 @@ def test_seconds_that_an_increment_cannot_take_are_refused(seconds, tmp_path):
 @pytest.mark.parametrize(
     ("name", "text"), [("summary.json", '{"status": '), ("step_check.json", "{"), ("range.csv", "a,b\n1,2\n")]
 )
+@pytest.mark.slow
 def test_files_of_a_folder_that_are_damaged_are_named_with_the_remedy(name, text, arch_results, capsys):
     (arch_results / name).write_text(text, encoding="utf-8")
     assert main(["report", str(arch_results)]) == 2

@@ -217,6 +217,7 @@ MOTIONS = {
 
 @pytest.mark.parametrize("seed", [*range(4), pytest.param(4, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.slow
 def test_static_program_meets_the_kinematic_oracle(seed, motion):
     wall, mu = random_wall(seed), (0.3, 0.5, 0.7, 0.9, 0.0)[seed]
     settlement = solver.Settlement(**MOTIONS[motion], increment=1e-4, limit=1e-4)

@@ -220,6 +220,7 @@ KEYSTONES = [(20, 0.3, 0.6708199), (30, 0.3, 0.4711886), (15, 0.6, 0.4834560)]
 
 @pytest.mark.parametrize(("degrees", "friction_coefficient", "thrust"), KEYSTONES)
 @pytest.mark.parametrize("increment", [0.01, 0.05])
+@pytest.mark.slow
 def test_keystone_between_spreading_supports(degrees, friction_coefficient, thrust, increment):
     """Slides down at H = (W/2) cot(β + φ), constant, and sinks d/(2 tan β): Coulomb friction, no dilation."""
     beta, phi = np.radians(degrees), np.arctan(friction_coefficient)

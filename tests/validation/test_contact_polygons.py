@@ -143,6 +143,7 @@ SMALL_FACADE = {"bricks": 12, "courses": 22, "storeys": 1, "windows": 1, "window
     "name",
     [*(pytest.param(name, marks=[pytest.mark.slow] * (name == "facade")) for name in [*PLANE, *FLAT]), "small facade"],
 )
+@pytest.mark.slow
 def test_what_touches_in_the_plane_touches_there_in_space(name):
     """Of every layout and example of the plane, at either end of the thickness; also at re-entrant corners."""
     if name == "small facade":

@@ -183,6 +183,7 @@ def test_a_column_that_nothing_presses_against_a_wall_hangs_nothing_on_it():
 
 
 @pytest.mark.parametrize("turn", [0.0, 1e-7, 1e-5, -1e-5, -1e-3, -1e-2])
+@pytest.mark.slow
 def test_blocks_that_meet_at_a_corner_do_not_hold_each_other(turn):
     """One passes below the other, turned by a hair, on a support that moves to the left and down: R = W sin 30°."""
     cos, sin = np.cos(turn), np.sin(turn)
