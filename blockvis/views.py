@@ -50,7 +50,6 @@ def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.Unstru
     """Make a dataset of blocks, joints, contact points or ties of an increment, below 0 from the end of the path."""
     import pyvista as pv
 
-    from .results.about import quantities_in
     from .results.datasets import block_grid, contact_grid, joint_grid, tie_grid
     from .results.increments import numbered
     from .results.mechanism_arrays import as_shown
@@ -59,8 +58,7 @@ def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.Unstru
     increment = numbered(response.increments, k)
     if response.path and k < 0:
         increment = numbered(response.path, k)
-    increment, falls = as_shown(response, increment)
-    quantities = quantities_in(response, increment.phase)
+    increment, quantities, falls = as_shown(response, increment)
     if of == "blocks":
         grid = block_grid(assembly, increment, quantities, shape=shape, falls=falls)
     elif of == "members":

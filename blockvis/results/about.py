@@ -110,6 +110,7 @@ class Quantities:
 
     parameter: mechanics.Quantity = mechanics.SETTLEMENT
     reaction: mechanics.Quantity = mechanics.REACTION
+    motion: str = "m"  #: Unit by which the motion that follows goes: a mechanism goes by its largest movement.
 
 
 STATIC = Quantities()
@@ -119,7 +120,7 @@ def quantities_in(course: Measured, phase: int) -> Quantities:
     """Give the quantities of a phase, by its number from 0."""
     unit = unit_in(course, phase)
     reaction = mechanics.reaction_to(unit) if course.measured.is_force else mechanics.REACTION
-    return Quantities(replace(course.parameter, unit=unit), reaction)
+    return Quantities(replace(course.parameter, unit=unit), reaction, "rad" if reaction.unit == "N·m" else "m")
 
 
 def quantities_of(course: Measured) -> tuple[Quantities, ...]:

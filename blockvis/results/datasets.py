@@ -96,9 +96,9 @@ def block_grid(
     if increment is not None:
         fallen, motion = increment.fallen, block_motion(assembly, increment, falls)
         add_arrays(grid.GetCellData(), {"fallen": fallen.astype(np.int32), **motion})
-        # A turn does its work on a moment; a mechanism goes by its largest movement, and frames by none of both.
-        per = "rad" if quantities.reaction.unit == "N·m" and falls is None else "m"
+        # Frames of a fall go by no unit of length or angle.
         if increment.status == solver.Status.EQUILIBRIUM:
+            per = quantities.motion
             units = {"mechanism_velocity": f"m/{per}", "mechanism_rotation": f"rad/{per}"}
     return _described(grid, increment, quantities, units)
 

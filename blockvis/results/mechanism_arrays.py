@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 import solver
 from blockvis.dynamics.fall import falls_from, with_mechanism
 from solver import mechanics
 
-from .about import losing
+from .about import STATIC, Quantities, losing, quantities_in
 from .swinging import swing_factors
 
 #: How far the fastest corner goes by the point array ``mechanism``, in extents of the free blocks: to be seen at once.
@@ -67,11 +69,17 @@ def at_last_equilibrium(response: solver.Response) -> solver.Increment:
     return last if begins is None or falls_from(response) is not last else begins
 
 
-def as_shown(response: solver.Response, increment: solver.Increment) -> tuple[solver.Increment, np.ndarray | None]:
-    """Give an increment as files and datasets show it, and the blocks (n_blocks,) that the collapse takes.
+def as_shown(
+    response: solver.Response, increment: solver.Increment
+) -> tuple[solver.Increment, Quantities, np.ndarray | None]:
+    """Give an increment as files and datasets show it, its quantities, and the blocks (n_blocks,) the collapse takes.
 
     At the last equilibrium before a collapse the motion that follows is the mechanism; of others nothing is known.
     """
+    quantities = quantities_in(response, increment.phase)
     if not response.path or increment is not response.path[-1] or response.collapse is None:
-        return increment, None
-    return at_last_equilibrium(response), falling_in(response)
+        return increment, quantities, None
+    shown = at_last_equilibrium(response)
+    # Where a later phase begins with the fall, the last equilibrium keeps the motion of its own phase.
+    own = quantities if shown is increment else replace(quantities, motion=STATIC.motion)
+    return shown, own, falling_in(response)

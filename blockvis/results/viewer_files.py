@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -90,8 +90,8 @@ def restore_grids(
 def write_end(folder: Path, response: solver.Response, vtu: ViewerFormat) -> None:
     """Write the VTU files of the last equilibrium again, when the collapse that follows it is known."""
     if response.path and response.collapse is not None:
-        last, falls = as_shown(response, response.path[-1])
-        write_grids(folder, len(response.path) - 1, response.assembly, last, vtu, falls)
+        last, own, falls = as_shown(response, response.path[-1])
+        write_grids(folder, len(response.path) - 1, response.assembly, last, replace(vtu, quantities=(own,)), falls)
 
 
 def write_grids(

@@ -15,7 +15,6 @@ from vtkmodules.vtkIOHDF import vtkHDFWriter
 import solver
 from blockvis.system.atomic_files import atomic_file
 
-from .about import quantities_in
 from .datasets import grids_of
 from .mechanism_arrays import as_shown
 from .viewer_files import output_times
@@ -66,8 +65,7 @@ class _Series(VTKPythonAlgorithmBase):
         time = about.Get(asked) if about.Has(asked) else self._times[0]
         number = int(np.abs(np.array(self._times) - time).argmin())
         together = vtkMultiBlockDataSet.GetData(about)
-        increment, falls = as_shown(self._response, self._response.path[number])
-        quantities = quantities_in(self._response, increment.phase)
+        increment, quantities, falls = as_shown(self._response, self._response.path[number])
         grids = grids_of(self._response.assembly, increment, self._response.ties, quantities, falls=falls)
         for k, (name, grid) in enumerate(grids.items()):
             together.SetBlock(k, _without_strings(grid))

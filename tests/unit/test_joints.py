@@ -198,6 +198,22 @@ def test_files_tell_the_units_of_their_phase(tmp_path):
     assert "settlement [rad]" in list(run.response.joints(last).field_data["units"])
 
 
+def test_the_last_equilibrium_before_a_phase_that_falls_at_once_keeps_the_units_of_its_own_motion(tmp_path):
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nlayout = "arch"\nparameters = { voussoirs = 5 }\n[analysis]\nfalling_frames = 1\n'
+        "[[settlement]]\nrotation_centre = [1.0, 0.0]\nrotation = -1.0\nincrement = 0.01\nlimit = 0.01\n"
+        "[[settlement]]\ndirection = [1, 0]\nincrement = 0.01\nlimit = 0.01\n"
+        '[[remove]]\nphase = 2\nblocks = ["voussoir 3"]\n',
+        encoding="utf-8",
+    )
+    run = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=())
+    last = len(run.response.path) - 1
+    assert (run.response.path[-1].phase, run.response.collapse.reaction) == (0, None)
+    for grid in (pv.read(run.folder / "increments" / f"blocks_{last:05d}.vtu"), run.response.mesh(last)):
+        assert {"mechanism_velocity [m/rad]", "mechanism_rotation [rad/rad]"} <= set(grid.field_data["units"])
+        assert grid["falls"].any()
+
+
 def test_files_have_the_place_of_a_load_that_moves(tmp_path):
     (tmp_path / "case.toml").write_text(
         '[geometry]\nlayout = "arch"\n[analysis]\nkind = "limit load"\n'
