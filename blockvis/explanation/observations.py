@@ -226,18 +226,14 @@ def _of_rows(
     columns = _columns(header, where, "xyz"[: assembly.dimension])
     joints = initial_joints(assembly)
     widths, points, given = list[_Width](), list[_Point](), list[_Cells]()
-    first = dict[tuple[Any, ...], int]()
+    first = dict[tuple[Any, ...], _Cells]()
     for number, row in rows:
         given.append(cells := _Cells(row, columns, f"{where}, {counted} {number}"))
         width = cells.length("width")
         if width is not None:
             place, joint, whole, label = _place(cells, assembly, joints)
             # Joints may meet at a place.
-            before = first.setdefault((joint, *place.tolist()), number)
-            if before != number:
-                # Readings of one crack share what the model errs by there.
-                said = f"is of {label}, as that of {counted} {before} is; give one width for each place, of one date"
-                raise cells.error("width", said)
+            _refuse_again(first, (joint, *place.tolist()), cells, "width", label, "width for each place")
             if width > WIDEST * assembly.block_size:
                 raise cells.error(
                     "width",
@@ -251,6 +247,10 @@ def _of_rows(
             )
         moved = _displacement(cells, assembly)
         if moved is not None:
+            point, block = moved[:2]
+            key = "dx" if cells.length("displaced_x") is None else "displaced_x"
+            label = f"'{block}' at {place_text(point)} m"
+            _refuse_again(first, (block, *point.tolist()), cells, key, label, "displacement for each point")
             points.append(moved)
         if width is None and moved is None:
             raise cells.error("width", 'is missing; give a width, 0 or "closed", or a displacement')
@@ -266,6 +266,16 @@ def _of_rows(
             )
     _note_middles(found, joints)
     return found
+
+
+def _refuse_again(
+    first: dict[tuple[Any, ...], _Cells], of: tuple[Any, ...], cells: _Cells, key: str, label: str, what: str
+) -> None:
+    """Refuse a second reading of one place: readings share what the model errs by there, and no column tells dates."""
+    before = first.setdefault(of, cells)
+    if before is not cells:
+        row = before.where.rpartition(", ")[2]
+        raise cells.error(key, f"is of {label}, as that of {row} is; give one {what}, of one date")
 
 
 def _observations(widths: Sequence[_Width], points: Sequence[_Point], where: str, d: int) -> Observations:

@@ -260,9 +260,11 @@ def test_runs_of_another_case_are_not_taken_for_its_own(tmp_path):
 @pytest.mark.slow
 def test_a_point_that_no_candidate_moves_so_is_unexplained(tmp_path):
     (tmp_path / "case.toml").write_text(SINKING, encoding="utf-8")
-    rows = [
-        {"block": f"{side} springer", "dx": 0, "dy": dy} for side, dy in (("right", -0.02), ("left", 0.02), ("left", 0))
-    ]
+    rows = [{"block": f"{side} springer", "dx": 0, "dy": dy} for side, dy in (("right", -0.02), ("left", 0.02))]
+    # A corner of the springer whose middle is said to have risen.
+    arch = generators.segmental_arch(voussoirs=10)
+    x, y = arch.outline(arch.index("left springer"))[0].tolist()
+    rows.append({"block": "left springer", "x": x, "y": y, "dx": 0, "dy": 0})
     found = blockvis.explain(tmp_path / "case.toml", rows, tmp_path / "out")
     assert (found.unexplained_points, found.points_made_by_none) == ((1,), (1,))
     words = "(0, 20) mm of left springer at "

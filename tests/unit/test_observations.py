@@ -63,7 +63,7 @@ def test_displaced_points_by_block_and_by_place(tmp_path):
         "block,x,y,dx [mm],dy [mm],displaced_x,displaced_y\n"
         "voussoir 3,,,1.0,-5.0,,\n"
         "voussoir 4,0.3,1.0,,,0.301,0.995\n"
-        ",0.3,1.0,2,0,,\n",
+        ",0.3,1.01,2,0,,\n",
     )
     assert found.blocks == ("voussoir 3", "voussoir 4", "voussoir 4")
     np.testing.assert_allclose(found.points[0], ARCH.centroids[ARCH.index("voussoir 3")])
@@ -124,6 +124,15 @@ def test_a_support_that_is_cut_is_named_by_its_name_or_its_pieces():
         (
             "date,joint,width [mm]\n2024,voussoir 1 | voussoir 2,1.3\n2025,voussoir 2 | voussoir 1,3.3\n",
             r"line 3: width \[mm\] is of voussoir 2 \| voussoir 1, as that of line 2 is; give one width for each place",
+        ),
+        (
+            "date,block,dx [mm],dy [mm]\n2024,left springer,0,-3\n2024,voussoir 1,0,1\n2025,left springer,0,-9\n",
+            r"line 4: dx \[mm\] is of 'left springer' at \(.*\) m, as that of line 2 is; give one displacement for "
+            "each point, of one date",
+        ),
+        (
+            "block,x,y,displaced_x,displaced_y\nvoussoir 4,0.3,1,0.301,1\n,0.3,1,0.302,1\n",
+            r"line 3: displaced_x is of 'voussoir 4' at \(0.3, 1\) m, as that of line 2 is",
         ),
         ("joint\nvoussoir 3 | voussoir 4\n", "has no column 'width'; its columns are 'joint'"),
         ("width\n0.003\n", "has no column 'joint'"),
