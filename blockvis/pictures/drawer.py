@@ -13,7 +13,7 @@ from PIL import Image
 import solver
 from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.layout.sights import Cut, Sight
-from blockvis.results.cracks import cracks_of, main_cracks
+from blockvis.results.cracks import cracks_of, main_areas
 from blockvis.results.joint_faces import initial_joints
 from blockvis.text import force_text, rounded_length, width_text
 from solver import mechanics
@@ -576,14 +576,13 @@ class Drawer:
         """Write the forces of ties, and the widths of the widest crack lines, beside them, where there is room."""
         points, words, colours = self.ties.labels(increment, shown)
         if widths:
-            # Between blocks that have parted no crack is drawn: of one with others the widest of these has the label.
+            # Between blocks that have parted no crack is drawn: what is air counts for none, and of a crack with other
+            # joints the widest of these has the label.
             found = marks_of(self.assembly, self.joints, increment, shown)
             cracks = cracks_of(self.assembly, increment.pose, increment.fallen)
-            drawn = [crack.joints[np.isin(crack.joints, found.joints)] for crack in cracks]
-            main = main_cracks(
-                [replace(crack, joints=own) for crack, own in zip(cracks, drawn, strict=True) if len(own)]
-            )
-            widest = np.searchsorted(found.joints, [crack.joints[0] for crack in main])
+            drawn = [np.isin(crack.joints, found.joints) for crack in cracks]
+            main = main_areas([float(crack.areas[own].sum()) for crack, own in zip(cracks, drawn, strict=True)])
+            widest = np.searchsorted(found.joints, [cracks[k].joints[drawn[k]][0] for k in main])
             openings = found.openings[widest]
             points = np.concatenate([points, found.middles[widest, openings.argmax(axis=1)]])
             words += [width_text(width) for width in openings.max(axis=1, initial=0.0).tolist()]

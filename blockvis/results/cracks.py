@@ -80,9 +80,15 @@ class Crack:
     #: farthest apart.
     ends: np.ndarray
     size: float  #: Length [m] of all its joints together, in space their area [m²].
-    mean_width: float  #: [m] Opening of its joints, by their sizes.
+    #: (n,) array: opening [m] of each of its joints times its length [m], in space its area [m²].
+    areas: np.ndarray
     #: What its two ends are at, as "the top" and "the upper left corner of opening 2"; empty in space.
     places: tuple[str, str] = ("", "")
+
+    @property
+    def mean_width(self) -> float:
+        """Opening [m] of its joints, by their sizes."""
+        return float(self.areas.sum() / self.size)
 
     @property
     def inclination(self) -> float:
@@ -144,9 +150,13 @@ def slid_joints(assembly: solver.Assembly, moved: np.ndarray) -> np.ndarray:
 
 def main_cracks(cracks: Sequence[Crack]) -> list[Crack]:
     """Choose the cracks that pictures tell apart, those with the largest areas of opening, in the given order."""
-    areas = np.array([crack.mean_width * crack.size for crack in cracks])
-    largest = np.sort(np.argsort(-areas, kind="stable")[:MOST_MAIN])
-    return [cracks[k] for k in largest.tolist() if areas[k] >= LEAST_MAIN * areas.max()]
+    return [cracks[k] for k in main_areas([float(crack.areas.sum()) for crack in cracks])]
+
+
+def main_areas(areas: Sequence[float]) -> list[int]:
+    """Choose the largest of the areas of opening of cracks, by their numbers in the given order; none that is 0."""
+    largest = sorted(range(len(areas)), key=lambda k: -areas[k])[:MOST_MAIN]
+    return sorted(k for k in largest if areas[k] > LEAST_MAIN * max(areas))
 
 
 def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
@@ -287,7 +297,7 @@ def _crack(
         at=rings.middles()[widest],
         ends=ends,
         size=float(sizes.sum()),
-        mean_width=float(np.maximum(moved[chosen, 0], 0.0) @ sizes / sizes.sum()),
+        areas=np.maximum(moved[chosen, 0], 0.0) * sizes,
         places=("", "") if places is None else (places.name(ends[0]), places.name(ends[1])),
     )
 

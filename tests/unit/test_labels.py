@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from PIL import Image, ImageDraw
-from structures import arch_response, box, dropped_brick, parted, rectangle, wall
+from structures import arch_response, box, dropped_brick, parted, posed, rectangle, wall
 
 import solver
 from blockvis import draw_mechanism, draw_still, generators
@@ -172,10 +172,21 @@ def test_widths_are_written_of_cracks_that_count(monkeypatch, tmp_path):
     written, response = [], arch_response()
     monkeypatch.setattr(drawing, "write_labels", lambda picture, places, words, *_: written.extend(words))
     widest = drawing.cracks_of(response.assembly, response.path[-1].pose)[0]
-    cracks = [replace(widest, mean_width=width) for width in (0.04, 0.004, 0.0004)]
+    cracks = [replace(widest, areas=part * widest.areas) for part in (1.0, 0.1, 0.01)]
     monkeypatch.setattr(drawing, "cracks_of", lambda *_: cracks)
     draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL)
     assert written == 2 * [drawing.width_text(widest.width)]
+
+
+def test_air_between_parted_blocks_makes_no_crack_a_main_one(monkeypatch, tmp_path):
+    """Two stones that are lifted side by side, one by far, and a third for itself."""
+    low = [rectangle(left, 0.0, left + 1.0, 1.0) for left in (0.0, 1.01, 4.0)]
+    assembly = solver.Assembly.from_outlines([rectangle(0.0, -1.0, 6.0, 0.0), *low], roles=["fixed"] + 3 * ["free"])
+    pose, written = solver.Pose.initial(assembly), []
+    pose.positions[1:, 1] += [0.7, 0.02, 0.03]
+    monkeypatch.setattr(drawing, "write_labels", lambda picture, places, words, *_: written.extend(words))
+    draw_still(posed(assembly, pose), -1, tmp_path / "lifted.png", size=SMALL)
+    assert written == ["20 mm", "30 mm"]
 
 
 @pytest.mark.slow
