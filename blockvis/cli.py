@@ -39,6 +39,9 @@ if TYPE_CHECKING:
 #: start from, Ctrl-C.
 BAD_INPUT, SOLVER_FAILED, NO_PICTURES, NO_EQUILIBRIUM, INTERRUPTED = 2, 3, 4, 5, 130
 
+#: What errors of the standard output have for the name of a file.
+OUTPUT = "standard output"
+
 #: What the exit codes mean, for ``--help``.
 EXIT_CODES = f"""exit codes:
   0    done, also when the structure collapses
@@ -89,7 +92,7 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Drawing] |
         options.outputs = outputs
         code: int = options.verb(options)
     except (ValueError, OSError, MissingExtra) as error:
-        if isinstance(error, OSError) and is_broken_pipe(error):
+        if isinstance(error, OSError) and (is_broken_pipe(error) or error.filename == OUTPUT):
             raise
         print(f"blockvis: {_in_plain_words(error)}", file=sys.stderr)
         return BAD_INPUT
@@ -131,6 +134,29 @@ class _Told(io.TextIOWrapper):
             super().flush()
 
 
+class _Output(io.TextIOWrapper):
+    """The standard output, whose errors name it: those of a file that is written have another remedy."""
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        with _of_output():
+            return super().write(text)
+
+    def flush(self) -> None:
+        """Write what is left."""
+        with _of_output():
+            super().flush()
+
+
+@contextlib.contextmanager
+def _of_output() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        error.filename = OUTPUT
+        raise
+
+
 class _Ended(KeyboardInterrupt):
     """The system asks the run to end, not a user to leave what it is at."""
 
@@ -148,20 +174,34 @@ def entry() -> None:
         stream or os.fdopen(os.open(os.devnull, os.O_WRONLY), "w") for stream in (sys.stdout, sys.stderr)
     )
     # Names of blocks may have characters that a console, or what the output goes to, cannot show.
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")
+    if isinstance(out := sys.__stdout__, io.TextIOWrapper):
+        sys.stdout = _Output(
+            out.buffer,
+            out.encoding,
+            "backslashreplace",
+            line_buffering=out.line_buffering,
+            write_through=out.write_through,
+        )
     if isinstance(sys.__stderr__, io.TextIOWrapper):
         sys.stderr = _Told(sys.__stderr__.buffer, sys.__stderr__.encoding, "backslashreplace", line_buffering=True)
     signal.signal(signal.SIGTERM, _end)
     try:
-        code = main()
+        try:
+            code = main()
+        except SystemExit as ended:
+            # A help ends so; what it said may not have gone out yet.
+            code = int(ended.code or 0)
         sys.stdout.flush()
     except OSError as error:
-        if not is_broken_pipe(error):
+        if not (is_broken_pipe(error) or error.filename == OUTPUT):
             raise
-        # Whatever reads the output, such as head, has enough of it; Python would complain again as it ends.
+        # Python would complain again as it ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Whatever reads the output, such as head, has enough of it.
         code = 0
+        if not is_broken_pipe(error):
+            print(f"blockvis: the {OUTPUT} cannot be written: {error.strerror}; send it elsewhere", file=sys.stderr)
+            code = BAD_INPUT
     # Python looks through all that is left as it ends, for a quarter of a second; nothing of it needs that.
     gc.freeze()
     if code == INTERRUPTED:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -306,6 +307,19 @@ def test_streams_that_take_nothing_end_no_run(case, streams):
     assert (done.returncode, done.stderr) == (0, "")
     assert (case.parent / "out" / "summary.json").is_file()
     assert (">&-" in streams.split()) != (f"results in {case.parent / 'out'}/" in done.stdout)
+
+
+@pytest.mark.parametrize("words", ["info {}", "--help"])
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no stream that is full")
+def test_an_output_that_is_full_is_named(case, words):
+    command = [sys.executable, "-m", "blockvis", *words.format(case.parent / "arch.msh").split()]
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        done = subprocess.run(
+            command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=ROOT, env=environment
+        )
+    said = "blockvis: the standard output cannot be written: No space left on device; send it elsewhere\n"
+    assert (done.returncode, done.stderr) == (2, said)
 
 
 def test_no_results_are_written_where_their_folder_has_no_name(case, capsys, monkeypatch):
