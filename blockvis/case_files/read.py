@@ -55,7 +55,8 @@ def read_case(path: str | Path, changes: str | Sequence[str] = ()) -> Case:
 
 def case_file_text(path: Path) -> str:
     """Read the text of a case file; raises ``ValueError`` where it is missing, a layout, or no text."""
-    if not path.is_file():
+    # What a program hands over, as /dev/stdin, is a pipe.
+    if not path.exists() or path.is_dir():
         near = files_like(path, "*.toml", or_any=True)
         hint = f"; beside it are {', '.join(near)}" if near else ""
         raise ValueError(f"there is no case file '{path}'{hint}")

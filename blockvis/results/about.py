@@ -50,7 +50,8 @@ def about(response: solver.Response) -> About:
         with contextlib.suppress(OSError, ValueError, KeyError):
             finished = str(read_json(folder / "summary.json")["finished"])
     stamp = finished or time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-    file = Path(record.case_file)
+    # Fonts have no letters for parts of a name in another encoding.
+    file = Path(record.case_file.encode(errors="backslashreplace").decode())
     return About(
         name=file.stem,
         file=file.name or "no case file",

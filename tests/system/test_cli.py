@@ -21,6 +21,19 @@ ROOT = Path(__file__).parents[2]
 
 CASE = (ROOT / "examples" / "semicircular_arch.toml").read_text(encoding="utf-8")
 
+#: A case that names no file.
+GENERATED = """
+[geometry]
+layout = "arch"
+parameters = { voussoirs = 5 }
+[settlement]
+direction = [1, 0]
+increment = 0.02
+limit = 0.02
+[output]
+animation = false
+"""
+
 
 @pytest.fixture
 def case(tmp_path):
@@ -320,6 +333,26 @@ def test_an_output_that_is_full_is_named(case, words):
         )
     said = "blockvis: the standard output cannot be written: No space left on device; send it elsewhere\n"
     assert (done.returncode, done.stderr) == (2, said)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names, or no such pipes")
+def test_a_case_that_comes_through_a_pipe_is_run(tmp_path):
+    command = [sys.executable, "-m", "blockvis", "run", "/dev/stdin", "-o", tmp_path / "out", "--no-pictures"]
+    done = subprocess.run(
+        [*command, "--no-check-steps"], input=GENERATED, capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "out" / "summary.json").is_file()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names, or no such pipes")
+def test_a_case_whose_name_is_in_another_encoding_is_drawn(tmp_path):
+    case = tmp_path / os.fsdecode(b"br\xfccke.toml")
+    case.write_text(GENERATED, encoding="utf-8")
+    assert run_command(case, "-o", tmp_path / "out", drawn=True) == 0
+    assert (tmp_path / "out" / "curve.png").is_file()
+    assert r"br\udcfccke" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_no_results_are_written_where_their_folder_has_no_name(case, capsys, monkeypatch):
