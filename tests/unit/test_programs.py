@@ -15,6 +15,7 @@ from hypothesis import example, given, reject, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 from structures import wall
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import solver
 from blockvis import generators
@@ -527,6 +528,23 @@ def with_two_threads():
 @pytest.mark.slow
 def test_threads_are_limited_and_given_back(with_two_threads):
     assert with_two_threads[0].split() == ["True", "2", "[1,", "1]"]
+
+
+def test_threads_are_given_back_by_the_last_of_several_analyses_at_once():
+    """The second saved the one thread of the first, and gave that back."""
+
+    def threads():
+        return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+
+    with threadpool_limits(2, user_api="blas"):
+        before, first, second = threads(), one_thread(), one_thread()
+        first.__enter__()
+        second.__enter__()
+        first.__exit__(None, None, None)
+        assert set(threads()) == {1}
+        second.__exit__(None, None, None)
+        assert threads() == before
+        assert max(before) == 2
 
 
 @pytest.mark.slow
