@@ -110,6 +110,11 @@ class TieForces:
     states: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))  #: (n_ties, 2, d) [m]
 
+    def held(self, ties: Sequence[Tie], gone: np.ndarray) -> TieForces:
+        """Return what those do whose blocks are all there; some, (n_blocks,) bool array, are gone."""
+        states = np.where(held_ties(ties, gone), self.states, ABSENT)
+        return replace(self, rest=np.where(np.isin(states, (ABSENT, BROKEN)), np.nan, self.rest), states=states)
+
 
 def held_ties(ties: Sequence[Tie], gone: np.ndarray) -> np.ndarray:
     """(n_ties,) bool array: ties whose blocks are all there; some, (n_blocks,) bool array, are gone."""

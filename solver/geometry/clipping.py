@@ -80,16 +80,12 @@ def _clipped(
     vertex_b = _on_face(placed, end, alone_b, b, b_in_a, corner_b, face_a, edge_a)
     pair, p, q = np.nonzero(crosses)
     u, v = on_a[pair, p, q], on_b[pair, p, q]
-    sine = np.abs(along_a[pair, p, 0] * along_b[pair, q, 1] - along_a[pair, p, 1] * along_b[pair, q, 0]) / (
-        long_a[pair, p] * long_b[pair, q]
-    )
+    turn = along_a[pair, p, 0] * along_b[pair, q, 1] - along_a[pair, p, 1] * along_b[pair, q, 0]
+    sine = np.abs(turn) / (long_a[pair, p] * long_b[pair, q])
     # The edge of a runs the other way round in its face: fractions count from the corner it starts at there.
     places = places_of(1.0 - u, v, sine < SMALLEST_SINE)
-    across = (
-        pair,
-        feature_rows(ACROSS, edge_a[pair, p], edge_b[pair, q], places),
-        a[pair, p] + u[:, None] * along_a[pair, p],
-    )
+    crossings = a[pair, p] + u[:, None] * along_a[pair, p]
+    across = pair, feature_rows(ACROSS, edge_a[pair, p], edge_b[pair, q], places), crossings
     owner, features, points = map(np.concatenate, zip(on_corner, vertex_a, vertex_b, across, strict=True))
     areas, wide, long, middle = corner_areas(owner, points, len(face_a))
     kept = wide[owner] > end[owner, 0]

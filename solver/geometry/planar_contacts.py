@@ -215,11 +215,8 @@ def _vertex_edge_candidates(
 
     to_next, to_previous = _flanks(shapes, vertices, vertex)
     normal = normals[edge]
-    outside = (
-        (dot(to_next, normal) >= -LARGEST_TILT)
-        & (dot(to_previous, normal) >= -LARGEST_TILT)
-        & (dot(_inward(to_next, to_previous), normal) > 0.0)
-    )
+    outside = (dot(to_next, normal) >= -LARGEST_TILT) & (dot(to_previous, normal) >= -LARGEST_TILT)
+    outside &= dot(_inward(to_next, to_previous), normal) > 0.0
     return vertex[outside], edge[outside]
 
 
@@ -247,9 +244,8 @@ def _is_behind_face(
     part = np.clip(-along[0] / np.where(along[0] == along[1], 1.0, along[1] - along[0]), 0.0, 1.0)
     height = gap[k] + across[0] + part * (across[1] - across[0])
     crosses = (np.minimum(*along) <= end[k]) & (np.maximum(*along) >= -end[k])
-    neighbour = ((other == following[edge[k]]) & shapes.convex_vertex[other]) | (
-        (other == previous[edge[k]]) & shapes.convex_vertex[edge[k]]
-    )
+    neighbour = (other == following[edge[k]]) & shapes.convex_vertex[other]
+    neighbour |= (other == previous[edge[k]]) & shapes.convex_vertex[edge[k]]
     through[k[crosses & ~neighbour & (height < -end[k]) & (height >= 2.0 * gap[k])]] = False
     return through
 

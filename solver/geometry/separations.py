@@ -55,11 +55,8 @@ def edge_separations(
         sense = np.sign(dot(normal, sides))
         normal, separates = unit(normal) * sense[..., None], separates & (sense != 0.0)
         for edges, along, side, axis in ((own, along_a, 1.0, 2), (other, along_b, -1.0, 1)):
-            for face, sense in (
-                (solids.face_of_corner[edges], 1.0),
-                (solids.face_of_corner[solids.twins[edges]], -1.0),
-            ):
-                inward = sense * cross(normals[face], along)
+            for of_face, sense in ((edges, 1.0), (solids.twins[edges], -1.0)):
+                inward = sense * cross(normals[solids.face_of_corner[of_face]], along)
                 separates &= side * dot(np.expand_dims(inward, axis), normal) >= -1e-6
         distance = np.where(separates, dot(a[:, :, None] - b[:, None], normal), -np.inf).reshape(len(k), -1)
         farthest = distance.argmax(axis=1)

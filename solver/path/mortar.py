@@ -103,13 +103,11 @@ class Mortar:
             none = np.zeros(n)
             return JointPoints(np.zeros((n, 2)), none, np.ones((n, 2)), np.zeros((n, d)), none, model.length)
         place = self.renamed(place, contacts)
-        blocks = contacts.block_a, contacts.block_b
+        interfaces, blocks = model.interfaces, (model.assembly, contacts.block_a, contacts.block_b)
         names = ("normal_stiffness", "shear_stiffness", "fracture_opening", "fracture_slip")
-        cohesion, tension, *of_joints = model.interfaces.values(
-            model.assembly, *blocks, "cohesion", "tensile_strength", *names
-        )
+        cohesion, tension, *of_joints = interfaces.values(*blocks, "cohesion", "tensile_strength", *names)
         bonds = place.bonds.of(contacts)
-        friction = model.interfaces.friction(model.assembly, *blocks)
+        friction = interfaces.friction(*blocks)
         # Corners alone, and points of members, have no area.
         across, along = (
             np.divide(model.force, k * bonds.areas * model.length, out=np.zeros(n), where=k * bonds.areas > 0.0)

@@ -375,9 +375,8 @@ class Path:
         refining = enclosing or place.s < state.refine_until
         length = self._length(state, target)
         try:
-            new, motion, error = self.stepper.step(
-                place, length, viscosity=REFINED if refining else 1.0, exact=refining or length == target - place.s
-            )
+            viscosity, exact = REFINED if refining else 1.0, refining or length == target - place.s
+            new, motion, error = self.stepper.step(place, length, viscosity=viscosity, exact=exact)
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))
         if error.penetration > WEDGED and length > FIRST_STEP * unit:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver import tolerances
 from solver.assembly import find_contacts
 from solver.contact_step.minimise import minimise
 from solver.contact_step.problem import ContactProblem, NotSolved
@@ -28,16 +29,6 @@ from solver.program.model import Model
 from solver.program.strength import ForceLimits
 from solver.results.increment import Bonds
 from solver.ties import TieForces, is_member
-from solver.tolerances import (
-    COMPLIANCE,
-    FARTHEST_FALL,
-    FRICTION_MEMORY,
-    IMPERFECTION,
-    PENETRATION_FRACTION,
-    SHEAR_COMPLIANCE,
-    VELOCITY_MEMORY,
-    VISCOSITY,
-)
 
 from .drivers import Driver
 from .members import Members
@@ -152,7 +143,7 @@ class Stepper:
         # Of motions that cancel, rounding would choose a direction of the sum.
         sense = support_motion.sum(axis=0) / max(float(np.linalg.norm(support_motion, axis=1).sum()), 1e-300)
         self.imperfection = np.zeros_like(model.load)
-        self.imperfection[:, :d] = model.imperfection * IMPERFECTION * self.weights[:, :1] * sense
+        self.imperfection[:, :d] = model.imperfection * tolerances.IMPERFECTION * self.weights[:, :1] * sense
         if model.fallen is not None:
             self.imperfection[model.fallen] = 0.0
 
@@ -172,10 +163,8 @@ class Stepper:
             # A corner that is pressed into what gives is deeper behind the edge than blocks are otherwise.
             pressed = before[(place.forces[:, 0] > 0.0) & ~is_member(before)]
             pressed = self.measured(pressed[~matched_contacts(pressed, found)[1]], place.pose, place.tie_lengths)
-            deepest = -PENETRATION_FRACTION * np.minimum(
-                *self.model.assembly.widths[[pressed.block_a, pressed.block_b]]
-            )
-            found = joined_contacts([found, pressed[pressed.gaps < deepest]])
+            thinner = self.model.assembly.widths[[pressed.block_a, pressed.block_b]].min(axis=0)
+            found = joined_contacts([found, pressed[pressed.gaps < -tolerances.PENETRATION_FRACTION * thinner]])
         return self.members.beside(found, place.pose, place.tie_lengths)
 
     def measured(self, contacts: Contacts, pose: Pose, tie_lengths: np.ndarray) -> Contacts:
@@ -189,11 +178,9 @@ class Stepper:
     def contacts(self, pose: Pose) -> Contacts:
         """Return the contact points of blocks at a pose; those of the last pose are kept."""
         if self._last is None or self._last[0] is not pose:
-            model = self.model
             # Contact points with a larger gap are not looked at.
-            reach = model.length / 4.0
-            found = find_contacts(model.assembly, moved_vertices(model.assembly, pose), reach)
-            self._last = pose, model.standing(found)
+            assembly, reach = self.model.assembly, self.model.length / 4.0
+            self._last = pose, self.model.standing(find_contacts(assembly, moved_vertices(assembly, pose), reach))
         return self._last[1]
 
     def friction(self, contacts: Contacts) -> np.ndarray:
@@ -236,7 +223,7 @@ class Stepper:
         pairs, joint = contacts.joints()
         joint_area = np.bincount(joint, contacts.areas, len(pairs))[joint]
         share = np.divide(contacts.areas, joint_area, out=np.full(n, 0.5), where=joint_area > 0.0)
-        of_joint = factor * np.array([COMPLIANCE] + [SHEAR_COMPLIANCE] * (d - 1))
+        of_joint = factor * np.array([tolerances.COMPLIANCE] + [tolerances.SHEAR_COMPLIANCE] * (d - 1))
         # Points of tiny tributary areas keep a finite compliance, however many share the joint.
         least = np.minimum(0.05, 1.0 / np.bincount(joint)[joint])
         return of_joint / np.maximum(share, least)[:, None]
@@ -307,7 +294,7 @@ class Stepper:
         start = self.contacts_at(place) if candidates is None else candidates
         place = self.mortar.renamed(place, start)
         # A larger share alternates where the normal force falls as the bound grows.
-        share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
+        share = 0.9 if in_time else min(0.5, size / (size + min(tolerances.FRICTION_MEMORY, s / self.unit)))
         points = self._points(place, start, share)
         joints, loads = points.joints, 0.0 if in_time else viscosity
         resisting, before = self._resistance(place, length, in_time, viscosity)
@@ -330,7 +317,7 @@ class Stepper:
     def gives(self, place: Place) -> bool:
         """Whether joints of given stiffness carry at a place: they move where their forces change."""
         elastic = self.model.interfaces.elastic
-        return elastic and bool((self.mortar.points(place, self.contacts_at(place)).give > COMPLIANCE).any())
+        return elastic and bool((self.mortar.points(place, self.contacts_at(place)).give > tolerances.COMPLIANCE).any())
 
     def standing(self, place: Place) -> Place | None:
         """The place once the supports have stood still, as joints of given stiffness give; None where it moves away."""
@@ -349,7 +336,7 @@ class Stepper:
             so_far += error.moved
             if time == STANDSTILL and error.moved < STANDING:
                 return replace(still, velocity=place.velocity, works=place.works)
-            if so_far > FARTHEST_FALL:
+            if so_far > tolerances.FARTHEST_FALL:
                 break
             time = min(10.0 * time, STANDSTILL)
         return None
@@ -449,9 +436,8 @@ class Stepper:
         # New contact points have the friction of their normal force at once.
         after = np.where(points.is_new, normal, followed + shares * (normal - followed))
         lengths = self.members.after(contacts, new.forces, place.tie_lengths)
-        return replace(
-            new, followed=after, tie_lengths=lengths, bonds=self.mortar.bonds(place, points.start, left.left)
-        )
+        bonds = self.mortar.bonds(place, points.start, left.left)
+        return replace(new, followed=after, tie_lengths=lengths, bonds=bonds)
 
     def _work_in_error(self, points: _StepPoints, new: Place, lost: np.ndarray, size: float) -> float:
         """Work of friction bounds that are not what was expected, and of lost cohesion (n,)."""
@@ -462,7 +448,7 @@ class Stepper:
         # What the points of one joint hand to each other does not change its friction.
         works = np.bincount(new.contacts.joints()[1], change * np.minimum(slip, size))
         # Differences of friction grow while bounds follow, by e in a step as long as the memory; longer ones miss that.
-        growth = (1.0 + size / FRICTION_MEMORY) ** 3
+        growth = (1.0 + size / tolerances.FRICTION_MEMORY) ** 3
         # Half of it, as bounds depart from what was expected in the course of the step, and joints err to either side.
         return 0.25 * growth * float(np.abs(works).sum())
 
@@ -516,8 +502,9 @@ class Stepper:
         weights, kept = self.weights[self.free].ravel(), 1.0
         # It is beyond the velocity that blocks had: at the start they have none, and all of it would choose the hinges.
         # A pushover begins with the mechanism of its limit load.
-        found = 1.0 if self.model.has_live else min(max(place.s / (VELOCITY_MEMORY * self.unit), STARTING), 1.0)
-        resisting = VISCOSITY * found * viscosity * self.unit / length * weights
+        memory = tolerances.VELOCITY_MEMORY * self.unit
+        found = 1.0 if self.model.has_live else min(max(place.s / memory, STARTING), 1.0)
+        resisting = tolerances.VISCOSITY * found * viscosity * self.unit / length * weights
         if in_time:
             resisting, kept = (1.0 / length**2 + DAMPING / length) * weights, 1.0 / (1.0 + DAMPING * length)
         if place.velocity is None:
@@ -527,7 +514,7 @@ class Stepper:
     def _velocity(self, place: Place, motion: np.ndarray, length: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity after a step, averaged with those before."""
         before = np.zeros_like(motion) if place.velocity is None else place.velocity
-        return before + (motion - length * before) / (length + VELOCITY_MEMORY * self.unit)
+        return before + (motion - length * before) / (length + tolerances.VELOCITY_MEMORY * self.unit)
 
     def _with_missed(self, stepped: Contacts, before: Place, pose: Pose, movement_size: float) -> Contacts:
         """Contact points of a step with those that it has missed, where they were: at its end a corner is in a block.

@@ -32,7 +32,6 @@ class Faces:
     """
 
     face: np.ndarray  #: (n_contacts,) int
-    centres: np.ndarray  #: (n_faces, 3) [m]
     radii: np.ndarray  #: (n_faces,) [m]
     areas: np.ndarray  #: (n_faces,) [m²]
     #: (5 n_faces, 3 n_contacts): from forces at the points to what limits a face: both components of its shear force T,
@@ -81,7 +80,7 @@ class Faces:
         parts[:, :3, 1:] = sign[:, None, None] * np.einsum("kix,kjx->kij", along, contacts.frames[:, 1:])
         parts[:, 4, 0] = friction
         shape = 5 * len(count), 3 * len(face)
-        return cls(face, centres, radii, areas, sp.csr_array(sp.bsr_array((parts[order], order, starts), shape=shape)))
+        return cls(face, radii, areas, sp.csr_array(sp.bsr_array((parts[order], order, starts), shape=shape)))
 
     def refuse_not_convex(self, contacts: Contacts, assembly: Assembly) -> None:
         """Raise ``ValueError`` where the polygon of points is larger than what touches there."""

@@ -207,17 +207,9 @@ class _Method:
             if not refine or np.abs(residual).max(initial=0.0) <= enough:
                 break
             row_dual = row_dual + self.band.solve(residual)
-        return _Point(
-            np.concatenate([x, w, -w]),
-            np.concatenate(
-                [
-                    reduced + PROXIMAL * x,
-                    below - dual[self.below] / primal[self.below] * w,
-                    above + dual[self.above] / primal[self.above] * w,
-                ]
-            ),
-            row_dual,
-        )
+        by_below, by_above = (dual[limit] / primal[limit] * w for limit in (self.below, self.above))
+        duals = np.concatenate([reduced + PROXIMAL * x, below - by_below, above + by_above])
+        return _Point(np.concatenate([x, w, -w]), duals, row_dual)
 
 
 def _joined(matrix: sp.csc_array) -> sp.csr_array:
