@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.words import counted, numbers_of, plain
+from solver.words import Kept, counted, kept, numbers_of, plain
 
 from .geometry.contacts import Contacts
 from .geometry.outlines import Outlines, self_crossings
@@ -28,10 +27,11 @@ FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 
 
 @dataclass(frozen=True, eq=False)
-class Assembly(Shown):
+class Assembly(Kept, Shown):
     """Rigid blocks of a masonry structure, supports included.
 
-    :meth:`from_outlines` and :meth:`from_solids` check their input.
+    :meth:`from_outlines` and :meth:`from_solids` check their input. Arrays are only read: for another density take
+    ``dataclasses.replace``.
 
     Attributes
     ----------
@@ -176,12 +176,12 @@ class Assembly(Shown):
         """Number of blocks, supports included."""
         return len(self.names)
 
-    @cached_property
+    @kept
     def free(self) -> np.ndarray:
         """(n_blocks,) bool array: true where the block is not a support."""
         return self.roles == FREE
 
-    @cached_property
+    @kept
     def moving(self) -> np.ndarray:
         """(n_blocks,) bool array: true where the block is a moving support."""
         return self.roles == MOVING
@@ -206,12 +206,12 @@ class Assembly(Shown):
         """(n_blocks,) array [m]: thickness of each block where it is thin, near b for a long a × b."""
         return self.shapes.widths
 
-    @cached_property
+    @kept
     def masses(self) -> np.ndarray:
         """(n_blocks,) array [kg]."""
         return self.shapes.volumes * self.density
 
-    @cached_property
+    @kept
     def block_size(self) -> float:
         """Edge of the square or cube as large as the mean free block [m]: the length the program is scaled by."""
         return self.shapes.size(self.free if self.free.any() else ~self.free)
@@ -274,7 +274,7 @@ class Assembly(Shown):
                 f"no block is named '{name}'; the assembly has {counted(self.n_blocks, 'block')}"
             ) from None
 
-    @cached_property
+    @kept
     def _numbers(self) -> dict[str, int]:
         return {name: k for k, name in enumerate(self.names)}
 
@@ -296,8 +296,8 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
     """
     if not assembly.free.any():
         raise ValueError(f"{counted(assembly.n_blocks, 'block')}, all supports; at least one must be free")
-    tolerance = DRAWN_GAP * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
-    if not plain(tolerance, "float", "overlap_tolerance") >= 0.0:
+    tolerance = DRAWN_GAP * assembly.widths.min() if overlap_tolerance is None else overlap_tolerance
+    if not (tolerance := plain(tolerance, "float", "overlap_tolerance")) >= 0.0:
         raise ValueError(f"overlap_tolerance is {tolerance:g} m; it must be at least 0")
     i, j, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
     real = np.flatnonzero(assembly.free[i] | assembly.free[j])

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .assembly import Assembly
 from .backfill import Backfill
 from .kinematics import Pose, composed_rotations, cross_rows, dimension_of, rotation_count, turned, turned_moments
-from .words import checked, make_plain, numbers_of, plain
+from .words import Kept, checked, make_plain, numbers_of, plain
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
@@ -117,7 +117,7 @@ def self_weight(assembly: Assembly) -> Loads:
 
 
 @dataclass(frozen=True, eq=False)
-class PointForces:
+class PointForces(Kept):
     """Forces at points of blocks, which go with them.
 
     Attributes
@@ -131,10 +131,6 @@ class PointForces:
     block: np.ndarray
     force: np.ndarray
     point: np.ndarray
-
-    def __post_init__(self) -> None:
-        """Make arrays of what is given."""
-        make_plain(self)
 
     @classmethod
     def at(cls, block: int, force: Sequence[float] | np.ndarray, point: Sequence[float] | np.ndarray) -> PointForces:
@@ -370,6 +366,9 @@ def check_steps(path: Any, what: str) -> None:
         value = getattr(path, name)
         if not (np.isfinite(value) and value > 0.0):
             raise ValueError(f"{what} {name} is {value:g}; it must be a positive number")
+    if path.tolerance < (least := 2.0 * np.spacing(path.limit)):
+        rounding = f"below the rounding of its limit of {path.limit:g}"
+        raise ValueError(f"{what} tolerance is {path.tolerance:g}, {rounding}; give at least {1.1 * least:.2g}")
 
 
 def set_vectors(owner: Any, what: str, counts: Mapping[str, tuple[int, ...]], units: Mapping[str, str]) -> None:
@@ -494,13 +493,14 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
     of_fill = assembly.centroids.shape, "one number per axis, in units of gravity"
     wanted = {"": (shape, components), "_arms": of_arms, "_acceleration": of_fill}
     wanted = {f"{kind}{of}": values for of, values in wanted.items() for kind in ("dead", "live")}
-    arrays: dict[str, Any] = {
-        name: numbers_of(given, f"{name} loads") for name in wanted if (given := getattr(loads, name)) is not None
-    }
-    for name, array in arrays.items():
-        size, words = wanted[name]
+    arrays: dict[str, Any] = {}
+    for name, (size, words) in wanted.items():
+        if (given := getattr(loads, name)) is None and "_" in name:
+            continue
+        arrays[name] = array = numbers_of(given, f"{name} loads")
         if array.shape != size:
-            raise ValueError(f"{name} loads have shape {array.shape}; give {size}: {words}")
+            are = "are None" if given is None else f"have shape {array.shape}"
+            raise ValueError(f"{name} loads {are}; give {size}: {words}")
         if not (finite := np.isfinite(array.reshape(len(array), -1)).all(axis=1)).all():
             block = int(finite.argmin())
             raise ValueError(f"{name} load on block '{assembly.names[block]}' is {array[block].tolist()}; not finite")

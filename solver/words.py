@@ -1,10 +1,11 @@
-"""Words of messages, and values that are refused by their name."""
+"""Words of messages, values that are refused by their name, and values that stay as they are."""
 
 from __future__ import annotations
 
 import operator
 from collections.abc import Callable
 from dataclasses import fields
+from functools import cached_property, wraps
 from typing import Any, TypeVar
 
 import numpy as np
@@ -42,7 +43,7 @@ def plain(value: Any, kind: str, what: str) -> Any:
     """Make plain a value of an annotation; raises ``ValueError``, or for texts ``TypeError``, that says what it is."""
     (wanted, make), text = _PLAIN[kind], isinstance(value, str)
     try:
-        made = make(np.nan if text else value)
+        made = make(np.nan if text or np.iscomplexobj(value) else value)
     except (TypeError, ValueError):
         made = np.nan
     if np.any(made != made):
@@ -61,9 +62,38 @@ def checked(value: Any, kind: type[T], what: str) -> T:
 def numbers_of(value: Any, what: str) -> np.ndarray:
     """Make an array of numbers, nan where they are masked; raises ``ValueError`` that says what others were to be."""
     try:
+        if np.iscomplexobj(value):
+            raise TypeError
         return np.array(np.ma.filled(value, np.nan), dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"{what} is {value!r}; give numbers, as many in each row") from None
+
+
+def read_only(value: T) -> T:
+    """Return an array, or several, none of which can be written into any more."""
+    for array in value if isinstance(value, tuple) else (value,):
+        if isinstance(array, np.ndarray):
+            array.setflags(write=False)
+    return value
+
+
+class Kept:
+    """A value from which others follow that are kept: its arrays are its own, and cannot be written into."""
+
+    def __post_init__(self) -> None:
+        """Make own arrays of what is given."""
+        make_plain(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Keep arrays from being written into where copied or unpickled, which numpy does not."""
+        self.__dict__.update({name: read_only(value) for name, value in state.items()})
+
+
+class kept(cached_property[T]):
+    """A property that is found once, as an array that cannot be written into."""
+
+    def __init__(self, find: Callable[[Any], T]) -> None:
+        super().__init__(wraps(find)(lambda owner: read_only(find(owner))))
 
 
 #: What makes plain what the annotation of a field asks for.
@@ -74,5 +104,5 @@ _PLAIN: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "Sequence[str]": ("a sequence of names", lambda names: tuple(map(str, names))),
     "Sequence[float]": ("a sequence of numbers", lambda numbers: tuple(map(float, numbers))),
     "Mapping": ("a mapping, by names", dict),
-    "np.ndarray": ("an array of numbers", np.array),
+    "np.ndarray": ("an array of numbers", lambda values: read_only(np.array(np.ma.filled(values, np.nan)))),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from solver.tolerances import CORNER_TOLERANCE, DRAWN_GAP
+from solver.words import Kept, kept
 
 from .flat_faces import ONE_WAY, merged_faces
 from .portions import alike
@@ -62,7 +63,7 @@ MOST_PARTS = 500
 
 
 @dataclass(frozen=True)
-class ConvexParts:
+class ConvexParts(Kept):
     """Convex parts of blocks, as drawn, and how their corners ride on those of the blocks."""
 
     solids: Solids  #: the parts
@@ -73,7 +74,7 @@ class ConvexParts:
     plane: np.ndarray  #: (n_faces,) int: the same for faces into which one face of a block was cut
     pieces: np.ndarray  #: (n_corners, n_pieces, 3): of each edge from corner to corner of the block: first, last, kind
 
-    @cached_property
+    @kept
     def goes_on(self) -> np.ndarray:
         """(n_corners,) bool array: corners of faces beyond which the face of the block goes on."""
         kind = self.pieces[..., 2] == GOES_ON
@@ -105,7 +106,7 @@ class PlacedParts:
         """The parts as drawn."""
         return self.parts.solids
 
-    @cached_property
+    @kept
     def faces(self) -> Faces:
         """Planes of their faces."""
         return self.solids.faces(self.vertices)
@@ -213,7 +214,7 @@ class _Piece:
     triangles: np.ndarray  #: (m, 3) int
     face: np.ndarray  #: (m,) int: the face of the block in which each lies; numbers beyond those of faces are of cuts
 
-    @cached_property
+    @kept
     def normals(self) -> np.ndarray:
         """(m, 3) array: unit normals; zero of triangles without an area, whose direction is rounding."""
         corners = self.points[self.triangles]
@@ -222,7 +223,7 @@ class _Piece:
         length, longest = np.sqrt(dot(area, area)), np.sqrt(dot(arms, arms)).max(axis=1)
         return np.where((length > ON_PLANE * longest)[:, None], unit(area), 0.0)
 
-    @cached_property
+    @kept
     def corners(self) -> np.ndarray:
         """(k, 3) array: points of triangles with an area."""
         return self.points[np.unique(self.triangles[self.normals.any(axis=1)])]
@@ -232,7 +233,7 @@ class _Piece:
         """(3 m, 2) int array: first and last point of the edges around all triangles."""
         return self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
 
-    @cached_property
+    @kept
     def twins(self) -> np.ndarray:
         """(3 m,) int array: each edge as the triangle beyond it has it."""
         number = np.array([len(self.points), 1])

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Self
 
 import numpy as np
 
 from solver.tolerances import GEOMETRY_TOLERANCE
+from solver.words import Kept, kept
 
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .portions import alike
@@ -22,7 +22,7 @@ def next_vertices(offsets: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Bodies:
+class Bodies(Kept):
     """Polygons or solids by their corners, one after another."""
 
     vertices: np.ndarray  #: (n_vertices, d) [m]
@@ -32,7 +32,7 @@ class Bodies:
         """Count the bodies."""
         return len(self.offsets) - 1
 
-    @cached_property
+    @kept
     def block_of_vertex(self) -> np.ndarray:
         """(n_vertices,) int array: the body each vertex belongs to."""
         return np.repeat(np.arange(len(self)), np.diff(self.offsets))
@@ -48,7 +48,7 @@ class Outlines(Bodies):
 
     thickness: np.ndarray  #: (n,) [m], out of plane
 
-    @cached_property
+    @kept
     def _integrals(self) -> tuple[np.ndarray, np.ndarray]:
         return polygon_integrals(self.vertices, self.offsets)
 
@@ -67,29 +67,29 @@ class Outlines(Bodies):
         """(n,) array [m³]."""
         return self.areas * self.thickness
 
-    @cached_property
+    @kept
     def next_vertex(self) -> np.ndarray:
         """(n_vertices,) int array: the vertex that follows counter-clockwise; edge i runs from i to it."""
         return next_vertices(self.offsets)
 
-    @cached_property
+    @kept
     def previous_vertex(self) -> np.ndarray:
         """(n_vertices,) int array: the vertex before."""
         return np.argsort(self.next_vertex)
 
-    @cached_property
+    @kept
     def edge_lengths(self) -> np.ndarray:
         """(n_vertices,) array [m]: length of the edge that starts at each vertex."""
         return np.hypot(*(self.vertices[self.next_vertex] - self.vertices).T)
 
-    @cached_property
+    @kept
     def convex_vertex(self) -> np.ndarray:
         """(n_vertices,) bool array: false at re-entrant corners and, to rounding, straight ones: no contact points."""
         along = (self.vertices[self.next_vertex] - self.vertices) / self.edge_lengths[:, None]
         before = along[self.previous_vertex]
         return before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0] > GEOMETRY_TOLERANCE
 
-    @cached_property
+    @kept
     def widths(self) -> np.ndarray:
         """(n,) array [m]: twice the area over the perimeter of each polygon, near b for a long a × b."""
         return 2.0 * self.areas / np.add.reduceat(self.edge_lengths, self.offsets[:-1])

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
+
+from solver.words import kept
 
 from .contacts import Contacts
 from .convex_parts import ConvexParts, convex_parts
@@ -23,12 +24,12 @@ class Polyhedra(Solids):
         """Edge of the cube as large as the mean of the chosen blocks, (n_blocks,) bool, [m]."""
         return float(np.cbrt(self.volumes[chosen].mean()))
 
-    @cached_property
+    @kept
     def parts(self) -> ConvexParts:
         """Convex parts of the blocks: the blocks themselves where all are convex."""
         return convex_parts(self)
 
-    @cached_property
+    @kept
     def gyration(self) -> np.ndarray:
         """(n_blocks,) array [m²]: square of the radius of gyration of each block, the mean about all axes."""
         return np.asarray(np.trace(self.inertia, axis1=1, axis2=2) / (3.0 * self.volumes))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Self
 
 import numpy as np
+
+from solver.words import kept
 
 from .broad_phase import expand_ranges
 from .outlines import Bodies, next_vertices
@@ -16,14 +17,7 @@ from .outlines import Bodies, next_vertices
 def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """(..., 3) array: cross products, a coordinate at a time, which is faster than ``np.cross``."""
     a, b = first, second
-    return np.stack(
-        [
-            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
-        ],
-        axis=-1,
-    )
+    return np.stack([a[..., i] * b[..., j] - a[..., j] * b[..., i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
 
 
 def dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -81,27 +75,27 @@ class Solids(Bodies):
         loops = np.split(self.corners[ends[0] : ends[-1]] - start, ends[1:-1] - ends[0])
         return self.vertices[start:stop], [loop.tolist() for loop in loops]
 
-    @cached_property
+    @kept
     def faces_of_block(self) -> np.ndarray:
         """(n + 1,) int array: solid ``i`` owns the faces from entry ``i`` to entry ``i + 1``."""
         return np.searchsorted(self.block_of_face, np.arange(len(self) + 1))
 
-    @cached_property
+    @kept
     def face_of_corner(self) -> np.ndarray:
         """(n_corners,) int array: the face each corner belongs to."""
         return np.repeat(np.arange(len(self.face_offsets) - 1), np.diff(self.face_offsets))
 
-    @cached_property
+    @kept
     def next_corner(self) -> np.ndarray:
         """(n_corners,) int array: the corner that follows around the face; edge k runs from corner k to it."""
         return next_vertices(self.face_offsets)
 
-    @cached_property
+    @kept
     def previous_corner(self) -> np.ndarray:
         """(n_corners,) int array: the corner before."""
         return np.argsort(self.next_corner)
 
-    @cached_property
+    @kept
     def twins(self) -> np.ndarray:
         """(n_corners,) int array: the same edge, run through the other way around the face beyond it."""
         n = np.int64(len(self.vertices))
@@ -109,19 +103,19 @@ class Solids(Bodies):
         order = np.argsort(start * n + end)
         return order[np.searchsorted((start * n + end)[order], end * n + start)]
 
-    @cached_property
+    @kept
     def whole_edges(self) -> tuple[np.ndarray, np.ndarray]:
         """Every edge once, by its corner, and (n + 1,) where those of each solid begin."""
         once = np.flatnonzero(np.arange(len(self.corners)) < self.twins)
         return once, np.searchsorted(once, self.face_offsets[self.faces_of_block])
 
-    @cached_property
+    @kept
     def edge_lengths(self) -> np.ndarray:
         """(n_corners,) array [m]: length of the edge that starts at each corner."""
         along = self.vertices[self.corners[self.next_corner]] - self.vertices[self.corners]
         return np.sqrt(dot(along, along))
 
-    @cached_property
+    @kept
     def shortest_edges(self) -> np.ndarray:
         """(n_faces,) array [m]: length of the shortest edge of each face."""
         return np.minimum.reduceat(self.edge_lengths, self.face_offsets[:-1])
@@ -140,7 +134,7 @@ class Solids(Bodies):
         middles = points[starts] + np.add.reduceat(arms, starts) / counts[:, None]
         return Faces(normals, unit(along), middles, np.sqrt(dot(areas, areas)))
 
-    @cached_property
+    @kept
     def face_widths(self) -> np.ndarray:
         """(n_faces,) array [m]: area over longest extent of each face, near b for a long a × b."""
         faces = self.faces(self.vertices)
@@ -148,12 +142,12 @@ class Solids(Bodies):
         far = np.maximum.reduceat(np.sqrt(dot(arms, arms)), self.face_offsets[:-1])
         return faces.areas / (2.0 * far)
 
-    @cached_property
+    @kept
     def surfaces(self) -> np.ndarray:
         """(n,) array [m²]: area of all faces of each solid."""
         return np.add.reduceat(self.faces(self.vertices).areas, self.faces_of_block[:-1])
 
-    @cached_property
+    @kept
     def _integrals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Volumes, centroids, and the second moments about them."""
         face, position = expand_ranges(np.diff(self.face_offsets) - 2)
@@ -192,7 +186,7 @@ class Solids(Bodies):
         moments = self._integrals[2]
         return np.trace(moments, axis1=1, axis2=2)[:, None, None] * np.eye(3) - moments
 
-    @cached_property
+    @kept
     def widths(self) -> np.ndarray:
         """(n,) array [m]: twice the volume over the surface of each solid, near c for a flat a × b × c."""
         return 2.0 * self.volumes / self.surfaces

@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from solver.tolerances import DRAWN_GAP
+from solver.words import numbers_of
 
 from .convex_parts import NoParts
 from .flat_faces import ONE_WAY, SLIVER, edges_of, merged_faces, renumbered
@@ -61,7 +62,7 @@ def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
 def _checked(solid: Surface, name: str) -> tuple[np.ndarray, list[list[int]]]:
     try:
         corners, loops = solid
-        vertices = np.asarray(corners, dtype=float)
+        vertices = numbers_of(corners, "what is given for corners")
         faces = [[int(corner) for corner in loop] for loop in loops]
     except (TypeError, ValueError) as error:
         raise ValueError(
@@ -135,9 +136,8 @@ def _place(point: np.ndarray) -> str:
 
 def _refuse_pieces(solids: Solids, names: Sequence[str]) -> None:
     n = len(solids.vertices)
-    links = coo_array(
-        (np.ones(len(solids.corners)), (solids.corners, solids.corners[solids.next_corner])), shape=(n, n)
-    )
+    edges = solids.corners, solids.corners[solids.next_corner]
+    links = coo_array((np.ones(len(solids.corners)), edges), shape=(n, n))
     _, which = connected_components(links, directed=False)
     pieces = np.bincount(solids.block_of_vertex[np.unique(which, return_index=True)[1]], minlength=len(solids))
     i = int(pieces.argmax())
@@ -168,8 +168,7 @@ def _coplanar_faces(solids: Solids, flatness: np.ndarray) -> np.ndarray:
     faces, face = solids.faces(solids.vertices), solids.face_of_corner
     beyond = solids.vertices[solids.corners[solids.next_corner[solids.next_corner[solids.twins]]]]
     out = np.abs(dot(beyond - faces.middles[face], faces.normals[face]))
-    same = (out <= flatness[solids.block_of_face[face]]) & (
-        dot(faces.normals[face], faces.normals[face[solids.twins]]) > ONE_WAY
-    )
+    same = out <= flatness[solids.block_of_face[face]]
+    same &= dot(faces.normals[face], faces.normals[face[solids.twins]]) > ONE_WAY
     largest = np.maximum.reduceat(faces.areas, solids.faces_of_block[:-1])
     return np.unique(np.append(face[same], np.flatnonzero(faces.areas <= SLIVER * largest[solids.block_of_face])))

@@ -1,5 +1,9 @@
 """Assembly: what it works out about its blocks, with shapely as the measure, and what it refuses."""
 
+import copy
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -157,3 +161,17 @@ def test_halves_of_characters_are_refused():
         solver.Assembly.from_outlines([square], materials=["\udfff"])
     with pytest.raises(ValueError, match=r"block 0: its name 'a\\x00' holds a NUL at place 1, which no file can hold"):
         solver.Assembly.from_outlines([square], names=["a\0"])
+
+
+@pytest.mark.parametrize("made", [replace, copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+def test_arrays_that_others_follow_from_cannot_be_written_into(made):
+    """Of ``density[:] = 1000`` masses that had been read knew nothing: the limit load doubled, in silence."""
+    blocks = solver.Assembly.from_outlines([SQUARE])
+    assert blocks.masses.tolist() == [2000.0]
+    blocks = made(blocks)
+    for name in ("density", "roles", "vertices", "offsets", "thickness", "masses", "free", "centroids", "widths"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(blocks, name)[:] = 1
+    density = np.array([1000.0])
+    assert replace(blocks, density=density).masses.tolist() == [1000.0]
+    density[:] = 3000.0

@@ -1,5 +1,6 @@
 """Loads at the centroids, and the motion of the supports."""
 
+import dataclasses
 from functools import partial
 
 import numpy as np
@@ -308,3 +309,44 @@ def test_forces_at_points_take_lists():
     forces = solver.PointForces([0, 0], [[3, 5], [0, -1]], [[2, 1], [1, 1]])
     loads = solver.self_weight(ASSEMBLY).with_forces(ASSEMBLY, forces, "live")
     assert loads.live[0] == pytest.approx([3, 4, 1 * 5 - 0.5 * 3])
+
+
+@pytest.mark.parametrize("missing", ["dead", "live"])
+def test_loads_that_are_none_are_refused_by_their_name(missing):
+    """An attribute of None was asked for, far from here."""
+    loads = dataclasses.replace(solver.self_weight(ASSEMBLY), **{missing: None})
+    with pytest.raises(ValueError, match=rf"^{missing} loads are None; give \(\d+, 3\): fx, fy, moment"):
+        solver.limit_load(ASSEMBLY, loads=loads, friction_coefficient=0.6)
+
+
+@pytest.mark.parametrize(
+    "path", [partial(solver.Settlement, direction=(1, 0)), partial(solver.ControlDisplacement, "a")]
+)
+def test_a_tolerance_below_the_rounding_of_the_limit_is_refused(path):
+    """Steps came to nothing by rounding, and the words asked for the case to be sent to the developers."""
+    said = "tolerance is 1e-17, below the rounding of its limit of 1; give at least 4.9e-16$"
+    with pytest.raises(ValueError, match=said):
+        path(tolerance=1e-17)
+    assert path(tolerance=4.9e-16).tolerance == 4.9e-16
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: solver.weight_fraction(ASSEMBLY, (1, 1j)), r"a fraction of the weight is \(1, 1j\); give numbers"),
+        (
+            lambda: ASSEMBLY.from_outlines([[[0, 0], [1, 0], [1, 1j]]]),
+            r"the outline of block 'block 0' is .*1j.*; give",
+        ),
+        (lambda: solver.PointForces([0], [[1j, 0]], [[0, 0]]), r"force is \[\[1j, 0\]\]; give an array of numbers"),
+        (lambda: solver.InterfaceLaw(np.complex128(0.5 + 1j)), r"friction_coefficient is \(0.5\+1j\); give a number"),
+        (
+            lambda: solver.Settlement((1, 0), stops=np.array([1j])),
+            r"stops is \[0\.\+1\.j\]; give a sequence of numbers",
+        ),
+    ],
+)
+def test_complex_numbers_are_refused_by_their_name(make, said):
+    """Numpy drops what is imaginary, with a warning or without."""
+    with pytest.raises(ValueError, match=said):
+        make()
