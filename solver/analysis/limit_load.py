@@ -27,18 +27,7 @@ from solver.programs.problem import SolveError, Unbounded
 from solver.results.certificate import Certificate, carrying_gap, largest_penetration
 from solver.results.increment import Bonds, State
 from solver.results.response import LimitLoad, LimitStatus
-from solver.ties import (
-    ABSENT,
-    BROKEN,
-    Tie,
-    TieForces,
-    check_ties,
-    held_ties,
-    is_member,
-    plastic_forces,
-    slack,
-    ties_as_drawn,
-)
+from solver.ties import Tie, TieForces, check_ties, is_member, plastic_forces, slack, ties_as_drawn
 from solver.tolerances import COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION, USED_UP
 from solver.words import checked, counted, plain
 
@@ -109,13 +98,13 @@ def find_limit_load(
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else checked(pose, Pose, "pose")
+    displacement, closed_gap = plain(displacement, "float", "displacement"), plain(closed_gap, "float", "closed_gap")
     for name, value in (("displacement", displacement), ("closed_gap", closed_gap)):
-        if not 0.0 <= plain(value, "float", name) < np.inf:
+        if not 0.0 <= value < np.inf:
             raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
     gone = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else np.asarray(fallen)
     told = ties_as_drawn(ties, assembly, pose) if ties_at is None else ties_at
-    states = np.where(held_ties(ties, gone), told.states, ABSENT)
-    told = replace(told, rest=np.where(np.isin(states, (ABSENT, BROKEN)), np.nan, told.rest), states=states)
+    told = told.held(ties, gone)
     force = mean_load(left, loads) or float(np.abs(loads.live[left.free]).max())
     model = Model(left, interfaces, loads, left.block_size, force, has_live=True, ties=tuple(ties))
     model = model.without(gone) if gone.any() else model

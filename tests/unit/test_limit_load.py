@@ -1,4 +1,6 @@
 import dataclasses
+from decimal import Decimal
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
@@ -329,3 +331,12 @@ def test_what_locks_and_crushes_has_the_limit_load_of_associative_flow(strength)
     )
     assert one.status is other.status is solver.LimitStatus.FOUND
     assert other.multiplier == pytest.approx(one.multiplier, rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", [Decimal, Fraction, lambda text: np.array(float(text))])
+def test_lengths_may_be_decimals_and_fractions(kind):
+    """They were checked as numbers, and computed with as they were given."""
+    pushing = pushed(block(), solver.weight_fraction(block(), (1.0, 0.0)))
+    lengths = {"displacement": "0.01", "closed_gap": "0.001", "overlap_tolerance": "0.001"}
+    given = {name: kind(value) for name, value in lengths.items()}
+    assert limit_load(block(), loads=pushing, friction_coefficient=0.6, **given).multiplier == pytest.approx(0.6)
