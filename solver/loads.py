@@ -366,7 +366,8 @@ def check_steps(path: Any, what: str) -> None:
         value = getattr(path, name)
         if not (np.isfinite(value) and value > 0.0):
             raise ValueError(f"{what} {name} is {value:g}; it must be a positive number")
-    if path.tolerance < (least := 2.0 * np.spacing(path.limit)):
+    # Paths take parameters that differ by no more for the same.
+    if path.tolerance < (least := 1e-12 * path.limit):
         rounding = f"below the rounding of its limit of {path.limit:g}"
         raise ValueError(f"{what} tolerance is {path.tolerance:g}, {rounding}; give at least {1.1 * least:.2g}")
 
