@@ -368,8 +368,8 @@ def check_steps(path: Any, what: str) -> None:
             raise ValueError(f"{what} {name} is {value:g}; it must be a positive number")
     # Paths take parameters that differ by no more for the same.
     if path.tolerance < (least := 1e-12 * path.limit):
-        rounding = f"below the rounding of its limit of {path.limit:g}"
-        raise ValueError(f"{what} tolerance is {path.tolerance:g}, {rounding}; give at least {1.1 * least:.2g}")
+        part = f"less than 1e-12 of its limit of {path.limit:g}"
+        raise ValueError(f"{what} tolerance is {path.tolerance:g}, {part}; give at least {1.1 * least:.2g}")
 
 
 def set_vectors(owner: Any, what: str, counts: Mapping[str, tuple[int, ...]], units: Mapping[str, str]) -> None:

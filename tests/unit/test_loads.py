@@ -324,7 +324,7 @@ def test_loads_that_are_none_are_refused_by_their_name(missing):
 )
 def test_a_tolerance_below_the_rounding_of_the_limit_is_refused(path):
     """Steps came to nothing by rounding, and the words asked for the case to be sent to the developers."""
-    said = "tolerance is 1e-17, below the rounding of its limit of 1; give at least 1.1e-12$"
+    said = "tolerance is 1e-17, less than 1e-12 of its limit of 1; give at least 1.1e-12$"
     with pytest.raises(ValueError, match=said):
         path(tolerance=1e-17)
     assert path(tolerance=1.1e-12).tolerance == 1.1e-12
