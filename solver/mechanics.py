@@ -10,8 +10,7 @@ from .contact_step.stiffness import ContactRows
 from .equilibrium import block_forces, wrench_matrix
 from .geometry.contacts import Contacts, joined_contacts, matched_contacts
 from .geometry.outlines import overlap_depths
-from .geometry.planar_contacts import corners_and_edges, features_of
-from .geometry.polygons import Polygons
+from .geometry.polygons import Polygons, corners_and_edges, features_of
 from .geometry.polyhedra import Polyhedra
 from .interfaces import steep_note
 from .kinematics import (

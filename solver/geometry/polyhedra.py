@@ -1,19 +1,33 @@
-"""Polyhedra: the shapes of blocks in space."""
+"""Polyhedra: the shapes of blocks in space, and their contact points, where convex parts face each other."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 from solver.words import kept
 
-from .contacts import Contacts
-from .convex_parts import ConvexParts, convex_parts
-from .entering import Movement
-from .separations import overlap_depths_in_space
-from .solids import Solids
-from .spatial_contacts import entered_points, find_points, measured_points
+from .broad_phase import expand_ranges
+from .clipping import clipped_faces
+from .contacts import SAME_NORMAL, STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
+from .convex_parts import ENDS, ConvexParts, PlacedParts, convex_parts
+from .cut_points import without_points_of_cuts
+from .entering import Movement, across, entered
+from .facing import FacingParts, facing_parts, near_parts
+from .separations import edge_separations, overlap_depths_in_space
+from .solids import Solids, cross, dot, unit
+from .spatial_features import ACROSS, BEFORE_EDGE, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
+
+#: Difference of separations, in widths, that is more than rounding.
+SAME_PLACE = 1e-4
+
+#: Width of a sliver at a cut, as a part of both faces, and its area, as a part of that in which the two blocks touch.
+SLIVER = 0.005
 
 
 @dataclass(frozen=True)
@@ -35,12 +49,84 @@ class Polyhedra(Solids):
         return np.asarray(np.trace(self.inertia, axis1=1, axis2=2) / (3.0 * self.volumes))
 
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
-        """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""
-        return find_points(self.parts.placed(vertices), reach, useful, self.widths)
+        """Find the points at which blocks touch or may touch within one increment, with gaps up to ``reach`` [m].
+
+        Where the corners, (n_vertices, 3) [m], now are. One of two blocks that touch must be of the ``useful``,
+        (n_blocks,) bool, those that are free to move. Sorted by their features, so that the same geometry gives the
+        same order.
+
+        Of two near parts, the face from which the other part is farthest leads, and the face of the other that opposes
+        it best answers. Both are projected into the plane half-way between and clipped. A corner of the clipped polygon
+        is a corner of one part in the face of the other, or an edge across an edge. Where they do not cover each other,
+        the next best answer. Where they do not come as near as their parts are, a tip stands on a face, or an edge lies
+        across an edge.
+        """
+        widths, placed = self.widths, self.parts.placed(vertices)
+        parts, solids, block_of_part = placed.parts, placed.solids, placed.parts.block_of_part
+        pairs = facing_parts(placed, reach, useful, widths)
+
+        def near(contacts: Contacts) -> np.ndarray:
+            deepest = PENETRATION_FRACTION * np.minimum(widths[contacts.block_a], widths[contacts.block_b])
+            return (contacts.gaps <= reach) & (contacts.gaps >= -deepest)
+
+        shallow = pairs.apart >= -PENETRATION_FRACTION * pairs.width
+        # Flanks of steep tips hardly face each other.
+        numbers = np.flatnonzero(shallow & (pairs.cosine <= -0.05))
+        facing, every, nearest = pairs[numbers], np.arange(len(numbers)), np.full(len(pairs.i), np.inf)
+        # With each point the planes of both faces, and whether it is near.
+        found: list[Contacts] = []
+        labels: list[np.ndarray] = []
+        at_cut = np.bincount(solids.face_of_corner, parts.goes_on) > 0
+        resolved, largest = np.zeros(len(every), dtype=bool), np.zeros(len(every))
+        _, joint = np.unique(block_of_part[facing.i] * len(widths) + block_of_part[facing.j], return_inverse=True)
+        # Other faces are tried where those that oppose each other best do not cover each other.
+        for pair, face_i, face_j in chain([(every, facing.face_i, facing.face_j)], facing.other_faces(placed)):
+            unresolved = ~resolved[pair]
+            pair, face_i, face_j = pair[unresolved], face_i[unresolved], face_j[unresolved]
+            corners = clipped_faces(placed, face_i, face_j)
+            contacts = _measured(placed, corners.features, corners.areas)
+            lowest = np.full(len(pair), np.inf)
+            np.minimum.at(lowest, corners.owner, contacts.gaps)
+            nearest[numbers[pair]] = np.minimum(nearest[numbers[pair]], lowest)
+            strip = corners.widths / np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
+            # What overlaps on a strip at a large gap slides past before it would touch.
+            slides_past = (strip < 0.5) & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
+            area = np.bincount(corners.owner, corners.areas, minlength=len(pair))
+            np.maximum.at(largest, joint[pair], area)
+            small = (area < SLIVER * largest[joint[pair]]) & (at_cut[face_i] | at_cut[face_j])
+            sliver = small[corners.owner] & (strip < SLIVER)
+            # Edges that cross behind a plane that separates their parts do not touch.
+            owner = pair[corners.owner]
+            behind = contacts.gaps < facing.apart[owner] - 1e-3 * facing.width[owner]
+            kept = ~slides_past & ~sliver & ~behind
+            inside = near(contacts)
+            # What touches along a line alone has no area.
+            contacts = replace(contacts, areas=(np.bincount(corners.owner, inside) > 2)[corners.owner] * contacts.areas)
+            resolved[pair[corners.owner[kept & inside]]] = True
+            kept = np.flatnonzero(kept if not parts.whole else kept & inside)
+            found.append(contacts[kept])
+            owner = corners.owner[kept]
+            labels.append(np.stack([parts.plane[face_i[owner]], parts.plane[face_j[owner]], inside[kept]], axis=1))
+        # Where a plane separates parts and points of both are as near as that, no tips or edges touch.
+        others = (pairs.apart < -SAME_PLACE * pairs.width) | (nearest > pairs.apart + SAME_PLACE * pairs.width)
+        tips = _measured(placed, _tips(placed, pairs[others & shallow], reach))
+        crossed = _measured(placed, _crossed_edges(placed, pairs[others], reach))
+        of_cuts = np.any([placed.kinds_at(edge, crossed.points) != ENDS for edge in crossed.features.T[1:3]], axis=0)
+        single = joined_contacts([tips, crossed[~of_cuts]])
+        single = single[near(single)]
+        contacts = joined_contacts([*found, single])
+        label = np.concatenate([*labels, np.tile([-1, -1, 1], (len(single), 1))])
+        at_one_place = CORNER_TOLERANCE * float(widths.min())
+        if not parts.whole:
+            contacts, kept = without_points_of_cuts(parts, contacts, label[:, :2], at_one_place)
+            contacts = contacts[label[kept, 2] > 0]
+        contacts = contacts[np.lexsort(contacts.features.T[[2, 1, 0]])]
+        # Parts of one block may have a point in common, and tips and edges across each other a corner of a polygon.
+        return _without_duplicates(contacts, at_one_place)
 
     def measure(self, vertices: np.ndarray, contacts: Contacts) -> Contacts:
         """Measure the contact points between the same features, with the corners (n_vertices, 3) [m] elsewhere."""
-        return measured_points(self.parts.placed(vertices), contacts.features, contacts.areas)
+        return _measured(self.parts.placed(vertices), contacts.features, contacts.areas)
 
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pairs of blocks that overlap by more than ``tolerance`` [m]; see :func:`overlap_depths_in_space`."""
@@ -49,6 +135,160 @@ class Polyhedra(Solids):
     def entered(
         self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
     ) -> Contacts:
-        """Contact points that would have kept apart what a movement put into each other; see :func:`entered_points`."""
-        movement = Movement(self.parts.placed(before), self.parts.placed(after))
-        return entered_points(movement, self.widths, useful, tolerance, contacts)
+        """Find the points that would have kept apart blocks that overlap after a movement, measured before it.
+
+        Of corners (n_vertices, 3) [m] before and after, of overlaps of more than the tolerance [m] with ``useful``
+        blocks, (n_blocks,) bool, those beside known contacts. Edges touch where they cross; where that is known and
+        does not help, as one turns, corners are to stay before the plane that separated the two.
+        """
+        placed = self.parts.placed(before)
+        movement = Movement(placed, self.parts.placed(after))
+        i, j, width = near_parts(movement.after, -tolerance, useful, self.widths)
+        deepest = PENETRATION_FRACTION * width
+        face_corner, face, own, other, pair, corner = entered(movement, i, j, tolerance, deepest)
+        on_face = _measured(placed, feature_rows(ON_FACE, face_corner, face, -1))
+        crossings = places_of(*_crossings(movement.after, own, other))
+        crossed = _measured(placed, feature_rows(ACROSS, own, other, crossings))
+        _, known = matched_contacts(crossed, contacts)
+        corner, pair = corner[known[pair]], pair[known[pair]]
+        own, other = own[pair], other[pair]
+        normals, along = across(placed, own, other), unit(placed.along(other))
+        apart = placed.vertices[corner] - placed.starts(other)
+        planes = Contacts(
+            features=feature_rows(BEFORE_EDGE, corner, other, -1),
+            block_a=placed.parts.block_of_part[placed.solids.block_of_vertex[corner]],
+            block_b=crossed.block_b[pair],
+            points=placed.vertices[corner],
+            frames=np.stack([normals, along, cross(normals, along)], axis=1),
+            gaps=dot(apart, normals),
+            slip=np.stack([dot(apart, along), dot(apart, cross(normals, along))], axis=1),
+            areas=np.zeros(len(corner)),
+        )
+        points = joined_contacts([on_face, crossed[~known], planes])
+        return points[~are_known(points, contacts)]
+
+
+def _measured(placed: PlacedParts, features: np.ndarray, areas: np.ndarray | None = None) -> Contacts:
+    """Frames, gaps and slips of given pairs of features, (n, 4) int, where the corners now are.
+
+    A corner inside a face has the normal of the face. On the boundary of a face its normal is half-way between that of
+    the face and that of the edges that cross there, so that the normal of a corner that enters the face changes in two
+    equal steps. A corner on a corner, and edges that are nearly parallel, have the normal half-way between the two
+    faces. An edge across an edge has the normal to both. Areas, (n,) [m²], are carried on, or zero.
+
+    The gap is the distance along the normal of two material points. Tangents ride on the face of ``block_b``: swung
+    about the edge there where the normal is not the face's. The slip is the place of the point of ``block_a`` along
+    them, so that its change is the slip between the blocks to first order.
+    """
+    solids, faces, block_of_part = placed.solids, placed.faces, placed.parts.block_of_part
+    kind, first, second, rest = features.T
+    corners, face_of, on_face = solids.corners, solids.face_of_corner, kind == ON_FACE
+    face_b = np.where(on_face, second, face_of[np.where(on_face, 0, second)])
+    vertex_a = np.where(on_face, first, corners[np.where(on_face, 0, first)])
+    x_a, x_b = placed.vertices[vertex_a], faces.middles[face_b]
+    normals, tangents = faces.normals[face_b], faces.tangents[face_b]
+    face_normals, face_tangents = normals.copy(), tangents.copy()
+    along = np.zeros_like(normals)
+
+    # A corner on the boundary of a face.
+    k = np.flatnonzero(on_face & (rest >= 0))
+    own, other = rest[k] % len(corners), rest[k] // len(corners)
+    x_b[k], along[k] = placed.starts(other), unit(placed.along(other))
+    crossing = unit(cross(placed.along(own), along[k]))
+    sense = np.sign(dot(crossing, placed.outward(other) - placed.outward(own)))
+    normals[k] = unit(face_normals[k] + sense[:, None] * crossing)
+
+    # An edge across an edge.
+    k = np.flatnonzero(kind == ACROSS)
+    on_a, on_b, parallel = read_places(rest[k])
+    own, other = first[k], second[k]
+    edge_a, edge_b = placed.along(own), placed.along(other)
+    x_a[k] = placed.starts(own) + on_a[:, None] * edge_a
+    x_b[k] = placed.starts(other) + on_b[:, None] * edge_b
+    crossing = unit(cross(edge_a, edge_b))
+    sense = np.sign(dot(crossing, placed.outward(other) - placed.outward(own)))
+    halfway = unit(face_normals[k] - faces.normals[face_of[own]])
+    normals[k] = np.where(parallel[:, None], halfway, sense[:, None] * crossing)
+    along[k] = np.where(parallel[:, None], 0.0, unit(edge_b))
+
+    k = np.flatnonzero(kind == ON_CORNER)
+    x_b[k] = placed.starts(second[k])
+    normals[k] = unit(face_normals[k] - faces.normals[face_of[first[k]]])
+
+    # Rotated about the edge; where there is none, projected onto the plane of the contact.
+    has_edge = dot(along, along) > 0.0
+    across = cross(face_normals, along)
+    rotated = dot(tangents, along)[:, None] * along + dot(tangents, across)[:, None] * cross(normals, along)
+    projected = tangents - dot(tangents, normals)[:, None] * normals
+    tangents = unit(np.where(has_edge[:, None], rotated, projected))
+    frames = np.stack([normals, tangents, cross(normals, tangents)], axis=1)
+
+    # From the middle of the face to the fixed point of block b, then to that of block a.
+    fixed, apart = x_b - faces.middles[face_b], x_a - x_b
+    place = np.stack([dot(fixed, face_tangents), dot(fixed, cross(face_normals, face_tangents))], axis=1)
+    slip = place + np.stack([dot(apart, frames[:, 1]), dot(apart, frames[:, 2])], axis=1)
+    return Contacts(
+        features=features,
+        block_a=block_of_part[solids.block_of_vertex[vertex_a]],
+        block_b=block_of_part[solids.block_of_face[face_b]],
+        points=np.where(on_face[:, None], x_a, (x_a + x_b) / 2.0),
+        frames=frames,
+        gaps=dot(apart, normals),
+        slip=slip,
+        areas=np.zeros(len(features)) if areas is None else areas,
+    )
+
+
+def _without_duplicates(contacts: Contacts, near: float) -> Contacts:
+    """Keep one of several points of two blocks at one place with one normal."""
+    from scipy.spatial import cKDTree
+
+    first, second = cKDTree(contacts.points).query_pairs(near, output_type="ndarray").T
+    pairs = contacts.pair_keys()
+    sense = np.where(contacts.block_a[first] == contacts.block_a[second], 1.0, -1.0)
+    same = pairs[first] == pairs[second]
+    same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > SAME_NORMAL
+    n = len(contacts)
+    links = coo_array((np.ones(np.count_nonzero(same)), (first[same], second[same])), shape=(n, n))
+    count, group = connected_components(links, directed=False)
+    areas = np.bincount(group, contacts.areas, minlength=count)
+    return replace(contacts, areas=areas[group])[np.sort(np.unique(group, return_index=True)[1])]
+
+
+def _tips(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
+    """Features of corners before a leading face that none of their faces opposes: a steep tip on a plane."""
+    solids, faces, vertices = placed.solids, placed.faces, placed.vertices
+    i_leads = pairs.face_i == pairs.lead_i
+    face, part = np.where(i_leads, pairs.lead_i, pairs.lead_j), np.where(i_leads, pairs.j, pairs.i)
+    owner, position = expand_ranges(np.diff(solids.offsets)[part])
+    vertex, face = solids.offsets[part][owner] + position, face[owner]
+    gap = dot(vertices[vertex] - faces.middles[face], faces.normals[face])
+    near = np.flatnonzero(gap <= reach)
+    vertex, face = vertex[near], face[near]
+    start = solids.face_offsets[face]
+    owner, position = expand_ranges(np.diff(solids.face_offsets)[face])
+    corner = start[owner] + position
+    inward = cross(faces.normals[face[owner]], unit(placed.along(corner)))
+    inside = dot(vertices[vertex[owner]] - placed.starts(corner), inward)
+    inside = np.minimum.reduceat(inside, np.flatnonzero(position == 0))
+    # What meets a boundary only, as a stone beyond the joint of its neighbour, does not stand on the face.
+    over = inside > CORNER_TOLERANCE * solids.shortest_edges[face]
+    return feature_rows(ON_FACE, vertex[over], face[over], -1)
+
+
+def _crossed_edges(placed: PlacedParts, pairs: FacingParts, reach: float) -> np.ndarray:
+    """Features of edges that separate two parts better than any of their faces: one point for a pair."""
+    apart, own, other = edge_separations(placed, pairs.i, pairs.j)
+    k = np.flatnonzero((apart > pairs.apart + SAME_PLACE * pairs.width) & (apart <= reach))
+    own, other = own[k], other[k]
+    on_a, on_b = _crossings(placed, own, other)
+    inside = (np.abs(np.stack([on_a, on_b]) - 0.5) < 0.5 - CORNER_TOLERANCE).all(axis=0)
+    return feature_rows(ACROSS, own[inside], other[inside], places_of(on_a[inside], on_b[inside]))
+
+
+def _crossings(placed: PlacedParts, own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where along two edges, as parts of them, their lines are nearest to each other, two (n,) arrays."""
+    apart, along_a, along_b = placed.starts(other) - placed.starts(own), placed.along(own), placed.along(other)
+    area = cross(along_a, along_b)
+    on_a, on_b = (dot(cross(apart, along), area) / dot(area, area) for along in (along_b, along_a))
+    return on_a, on_b

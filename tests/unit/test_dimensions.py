@@ -11,7 +11,7 @@ import solver
 from solver import mechanics
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import matched_contacts
-from solver.geometry.spatial_contacts import ACROSS, ON_CORNER, ON_FACE
+from solver.geometry.spatial_features import ACROSS, ON_CORNER, ON_FACE
 from solver.kinematics import (
     composed_rotations,
     cross_rows,
