@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from solver.assembly import Assembly, find_contacts
-from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_count, rotation_matrices
+from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_matrices
 from solver.loads import Settlement, check_fits, check_steps, set_vectors
 from solver.words import make_plain
 
@@ -114,30 +114,6 @@ class ControlDisplacement:
         set_vectors(self, "control", {"direction": (2, 3), "point": (2, 3)}, units)
         check_steps(self, "control")
 
-    def displacement(self, assembly: Assembly, pose: Pose) -> float:
-        """Control displacement at a pose [m]."""
-        block, arm, turned = self._place(assembly, pose)
-        moved_by = pose.positions[block] + turned - assembly.centroids[block] - arm
-        return float(moved_by @ self._along(assembly))
-
-    def weights(self, assembly: Assembly, pose: Pose) -> np.ndarray:
-        """(n_blocks, n_dof) array: gradient of the control displacement by movements of the blocks."""
-        block, _, turned = self._place(assembly, pose)
-        along = self._along(assembly)
-        weights = np.zeros((assembly.n_blocks, len(along) + rotation_count(len(along))))
-        weights[block] = np.concatenate([along, cross_rows(turned[None])[0] @ along])
-        return weights
-
-    def _place(self, assembly: Assembly, pose: Pose) -> tuple[int, np.ndarray, np.ndarray]:
-        """The block, and the arm of the point from its centroid, as drawn and at a pose."""
-        block = assembly.index(self.block)
-        centroid = assembly.centroids[block]
-        arm = np.zeros_like(centroid) if self.point is None else np.asarray(self.point) - centroid
-        return block, arm, rotation_matrices(pose.rotations[[block]])[0] @ arm
-
-    def _along(self, assembly: Assembly) -> np.ndarray:
-        return np.eye(assembly.dimension)[0] if self.direction is None else np.asarray(self.direction)
-
     def check_dimension(self, assembly: Assembly) -> None:
         """Raise ``ValueError`` where the numbers are for the plane and the blocks in space, or the other way round."""
         check_fits(assembly, "control", {"direction": self.direction, "point": self.point})
@@ -150,7 +126,12 @@ class ControlledLoad(Driver):
 
     def __init__(self, assembly: Assembly, chosen: ControlDisplacement, start: Pose) -> None:
         super().__init__(assembly, chosen, start)
-        self.chosen, self.offset = chosen, chosen.displacement(assembly, start)
+        self.block, d = assembly.index(chosen.block), assembly.dimension
+        self.along = np.eye(d)[0] if chosen.direction is None else np.asarray(chosen.direction)
+        self.drawn, self.offset = assembly.centroids[self.block], 0.0
+        #: From the centroid of the block as drawn to the point.
+        self.arm = np.zeros(d) if chosen.point is None else np.asarray(chosen.point) - self.drawn
+        self.offset = self.control_displacement(start)
         self.misdirected = (
             f"the mechanism does not move block '{chosen.block}' along {chosen.direction or 'x'}; choose another "
             "control block, point or direction"
@@ -166,8 +147,15 @@ class ControlledLoad(Driver):
 
     def control_displacement(self, pose: Pose) -> float:
         """Since the start [m]."""
-        return self.chosen.displacement(self.assembly, pose) - self.offset
+        moved_by = pose.positions[self.block] + self._turned(pose) - self.drawn - self.arm
+        return float(moved_by @ self.along) - self.offset
 
     def control(self, pose: Pose) -> np.ndarray:
         """Gradient of the displacement of the control point."""
-        return self.chosen.weights(self.assembly, pose)
+        weights = self.rate(0.0)
+        weights[self.block] = np.concatenate([self.along, cross_rows(self._turned(pose)[None])[0] @ self.along])
+        return weights
+
+    def _turned(self, pose: Pose) -> np.ndarray:
+        """(d,) array [m]: the arm at a pose."""
+        return rotation_matrices(pose.rotations[[self.block]])[0] @ self.arm
