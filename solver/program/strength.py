@@ -57,30 +57,27 @@ class Admissible:
         n = len(friction)
         sticky, brittle = np.flatnonzero(cohesion > 0.0), np.flatnonzero(np.isfinite(crushing))
         p, q = len(sticky), len(brittle)
-        if size > 2:
+        if size == 2:
+            rays, values = friction_rays(friction), np.tile([1.0, -1.0], p)
+            shear = sp.csc_array((values, (np.repeat(2 * sticky + 1, 2), np.arange(2 * p))), shape=(2 * n, 2 * p))
+            columns = sp.csc_array(sp.hstack([rays, shear], format="csc"))
+            # A limit of one coefficient costs nothing, one of both would widen the band of the program.
+            each, normal = sp.eye_array(2 * (n + p), format="csr")[2 * n :], sp.csr_array(columns)[2 * brittle]
+            limits, slopes = sp.csc_array(sp.vstack([each, normal], format="csc")), np.zeros(0)
+            sticky = np.repeat(sticky, 2)
+        else:
             shear, of_added = ((size * which[:, None] + np.arange(1, size)).ravel() for which in (sticky, np.arange(p)))
             added = sp.csc_array((np.ones(len(shear)), (shear, of_added)), shape=(size * n, size * p))
             columns = sp.csc_array(sp.hstack([sp.eye_array(size * n, format="csc"), added], format="csc"))
             limited = np.concatenate([size * (n + np.arange(p)), size * brittle])
             limits = sp.csc_array((np.ones(p + q), (np.arange(p + q), limited)), shape=(p + q, columns.shape[1]))
-            most, of = np.concatenate([cohesion[sticky], crushing[brittle]]), np.concatenate([sticky, brittle])
-            slopes = np.concatenate([friction, np.ones(p)])
-            if faces is None:
-                return cls(columns, limits, most, of, slopes)
+            slopes = np.append(friction, np.ones(p))
+        most, of = np.append(cohesion[sticky], crushing[brittle]), np.append(sticky, brittle)
+        if faces is not None:
             # Cohesion adds to the friction of its face.
             adds = (np.ones(p), (5 * faces.face[sticky] + 4, size * (n + np.arange(p))))
             shares = faces.shares @ columns
             columns, limits = faces.beside(columns, limits, shares + sp.coo_array(adds, shape=shares.shape))
-            of, slopes = np.append(np.repeat(faces.first, 5), of), np.append(slopes, np.ones(2 * len(faces.radii)))
-            return cls(columns, limits, np.append(np.zeros(shares.shape[0]), most), of, slopes)
-        rays = friction_rays(friction)
-        values = np.tile([1.0, -1.0], p)
-        shear = sp.csc_array((values, (np.repeat(2 * sticky + 1, 2), np.arange(2 * p))), shape=(2 * n, 2 * p))
-        columns = sp.csc_array(sp.hstack([rays, shear], format="csc"))
-        # A limit of one coefficient costs nothing, one of both would widen the band of the program.
-        each = sp.eye_array(2 * (n + p), format="csr")[2 * n :]
-        normal = sp.csr_array(columns)[2 * brittle] if q else sp.csr_array((0, columns.shape[1]))
-        limits = sp.csc_array(sp.vstack([each, normal], format="csc"))
-        sticky = np.repeat(sticky, 2)
-        most = np.concatenate([cohesion[sticky], crushing[brittle]])
-        return cls(columns, limits, most, np.concatenate([sticky, brittle]), np.zeros(0))
+            most, of = np.append(np.zeros(shares.shape[0]), most), np.append(np.repeat(faces.first, 5), of)
+            slopes = np.append(slopes, np.ones(2 * len(faces.radii)))
+        return cls(columns, limits, most, of, slopes)
