@@ -60,8 +60,6 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     """
     contacts, n, d = increment.contacts, assembly.n_blocks, assembly.dimension
     fastest = float(np.abs(increment.velocity[:, :d]).max(initial=0.0))
-    if fastest == 0.0:
-        return np.full(n, -1)
     spins = increment.velocity[:, d:] * assembly.block_size
     rates, gives = increment.displacements.copy(), contacts.gaps < CLOSED * assembly.block_size
     gives[np.flatnonzero(increment.state.crushing)] = False
@@ -76,7 +74,7 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     # Corners, not centroids: a block may turn about its own centroid.
     moves = motion_size(increment.velocity, assembly.block_size) > NOTICEABLE * fastest
     moves &= assembly.free
-    volume = np.bincount(part, weights=assembly.shapes.volumes * moves, minlength=int(part.max()) + 1)
+    volume = np.bincount(part, weights=assembly.shapes.volumes * moves)
     rank = np.argsort(np.argsort(-volume, kind="stable"))
     return np.where(moves, rank[part], -1)
 
@@ -118,10 +116,9 @@ def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
 
 def _joints(contacts: Contacts, chosen: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of blocks that chosen contact points lie between, (n, 2), and of each the point that carries most."""
-    ends = np.stack([contacts.block_a[chosen], contacts.block_b[chosen]], axis=1)
-    order = np.argsort(-normal[chosen], kind="stable")
-    pairs, first = np.unique(np.sort(ends[order], axis=1), axis=0, return_index=True)
-    return pairs.reshape(-1, 2), chosen[order[first]]
+    order = chosen[np.argsort(-normal[chosen], kind="stable")]
+    pairs, joint = contacts[order].joints()
+    return pairs, order[np.unique(joint, return_index=True)[1]]
 
 
 def with_motion(increment: Increment, motion: np.ndarray) -> Increment:

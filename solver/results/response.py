@@ -212,9 +212,7 @@ class Response(Shown):
         path = self.path
         if not path:
             return None
-        if self.parameter.is_path:
-            return path[-1]
-        return path[lowest([i.measured for i in path])]
+        return path[-1 if self.parameter.is_path else lowest([i.measured for i in path])]
 
     @property
     def limit_states(self) -> list[tuple[LimitLoad, Increment]]:
