@@ -12,14 +12,14 @@ from scipy.sparse.csgraph import connected_components
 from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 from solver.words import kept
 
-from .broad_phase import expand_ranges
+from .broad_phase import box_pairs, expand_ranges
 from .clipping import clipped_faces
 from .contacts import SAME_NORMAL, STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
 from .convex_parts import ENDS, ConvexParts, PlacedParts, convex_parts
 from .cut_points import without_points_of_cuts
-from .entering import Movement, across, entered
+from .entering import PARALLEL, Movement, across, entered
 from .facing import FacingParts, facing_parts, near_parts
-from .separations import edge_separations, overlap_depths_in_space
+from .separations import edge_separations, face_separations
 from .solids import Solids, cross, dot, unit
 from .spatial_features import ACROSS, BEFORE_EDGE, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
 
@@ -129,8 +129,29 @@ class Polyhedra(Solids):
         return _measured(self.parts.placed(vertices), contacts.features, contacts.areas)
 
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Pairs of blocks that overlap by more than ``tolerance`` [m]; see :func:`overlap_depths_in_space`."""
-        return overlap_depths_in_space(self.parts.placed(vertices), tolerance)
+        """Pairs of blocks that overlap by more than a tolerance [m], (n,) int, the lower first, and their depths [m].
+
+        A depth is the smallest movement that separates their deepest two parts. Convex parts are separated by a face of
+        one of them or by two edges across each other: the largest separation of these, negative, is the depth.
+        """
+        placed, block_of_part = self.parts.placed(vertices), self.parts.block_of_part
+        i, j = box_pairs(placed.vertices, placed.solids.offsets, -tolerance)
+        other = block_of_part[i] != block_of_part[j]
+        i, j = i[other], j[other]
+        none = np.zeros(len(placed.solids.block_of_face), dtype=bool)
+        apart, _, _ = face_separations(placed, i, j, none)
+        deep = np.flatnonzero(apart < -tolerance)
+        i, j, apart = i[deep], j[deep], apart[deep]
+        apart = np.maximum(apart, face_separations(placed, j, i, none)[0])
+        deep = np.flatnonzero(apart < -tolerance)
+        i, j, apart = i[deep], j[deep], apart[deep]
+        apart = np.maximum(apart, edge_separations(placed, i, j, PARALLEL)[0])
+        deep = apart < -tolerance
+        blocks = np.sort(np.stack([block_of_part[i[deep]], block_of_part[j[deep]]], axis=1), axis=1)
+        pairs, pair_of = np.unique(blocks, axis=0, return_inverse=True)
+        depth = np.zeros(len(pairs))
+        np.maximum.at(depth, pair_of.ravel(), -apart[deep])
+        return pairs[:, 0], pairs[:, 1], depth
 
     def entered(
         self, before: np.ndarray, after: np.ndarray, useful: np.ndarray, tolerance: float, contacts: Contacts
