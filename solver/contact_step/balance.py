@@ -11,7 +11,7 @@ interior method in the scaling of Nesterov & Todd, see :mod:`.cones`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,45 +41,56 @@ class _Change:
     rho: float
 
 
+@dataclass(frozen=True)
+class BalanceProblem:
+    """The program over n closed contact points, forces in block weights."""
+
+    rows: ContactRows
+    reference: np.ndarray  #: (n, d): f⁰
+    compliance: np.ndarray  #: (n, d): c, of which only ratios matter
+    friction: np.ndarray  #: (n,)
+    most: np.ndarray  #: (n,): M
+    cohesion: np.ndarray  #: (n,): C
+    load: np.ndarray  #: (n_dof,)
+    unit_reaction: np.ndarray | None  #: (n, d): r
+    reaction: float  #: R
+
+    def __getitem__(self, chosen: np.ndarray) -> BalanceProblem:
+        """Choose some of the contact points, by a mask or their numbers."""
+        names = "rows", "reference", "compliance", "friction", "most", "cohesion", "unit_reaction"
+        given = {name: value[chosen] for name in names if (value := getattr(self, name)) is not None}
+        return replace(self, **given)
+
+
 class _Iterate:
     """Forces f inside their friction cones, (μ N + C, T) = u, with multipliers z inside theirs, and w of the limits."""
 
-    def __init__(
-        self,
-        rows: ContactRows,
-        reference: np.ndarray,
-        compliance: np.ndarray,
-        friction: np.ndarray,
-        most: np.ndarray,
-        cohesion: np.ndarray,
-        load: np.ndarray,
-        unit_reaction: np.ndarray | None,
-        reaction: float,
-    ) -> None:
+    def __init__(self, problem: BalanceProblem) -> None:
+        p, reference = problem, problem.reference
         # Where there is cohesion the cone does not keep normal forces from pulling.
-        upper, lower = np.flatnonzero(np.isfinite(most)), np.flatnonzero(cohesion > 0.0)
+        upper, lower = np.flatnonzero(np.isfinite(p.most)), np.flatnonzero(p.cohesion > 0.0)
         self.limited = np.concatenate([upper, lower])
         self.sense = np.concatenate([np.ones(len(upper)), -np.ones(len(lower))])
-        self.limit = np.concatenate([most[upper], np.zeros(len(lower))])
-        self.rows, self.reference, self.load = rows, reference, load
-        self.unit_reaction, self.reaction = unit_reaction, reaction
+        self.limit = np.concatenate([p.most[upper], np.zeros(len(lower))])
+        self.rows, self.reference, self.load = p.rows, reference, p.load
+        self.unit_reaction, self.reaction = p.unit_reaction, p.reaction
         n, self.d = reference.shape
         self.slope = np.ones((n, self.d))
-        self.slope[:, 0] = np.maximum(friction, 1e-9)  # A cone without width has no interior.
+        self.slope[:, 0] = np.maximum(p.friction, 1e-9)  # A cone without width has no interior.
         self.offset = np.zeros((n, self.d))
-        self.offset[:, 0] = cohesion
-        rigid = np.isinf(most) if np.isinf(most).any() else np.ones(n, dtype=bool)
-        self.weight = compliance / float(compliance[rigid, 0].mean())
+        self.offset[:, 0] = p.cohesion
+        rigid = np.isinf(p.most) if np.isinf(p.most).any() else np.ones(n, dtype=bool)
+        self.weight = p.compliance / float(p.compliance[rigid, 0].mean())
         # The start lies well inside the cones.
         self.forces = reference.copy()
-        self.forces[:, 0] = np.minimum(np.maximum(reference[:, 0], 0.1), 0.5 * most)
+        self.forces[:, 0] = np.minimum(np.maximum(reference[:, 0], 0.1), 0.5 * p.most)
         length = np.sqrt((reference[:, 1:] ** 2).sum(axis=1))
-        limit = 0.9 * self.slope[:, 0] * self.forces[:, 0] + 0.9 * cohesion
+        limit = 0.9 * self.slope[:, 0] * self.forces[:, 0] + 0.9 * p.cohesion
         self.forces[:, 1:] *= np.minimum(1.0, limit / np.maximum(length, 1e-300))[:, None]
         self.z = np.zeros((self.d, n))
         self.z[0] = np.maximum(1.0, 1.0 / (self.slope * self.forces + self.offset)[:, 0])
         self.yielding = 1.0 / self.reserve
-        self.motion, self.rho, self.count = np.zeros_like(load), 0.0, 2 * n + len(self.limited)
+        self.motion, self.rho, self.count = np.zeros_like(p.load), 0.0, 2 * n + len(self.limited)
         self.measure()
 
     @property
@@ -177,36 +188,19 @@ class _Iterate:
 
 
 @np.errstate(all="ignore")  # A step that overflows is seen by its result.
-def nearest_equilibrium(
-    rows: ContactRows,
-    reference: np.ndarray,
-    compliance: np.ndarray,
-    friction: np.ndarray,
-    most: np.ndarray,
-    cohesion: np.ndarray,
-    load: np.ndarray,
-    unit_reaction: np.ndarray | None = None,
-    reaction: float = 0.0,
-) -> np.ndarray:
-    """(n, d) array: forces of the closed contact points in equilibrium within friction nearest to the reference f⁰.
-
-    Forces are in block weights; ``most`` is M and ``cohesion`` C, (n,) arrays, ``unit_reaction`` r, (n, d), and
-    ``reaction`` R. Of the compliance (n, d) only ratios matter. Raises ``NotSolved`` where none were found.
-    """
-    if len(reference) == 0:
-        if np.abs(load).max(initial=0.0) > ACCEPTED:
+def nearest_equilibrium(problem: BalanceProblem) -> np.ndarray:
+    """(n, d) array: forces in equilibrium within friction nearest to the reference f⁰; raises ``NotSolved``."""
+    forces = np.zeros_like(problem.reference)
+    if len(forces) == 0:
+        if np.abs(problem.load).max(initial=0.0) > ACCEPTED:
             raise NotSolved("nothing touches the free blocks")
-        return reference
-    loaded = most > BALANCED
+        return forces
+    loaded = problem.most > BALANCED
     if not loaded.all():
         # Those that can carry nothing would leave the program without an interior.
-        forces, unit = np.zeros_like(reference), None if unit_reaction is None else unit_reaction[loaded]
-        reference, compliance, friction = reference[loaded], compliance[loaded], friction[loaded]
-        forces[loaded] = nearest_equilibrium(
-            rows[loaded], reference, compliance, friction, most[loaded], cohesion[loaded], load, unit, reaction
-        )
+        forces[loaded] = nearest_equilibrium(problem[loaded])
         return forces
-    point = _Iterate(rows, reference, compliance, friction, most, cohesion, load, unit_reaction, reaction)
+    point = _Iterate(problem)
     best, part = (point.residual, point.forces), 1.0
     for _ in range(ITERATIONS):
         converged = point.residual < BALANCED and point.mean < CONVERGED * max(1.0, float(point.forces[:, 0].max()))

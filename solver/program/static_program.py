@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from solver.contact_step.balance import nearest_equilibrium
+from solver.contact_step.balance import BalanceProblem, nearest_equilibrium
 from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
@@ -217,17 +217,18 @@ class StaticProgram:
         if reaction is not None:
             unit_reaction = self.work.reshape(least.shape)
             beyond = reaction / self.unit - float((unit_reaction * least).sum())
-        return least + nearest_equilibrium(
-            ContactRows(matrix, assembly.free, assembly.centroids),
-            reference - least,
-            compliance,
-            self.friction,
-            self.limits.beyond_least,
-            self.limits.cohesion,
-            self.dead + multiplier * self.live,
-            unit_reaction,
-            beyond,
+        problem = BalanceProblem(
+            rows=ContactRows(matrix, assembly.free, assembly.centroids),
+            reference=reference - least,
+            compliance=compliance,
+            friction=self.friction,
+            most=self.limits.beyond_least,
+            cohesion=self.limits.cohesion,
+            load=self.dead + multiplier * self.live,
+            unit_reaction=unit_reaction,
+            reaction=beyond,
         )
+        return least + nearest_equilibrium(problem)
 
     def _solved(
         self,
