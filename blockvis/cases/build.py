@@ -30,6 +30,7 @@ from .contents import Case
 from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
+from .magnitudes import doubted_numbers
 from .profiles import cut_ground, pieces_named
 from .removals import gone_in, removed_blocks, removed_ties
 from .role_places import with_roles_by_place
@@ -37,9 +38,6 @@ from .ties import check_layers, drawn_ties, ties_of, without_tie_lines
 
 #: The weight of a block lighter than this fraction of the whole may be lost in rounding errors of the other forces.
 LIGHTEST = 1e-14
-
-#: Masonry lighter than this [kg/m³] is probably in t/m³ or kN/m³.
-LIGHTEST_STONE = 100.0
 
 #: A settlement that ends further than so many times the size of the structure is probably in mm.
 FARTHEST_LIMIT = 5.0
@@ -197,13 +195,7 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
     for where, friction in steep.items():
         if note := steep_note(friction):
             notes.append(f"{where} {note}")
-    light = float(assembly.density[assembly.free].min(initial=np.inf))
-    if light < LIGHTEST_STONE:
-        # 2 t/m³ or 20 kN/m³ are those of stone.
-        unit, factor = ("t/m³", 1000.0) if light < 10.0 else ("kN/m³", 1000.0 / solver.GRAVITY)
-        notes.append(
-            f"density {light:g} kg/m³ is lighter than masonry; if it is in {unit}, give {factor * light:.4g} kg/m³"
-        )
+    notes += doubted_numbers(case, assembly)
     whole, block = float(np.ptp(assembly.vertices, axis=0).max()), float(np.median(sizes)) if len(sizes) else np.inf
     farthest = max(FARTHEST_LIMIT * whole, solver.Settlement.limit)
     for key, most, size, what in (

@@ -79,6 +79,66 @@ def test_likely_unit_mistakes_are_named(tmp_path, keys, note):
         assembled(tmp_path, COLUMN + keys)
 
 
+TIE = '[[ties]]\nname = "iron"\nfrom = { fixed = [-5, 0] }\nto = [0, 0.2]\n'
+FILL = '[[backfill]]\nover = "*"\nsurface = 9\n'
+
+
+@pytest.mark.parametrize(
+    ("keys", "note"),
+    [
+        ("[material]\ndensity = 0.5", "density 0.5 kg/m³ is lighter than masonry; if it is in t/m³, give 500 kg/m³"),
+        (
+            "[material]\ndensity = 18000",
+            "density 18000 kg/m³ is heavier than lead; if it is in N/m³, give 1835 kg/m³",
+        ),
+        ("[material]\ndensity = 2.4e6", "density 2.4e[+]06 kg/m³ is .*; if it is in g/m³, give 2400 kg/m³"),
+        (
+            FILL + "unit_weight = 18",
+            r"\[backfill\] unit_weight = 18 N/m³ is .*; if it is in kN/m³, give 1.8e[+]04 N/m³",
+        ),
+        (TIE + "area = 500\nmodulus = 2e11", r"\[\[ties\]\] 'iron' area = 500 m² is .* in mm², give 0.0005 m²"),
+        (TIE + "area = 5e-4\nmodulus = 2.1e5", "modulus = 210000 Pa is softer .* in MPa, give 2.1e[+]11 Pa"),
+        (TIE + "area = 5e-4\nmodulus = 210", "modulus = 210 Pa is softer .* in GPa, give 2.1e[+]11 Pa"),
+        ("[material]\ncohesion = 0.06", r"\[material\] cohesion = 0.06 Pa .*; if it is in MPa, give 6e[+]04 Pa"),
+        (
+            "[material]\ncohesion = 6e4\ntensile_strength = 0.03",
+            "tensile_strength = 0.03 Pa .*; if it is in MPa, give 3e[+]04 Pa",
+        ),
+        ("[material]\nnormal_stiffness = 5", "normal_stiffness = 5 Pa/m .* in GPa/m, which is N/mm³, give 5e[+]09"),
+        (
+            "[[supports]]\nname = 'soil'\nstiffness = 20\noutline = [[0, -9], [9, -9], [9, -8]]",
+            r"\[\[supports\]\] 'soil' stiffness = 20 Pa/m .*MN/m³, give 2e[+]07 Pa/m",
+        ),
+    ],
+)
+def test_numbers_a_power_of_ten_off_are_named(tmp_path, keys, note):
+    with pytest.warns(UserWarning, match=note):
+        assembled(tmp_path, COLUMN + keys)
+
+
+def test_strengths_of_interfaces_are_doubted_too(tmp_path):
+    drawn(tmp_path / "a.json", [np.array([[0, 0], [1, 0], [1, 1], [0, 1]])], material=("brick",))
+    pair = '[[interfaces]]\nmaterials = ["brick", "brick"]\nfriction_coefficient = 0.6\ncohesion = 0.2'
+    with pytest.warns(UserWarning, match=r"\[\[interfaces\]\] brick and brick cohesion = 0.2 Pa .* give 2e[+]05 Pa"):
+        assembled(tmp_path, f'[geometry]\nfile = "a.json"\n{pair}')
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        "[material]\ndensity = 11340\ncohesion = 50\ntensile_strength = 20",
+        "[material]\ndensity = 150\nnormal_stiffness = 1e5\nshear_stiffness = 1e5",
+        TIE + "area = 1e-8\nmodulus = 1e6",
+        TIE + "area = 4\nmodulus = 1.2e12",
+        FILL + "unit_weight = 200",
+    ],
+)
+def test_models_of_lead_rubber_and_foam_are_not_doubted(tmp_path, keys):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assembled(tmp_path, COLUMN + keys)
+
+
 def test_long_increments_within_a_block_are_not_noted(tmp_path):
     """Steps within an increment are chosen by their own error, however long it is."""
     with warnings.catch_warnings():
