@@ -69,6 +69,18 @@ def new_motions(response: solver.Response) -> list[int]:
     return found
 
 
+def losses_along(response: solver.Response) -> list[tuple[int, float, int]]:
+    """List where blocks are lost along a path: the row that first lacks them, the place on the axis, and how many."""
+    path, total, found = response.path, response.parameters, []
+    per_length = parameter_unit(response)[0]
+    for k in range(1, len(path) if response.settlements else 0):
+        new = path[k].fallen & ~path[k - 1].fallen & ~path[k].removed
+        if new.any():
+            at = total[k] - path[k].parameter + float(path[k].state.fell_at[new].min())
+            found.append((k, per_length * float(np.clip(at, total[k - 1], total[k])), int(new.sum())))
+    return found
+
+
 def in_one_unit(response: solver.Response, phase: int | None = None) -> solver.Response:
     """Leave out the phases that another unit parts from a given one: distances and rotations share no axis.
 

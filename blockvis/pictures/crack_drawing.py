@@ -75,11 +75,15 @@ def draw_cracks(
         picture = drawing.image(main, _numbers(main, cracks))
         keys, pixel, slip, drawn = drawing.keys, drawing.pixel, drawing.slip, ""
         hidden = len(drawing.hidden(shown))
-    none = "no joint is open" + ("" if response.parameter.is_path else ": a limit load is of the layout as it stands")
+    lost = loss_words(increment)
+    none = f"no joint {'of what stands ' * bool(lost)}is open" + (
+        "" if response.parameter.is_path else ": a limit load is of the layout as it stands"
+    )
     of_them = "" if len(shown) == len(cracks) else f", of which the section shows {len(shown) or 'none'}"
     of_them += f", {'' if hidden == len(cracks) else f'{hidden} '}in no view" if hidden else ""
     counts = [mechanics.counted(len(cracks), "crack") + of_them if cracks else none]
-    counts += [*phase_words(response, increment), *loss_words(increment)] if cracks else []
+    counts += phase_words(response, increment) if cracks else []
+    counts += [f"{words}, not drawn" for words in lost]
     counts += [thickness + width_text(shown[0].width)] if shown else []
     counts += [f"joints slide by up to {width_text(slip)}{drawn}"] if slip else []
     counts += ["drawn on the layout"] if cracks or slip else []

@@ -28,6 +28,7 @@ from .captions import (
     drops_at_start,
     force_unit,
     in_one_unit,
+    losses_along,
     lost_text,
     new_motions,
     parameter_label,
@@ -47,6 +48,9 @@ MOST_DOTS = 25
 
 #: The diagram of one limit load goes so far, as a part of the structure's size: as far as its mechanism is drawn.
 SMALL = 0.05
+
+#: Losses of blocks that have words, the largest.
+MOST_LOSSES = 3
 
 #: Words beside a collapse take so much of the width.
 WORDS = 0.35
@@ -198,6 +202,7 @@ class _Plot:
             self._lowest()
         if self.words and len(known):
             self._unbounded()
+        self._losses()
         if response.collapse is not None and len(response.path):
             self._collapse(response.collapse)
         if response.stop is solver.Status.SOLVER_FAILED:
@@ -225,8 +230,12 @@ class _Plot:
         """Draw the path, in a file of its own with dots at few increments."""
         axes, total, values = self.axes, self.total, self.values
         first = 1 if drops_at_start(self.response) else 0
-        for start, stop in pairwise([first, *new_motions(self.response), len(total)]):
+        losses = [row for row, _, _ in losses_along(self.response)]
+        for start, stop in pairwise(sorted({first, *losses, *new_motions(self.response), len(total)})):
             axes.plot(total[start:stop], values[start:stop], "-", color=BLUE, linewidth=2.0, zorder=3)
+        for row in losses:
+            # The reaction just before and after a loss is not known.
+            axes.plot(total[row - 1 : row + 1], values[row - 1 : row + 1], ":", color=BLUE, linewidth=1.2, zorder=3)
         axes.plot(total[: 2 * first], values[: 2 * first], ":", color=BLUE, linewidth=1.2, zorder=3)
         if not self.words:
             return
@@ -238,6 +247,20 @@ class _Plot:
             word, up = "at rest" if self.response.measured.is_force else "rigid", "bottom" if above else "top"
             offset = -4, 6 if above else -6
             _word(axes, word, (total[0], values[0]), offset, va=up, fontsize=0.9 * self.text, zorder=4, bbox=PATCH)
+
+    def _losses(self) -> None:
+        """Mark where blocks are lost while the rest stands, and say how many where the curve leaves room."""
+        losses = losses_along(self.response)
+        words = sorted(losses, key=lambda loss: -loss[2])[: MOST_LOSSES * self.words]
+        for row, place, number in losses:
+            self.axes.axvline(place, color=RED, linewidth=1.0, linestyle=(0, (1, 2)), zorder=2)
+            if (row, place, number) in words:
+                low, high = self.axes.get_ylim()
+                near = self.values[row - 1 : row + 1].mean()
+                above = near < (low + high) / 2.0
+                style = {"ha": "right", "va": "top" if above else "bottom", "rotation": 90, "color": RED, "bbox": PATCH}
+                told = f"{mechanics.counted(number, 'block')} lost"
+                _word(self.axes, told, (place, 0.96 if above else 0.04), (-3, 0), AT, fontsize=0.9 * self.text, **style)
 
     def _failure(self) -> None:
         """Mark where the solver gave up: the curve ends there, the structure need not."""

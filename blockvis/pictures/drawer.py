@@ -333,6 +333,8 @@ class Drawer:
             increment = without_removed(increment, self.response.increments[-1].state.fell_at)
         self.scene.hide(increment.removed)
         self.scene.pose(shown, self._block_colours(increment.pose, increment))
+        if self._loses and isinstance(self.scene, FlatScene):
+            self.scene.lost(increment.fallen & ~increment.removed)
         dots, falling = np.zeros((0, self.assembly.dimension)), increment.status == solver.Status.FALLING
         if blocks_only:
             self.scene.clear(*OF_STATICS)
@@ -442,9 +444,7 @@ class Drawer:
                     Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",))
                 )
             if self._loses and ("lost" in self._seen.marks or self._drawn_at is not None):
-                first = self.assembly.index(self.response.losses[0].blocks[0])
-                colour = palette.rgb(palette.pale(self.fill[[first]], np.ones(1, dtype=bool))[0])
-                keys.append(Key("area", LOST, colour))
+                keys.append(Key("area", LOST, palette.LOST, rim=palette.WARNING if self._flat else None))
             if self.live.largest > 0.0:
                 keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
             if self._drawn_at is not None:
@@ -531,8 +531,8 @@ class Drawer:
         if not self._loses:
             return colours
         # As in the legend, whatever colours the others.
-        lost = palette.pale(self.fill, increment.fallen)
-        return lost if colours is None else np.where(increment.fallen[:, None], lost, colours)
+        lost = np.asarray(palette.LOST, dtype=np.uint8)
+        return np.where(increment.fallen[:, None], lost, self.fill if colours is None else colours)
 
     def _standing_colours(self, pose: solver.Pose, increment: solver.Increment) -> np.ndarray | None:
         if self.look.colour_by != "displacement":

@@ -27,7 +27,7 @@ from .underlay import COVER, CarriedPhotograph, Underlay
 
 #: The layers, back to front.
 ORDER = (
-    "earth", "backfill", "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding",
+    "earth", "backfill", "ghost", "crack", "fill", "hatch", "outline", "lost", "ground", "crack edge", "sliding",
     "motion outline", "force line", "force",
     "tie rim", "tie ground", "tie slack", "tie elastic", "tie pressed", "tie yielding", "tie broken", "tie end",
     "hinge", "hinge top", "crushing", "crushing top",
@@ -90,6 +90,13 @@ class FlatScene(Scene):
             moved = mechanics.carried(points, blocks, solver.Pose.initial(self.assembly), shown)
             moved[self._gone[blocks]] = self.frame.low - self.frame.size
             self._layers["hatch"].move(moved)
+
+    def lost(self, blocks: np.ndarray) -> None:
+        """Edge blocks that have fallen, (n_blocks,) bool array, where they are drawn."""
+        corners = mechanics.moved_vertices(self.assembly, self._shown)
+        edges = np.stack([corners, corners[self.assembly.next_vertex]], axis=1)
+        width = max(2.0 * self._outline_width(), THINNEST)
+        self.lines("lost", edges[blocks[self.assembly.block_of_vertex]], palette.WARNING, width)
 
     def backfill(self, bodies: FillBodies) -> None:
         """Fill and hatch what lies between extrados and surface, behind the blocks."""

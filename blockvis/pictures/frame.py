@@ -44,6 +44,7 @@ class Key:
     colour: tuple[int, int, int]
     length: float = 0.0  #: Pixels, of a bar drawn to scale.
     layers: tuple[str, ...] = ()  #: Of the scene that it explains; none of what is in every picture.
+    rim: tuple[int, int, int] | None = None  #: Colour of the edge of an area.
 
 
 @dataclass(frozen=True)
@@ -302,7 +303,8 @@ def _width(key: Key, size: int) -> float:
 
 def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float, text: float) -> None:
     if key.kind == "area":
-        draw.rectangle((x, y - 0.38 * text, x + wide, y + 0.38 * text), fill=key.colour)
+        box, width = (x, y - 0.38 * text, x + wide, y + 0.38 * text), max(1, round(text / 12))
+        draw.rectangle(box, fill=key.colour, outline=key.rim, width=width if key.rim else 0)
     elif key.kind == "dash":
         for k in range(3):
             left = x + (k + 0.15) * wide / 3.0

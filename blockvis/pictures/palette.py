@@ -31,6 +31,8 @@ TIE, YIELDING = (30, 130, 50), (222, 148, 0)
 #: Loose fill over arches and vaults, its hatch and its rim.
 FILL, FILL_HATCH, FILL_RIM = (245, 239, 226), (196, 180, 150), (150, 128, 92)
 WARNING = (190, 30, 30)
+#: Blocks that have fallen while the rest stands, whatever they are of; their edges are those of a warning.
+LOST = (247, 205, 198)
 #: Blocks as drawn, before any analysis: all, drawn twice, refused, not standing; and what was left out.
 DRAWN = (239, 230, 212)
 TWICE = (91, 143, 214)
@@ -108,7 +110,7 @@ def role_colours(assembly: solver.Assembly, settles: bool = True) -> np.ndarray:
     return fill
 
 
-def pale(fill: np.ndarray, blocks: np.ndarray, left: float = 0.25) -> np.ndarray:
+def pale(fill: np.ndarray, blocks: np.ndarray, left: float) -> np.ndarray:
     """(n_blocks, 3) uint8 array: fills of some blocks, (n_blocks,) bool, with a part of their colour ``left``."""
     return np.where(blocks[:, None], np.rint(left * fill + (1.0 - left) * np.array(PAPER)), fill).astype(np.uint8)
 

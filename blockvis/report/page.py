@@ -30,6 +30,8 @@ from blockvis.pictures.captions import (
     fall_text,
     force_unit,
     in_one_unit,
+    loss_words,
+    losses_along,
     new_motions,
     parameter_label,
     parameter_unit,
@@ -286,7 +288,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
             name: palette.hexadecimal(getattr(palette, name.upper()))
             for name in (
                 "ink", "outline", "support", "moving", "hatch", "open", "sliding", "force", "hinge", "settlement",
-                "crushing", "warning", "live",
+                "crushing", "warning", "live", "lost",
             )
         },
         "frames": _frames(response, frames),
@@ -378,12 +380,12 @@ def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, An
             caption = state_text(increment, response)
             if len(response.settlements) > 1:
                 caption += f"  ·  phase {increment.phase + 1}"
+            caption = "  ·  ".join([caption, *loss_words(increment)])
         phase = min(increment.phase, max(len(response.settlements) - 1, 0))
         caption = caption.replace("   ·   ", "  ·  ")
-        gone = np.flatnonzero(increment.fallen).tolist()
-        frames.append(
-            {"caption": caption, "falling": frame.falling, "curve": frame.curve, "phase": phase, "gone": gone}
-        )
+        told = {"caption": caption, "falling": frame.falling, "curve": frame.curve, "phase": phase}
+        lost = np.flatnonzero(increment.fallen & ~increment.removed).tolist()
+        frames.append(told | {"gone": np.flatnonzero(increment.fallen).tolist(), "lost": lost})
     return frames
 
 
@@ -429,6 +431,8 @@ def _curve(response: solver.Response, band: ReactionRange | None) -> dict[str, A
         "rest": drops_at_start(response),
         # From these on it is along another motion.
         "breaks": new_motions(response),
+        # Rows that blocks were lost before, and where.
+        "losses": [[row, float(f"{place:.7g}")] for row, place, _ in losses_along(response)],
         "band": [[float(f"{v:.7g}") for v in row] for row in zip(total, least, most, strict=True)],
         "collapse": collapse,
         "x_min": first,

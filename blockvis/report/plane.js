@@ -127,6 +127,7 @@
 
   function fillOf(b, vector) {
     if (model.roles[b]) return vector ? model.colours.support : support;
+    if (isLost(b)) return model.colours.lost;
     if (state.colours === "mechanism" && model.tints.length) return model.tints[b];
     if (state.colours === "displacement") {
       const part = norm(pose[3 * b], pose[3 * b + 1]) / (model.largest_displacement || 1);
@@ -164,10 +165,10 @@
     if (layers.start) drawStart(pen, colours);
     state.cracks = 0;
     const lines = layers.cracks && (!falling || model.joints_of_fall) ? drawCracks(pen) : [];
-    pen.strokeStyle = model.colours.outline;
-    pen.lineWidth = Math.max(0.4, Math.min(1.1, model.block_size * state.view.scale / 25));
+    const thin = Math.max(0.4, Math.min(1.1, model.block_size * state.view.scale / 25));
     for (let b = 0; b < nBlocks; b++) {
       outline(pen, corners, b);
+      [pen.strokeStyle, pen.lineWidth] = isLost(b) ? [model.colours.warning, 2 * thin] : [model.colours.outline, thin];
       pen.fillStyle = fillOf(b, pen instanceof SvgPen);
       pen.fill(); pen.stroke();
     }
@@ -276,7 +277,7 @@
   const MOST_JOINTS = 6;
   function blockText(b) {
     const size = norm(pose[3 * b], pose[3 * b + 1]);
-    const kind = ["free", "fixed support", "moving support"][model.roles[b]];
+    const kind = isLost(b) ? "lost" : ["free", "fixed support", "moving support"][model.roles[b]];
     const own = jointsOf[b].map((j) => [j === state.joint ? Infinity : faces(pose, j).opening, j]).sort((one, two) => two[0] - one[0]).map(([, j]) => j);
     const more = own.length > MOST_JOINTS ? `\nand ${own.length - MOST_JOINTS} more joints` : "";
     return `${model.names[b]}${model.materials[b] ? " · " + model.materials[b] : ""} · ${kind}\n` +

@@ -45,7 +45,10 @@
 
   // Blocks that have fallen or were taken away by each frame: their joints are no more, and they take the fill over them along.
   const gone = model.frames.map((frame) => new Set(frame.gone));
-  const joined = (a, b) => { const now = gone[Math.min(Math.round(state.frame), nFrames - 1)]; return !now.has(a) && !now.has(b); };
+  const nearest = () => Math.min(Math.round(state.frame), nFrames - 1);
+  const joined = (a, b) => { const now = gone[nearest()]; return !now.has(a) && !now.has(b); };
+  // Those of them that have fallen are drawn where they began to.
+  const lost = model.frames.map((frame) => new Set(frame.lost)), isLost = (b) => lost[nearest()].has(b);
 
   // Normal force, compression positive, and shear force of a joint on its block a; null where there is no equilibrium.
   // Stored are the steps from the smallest that is told, each by the same part of itself.
@@ -211,6 +214,7 @@
     if (model.fill && !falling && model.space && marked) add("line", "edges of the fill", model.fill.colours[2]);
     if (model.fill && model.fill.words && marked && layers.forces && !falling) add("line", model.fill.words, model.fill.colours[2]);
     if (marked && model.live_words) add("line", model.live_words, model.colours.live);
+    if (lost[k].size) add("area lost", "lost block", model.colours.lost);
     if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.moving]);
     if (state.colours === "displacement") add("ramp", `displacement, 0 to ${+(1000 * model.largest_displacement).toPrecision(3)} mm${falling ? " or more" : ""}`, `linear-gradient(90deg, ${model.ramp.join(",")})`);
     const many = [["hinges", 1], ["sliding", 2]].filter(([name, kind]) => model.many && countOf(k, kind) && !layers[name]);
@@ -287,22 +291,21 @@
       c.band.slice().reverse().forEach(([s, , high]) => pen.lineTo(X(s), Y(high)));
       pen.closePath(); pen.fill(); pen.globalAlpha = 0.5; pen.lineWidth = 1; pen.stroke(); pen.restore(); pen.beginPath();
     }
+    const leaps = [...(c.rest ? [1] : []), ...c.losses.map(([row]) => row)];
     if (c.single && c.reaction[0] !== null) { pen.moveTo(X(0), Y(0)); pen.lineTo(X(0), Y(c.reaction[0])); pen.lineTo(X(1), Y(c.reaction[0])); }
     // An unbounded multiplier is null: the line stops before it and starts again after it, as where another motion begins.
     if (!c.single) c.settlement.forEach((s, i) => {
       if (c.reaction[i] === null) return;
-      if (i > (c.rest ? 1 : 0) && c.reaction[i - 1] !== null && !c.breaks.includes(i)) pen.lineTo(X(s), Y(c.reaction[i])); else pen.moveTo(X(s), Y(c.reaction[i]));
+      if (i && c.reaction[i - 1] !== null && !leaps.includes(i) && !c.breaks.includes(i)) pen.lineTo(X(s), Y(c.reaction[i])); else pen.moveTo(X(s), Y(c.reaction[i]));
     });
     pen.stroke();
-    if (c.rest) {
-      pen.lineWidth = 1.2; pen.setLineDash([2, 4]);
-      pen.beginPath(); pen.moveTo(X(c.settlement[0]), Y(c.reaction[0])); pen.lineTo(X(c.settlement[1]), Y(c.reaction[1])); pen.stroke(); pen.setLineDash([]);
-    }
+    pen.lineWidth = 1.2; pen.setLineDash([2, 4]);
+    for (const i of leaps) { pen.beginPath(); pen.moveTo(X(c.settlement[i - 1]), Y(c.reaction[i - 1])); pen.lineTo(X(c.settlement[i]), Y(c.reaction[i])); pen.stroke(); }
     pen.restore();
-    if (c.collapse !== null) {
-      pen.strokeStyle = model.colours.warning; pen.lineWidth = 1; pen.setLineDash([5, 4]);
-      pen.beginPath(); pen.moveTo(X(c.collapse), top); pen.lineTo(X(c.collapse), h - bottom); pen.stroke(); pen.setLineDash([]);
-    }
+    pen.strokeStyle = model.colours.warning; pen.lineWidth = 1;
+    const fails = [...c.losses.map(([, at]) => [at, [1, 3]]), ...(c.collapse === null ? [] : [[c.collapse, [5, 4]]])];
+    for (const [at, dash] of fails) { pen.setLineDash(dash); pen.beginPath(); pen.moveTo(X(at), top); pen.lineTo(X(at), h - bottom); pen.stroke(); }
+    pen.setLineDash([]);
     const at = Math.min(model.frames[k].curve - c.first, c.settlement.length - 1);
     pen.fillStyle = model.frames[k].falling ? model.colours.warning : model.colours.settlement;
     pen.beginPath();

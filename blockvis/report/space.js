@@ -159,6 +159,7 @@
   function fillOf(b) {
     if (model.roles[b] === 2) return model.colours.moving;
     if (model.roles[b]) return model.colours.support;
+    if (isLost(b)) return model.colours.lost;
     if (state.colours === "mechanism" && model.tints.length) return model.tints[b];
     if (state.colours === "displacement") return mixed(Math.max(0, Math.min(1, norm(pose[6 * b], pose[6 * b + 1], pose[6 * b + 2]) / (model.largest_displacement || 1))));
     return model.fills[b];
@@ -372,7 +373,7 @@
 
   const MOST_JOINTS = 6;
   function blockText(b) {
-    const p = [...pose.slice(6 * b, 6 * b + 6)], kind = ["free", "fixed support", "moving support"][model.roles[b]];
+    const p = [...pose.slice(6 * b, 6 * b + 6)], kind = isLost(b) ? "lost" : ["free", "fixed support", "moving support"][model.roles[b]];
     const own = jointsOf[b].map((j) => [j === state.joint ? Infinity : faces(pose, j).opening, j]).sort((one, two) => two[0] - one[0]).map(([, j]) => j);
     const more = own.length > MOST_JOINTS ? `\nand ${own.length - MOST_JOINTS} more joints` : "";
     return `${model.names[b]}${model.materials[b] ? " · " + model.materials[b] : ""} · ${kind}\n` +

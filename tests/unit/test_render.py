@@ -11,11 +11,24 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from structures import BENT, alike, arch_response, box, parted, partly_unbounded, pixels, rectangle, report_of, wall
+from structures import (
+    BENT,
+    alike,
+    arch_response,
+    box,
+    dropped_brick,
+    parted,
+    partly_unbounded,
+    pixels,
+    rectangle,
+    report_of,
+    wall,
+)
 
 import blockvis
 import solver
 from blockvis import animate, draw_mechanism, draw_still, generators
+from blockvis.cli import main
 from blockvis.pictures import palette
 from blockvis.pictures.curves import CurvePanel
 from blockvis.pictures.drawer import Drawer, Look, magnified
@@ -179,6 +192,16 @@ def test_options_change_the_picture(tmp_path):
     assert alike(drawn["thrust"], palette.FORCE).sum() > 200
     scale = drawn["displacement"][:, 560:]
     assert all(alike(scale, colour).any() for colour in palette.RAMP[1:-1])
+
+
+@pytest.mark.slow
+def test_a_drawing_of_cracks_says_what_it_leaves_out(tmp_path, monkeypatch):
+    """The pier stands on ground that does not move: no joint of what stands is open."""
+    told, composed = [], Sheet.composed
+    monkeypatch.setattr(Sheet, "composed", lambda *a, **k: told.append(k["detail"]) or composed(*a, **k))
+    out = blockvis.write(dropped_brick(0.05), tmp_path / "out")
+    assert main(["render", str(out), "--cracks", "-1"]) == 0
+    assert told[-1].startswith("no joint of what stands is open   ·   1 block lost, not drawn")
 
 
 def test_magnified_blocks_have_no_points_of_contact(tmp_path, monkeypatch):

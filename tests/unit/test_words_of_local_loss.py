@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, dropped_brick, report_of
+from structures import alike, arch_response, dropped_brick, pixels, report_of
 
 import blockvis
 import solver
@@ -38,7 +38,7 @@ def test_summary_console_report_and_curve_tell_them_apart(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_loss_is_in_every_output_and_drawn_pale(tmp_path):
+def test_a_loss_is_in_every_output_and_told_apart(tmp_path):
     response = dropped_brick(0.05)
     assert response.stop is solver.Status.LIMIT_REACHED
     out = blockvis.write(response, tmp_path / "out")
@@ -48,13 +48,19 @@ def test_a_loss_is_in_every_output_and_drawn_pale(tmp_path):
     assert loss["settlement"] == pytest.approx(response.losses[0].settlement)
     (line,) = (line for line in _in_words(response, tmp_path).splitlines() if line.startswith("loss: "))
     assert re.fullmatch(r"loss: brick at 0\.15\d+ m, 1\.962 kN, 1\.2 % of the weight; the structure stands .*", line)
-    assert "the structure stands without" in report_of(response)
+    page = report_of(response)
+    assert "the structure stands without" in page
+    assert re.search(
+        r"<h1>Part has fallen: 1 block at a settlement of 0\.15\d+ m; the rest stands at the end</h1>", page
+    )
     assert blockvis.open_results(out).losses == response.losses, "the files keep what fell"
     blocks = response.mesh(len(response.path) - 1)
     assert blocks.cell_data["fallen"].tolist() == [0, 1, 0, 0]
-    still = Image.open(blockvis.draw_still(response, -1, path=tmp_path / "last.png")).convert("RGB")
-    standing = Image.open(blockvis.draw_still(response, 0, path=tmp_path / "first.png")).convert("RGB")
-    assert np.asarray(still).mean() > np.asarray(standing).mean()
+    for name, number in (("first", 0), ("last", -1)):
+        still = pixels(blockvis.draw_still(response, number, path=tmp_path / f"{name}.png"))
+        # On the stone, and in the legend below it.
+        for part in (still[:-100], still[-100:]):
+            assert bool(alike(part, (247, 205, 198), 3).any()) == (number != 0)
     pictures = []
     for number in ("0", "-1"):
         assert main(["render", str(out), "--cracks", number]) == 0
@@ -63,3 +69,19 @@ def test_a_loss_is_in_every_output_and_drawn_pale(tmp_path):
             pictures.append(np.asarray(picture.convert("L"))[100:])
     whole, left = ((picture < 255).sum() for picture in pictures)
     assert left < whole, "a stone that is lost leaves a hole in the survey of cracks"
+
+
+@pytest.mark.slow
+def test_the_curve_marks_where_blocks_are_lost(tmp_path):
+    response = dropped_brick(0.05)
+    said = draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
+    assert "<!-- 1 block lost -->" in said
+    assert "lost" not in draw_curve(arch_response(), tmp_path / "arch.svg").read_text(encoding="utf-8")
+    model = json.loads(re.search(r'id="model" type="application/json">(.*?)</script>', report_of(response)).group(1))
+    ((row, place),) = model["curve"]["losses"]
+    assert place == pytest.approx(response.losses[0].settlement, rel=1e-6)
+    assert response.path[row - 1].parameter < place < response.path[row].parameter
+    lost = [frame["lost"] for frame in model["frames"]]
+    assert lost == [[]] * row + [[1]] * (len(lost) - row)
+    assert "1 block lost" in model["frames"][-1]["caption"]
+    assert "1 block lost" not in model["frames"][0]["caption"]
