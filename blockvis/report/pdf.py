@@ -17,7 +17,7 @@ from fpdf.enums import TableBordersLayout
 import solver
 from blockvis.dynamics.fall import Fall
 from blockvis.pictures import palette
-from blockvis.pictures.captions import failure_text, in_one_unit, parameter_text
+from blockvis.pictures.captions import failure_text, in_one_unit, losses_along, parameter_text
 from blockvis.pictures.crack_drawing import draw_cracks
 from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.marks import evenly
@@ -82,7 +82,7 @@ def write_pdf(
             paper.picture(draw_still(response, last, Path(folder) / "last.png", underlay=underlay, **eye))
             paper.heading("Curve", 12.0, PICTURE)
             paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), 140.0)
-            paper.tabulate("States", *_states(response))
+            paper.tabulate(*_states(response))
             cracks = cracks_of(response.assembly, last.pose, last.fallen)
             if cracks:
                 paper.heading("Cracks", 12.0, PICTURE)
@@ -108,13 +108,23 @@ def _keys_in_use(case_text: str) -> str:
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip()
 
 
-def _states(response: solver.Response) -> tuple[Sequence[str], list[tuple[str, ...]], Sequence[float]]:
-    """Give head, rows and widths [mm] of the table of the path, evenly thinned."""
+def _states(response: solver.Response) -> tuple[str, Sequence[str], list[tuple[str, ...]], Sequence[float]]:
+    """Give title, head, rows and widths [mm] of the table of the path, evenly thinned but for what matters."""
     path, weight = response.path, response.total_weight
-    chosen = evenly(np.arange(len(path)), MOST_STATES)
-    head = [response.parameter.name, response.measured.name, "of the weight W" if response.measured.is_force else ""]
+    # Of states that stand by themselves the lowest decides; a loss ends what the row before it carries.
+    extreme, sign = ("largest", 1.0) if response.parameter.is_path else ("lowest", -1.0)
+    kept = [
+        int(np.nan_to_num(sign * response.values, nan=-np.inf).argmax()),
+        *(row - 1 for row, _, _ in losses_along(response)),
+    ]
+    chosen = sorted({*evenly(np.arange(len(path)), MOST_STATES).tolist(), *kept})
+    title = "States"
+    if len(chosen) < len(path):
+        loss = ", the last before blocks are lost" * bool(response.losses)
+        title += f": {len(chosen)} of {len(path)}, evenly chosen, with the {extreme}{loss} and the last"
+    head = [response.parameter.name, response.measured.name, "of the weight W"]
     rows: list[tuple[str, ...]] = []
-    for k in chosen.tolist():
+    for k in chosen:
         increment = path[k]
         here = in_one_unit(response, increment.phase)
         measured, moment = here.measured, here.measured.unit == "N·m"
@@ -123,7 +133,9 @@ def _states(response: solver.Response) -> tuple[Sequence[str], list[tuple[str, .
         place = parameter_text(increment.parameter, here)
         several = len(response.settlements) > 1
         rows.append((f"{place}, phase {increment.phase + 1}" if several else place, value, share))
-    return head, rows, (58.0, 58.0, 58.0)
+    # Moments and multipliers are no parts of the weight.
+    columns = 3 if any(share for _, _, share in rows) else 2
+    return title, head[:columns], [row[:columns] for row in rows], (WIDTH / columns,) * columns
 
 
 def _crack_table(cracks: Sequence[Crack]) -> tuple[Sequence[str], list[tuple[str, ...]], Sequence[float]]:

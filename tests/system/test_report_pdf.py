@@ -4,9 +4,10 @@ import json
 import re
 
 import pytest
-from structures import moved_and_turned, vault_response
+from structures import dropped_brick, moved_and_turned, rectangle, vault_response
 
 import blockvis
+import solver
 from blockvis.cli import main
 
 
@@ -87,3 +88,33 @@ def test_states_of_a_rotation_are_told_in_rad_with_their_moment(tmp_path, monkey
     assert rows[1][0] == "1.00 mm, phase 1"
     assert rows[1][1].endswith(" kN")
     assert rows[-1] == ("0.00100 rad, phase 2", f"{last:.4g} N·m", "")
+
+
+def states_on_paper(response, folder, monkeypatch):
+    """Title, head, rows and widths of the table of states."""
+    tables = []
+    monkeypatch.setattr("blockvis.report.pdf._Paper.tabulate", lambda _, *table: tables.append(table))
+    assert main(["report", str(blockvis.write(response, folder / "out")), "--pdf"]) == 0
+    return next(table for table in tables if table[0].startswith("States"))
+
+
+@pytest.mark.slow
+def test_states_of_moments_alone_have_no_column_of_weights(tmp_path, monkeypatch):
+    column = solver.Assembly.from_outlines([rectangle(0, -1, 1, 0), rectangle(0, 0, 1, 2)], roles=["moving", "free"])
+    turns = solver.Settlement(rotation=1.0, rotation_centre=(0.0, 0.0), increment=1e-3, limit=2e-3)
+    response = solver.settle(column, turns, friction_coefficient=0.6)
+    title, head, rows, widths = states_on_paper(response, tmp_path, monkeypatch)
+    assert (title, len(head), len(widths)) == ("States", 2, 2)
+    assert all(len(row) == 2 and row[1].endswith("N·m") for row in rows)
+
+
+@pytest.mark.slow
+def test_states_that_are_left_out_are_told_and_what_matters_stays(tmp_path, monkeypatch):
+    response = dropped_brick(0.05)
+    title, _, rows, _ = states_on_paper(response, tmp_path, monkeypatch)
+    chosen, last = len(rows), response.path[-1].parameter
+    with_them = "evenly chosen, with the largest, the last before blocks are lost and the last"
+    assert title == f"States: {chosen} of {len(response.path)}, {with_them}"
+    before = max(i.parameter for i in response.path if not i.fallen.any())
+    largest = max(response.path, key=lambda increment: increment.measured).parameter
+    assert {f"{at:.4f} m" for at in (before, largest, last)} <= {row[0] for row in rows}
