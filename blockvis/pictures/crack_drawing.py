@@ -21,7 +21,7 @@ from solver import mechanics
 from . import palette
 from .captions import loss_words, phase_words, state_text
 from .flat_scene import FlatScene
-from .frame import Key, Sheet, framed, write_labels
+from .frame import Key, Sheet, along_lines, framed, write_labels
 from .render import STILL_SIZE, numbered, save_picture, seen_from
 
 #: Thickness of a crack that only slides and of the widest one, in heights of the picture; the latter in block sizes at
@@ -126,12 +126,12 @@ def _drawn_in_plane(
     picture = scene.image()
     if main:
         spread = np.concatenate([joints.ends[crack.joints] for crack in cracks])
-        along = np.linspace(0.0, 1.0, 5)[:, None, None]
-        dots = ((1.0 - along) * spread[:, 0] + along * spread[:, 1]).reshape(-1, 2)
+        dots = along_lines(spread)
+        lines = [scene.at_pixel(along_lines(joints.ends[crack.joints])) for crack in main]
         places = scene.at_pixel(np.array([_widest_point(crack, joints, openings) for crack in main]))
         words = [width_text(crack.width) for crack in main]
         colours = palette.SURVEYED[: len(main)]
-        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours)
+        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours, lines)
     named = zip(_numbers(main, cracks), palette.SURVEYED, strict=False)
     keys = [Key("line", f"crack {number}", colour) for number, colour in named]
     if others:

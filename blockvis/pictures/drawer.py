@@ -22,7 +22,7 @@ from . import palette
 from .backfill import fill_bodies
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, fall_text, matters
 from .flat_scene import FlatScene
-from .frame import ColourBar, Frame, Key, Sheet, framed, write_labels
+from .frame import ColourBar, Frame, Key, Sheet, along_lines, framed, write_labels
 from .live_load import LiveLoads
 from .marks import (
     SMALLEST_RESULTANT,
@@ -575,6 +575,7 @@ class Drawer:
     ) -> None:
         """Write the forces of ties, and the widths of the widest crack lines, beside them, where there is room."""
         points, words, colours = self.ties.labels(increment, shown)
+        lines = [np.zeros((0, 2))] * len(words)
         if widths:
             # Between blocks that have parted no crack is drawn: what is air counts for none, and of a crack with other
             # joints the widest of these has the label.
@@ -587,10 +588,12 @@ class Drawer:
             points = np.concatenate([points, found.middles[widest, openings.argmax(axis=1)]])
             words += [width_text(width) for width in openings.max(axis=1, initial=0.0).tolist()]
             colours += [palette.OPEN] * len(main)
+            own = [found.middles[np.isin(found.joints, cracks[k].joints)] for k in main]
+            lines += [self.scene.at_pixel(along_lines(middles)) for middles in own]
         if words:
             dots = np.concatenate([dots, *self._along_arrows.values(), self.ties.along(increment, shown)])
             places, dots = self.scene.at_pixel(points), self.scene.at_pixel(dots)
-            write_labels(picture, places, words, self.sheet.text, dots, colours)
+            write_labels(picture, places, words, self.sheet.text, dots, colours, lines)
 
     def _draw_forces(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if self.force_scale == 0.0:

@@ -31,6 +31,9 @@ CROSSED = 10
 #: To which side a label may lie, to the right and down, the best first.
 BESIDE = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, -1), (1, 1), (-1, 1))
 
+#: Supports are shown whole on sides where they end within so many times what is shown of them else.
+JUST_OUTSIDE = 2.0
+
 #: Between two entries of the legend, in heights of its letters.
 LEGEND_GAP = 1.3
 
@@ -223,11 +226,13 @@ def write_labels(
     text: int,
     dots: np.ndarray,
     colours: Sequence[tuple[int, int, int]] = (),
+    cracks: Sequence[np.ndarray] = (),
 ) -> None:
     """Write labels on paper beside places (n, 2) of a picture, in their order, each where none lies yet.
 
-    They leave dots (n, 2) free where there is room beside them; farther from its place a label has a leader. All
-    lengths are in pixels; the rims have the colour of open joints by default.
+    They leave dots (n, 2) free where there is room beside them; farther from its place, and where it lies nearer to
+    another of the ``cracks``, points (m, 2) of what each label is of, a label has a leader. All lengths are in pixels;
+    the rims have the colour of open joints by default.
     """
     draw, font = ImageDraw.Draw(picture), _font(round(0.85 * text))
     rim, written = 0.4 * text, list[_Label]()
@@ -235,7 +240,7 @@ def write_labels(
     dots = np.concatenate([dots, np.repeat(places, CROSSED, axis=0)])
     away = np.repeat(np.multiply(LABELS_AWAY, text), len(BESIDE))
     beside = np.tile(BESIDE, (len(LABELS_AWAY), 1))
-    for place, label, colour in zip(places, words, colours or [palette.OPEN] * len(words), strict=True):
+    for k, (place, label, colour) in enumerate(zip(places, words, colours or [palette.OPEN] * len(words), strict=True)):
         if not ((place >= 0.0) & (place <= picture.size)).all():
             continue
         size = np.array([font.getlength(label) + 0.5 * text, 1.2 * text])
@@ -243,16 +248,21 @@ def write_labels(
         nearest = np.clip(place, lows, lows + size)
         leaders = np.linspace(np.broadcast_to(place, nearest.shape), nearest, 12)[1:]
         free = (lows >= 0.0).all(axis=1) & (lows + size <= picture.size).all(axis=1)
-        cost = _inside(dots[:, None], lows - rim, lows + size + rim).sum(axis=0) + away / text
+        others = np.concatenate([np.zeros((0, 2)), *cracks[:k], *cracks[k + 1 :]])
+        taken = np.concatenate([dots, others])
+        cost = _inside(taken[:, None], lows - rim, lows + size + rim).sum(axis=0) + away / text
         for other in written:
             free &= ~((lows < other.high) & (other.low < lows + size)).all(axis=1)
             over = _inside(other.leader[:, None], lows, lows + size).any(axis=0)
             cost += CROSSED * (over.astype(int) + _inside(leaders, other.low, other.high).any(axis=0))
         if free.any():
             best = int(np.where(free, cost, np.inf).argmin())
-            written.append(_Label(place, lows[best], lows[best] + size, leaders[:, best], label, colour))
+            away_from = np.hypot(*(nearest[best] - place))
+            beyond = np.hypot(*(others - np.clip(others, lows[best], lows[best] + size)).T)
+            led = bool(away_from > text or (beyond < away_from).any())
+            written.append(_Label(place, lows[best], lows[best] + size, leaders[:, best], label, colour, led))
     for one in written:
-        if np.hypot(*(one.leader[-1] - one.place)) > text:
+        if one.led:
             # Grey and with a dot at its end: a coloured one would look like a crack.
             draw.line((*one.place, *one.leader[-1]), fill=palette.FAINT, width=max(1, text // 16))
             draw.circle(tuple(one.place.tolist()), text / 8.0, fill=palette.FAINT)
@@ -260,6 +270,12 @@ def write_labels(
         box = (*one.low.tolist(), *one.high.tolist())
         draw.rounded_rectangle(box, 0.25 * text, fill=palette.PAPER, outline=one.colour, width=max(1, text // 15))
         draw.text(tuple(((one.low + one.high) / 2.0).tolist()), one.words, palette.INK, font, anchor="mm")
+
+
+def along_lines(ends: np.ndarray) -> np.ndarray:
+    """(5 n, d) array: points along lines with ends (n, 2, d), these included."""
+    share = np.linspace(0.0, 1.0, 5)[:, None, None]
+    return np.asarray((1.0 - share) * ends[:, 0] + share * ends[:, 1]).reshape(-1, ends.shape[-1])
 
 
 class _Label(NamedTuple):
@@ -271,6 +287,7 @@ class _Label(NamedTuple):
     leader: np.ndarray
     words: str
     colour: tuple[int, int, int]
+    led: bool
 
 
 def _inside(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -402,8 +419,10 @@ def frame_around(free: ArrayLike, supported: ArrayLike, margin: float, supports:
     size = float((high - low).max())
     all_of_it = float((np.maximum(high, outer_high) - np.minimum(low, outer_low)).max())
     beyond = np.inf if all_of_it <= whole * size else supports * size
-    low = np.minimum(low, np.maximum(outer_low, low - beyond))
-    high = np.maximum(high, np.minimum(outer_high, high + beyond))
+    # The corner of a sloping ground that is cut off just before its end looks like a shape of its own.
+    reach = beyond if whole else JUST_OUTSIDE * beyond
+    low = np.minimum(low, np.where(low - outer_low <= reach, outer_low, low - beyond))
+    high = np.maximum(high, np.where(outer_high - high <= reach, outer_high, high + beyond))
     return Frame(low - margin * size, high + margin * size)
 
 

@@ -308,6 +308,16 @@ def test_labels_lie_apart_and_tell_by_leaders_where_they_belong():
     assert (pixels == palette.PAPER).all(axis=2).sum() > 5 * 150
 
 
+def test_a_label_nearer_to_another_crack_than_to_its_own_has_a_leader():
+    place, other = np.array([[100.0, 60.0], [20.0, 20.0]]), np.array([[x, 60.0] for x in range(90, 172, 2)])
+    led, shifts = [], np.array([[0.0, -12.0], [0.0, 12.0], [-82.0, 0.0]])
+    for cracks in ((), (place[:1], (other + shifts[:, None]).reshape(-1, 2))):
+        picture = Image.new("RGB", (300, 200), "green")
+        write_labels(picture, place, ["12 mm", "9 mm"], 12, np.zeros((0, 2)), (), cracks)
+        led.append(bool((np.asarray(picture)[60, 100] == palette.FAINT).all()))
+    assert led == [False, True]
+
+
 @pytest.mark.slow
 def test_what_lies_still_has_no_badge_of_falling(words):
     response = arch_response()

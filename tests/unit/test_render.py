@@ -389,13 +389,22 @@ def test_huge_supports_do_not_shrink_the_structure():
     assert frame.size.max() < 3.0
 
 
+def test_supports_that_end_just_outside_are_shown_whole():
+    """The lower corner of a ground that slopes was cut off flat."""
+    turn = np.array([[np.cos(0.2), np.sin(0.2)], [-np.sin(0.2), np.cos(0.2)]])
+    outlines = [rectangle(-1, 0, 1, 2) @ turn, rectangle(-1.3, -0.2, 1.3, 0) @ turn]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["free", "fixed"])
+    frame = framed(assembly, [solver.Pose.initial(assembly)], margin=0.0, supports=0.08)
+    assert frame.low[1] == pytest.approx(outlines[1][:, 1].min())
+
+
 def test_supports_are_shown_whole_where_there_is_room():
     outlines = [[[-0.5, 0], [0.5, 0], [0.5, 1], [-0.5, 1]], [[-0.8, -0.5], [0.8, -0.5], [0.8, 0], [-0.8, 0]]]
     block = solver.Assembly.from_outlines(outlines, roles=["free", "fixed"])
     pose = [solver.Pose.initial(block)]
-    assert framed(block, pose, margin=0.0, supports=0.2).size.tolist() == pytest.approx([1.4, 1.2])
-    assert framed(block, pose, margin=0.0, supports=0.2, whole=1.75).size.tolist() == pytest.approx([1.6, 1.5])
-    assert framed(block, pose, margin=0.0, supports=0.2, whole=1.5).size.tolist() == pytest.approx([1.4, 1.2])
+    assert framed(block, pose, margin=0.0, supports=0.1).size.tolist() == pytest.approx([1.2, 1.1])
+    assert framed(block, pose, margin=0.0, supports=0.1, whole=1.75).size.tolist() == pytest.approx([1.6, 1.5])
+    assert framed(block, pose, margin=0.0, supports=0.1, whole=1.5).size.tolist() == pytest.approx([1.2, 1.1])
 
 
 def test_magnified_keeps_blocks_rigid():
