@@ -10,7 +10,7 @@ import numpy as np
 from solver.contact_step.problem import NotSolved
 from solver.kinematics import motion_size
 from solver.results.increment import Increment, Status
-from solver.results.mechanism import mechanism_of, with_motion
+from solver.results.mechanism import joint_rates, mechanism_of, with_motion
 from solver.results.response import Collapse
 from solver.tolerances import CLOSING_GAP, FARTHEST_FALL
 
@@ -152,12 +152,16 @@ class Fall:
             return
         # Where something is taken away at once the joints of what stays spring back first.
         place = self.relax(place, SPRUNG_BACK)[0] if at_once else place
-        for least in (MECHANISM, *[0.1] * max(self.n_frames - 1, 0)):
-            start, total = place, np.zeros_like(self.model.load)
-            for moved, motion, _, _ in self.time_steps(start, 2.0 * least):
+        for largest in (2.0 * MECHANISM, *[0.2] * max(self.n_frames - 1, 0)):
+            frame = self.reports.falling_increment(start := place, total := np.zeros_like(self.model.load))
+            for moved, motion, _, _ in self.time_steps(start, largest):
                 place, total = moved, total + motion
-                if np.abs(total).max() > least:
+                frame = self.reports.falling_increment(start, total * self.model.lengths)
+                parted = joint_rates(self.model.assembly, frame)[1].max(initial=0.0) / self.model.length
+                # The first one shows the mechanism once joints have moved by more than they give.
+                if np.abs(total).max() > 0.1 or (largest < 0.1 and parted > MECHANISM):
+                    yield frame
                     break
-            yield self.reports.falling_increment(start, total * self.model.lengths)
-            if np.abs(total).max() <= least:
+            else:
+                yield frame
                 return

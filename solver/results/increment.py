@@ -48,11 +48,12 @@ def used_up(forces: np.ndarray, friction: np.ndarray) -> np.ndarray:
     return np.linalg.norm(forces[:, 1:], axis=1) >= friction * forces[:, 0] * (1.0 - USED_UP)
 
 
-def slides(slip: np.ndarray, opening: np.ndarray, friction: np.ndarray, slow: float) -> np.ndarray:
-    """(n,) bool array: which points slide along their joint, and do not only open, by their relative velocities."""
-    # Associative friction opens by friction times slip.
+def slides(forces: np.ndarray, slip: np.ndarray, opening: np.ndarray, friction: np.ndarray, slow: float) -> np.ndarray:
+    """(n,) bool array: which points slide along their joint, and do not only open or give, by their velocities."""
+    # Associative friction opens by friction times slip; and bounds follow the normal forces, so that half is enough.
     lift = np.maximum(slow, friction * np.abs(slip) * (1.0 + DILATANCY_SLACK))
-    return ~at_rest(slip, slow) & (opening <= lift)
+    gives = 2.0 * np.linalg.norm(forces[:, 1:], axis=1) < friction * forces[:, 0]
+    return ~at_rest(slip, slow) & (opening <= lift) & ~gives
 
 
 def at_rest(velocity: np.ndarray, slow: float) -> np.ndarray:

@@ -58,8 +58,24 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     Part -1 is at rest. The others are numbered from 0, the largest volume first. The contact points of two blocks that
     move together come apart, and their corners turn against each other, by next to nothing.
     """
-    contacts, n, d = increment.contacts, assembly.n_blocks, assembly.dimension
-    fastest = float(np.abs(increment.velocity[:, :d]).max(initial=0.0))
+    n, (pairs, apart, slow) = assembly.n_blocks, joint_rates(assembly, increment)
+    a, b = pairs[apart <= slow].T
+    part = connected_components(sp.coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[1]
+    # Corners, not centroids: a block may turn about its own centroid.
+    moves = motion_size(increment.velocity, assembly.block_size) > slow
+    # What gives on a support at rest does not move, however much that comes to over many joints.
+    moves &= assembly.free & ~np.isin(part, part[~assembly.free & ~moves])
+    volume = np.bincount(part, weights=assembly.shapes.volumes * moves)
+    rank = np.argsort(np.argsort(-volume, kind="stable"))
+    return np.where(moves, rank[part], -1)
+
+
+def joint_rates(assembly: Assembly, increment: Increment) -> tuple[np.ndarray, np.ndarray, float]:
+    """Pairs of blocks, (n, 2), how fast they come apart or turn against each other, (n,), and what is slow for these.
+
+    The fastest joint is the measure, not the fastest block: the top of a tower goes far where its foot opens a little.
+    """
+    contacts, d = increment.contacts, assembly.dimension
     spins = increment.velocity[:, d:] * assembly.block_size
     rates, gives = increment.displacements.copy(), contacts.gaps < CLOSED * assembly.block_size
     gives[np.flatnonzero(increment.state.crushing)] = False
@@ -69,14 +85,8 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     apart = np.zeros(len(pairs))
     np.maximum.at(apart, joint, np.abs(rates).max(axis=1))
     apart = np.maximum(apart, np.abs(spins[pairs[:, 0]] - spins[pairs[:, 1]]).max(axis=1))
-    a, b = pairs[apart < NOTICEABLE * fastest].T
-    part = connected_components(sp.coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[1]
-    # Corners, not centroids: a block may turn about its own centroid.
-    moves = motion_size(increment.velocity, assembly.block_size) > NOTICEABLE * fastest
-    moves &= assembly.free
-    volume = np.bincount(part, weights=assembly.shapes.volumes * moves)
-    rank = np.argsort(np.argsort(-volume, kind="stable"))
-    return np.where(moves, rank[part], -1)
+    fastest = max(apart.max(initial=0.0), 0.2 * float(np.abs(increment.velocity[:, :d]).max(initial=0.0)))
+    return pairs, apart, NOTICEABLE * fastest
 
 
 def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
@@ -94,13 +104,13 @@ def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
     moves, motions = parts >= 0, np.zeros((count, velocity.shape[1]))
     np.add.at(motions, parts[moves], (assembly.masses[:, None] * velocity)[moves])
     motions /= np.bincount(parts[moves], assembly.masses[moves], count)[:, None]
-    slow = NOTICEABLE * float(np.abs(velocity[:, :d]).max(initial=0.0))
+    slow = joint_rates(assembly, increment)[2]
     between = parts[contacts.block_a] != parts[contacts.block_b]
     closed = between & (contacts.gaps < CLOSED * assembly.block_size)
     opening, slip = increment.displacements[:, 0], np.linalg.norm(increment.displacements[:, 1:], axis=1)
     spin = np.abs(velocity[contacts.block_a, d:] - velocity[contacts.block_b, d:]).max(axis=1, initial=0.0)
     turns = closed & at_rest(opening, slow) & at_rest(slip, slow) & ~at_rest(spin * assembly.block_size, slow)
-    slips = closed & slides(slip, opening, increment.friction, slow)
+    slips = closed & slides(increment.forces, slip, opening, increment.friction, slow)
     carrying = carries(increment.forces)
     at_strength = increment.state.crushing
     crushes = closed & carrying & (opening < -slow) & (at_strength if len(at_strength) else False)
