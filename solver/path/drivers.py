@@ -65,9 +65,16 @@ class SupportMotion(Driver):
         super().__init__(assembly, phase, start)
         self.phase, self.stops = phase, phase.stops
         # Where blocks are near it: how deep a support is drawn counts for nothing.
-        near = find_contacts(assembly, moved_vertices(assembly, start), assembly.block_size / 4.0)
-        speeds = [point_velocities(near.points, of, start, self.rate(0.0)) for of in (near.block_a, near.block_b)]
-        self.lever = float(np.linalg.norm(speeds, axis=2).max(initial=0.0)) or 1.0
+        rate, vertices = self.rate(0.0), moved_vertices(assembly, start)
+        near = find_contacts(assembly, vertices, assembly.block_size / 4.0)
+        moved = [(near.points, near.block_a), (near.points, near.block_b)]
+        supports = np.flatnonzero(~assembly.free & np.isin(np.arange(assembly.n_blocks), [near.block_a, near.block_b]))
+        if len(supports) and rate[supports].any(axis=1).all():
+            # All blocks ride on them: the top of a tower goes far.
+            riding = vertices[assembly.free[assembly.block_of_vertex]]
+            moved.append((riding, np.full(len(riding), supports[0])))
+        speeds = [np.linalg.norm(point_velocities(points, of, start, rate), axis=1) for points, of in moved]
+        self.lever = float(np.concatenate(speeds).max(initial=0.0)) or 1.0
 
     def supports(self, s: float) -> Pose:
         """Of the settlement."""

@@ -19,7 +19,9 @@ def test_a_tilted_tower_falls_about_its_toe(n_drums):
     tilts = solver.Settlement(rotation=1.0, rotation_centre=(0.0, 0.0), increment=0.02, limit=0.1)
     response = solver.Structure(tower, friction_coefficient=0.6).settle(tilts)
     assert response.collapse is not None
-    assert response.collapse.displacement == pytest.approx(np.arctan(1.0 / 30.0), rel=2e-3)
+    assert response.collapse.displacement == pytest.approx(np.arctan(1.0 / 30.0), rel=5e-4)
+    # Held to the speed of its foot, the top lagged behind: the tower rocked backwards.
+    assert max(increment.certificate.energy_residual for increment in response.path) < 0.1
     assert response.collapse.words == "1 macro-block; hinge at base | drum 1"
     last = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
     assert (mechanics.rigid_parts(tower, last)[1:] == 0).all()
