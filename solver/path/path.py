@@ -22,7 +22,7 @@ from .collapse import MECHANISM, Fall
 from .controls import Controls, Ending
 from .drivers import Driver
 from .equilibrium_check import EquilibriumChecks
-from .reports import Reports, no_equilibrium
+from .reports import UNSTABLE, Reports, no_equilibrium
 from .state import EquilibriumCheck, PathState, Place
 from .stepping import CARRIES, StepError, Stepper
 
@@ -241,6 +241,9 @@ class Path:
         if not bounds.in_equilibrium:
             yield (frame := next(self.fall.frames(place)))
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, frame.velocity))
+        if not self.stepper.is_stable(place):
+            yield self.reports.falling_increment(place, np.zeros_like(model.load))
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, UNSTABLE)
         # Without friction a program carries what its own check lets pass.
         least = ACCEPTED_ERROR * model.total_load / max(model.scaled_live(place.pose)[1], 1e-300)
         if model.has_live and bounds.high == np.inf:

@@ -200,6 +200,13 @@ def falling_blocks(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
     return np.flatnonzero(assembly.free & (size >= 0.1 * size.max()))
 
 
+#: Message where the equilibrium at the start is one from which blocks lean ever farther.
+UNSTABLE = (
+    "no stable equilibrium before any settlement: what leans a little leans on, on joints or ground of the given "
+    "stiffness; check normal_stiffness and the stiffness of supports"
+)
+
+
 def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
     """Message that names the blocks that fall before any settlement, by their motion, (n_blocks, n_dof) array."""
     falling = falling_blocks(assembly, motion)

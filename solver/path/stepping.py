@@ -24,7 +24,7 @@ from solver.contact_step.problem import ContactProblem, NotSolved
 from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts, successors
-from solver.kinematics import Pose, moved, moved_vertices, put_together
+from solver.kinematics import Pose, moved, moved_vertices, point_velocities, put_together
 from solver.program.model import Model
 from solver.program.strength import ForceLimits
 from solver.results.increment import Bonds
@@ -61,6 +61,9 @@ OPEN = 1e-6
 #: Times, in units of √(block size / g), in which what viscosity retards comes to rest at once, and in which what falls
 #: hardly moves; movement, in block sizes, in which it has come to rest; and steps after which it does not.
 STANDSTILL, SHORT, STANDING, STANDSTILLS = 1e3, 1e-3, 1e-7, 300
+
+#: Lean [rad] from which blocks come back on joints and ground that carry them.
+LEAN = 1e-5
 
 #: Part of the viscosity at the start of a settlement; it grows as the memory of velocities fills.
 STARTING = 0.1
@@ -340,6 +343,23 @@ class Stepper:
                 break
             time = min(10.0 * time, STANDSTILL)
         return None
+
+    def is_stable(self, place: Place) -> bool:
+        """Whether joints and ground of given stiffness bring blocks back that lean a little about their supports."""
+        if not self.gives(place):
+            return True
+        positions, n, d = place.pose.positions, len(self.free), self.model.dimension
+        lean = np.append(np.zeros(d), np.full(self.model.n_dof - d, LEAN))[None]
+        about = Pose(positions[~self.free].mean(axis=0)[None], lean[:, d:])
+        turning = point_velocities(positions, np.zeros(n, dtype=np.int64), about, lean)
+        motion = np.column_stack([turning, np.repeat(lean[:, d:], n, axis=0)])
+        leaning = put_together(self.free, moved(place.pose, motion), place.pose)
+        still = self.standing(replace(place, pose=leaning))
+        if still is None:
+            return False
+        # Elsewhere they may lean and stand.
+        away = place.pose.movement_to(still.pose)[self.free]
+        return bool(np.abs(away).max() <= np.abs(motion[self.free]).max())
 
     def _solved(
         self,

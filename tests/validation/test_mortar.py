@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from structures import box, rectangle, wall
+from structures import box, brick, rectangle, wall
 
 import solver
 from blockvis import generators
@@ -591,3 +591,20 @@ def test_a_block_on_two_elastic_joints_tilts_as_on_springs(settlement):
     last = response.path[-1]
     assert -last.pose.rotations[2, 0] == pytest.approx(tilt, rel=0.01)
     assert last.reaction == pytest.approx(weight / 2.0 - spring * (settlement - tilt / 2.0), rel=3e-4)
+
+
+@pytest.mark.parametrize(("factor", "status"), [(0.95, "no initial equilibrium"), (1.05, "limit reached")])
+@pytest.mark.parametrize("n_drums", [1, 5])
+def test_a_tower_on_soft_ground_stands_as_long_as_it_is_stable(factor, status, n_drums):
+    """By hand it leans ever farther below k A b²/4 = W h/2; upright it is in equilibrium on any ground."""
+    height, weight = 10.0, 10.0 * 2000.0 * solver.GRAVITY
+    drums = [brick(-0.5, k * height / n_drums, 1.0, height / n_drums) for k in range(n_drums)]
+    roles = ["moving", *["free"] * n_drums]
+    names = ["ground", *(f"drum {k + 1}" for k in range(n_drums))]
+    outlines = [brick(-1.0, -1.0, 2.0, 1.0), *drums]
+    tower = solver.Assembly.from_outlines(outlines, names=names, roles=roles, density=2000.0)
+    springs = solver.Interfaces(solver.InterfaceLaw(0.6), ground={"ground": factor * 2.0 * weight * height})
+    sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.002, limit=0.004)
+    response = solver.settle(tower, sinks, interfaces=springs)
+    assert response.stop == status
+    assert ("no stable equilibrium" in response.message) is (factor < 1.0)
