@@ -120,28 +120,31 @@ def _unless_worse(
 ) -> tuple[tuple[Solid, ...], list[int]]:
     """Leave blocks as drawn that overlap more, and by more than ``near``, when they are faced, and tell which."""
     found, kept = tuple(moved), set[int]()
+    # Of a thin stone the same overlap would be all of it.
+    allowed = np.minimum(near, [WORSE * width_of(*solid) for solid in drawn])
     try:
-        after = _depths(found, names, near)
+        after = _depths(found, names, allowed)
     except ValueError:
         # Moved so far that a block is none any more.
         return tuple(drawn), list(range(len(drawn)))
-    before = _depths(drawn, names, near) if after else {}
+    before = _depths(drawn, names, allowed) if after else {}
     while True:
         # What has been moved of two blocks that now overlap more goes back, until nothing does.
-        worse = {i for pair, depth in after.items() if depth > (1.0 + ROUNDING) * before.get(pair, near) for i in pair}
+        worse = {i for pair, depth in after.items() if depth > (1.0 + ROUNDING) * before.get(pair, 0.0) for i in pair}
         worse = {i for i in worse - kept if moved[i] is not drawn[i]}
         if not worse:
             return found, sorted(kept)
         kept |= worse
         found = tuple(drawn[i] if i in kept else solid for i, solid in enumerate(moved))
-        after = _depths(found, names, near)
+        after = _depths(found, names, allowed)
 
 
-def _depths(solids: Sequence[Solid], names: Sequence[str], near: float) -> dict[tuple[int, int], float]:
-    """How deep [m] pairs of blocks overlap, by more than ``near``."""
+def _depths(solids: Sequence[Solid], names: Sequence[str], allowed: np.ndarray) -> dict[tuple[int, int], float]:
+    """How deep [m] pairs of blocks overlap, by more than is allowed (n_blocks,) of either."""
     assembly = solver.Assembly.from_solids(solids, names=names)
-    i, j, depth = assembly.shapes.overlaps(assembly.vertices, near)
-    return {(int(a), int(b)): float(d) for a, b, d in zip(i, j, depth, strict=True)}
+    i, j, depth = assembly.shapes.overlaps(assembly.vertices, float(allowed.min()))
+    deep = depth > np.minimum(allowed[i], allowed[j])
+    return {(int(a), int(b)): float(d) for a, b, d in zip(i[deep], j[deep], depth[deep], strict=True)}
 
 
 def _faces_of(solids: Sequence[Solid]) -> _Faces:
@@ -162,7 +165,35 @@ def _joints(faces: _Faces, near: float, exact: float) -> tuple[np.ndarray, np.nd
     one, other = _near_planes(faces, one[pair], other[pair], near, exact)
     gaps = np.array([_gap(faces, a, b) for a, b in zip(one.tolist(), other.tolist(), strict=True)], dtype=float)
     found = np.abs(gaps) <= near
+    one, other, gaps = one[found], other[found], gaps[found]
+    found = ~_apart_for_good(faces, one, other, gaps, exact)
     return one[found], other[found], gaps[found]
+
+
+def _apart_for_good(faces: _Faces, one: np.ndarray, other: np.ndarray, gaps: np.ndarray, exact: float) -> np.ndarray:
+    """(n,) bool array: pairs of faces that are no joint, as a thin stone lies between them or is one of the two."""
+    pairs = list(zip(one.tolist(), other.tolist(), gaps.tolist(), strict=True))
+    across: dict[int, dict[tuple[int, int], float]] = {}
+    for a, b, gap in pairs:
+        for k, far in ((a, b), (b, a)):
+            across.setdefault(k, {})[int(faces.block[far]), far] = abs(gap)
+    for_good = np.zeros(len(pairs), dtype=bool)
+    for n, (a, b, gap) in enumerate(pairs):
+        if gap > exact:
+            # Of a sheet both faces are nearer to these two than they are to each other.
+            beside = ({block: k for (block, k), off in across[end].items() if off < gap} for end in (a, b))
+            below, above = beside
+            for_good[n] = any(k != above.get(block, k) for block, k in below.items())
+        elif gap < -exact:
+            # Faces that look away from each other on both sides of a sheet seem to overlap by its thickness.
+            for_good[n] = -gap >= (1.0 - ROUNDING) * min(_thickness(faces, a), _thickness(faces, b))
+    return for_good
+
+
+def _thickness(faces: _Faces, face: int) -> float:
+    """How far [m] the block of a face reaches behind its plane."""
+    rings = (faces.rings[k] for k in np.flatnonzero(faces.block == faces.block[face]))
+    return float(max((faces.planes[face, 3] - ring @ faces.planes[face, :3]).max() for ring in rings))
 
 
 def _near_boxes(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray]:
@@ -260,13 +291,30 @@ def _flat_groups(
     def is_flat(group: list[int]) -> bool:
         if len(group) == 2:
             return True
-        plane = _common_plane(faces, group, _sides(faces, group))
+        sides = _sides(faces, group)
+        if holds_both_sides(group, sides):
+            return False
+        plane = _common_plane(faces, group, sides)
         return all(np.abs(faces.rings[k] @ plane[:3] - plane[3]).max() <= near for k in group)
+
+    def holds_both_sides(group: list[int], sides: np.ndarray) -> bool:
+        # A thin stone whose faces lay in one plane would be none any more.
+        blocks = faces.block[group]
+        return bool(np.intersect1d(blocks[sides > 0.0], blocks[sides < 0.0]).size)
+
+    def off(pair: tuple[int, int]) -> float:
+        a, b = pair
+        return float(np.abs(faces.rings[b] @ faces.planes[a, :3] - faces.planes[a, 3]).max())
 
     if is_flat(members):
         return [(members, _sides(faces, members))]
     groups: dict[int, list[int]] = {k: [k] for k in members}
-    for a, b in sorted(pairs, key=lambda pair: -min(faces.areas[pair[0]], faces.areas[pair[1]])):
+    if holds_both_sides(members, _sides(faces, members)):
+        # The joints above and below a thin stone are told apart by the faces that are nearest.
+        pairs = sorted(pairs, key=off)
+    else:
+        pairs = sorted(pairs, key=lambda pair: -min(faces.areas[pair[0]], faces.areas[pair[1]]))
+    for a, b in pairs:
         joined = groups[a] if groups[a] is groups[b] else groups[a] + groups[b]
         if is_flat(joined):
             groups |= dict.fromkeys(joined, joined)

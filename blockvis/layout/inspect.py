@@ -312,4 +312,14 @@ def _open_joints(assembly: solver.Assembly, width: float) -> list[tuple[int, int
     # What touches somewhere, or opens like a wedge, is no joint that was drawn open.
     found = (low > SMALLEST_JOINT * width) & (high < 2.0 * low) & (area > (0.3 * width) ** 2)
     gaps = [(int(i), int(j), float(gap)) for (i, j), gap in zip(pairs[found], high[found], strict=True)]
-    return sorted(gaps, key=lambda pair: -pair[2])
+    beside: dict[int, set[int]] = {}
+    for i, j in pairs.tolist():
+        beside.setdefault(i, set()).add(j)
+        beside.setdefault(j, set()).add(i)
+    # Stones that a sheet keeps apart have no joint with each other.
+    open_ones = (
+        (i, j, gap)
+        for i, j, gap in gaps
+        if not any(assembly.widths[k] <= (1.0 + 1e-6) * gap for k in beside[i] & beside[j])
+    )
+    return sorted(open_ones, key=lambda pair: -pair[2])

@@ -557,6 +557,45 @@ def test_exact_joints_stay_bit_for_bit(tmp_path):
     assert (read(tmp_path / "dome.json").vertices == layout_of(dome).points).all()
 
 
+SHEET = 0.003
+SHEETS = {
+    "one": [(0.5, 0.5, SHEET)],
+    "two on each other": [(0.5, 0.5, SHEET), (0.5, 0.5, SHEET)],
+    "wider than the stones": [(0.7, 0.7, SHEET)],
+    "under a part of the stone": [(0.5, 0.2, SHEET)],
+}
+
+
+@pytest.mark.parametrize("name", SHEETS)
+@pytest.mark.filterwarnings("error")
+def test_thin_sheets_between_thick_stones_stay_as_drawn(name, tmp_path):
+    """Lead, slate, damp-proof courses: the gap between the stones that they fill is no joint."""
+    solids, z = [box((-1, -1, -0.5), (1, 1, 0)), box((-0.5, -0.5, 0), (0.5, 0.5, 0.5))], 0.5
+    for x, y, thick in SHEETS[name]:
+        solids.append(box((-x, -y, z), (x, y, z + thick)))
+        z += thick
+    solids.append(box((-0.5, -0.5, z), (0.5, 0.5, z + 0.5)))
+    path = drawn(tmp_path / "a.json", solids, [f"stone {k}" for k in range(len(solids))])
+    assert (read(path).vertices == read_layout(path).points).all()
+    assert inspect(path).open_joints == ()
+
+
+def test_joints_of_sheets_stay_apart_where_others_are_faced(tmp_path):
+    """Columns side by side, their sheets not quite at one height, under stones with open beds."""
+    solids, names = [box((-2, -0.3, -0.5), (2, 0.3, 0))], ["ground"]
+    for k, z in enumerate((0.4, 0.4, 0.401, 0.4)):
+        x = k - 2
+        levels = {"low": (0, z), "sheet": (z, z + 0.002), "high": (z + 0.002, 0.8)}
+        solids += [box((x, -0.3, low), (x + 1, 0.3, high)) for low, high in levels.values()]
+        names += [f"{name} {k}" for name in levels]
+    solids += [box((-2, -0.3, 0.8024), (-1, 0.3, 1.1)), box((-1, -0.3, 0.8016), (2, 0.3, 1.1))]
+    path = drawn(tmp_path / "a.json", solids, [*names, "top left", "top"])
+    with pytest.warns(UserWarning, match=r"not plane, open by up to 0.0024 m \('high 0' and 'top left'\)"):
+        volumes = read(path).shapes.volumes
+    assert volumes[[2, 5, 8, 11]] == pytest.approx(0.002 * 0.6, rel=0.5)
+    assert not len(read(path).shapes.overlaps(read(path).vertices, 1e-5)[0])
+
+
 def test_what_is_moved_is_counted_and_named(tmp_path):
     stones = [box((0, 0, 0), (1, 1, 1)), box((0, 0, 1.004), (1, 1, 2)), box((0, 0, 1.998), (1, 1, 3))]
     path = drawn(tmp_path / "a.json", stones, ["low", "middle", "high"])
