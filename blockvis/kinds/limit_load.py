@@ -16,6 +16,7 @@ from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import collapse_phase, governing_limit, in_phase, unit_in
+from blockvis.results.other_mechanisms import has_others
 from blockvis.results.swinging import swing_factors, swung_increment
 from blockvis.results.tables import csv_text, finite
 from blockvis.text import force_text
@@ -207,7 +208,7 @@ class LimitLoadKind(AnalysisKind):
             mechanism = mechanics.mechanism_of(response.assembly, chosen) if chosen.velocity.any() else None
             summary["mechanism"] = None if mechanism is None else str(mechanism)
             if mechanism is not None:
-                summary |= _effective_mass(response, chosen, mechanism)
+                summary |= _effective_mass(response, chosen, mechanism, limit)
         if not response.parameter.is_path and len(response.limits) > 1:
             found = chosen is not None and np.isfinite(chosen.measured)
             summary["governing_position"] = chosen.parameter if chosen is not None and found else None
@@ -290,6 +291,8 @@ class LimitLoadKind(AnalysisKind):
         if (mass := said.get("effective_mass_share")) is not None:
             spectral = f"a spectral acceleration of {said['spectral_acceleration']:.6g} g"
             lines.append(f"effective mass       {mass:12.6g}     of what moves: {spectral}")
+            if "effective_mass_note" in said:
+                lines.append(f"note: {said['effective_mass_note']}")
         return lines
 
     def title(self, response: solver.Response) -> str:
@@ -386,12 +389,13 @@ def _capacity_at_without_settlement(case: Case) -> ValueError:
 
 
 def _effective_mass(
-    response: solver.Response, state: solver.Increment, mechanism: mechanics.Mechanism
-) -> dict[str, float]:
+    response: solver.Response, state: solver.Increment, mechanism: mechanics.Mechanism, limit: solver.LimitLoad | None
+) -> dict[str, Any]:
     """Part e* of the mass of what moves that takes part in the mechanism, and α/e* in g, under one acceleration alone.
 
     e* = (Σ P δ)² / (Σ P Σ P δ²) over macro-blocks of weight P whose centroids move by δ along the acceleration: Italian
-    Circolare 7/2019, C8.7.1.2.1.
+    Circolare 7/2019, C8.7.1.2.1. Where others than the mechanism that was found are as near, it is 1, which e* never
+    exceeds, and with a note why.
     """
     loads, assembly, d = response.loads_at(state), response.assembly, response.assembly.dimension
     if loads.live_acceleration is None:
@@ -411,7 +415,18 @@ def _effective_mass(
     if spread == 0.0:
         return {}
     share = float((weights * travel).sum() ** 2 / spread)
-    return {"effective_mass_share": share, "spectral_acceleration": state.load_multiplier * size / share}
+    found = {"effective_mass_share": share, "spectral_acceleration": state.load_multiplier * size / share}
+    if limit is None or limit.torsion != "points" or response.ties or not response.interfaces.dry:
+        return found
+    live, associative = loads.live_at(assembly, state.pose), limit.flow == FLOWS[0]
+    if share > 1.0 - 1e-9 or not has_others(assembly, state, live, fastest, associative=associative):
+        return found
+    return {
+        "effective_mass_share": 1.0,
+        "spectral_acceleration": state.load_multiplier * size,
+        "effective_mass_note": f"several mechanisms have this multiplier, and the one found, of effective mass "
+        f"{share:.6g}, need not be the least favourable; 1, which none exceeds, is on the safe side",
+    }
 
 
 def _stored(limit: solver.LimitLoad) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import case_from, pixels, rectangle, report_of, run_command
+from structures import box, case_from, pixels, rectangle, report_of, run_command
 
 import blockvis
 import solver
@@ -600,6 +600,7 @@ def test_effective_mass_of_a_portal_however_many_courses_its_columns_have(course
     column, lintel = 0.2, 1.6 * 0.3
     expected = (column + lintel) ** 2 / ((2.0 * column + lintel) * (0.5 * column + lintel))
     assert summary["effective_mass_share"] == pytest.approx(expected, rel=1e-6)
+    assert "effective_mass_note" not in summary
     assert summary["limit_load_multiplier"] == pytest.approx(0.2, rel=1e-6)
     assert summary["spectral_acceleration"] == pytest.approx(0.2 / expected, rel=1e-6)
     half = SIDEWAYS.replace("1.0", "0.5")
@@ -608,3 +609,40 @@ def test_effective_mass_of_a_portal_however_many_courses_its_columns_have(course
     assert summary["limit_load_multiplier"] == pytest.approx(0.4, rel=1e-6)
     assert summary["spectral_acceleration"] == pytest.approx(0.2 / expected, rel=1e-6)
     assert "effective_mass_share" not in solved(text + SIDEWAYS.replace("weight_fraction", "force"), tmp_path)[1]
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+def test_effective_mass_of_drums_that_may_slide_anywhere_is_on_the_safe_side(flow, tmp_path):
+    """All of them on their base at least: e* = 1, whatever mechanism is found."""
+    drums = [(0.0, 0.5 * k, 0.8, 0.5 * k + 0.5) for k in range(5)] + [(-1.0, -0.3, 2.0, 0.0)]
+    roles = ["free"] * 5 + ["fixed"]
+    solids = [box((x0, 0.0, z0), (x1, 0.8, z1)) for x0, z0, x1, z1 in drums]
+    assembly = solver.Assembly.from_solids(solids, roles=roles)
+    blockvis.save_layout(assembly, tmp_path / "drums.json")
+    case = '[geometry]\nfile = "drums.json"\n[material]\nfriction_coefficient = {}\n[analysis]\nkind = "limit load"\n'
+    case += f'flow = "{flow}"\n' + SIDEWAYS.replace("0.0]", "0.0, 0.0]")
+    _, summary = solved(case.format(0.1), tmp_path)
+    assert summary["limit_load_multiplier"] == pytest.approx(0.1)
+    assert summary["effective_mass_share"] == 1.0
+    assert summary["spectral_acceleration"] == pytest.approx(0.1)
+    assert "several mechanisms have this multiplier" in summary["effective_mass_note"]
+    # They rock as one in one way only.
+    _, summary = solved(case.format(0.9), tmp_path)
+    assert summary["effective_mass_share"] == pytest.approx(1.0)
+    assert "effective_mass_note" not in summary
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+@pytest.mark.parametrize("portals", [1, 2])
+def test_effective_mass_of_two_portals_alike_is_that_of_neither(portals, flow, tmp_path):
+    shapes = []
+    for x in (0.0, 3.0)[:portals]:
+        shapes += [rectangle(x, 0, x + 0.2, 1), rectangle(x + 1.2, 0, x + 1.4, 1), rectangle(x - 0.1, 1, x + 1.5, 1.3)]
+    roles = ["free"] * len(shapes) + ["fixed"]
+    blockvis.save_layout(
+        solver.Assembly.from_outlines([*shapes, rectangle(-1, -0.2, 6, 0)], roles=roles), tmp_path / "portals.json"
+    )
+    case = f'[geometry]\nfile = "portals.json"\n[analysis]\nkind = "limit load"\nflow = "{flow}"\n' + SIDEWAYS
+    _, summary = solved(case, tmp_path)
+    assert ("effective_mass_note" in summary) == (portals == 2)
+    assert summary["effective_mass_share"] == pytest.approx((0.905956, 1.0)[portals - 1], rel=1e-5)

@@ -1,0 +1,100 @@
+"""Whether a limit load has other mechanisms than the one that was found, at the same multiplier."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+import solver
+from solver import mechanics
+
+#: Points with less than this part of the largest force have none, and shear within it of its bound has reached it.
+CARRIES, USED_UP = 1e-7, 1e-5
+
+#: Relative velocities below this part of the fastest block's are none.
+STILL = 1e-6
+
+#: Of movements up to 1, those that are another mechanism; less is the tolerance of the program.
+ANOTHER = 1e-3
+
+#: Directions in which slip is free to begin at a point in space that has no force.
+DIRECTIONS = 8
+
+
+def has_others(
+    assembly: solver.Assembly, state: solver.Increment, live: np.ndarray, along: np.ndarray, *, associative: bool
+) -> bool:
+    """Whether dry joints let blocks move otherwise along a direction (d,), with the same forces and live power.
+
+    By complementarity every mechanism goes with every limit state of the forces: what presses and is not sheared to its
+    bound sticks, what is slides against the shear, what does not press may open. Mechanisms make a convex set, so that
+    another one lies next to the one found: a movement that may be added to it, without power of the live load,
+    (n_blocks, n_dof) [N, N·m]. Of random weights on the blocks one is seen by its sum, or by minus it.
+    """
+    from scipy.optimize import linprog
+
+    free, d = assembly.free, assembly.dimension
+    n_dof, length = state.velocity.shape[1], assembly.block_size
+    equal, least = _rows(assembly, state, associative)
+    moving = np.repeat(free, n_dof)
+    power = (live / _units(n_dof, d, length))[free].ravel()
+    equal = sp.vstack([equal[:, moving], sp.csr_array((power / (np.abs(power).max() or 1.0))[None])])
+    weights = np.zeros((int(free.sum()), n_dof))
+    weights[:, :d] = np.random.default_rng(0).uniform(0.5, 1.5, len(weights))[:, None] * along / np.linalg.norm(along)
+    for sign in (-1.0, 1.0):
+        found = linprog(
+            sign * weights.ravel(),
+            A_ub=-least[:, moving] if least.shape[0] else None,
+            b_ub=np.zeros(least.shape[0]) if least.shape[0] else None,
+            A_eq=equal,
+            b_eq=np.zeros(equal.shape[0]),
+            bounds=(-1.0, 1.0),
+        )
+        if found.status == 0 and -found.fun > ANOTHER:
+            return True
+    return False
+
+
+def _units(n_dof: int, d: int, length: float) -> np.ndarray:
+    """(n_dof,) array: by which loads are divided so that movements are those of rotations times a length [m]."""
+    return np.where(np.arange(n_dof) < d, 1.0, length)
+
+
+def _rows(assembly: solver.Assembly, state: solver.Increment, associative: bool) -> tuple[sp.csr_array, sp.csr_array]:
+    """Make the rows over movements, rotations times the block size, that are zero, and those that are at least that."""
+    forces, friction, contacts = state.forces, state.friction, state.contacts
+    n, d = forces.shape
+    relative = sp.csr_array(mechanics.wrench_matrix(contacts, state.pose, assembly.block_size).T)
+    scale = _units(state.velocity.shape[1], d, 1.0 / assembly.block_size)
+    velocity = (state.velocity / scale).ravel()
+    velocity = velocity / (np.abs(velocity).max() or 1.0)
+    moved = (relative @ velocity).reshape(n, d)
+    lift = friction if associative else np.zeros(n)
+    presses = forces[:, 0] > CARRIES * forces[:, 0].max(initial=0.0)
+    shear = np.linalg.norm(forces[:, 1:], axis=1)
+    used = presses & (friction > 0.0) & (shear >= friction * forces[:, 0] * (1.0 - USED_UP))
+    frictionless = presses & (friction == 0.0)
+    point = np.arange(n)
+    opening, slips = relative[d * point], [relative[d * point + k] for k in range(1, d)]
+
+    def along(which: np.ndarray, ways: np.ndarray) -> sp.csr_array:
+        return sum(sp.diags_array(ways[:, k]) @ slips[k][which] for k in range(d - 1))
+
+    stuck = np.repeat(presses & ~used & ~frictionless, d)
+    way = -forces[used, 1:] / shear[used, None]
+    slip = along(used, way)
+    equal = [relative[stuck], opening[frictionless], opening[used] - sp.diags_array(lift[used]) @ slip]
+    if d == 3:
+        equal.append(along(used, np.stack([-way[:, 1], way[:, 0]], axis=1)))
+    least = [slip[np.einsum("ij,ij->i", way, moved[used, 1:]) <= STILL]]
+    size = np.linalg.norm(moved[:, 1:], axis=1)
+    closed = ~presses & (moved[:, 0] - lift * size <= STILL)
+    slides = closed & (size > STILL)
+    least.append(opening[slides] - sp.diags_array(lift[slides]) @ along(slides, moved[slides, 1:] / size[slides, None]))
+    rests = closed & ~slides
+    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    ways = np.array([[-1.0], [1.0]]) if d == 2 else np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    for one in ways:
+        every = np.broadcast_to(one, (int(rests.sum()), d - 1))
+        least.append(opening[rests] - sp.diags_array(lift[rests]) @ along(rests, every))
+    return sp.csr_array(sp.vstack(equal)), sp.csr_array(sp.vstack(least))
