@@ -135,7 +135,9 @@ def _refuse_doubted_unit(case: Case, sketch: layout.Layout) -> None:
     page = sketch.unit_by == "page"
     better = units_instead(sketch.unit, size, page=page)
     if better:
-        remedy = f'give [geometry] unit = "{better[0]}", or unit = "{sketch.unit}" if it is right'
+        remedy = (
+            f'give the one it is drawn in, as [geometry] unit = "{better[0]}", or unit = "{sketch.unit}" if it is right'
+        )
         raise ValueError(f"{case.source}: '{case.file.name}': {doubt(sketch.unit, size, page=page, remedy=remedy)}")
 
 

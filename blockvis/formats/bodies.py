@@ -204,6 +204,11 @@ def with_z_up(points: np.ndarray) -> np.ndarray:
     return points[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
 
 
+def _in_space_too(reading: Reading) -> str:
+    """Add to a remedy what a view needs: alone it asks for the plane."""
+    return "" if reading.dimension == 3 else " and dimension = 3"
+
+
 def solids_of_bodies(found: Bodies, reading: Reading) -> Layout:
     """Make a layout in space of bodies of any shape.
 
@@ -211,8 +216,8 @@ def solids_of_bodies(found: Bodies, reading: Reading) -> Layout:
     """
     if not found.up and reading.view is None:
         raise ValueError(
-            'y is up in some of its files and z in others; export them alike, or give view = "xy" if y is '
-            'up in all of them, "xz" if z is'
+            'y is up in some of its files and z in others; export them alike, or give view = "xy"'
+            f'{_in_space_too(reading)} if y is up in all of them, "xz" if z is'
         )
     asked, view = _selected(found, reading), reading.view
     lying = found.up == "y" if view is None else view == "xy"
@@ -243,7 +248,8 @@ def solids_of_bodies(found: Bodies, reading: Reading) -> Layout:
     if found.up_says and view is None:
         taken = "its (x, y, z) were read as (x, -z, y)" if lying else "z was taken as up"
         said.append(
-            f'{found.up_says}: {taken}; give view = "{"xz" if lying else "xy"}" if {"z" if lying else "y"} is up'
+            f'{found.up_says}: {taken}; give view = "{"xz" if lying else "xy"}"{_in_space_too(reading)} if '
+            f"{'z' if lying else 'y'} is up"
         )
     layout = Layout(
         blocks=tuple(solids),

@@ -44,7 +44,7 @@ _WORDS = ("o", "g", "usemtl")
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read bodies or a flat mesh; .glb is in metres, .dae states its unit, the other formats state none."""
     suffix = path.suffix.lower()
-    drawn = {".dae": dae.drawn_in, ".obj": _obj}.get(suffix, _scene)(path)
+    drawn = {".dae": dae.drawn_in, ".obj": _obj, ".off": _off}.get(suffix, _scene)(path)
     size = _checked_size(drawn.bodies)
     if is_flat(np.concatenate([part.points for part in drawn.bodies])):
         flat = _flat(drawn.bodies, path, reading.view)
@@ -151,6 +151,25 @@ def _obj(path: Path) -> Bodies:
     if word == "o" and _distinct(rows) == [part.name for part in parts]:
         parts = [replace(part, said=row) for part, row in zip(parts, rows, strict=True)]
     return Bodies(parts, grouped=word != "o", notes=_inherited(objects))
+
+
+def _off(path: Path) -> Bodies:
+    """Read an .off file, whose faces may have any number of corners; colours and normals are not taken."""
+    data = path.read_bytes()
+    if re.match(rb"\s*(ST|C|N)*OFF[ \t]+BINARY", data):
+        return _scene(path)
+    lines = [words for line in data.decode("latin-1").splitlines() if (words := line.partition("#")[0].split())]
+    if lines and lines[0][0].endswith("OFF"):
+        # The counts may stand on the first line.
+        lines[0] = lines[0][1:]
+        lines = lines if lines[0] else lines[1:]
+    with parsing(".off"):
+        n, m = int(lines[0][0]), int(lines[0][1])
+        points = np.array([words[:3] for words in lines[1 : n + 1]], dtype=float).reshape(-1, 3)
+        faces = [[int(k) for k in words[1 : int(words[0]) + 1]] for words in lines[n + 1 : n + m + 1]]
+        if len(faces) < m or any(len(face) < int(words[0]) for face, words in zip(faces, lines[n + 1 :], strict=False)):
+            raise ValueError(f"it breaks off: {m} faces announced, {len(faces)} there")
+    return Bodies([Body(path.name, points, fans(faces))] if m else [])
 
 
 def _inherited(objects: dict[str, _Object]) -> list[Any]:

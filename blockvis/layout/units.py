@@ -136,11 +136,11 @@ def _masonry_units(size: float, rare: Sequence[str] = RARE) -> list[str]:
     return sorted(common, key=lambda unit: (unit not in METRIC, abs(np.log(made[unit] / USUAL))))
 
 
-def _would_make(units: Sequence[str], size: float) -> str:
-    """Say how large the likeliest of some units makes blocks of a size, and other metric ones that are as possible."""
+def _would_make(units: Sequence[str], size: float, rare: Sequence[str] = RARE) -> str:
+    """Say how large the likeliest of some units makes blocks of a size, and others, not rare, that are as possible."""
     first, *others = units
     said = [f"{first} would make it {size * metres_per(first):.3g} m"]
-    return ", ".join(said + [f"{unit} {size * metres_per(unit):.3g} m" for unit in others if unit not in (*RARE, "km")])
+    return ", ".join(said + [f"{unit} {size * metres_per(unit):.3g} m" for unit in others if unit not in (*rare, "km")])
 
 
 def units_instead(unit: str, size: float, *, page: bool = False) -> list[str]:
@@ -173,7 +173,7 @@ def doubt(
     size: float,
     *,
     page: bool = False,
-    remedy: str = 'say so under [geometry] unit = "{0}", or by --unit {1}',
+    remedy: str = 'give the one it is drawn in, as [geometry] unit = "{0}", or --unit {1}',
 ) -> str:
     """Doubt the unit of a drawing whose blocks are far larger or smaller than those of masonry.
 
@@ -192,4 +192,6 @@ def doubt(
         return f"{doubted}; no other unit makes it masonry"
     quoted = f'"{others[0]}"' if " " in others[0] else others[0]
     scaled = f"; is it drawn at a scale, as at 1:{SCALES[0]}?" if page and size < DOUBTED[0] else ";"
-    return f"{doubted}{scaled} {_would_make(others, size / metres_per(unit))}: {remedy.format(others[0], quoted)}"
+    # Inches are as likely where a file says no unit.
+    made = _would_make(others, size / metres_per(unit), ("dm", "ft"))
+    return f"{doubted}{scaled} {made}: {remedy.format(others[0], quoted)}"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from structures import fans, layout_of
+from structures import box, fans, layout_of
 
 from blockvis import generators, read, read_layout, write_layout
 
@@ -382,3 +382,31 @@ def test_nodes_around_those_of_stones_are_groups(tmp_path):
     nodes[5] |= {"mesh": 0, "translation": [2, 0, 0]}
     layout = read_layout(glb(tmp_path / "a.glb", nodes, [0]))
     assert (layout.names, layout.groups, layout.roles) == (("a", "b"), ("deep", "wall"), ("fixed", ""))
+
+
+@pytest.mark.parametrize("head", ["OFF\n# two stones\n16 12 0\n", "OFF 16 12 0\n", "COFF\n\n16 12 24\n"])
+def test_off_files_may_have_faces_of_any_number_of_corners(head, tmp_path):
+    lines, faces = [], []
+    for k, (points, rings) in enumerate((box((0, 0, 0), (1, 0.5, 0.4)), box((0, 0, 0.4), (0.6, 0.5, 0.8)))):
+        lines += [" ".join(map(str, point)) + "  255 0 0" * head.startswith("COFF") for point in points]
+        faces += [" ".join(str(v) for v in (len(ring), *(8 * k + i for i in ring))) + "  0.5 0.5 0.5" for ring in rings]
+    path = tmp_path / "a.off"
+    path.write_text(head + "\n".join([*lines, *faces]) + "\n", encoding="utf-8")
+    assert sorted(read_layout(path, dimension=3).volumes) == pytest.approx([0.12, 0.2])
+    path.write_text(head + "\n".join([*lines, *faces[:-1]]), encoding="utf-8")
+    with pytest.raises(ValueError, match="12 faces"):
+        read_layout(path)
+
+
+def test_a_view_that_a_note_proposes_for_blocks_in_space_names_the_dimension_that_it_needs(tmp_path):
+    """Alone it asks for the plane, and was refused."""
+    stairs = [box((k, 0, 0.2 * k), (k + 1.5, 1, 0.2 * k + 0.2)) for k in range(3)]
+    stairs += [box((0, 1, -0.2 - k), (0.5 + k, 2, 0)) for k in range(2)]
+    scene = trimesh.Scene()
+    for k, (points, faces) in enumerate(stairs):
+        scene.add_geometry(trimesh.Trimesh(points, fans(faces), process=False), node_name=f"{k}", geom_name=f"{k}")
+    scene.export(tmp_path / "a.glb")
+    note = next(note for note in read_layout(tmp_path / "a.glb").notes if "coordinates as they are" in note)
+    assert 'give view = "xy" and dimension = 3 if y is up' in note
+    assert read_layout(tmp_path / "a.glb", view="xy", dimension=3).n_blocks == 5
+    assert not any("and dimension" in note for note in read_layout(tmp_path / "a.glb", dimension=3).notes)

@@ -81,13 +81,13 @@ def test_no_unit_is_made_up_for_a_page_at_a_scale(tmp_path, capsys):
     (note,) = layout.notes
     assert "unit pt in doubt: it makes the median block 0.00775 m across; is it drawn at a scale, as at 1:50?" in note
     assert "50 pt would make it 0.387 m, 20 pt 0.155 m" in note
-    assert 'or by --unit "50 pt"' in note
+    assert 'or --unit "50 pt"' in note
     assert main(["new", str(drawing), "-o", str(tmp_path / "a.toml")], outputs=()) == 2
-    assert 'or by --unit "50 pt"' in capsys.readouterr().err
+    assert 'or --unit "50 pt"' in capsys.readouterr().err
     case = tmp_path / "b.toml"
     case.write_text('[geometry]\nfile = "a.svg"\n[settlement]\ndirection = [0, -1]\n', encoding="utf-8")
     assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 2
-    assert 'give [geometry] unit = "50 pt", or unit = "pt" if it is right' in capsys.readouterr().err
+    assert 'as [geometry] unit = "50 pt", or unit = "pt" if it is right' in capsys.readouterr().err
     assert read(drawing, unit="50 pt").areas == pytest.approx([0.15] * 4)
 
 

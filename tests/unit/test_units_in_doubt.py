@@ -39,8 +39,16 @@ def test_metres_are_doubted_too(tmp_path, factor, unit):
         (9.0, ""),
         (35.0, "cm would make it 0.35 m"),
         # Stones of half a metre in cm are no chips of 5 cm in mm; bricks in mm no stones of a metre in cm.
-        (49.9, 'cm would make it 0.499 m, mm 0.0499 m: say so under [geometry] unit = "cm"'),
-        (105.0, 'mm would make it 0.105 m, cm 1.05 m: say so under [geometry] unit = "mm"'),
+        (
+            49.9,
+            'cm would make it 0.499 m, mm 0.0499 m, in 1.27 m: give the one it is drawn in, as [geometry] unit = "cm"',
+        ),
+        (
+            105.0,
+            'mm would make it 0.105 m, cm 1.05 m, in 2.67 m: give the one it is drawn in, as [geometry] unit = "mm"',
+        ),
+        # A stair in inches.
+        (16.2, "cm would make it 0.162 m, in 0.411 m: give the one it is drawn in"),
     ],
 )
 def test_masonry_is_not_doubted(tmp_path, size, doubt):
@@ -154,7 +162,7 @@ def test_a_unit_in_doubt_stops_a_run_until_the_case_gives_one(tmp_path, capsys):
     assert main(["run", str(case), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
     assert "unit m in doubt: it makes the median block 131 m across; mm would make it 0.131 m" in said
-    assert 'give [geometry] unit = "mm", or unit = "m" if it is right' in said
+    assert 'give the one it is drawn in, as [geometry] unit = "mm", or unit = "m" if it is right' in said
     for unit, width in (("mm", 0.72), ("m", 720.0)):
         assembly = assembled(tmp_path, f"[geometry]\nfile = 'a.msh'\nunit = '{unit}'\n")
         assert np.ptp(assembly.vertices[assembly.vertices[:, 1] > -1.0, 0]) == pytest.approx(width)
@@ -202,3 +210,16 @@ def test_the_first_line_of_a_run_says_the_largest_block(capsys):
     assert _in_words(response, Path("out")).startswith(
         "2 blocks (1 free), 0.3 m wide, 0.4 m high, weight 2354.4 N, largest block 0.5 m across\n"
     )
+
+
+def test_a_speck_among_large_blocks_is_named_where_it_is_read_and_run(tmp_path, capsys):
+    stones = [[[0, 0], [1, 0], [1, 0.5], [0, 0.5]], [[0, 0.5], [1, 0.5], [1, 1], [0, 1]]]
+    speck = [[0.5, 1], [0.501, 1], [0.501, 1.001], [0.5, 1.001]]
+    path = drawn(tmp_path / "a.json", [np.array(ring) for ring in (*stones, speck)], ("low", "high", "speck"))
+    assert any("block 'speck' is 0.001 m across, 1/707 of the median" in note for note in read_layout(path).notes)
+    assert not any("governs the steps" in note for note in read_layout(path, ignore=("speck",)).notes)
+    case = tmp_path / "case.toml"
+    text = '[geometry]\nfile = "a.json"\n[roles]\nlow = "moving"\n[settlement]\ndirection = [0, -1]\nincrement = 0.01\n'
+    case.write_text(text + "limit = 0.01\n[output]\nanimation = false\n", encoding="utf-8")
+    assert main(["run", str(case), "--out", str(tmp_path / "out")]) == 0
+    assert "block 'speck' is 0.001 m across" in capsys.readouterr().err
