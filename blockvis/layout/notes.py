@@ -17,8 +17,11 @@ OF_UNITS = (UNIT, UNIT_CLASH, UNIT_TAKEN)
 #: A drawing that stands upright was turned into the plane of x and y.
 UPRIGHT = "upright"
 
-#: Kinds that change what is analysed.
-REPORTED = (LEFT_OUT, CHANGED, UNIT, UNIT_CLASH)
+#: A block is so much smaller than the others that it makes a run slow.
+SPECK = "speck"
+
+#: Kinds that change what is analysed, or how long that takes.
+REPORTED = (LEFT_OUT, CHANGED, UNIT, UNIT_CLASH, SPECK)
 
 
 class Note(str):

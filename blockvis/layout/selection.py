@@ -12,13 +12,14 @@ import numpy as np
 import shapely
 
 from blockvis.text import by_similarity
+from solver.mechanics import counted
 
 from .choice import KINDS, Choice, look_of
 from .crossings import uncrossed
 from .layout import Layout
 from .left_out import LeftOut, in_words, matches
 from .linked import linked
-from .notes import LEFT_OUT, UNIT, Note
+from .notes import LEFT_OUT, SPECK, UNIT, Note
 from .outlines import ring_area, ring_width
 from .unfilled import walls_to_fill
 from .units import doubt
@@ -26,6 +27,9 @@ from .window import within_window
 
 #: An outline with less area than this times its perimeter squared is a line: the solver takes no block of less.
 LINE = 1e-9
+
+#: Blocks smaller than this fraction of the median one govern the steps of a path.
+SPECK_SIZE = 0.01
 
 #: A sliver is narrower than this fraction of the width of the median block ...
 SLIVER_WIDTH = 2e-3
@@ -100,8 +104,22 @@ def noted(layout: Layout) -> Layout:
     size = float(np.median(layout.sizes))
     doubted = "" if layout.unit_by == "user" else doubt(layout.unit, size, page=layout.unit_by == "page")
     found = [Note(UNIT, words) for words in (doubted, _thickness_doubt(layout, size)) if words]
+    found += [Note(SPECK, words) for words in (_specks(layout, size),) if words]
     walls = [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]
     return replace(layout, notes=(*layout.notes, *walls, *in_words(layout.left_out), *found))
+
+
+def _specks(layout: Layout, median: float) -> str:
+    """Tell of blocks far smaller than the median one [m]; "" where there are none."""
+    small = np.flatnonzero(layout.sizes < SPECK_SIZE * median)
+    if not len(small):
+        return ""
+    i = int(small[layout.sizes[small].argmin()])
+    others = f" (and {counted(len(small) - 1, 'other')})" if len(small) > 1 else ""
+    return (
+        f"block '{layout.names[i]}' is {layout.sizes[i]:.3g} m across, 1/{median / layout.sizes[i]:.3g} of the median "
+        f"block{others}: it governs the steps of a path, which may be slow; leave it out (ignore) if it is debris"
+    )
 
 
 def _thickness_doubt(layout: Layout, median: float) -> str:
