@@ -52,7 +52,7 @@ def draw_cracks(
     increment = numbered(increments, number)
     joints = initial_joints(assembly)
     cracks = cracks_of(assembly, increment.pose, increment.fallen)
-    shown, hidden = cracks, 0
+    shown, hidden, cut_at = cracks, 0, list[str]()
     sheet = Sheet(size)
     if assembly.dimension == 2:
         if view is not None or section is not None:
@@ -73,7 +73,7 @@ def draw_cracks(
         shown = drawing.left_by_section(cracks)
         main = main_cracks(shown)
         picture = drawing.image(main, _numbers(main, cracks))
-        keys, pixel, slip, drawn = drawing.keys, drawing.pixel, drawing.slip, ""
+        keys, pixel, slip, drawn, cut_at = drawing.keys, drawing.pixel, drawing.slip, "", drawing.section
         hidden = len(drawing.hidden(shown))
     lost = loss_words(increment)
     none = f"no joint {'of what stands ' * bool(lost)}is open" + (
@@ -87,6 +87,7 @@ def draw_cracks(
     counts += [thickness + width_text(shown[0].width)] if shown else []
     counts += [f"joints slide by up to {width_text(slip)}{drawn}"] if slip else []
     counts += ["drawn on the layout"] if cracks or slip else []
+    counts += cut_at
     page = sheet.composed(
         picture,
         title=f"Cracks   ·   {state_text(increment, response)}",

@@ -20,7 +20,7 @@ from .drawer import MARGIN, WHOLE
 from .frame import Frame, Key, Sheet, framed, write_labels
 from .paired_scenes import PairedScenes
 from .sight_lines import SightLines
-from .solid_view import AROUND, View, heights_over, hiding_supports, plane_of, views_of
+from .solid_view import AROUND, View, heights_over, hiding_supports, plane_of, section_words, views_of
 from .swing import swing_of
 
 #: Widths between the classes are of these, times a power of ten [mm]; most classes; thinnest and thickest line in
@@ -56,8 +56,9 @@ class CracksInSpace:
         if cut is None and (sight is None or sight.azimuth is None):
             self._views = _showing(assembly, self._views, opened, main_cracks(cracks), increment.fallen)
         plane = plane_of(assembly, cut, self._views[0])
+        #: The section in words; none without one.
+        self.section = section_words(plane)
         self._opened = opened.chosen(heights_over(plane, opened.middles) >= 0.0)
-        self._joints_kept = joints.rings.ring[heights_over(plane, joints.rings.points) >= 0.0]
         moved = opening_and_slip(assembly, joints, increment.pose, increment.fallen)
         slides = np.isin(edges.joints, slid_joints(assembly, moved))
         self._slid = edges.chosen(slides & (heights_over(plane, edges.middles) >= 0.0))
@@ -88,7 +89,7 @@ class CracksInSpace:
 
     def left_by_section(self, cracks: Sequence[Crack]) -> list[Crack]:
         """Choose the cracks of which the section leaves something."""
-        return [crack for crack in cracks if np.isin(crack.joints, self._joints_kept).any()]
+        return [crack for crack in cracks if np.isin(crack.joints, self._opened.joints).any()]
 
     def hidden(self, cracks: Sequence[Crack]) -> list[Crack]:
         """Choose the cracks of which the views of the last image show nothing."""

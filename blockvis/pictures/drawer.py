@@ -34,7 +34,7 @@ from .marks import (
     thrust_line,
 )
 from .scene import OF_STATICS
-from .solid_view import View, heights_over, hiding_supports, into_sight, kept_blocks, plane_of, views_of
+from .solid_view import View, heights_over, hiding_supports, into_sight, kept_blocks, plane_of, section_words, views_of
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 from .ties import DASH, DrawnTies
 from .underlay import Underlay
@@ -359,7 +359,7 @@ class Drawer:
         return self.sheet.composed(
             picture,
             title=title or head,
-            detail=note or detail,
+            detail="   ·   ".join([note or detail, *section_words(self._plane)]),
             badge=(badge_of(self.response) if falling else FAILED_BADGE if failed else "") if badge is None else badge,
             keys=self._keys_drawn(increment),
             # A fall has few keys, and always the same.

@@ -152,9 +152,17 @@ class SolidScene(Scene):
         self._edges.points = self._traces.points = corners
         if self._shadow is not None:
             # Supports that reach below the ground throw theirs into it.
-            flat = np.array(corners)
-            flat[:, 2] = np.minimum(corners[:, 2], self._floor)
-            self._shadow.points = flat
+            flat, faces = corners, None
+            if self._cut is not None:
+                # What the section leaves out throws none: the halves that are left would seem to float.
+                left = self._surface.clip(normal=-self._cut[1], origin=self._cut[0]).triangulate()
+                flat, faces = left.points, left.faces
+            flat = np.array(flat)
+            flat[:, 2] = np.minimum(flat[:, 2], self._floor)
+            if faces is None:
+                self._shadow.points = flat
+            else:
+                self._shadow.copy_from(pv.PolyData(flat, faces=faces))
         if block_fill is not None:
             self._fill = block_fill
             self._surface.cell_data["colour"] = block_fill[self._faced]

@@ -140,6 +140,19 @@ def heights_over(plane: np.ndarray | None, points: np.ndarray) -> np.ndarray:
     return np.full(len(points), np.inf) if plane is None else np.asarray((points - plane[0]) @ plane[1])
 
 
+def section_words(plane: np.ndarray | None) -> list[str]:
+    """Name the plane of a section, as of :func:`plane_of`, for a caption; empty where there is none."""
+    if plane is None:
+        return []
+    point, normal = plane
+    axis = int(np.abs(normal).argmax())
+    if abs(normal[axis]) > 1.0 - 1e-9:
+        # No minus before a zero.
+        return [f"section {'xyz'[axis]} = {point[axis] + 0.0:.4g} m"]
+    place, towards = (", ".join(f"{x:.4g}" for x in np.round(vector, 9) + 0.0) for vector in (point, normal))
+    return [f"section through ({place}) m across ({towards})"]
+
+
 def kept_blocks(plane: np.ndarray | None, assembly: solver.Assembly, pose: solver.Pose) -> np.ndarray:
     """(n_blocks,) bool array: blocks of which a section at a plane leaves something; all where there is none."""
     inside = heights_over(plane, mechanics.moved_vertices(assembly, pose)) > 0.0

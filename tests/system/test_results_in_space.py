@@ -430,6 +430,20 @@ def test_supports_that_go_beyond_the_picture_fade_there(tmp_path):
 
 
 @pytest.mark.slow
+def test_what_a_section_leaves_out_throws_no_shadow(tmp_path):
+    """Seen along the span: under a light from above shadows are as wide as the halves that are left."""
+    down = solver.Settlement(direction=(0, 0, -1), increment=0.1, limit=2.0)
+    response = solver.settle(piers_on_slabs(1.0, thick=0.2), down, friction_coefficient=0.2)
+    seen = {"view": {"azimuth": 0, "elevation": 20}, "section": {"normal": (0, 1, 0)}}
+    frames = animate(response, tmp_path / "frames", size=(960, 540), fps=2, seconds=1.0, **seen)
+    last = pixels(max(frames.iterdir()))[60:480]
+    blocks = np.flatnonzero((last.max(axis=2) < 120).sum(axis=0) > 1)
+    shadows = np.flatnonzero(alike(last, palette.SHADOW).sum(axis=0) > 1)
+    assert len(shadows) > 20
+    assert blocks.min() - 4 <= shadows.min() <= shadows.max() <= blocks.max() + 4
+
+
+@pytest.mark.slow
 def test_supports_reach_down_to_the_ground_of_a_fall_which_has_no_end(tmp_path):
     """A lintel slides off when the right slab has sunk by more than the left one is thick."""
     down = solver.Settlement(direction=(0, 0, -1), increment=0.1, limit=2.0)

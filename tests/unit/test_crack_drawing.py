@@ -105,6 +105,9 @@ def test_cracks_that_a_section_cuts_away_are_not_shown(tmp_path, monkeypatch):
         "2 cracks   ·   the widest 20 mm",
         "2 cracks, of which the section shows none   ·   drawn on the layout",
     ]
+    assert [detail.split("   ·   ")[-1] for detail in details] == [
+        f"section {plane} m" for plane in ("x = 1.5", "x = 1.5", "y = 0.5", "x = 0.5")
+    ]
 
 
 def test_labels_stand_at_the_widest_point_of_a_joint(monkeypatch):
