@@ -17,8 +17,8 @@ from .contents import Case
 class Plausible:
     """What a key may be in its unit, models of plaster, lead or rubber included, and what its value is else.
 
-    ``others`` are units in which it is given by mistake, the likeliest first, with the number of its own in each; a
-    number is doubted only where one of them makes it plausible.
+    ``others`` are units in which it is given by mistake, the likeliest first, with the number of its own in each and
+    the largest number that is likely in it; a number is doubted only where one of them makes it plausible.
     """
 
     unit: str
@@ -26,35 +26,37 @@ class Plausible:
     highest: float
     below: str
     above: str
-    others: tuple[tuple[str, float], ...]
+    others: tuple[tuple[str, float, float], ...]
 
     def doubt(self, value: float) -> str:
         """Doubt a value, and say what to give for it; empty where it is plausible."""
         if self.lowest <= value <= self.highest or value <= 0.0:
             return ""
-        for unit, factor in self.others:
-            if self.lowest <= factor * value <= self.highest:
+        for unit, factor, most in self.others:
+            if value <= most and self.lowest <= factor * value <= self.highest:
                 what = self.below if value < self.lowest else self.above
                 return f"{value:g} {self.unit} is {what}; if it is in {unit}, give {factor * value:.4g} {self.unit}"
         return ""
 
 
-_STRESS = (("MPa", 1e6),)
-_STIFFNESS = Plausible("Pa/m", 1e3, math.inf, "softer than foam", "", (("GPa/m, which is N/mm³", 1e9),))
+_STRESS = (("MPa", 1e6, math.inf),)
+_STIFFNESS = Plausible("Pa/m", 1e3, math.inf, "softer than foam", "", (("GPa/m, which is N/mm³", 1e9, math.inf),))
 
 #: Of each key what is plausible; a joint that holds 10 Pa bears half a millimetre of stone.
 PLAUSIBLE = {
-    "density": Plausible("kg/m³", 100.0, 12000.0, "lighter than masonry", "heavier than lead", (("t/m³", 1e3),
-        ("kN/m³", 1e3 / solver.GRAVITY), ("N/m³", 1.0 / solver.GRAVITY), ("g/m³", 1e-3))),
-    "unit_weight": Plausible("N/m³", 100.0, math.inf, "lighter than any fill", "", (("kN/m³", 1e3),)),
+    "density": Plausible("kg/m³", 100.0, 12000.0, "lighter than masonry", "heavier than lead", (("t/m³", 1e3, 8.0),
+        ("kN/m³", 1e3 / solver.GRAVITY, math.inf), ("N/m³", 1.0 / solver.GRAVITY, math.inf), ("g/m³", 1e-3, math.inf))),
+    "unit_weight": Plausible("N/m³", 100.0, math.inf, "lighter than any fill", "", (("kN/m³", 1e3, math.inf),)),
     "cohesion": Plausible("Pa", 10.0, math.inf, "next to nothing", "", _STRESS),
     "tensile_strength": Plausible("Pa", 10.0, math.inf, "next to nothing", "", _STRESS),
     "compressive_strength": Plausible("Pa", 1e3, math.inf, "weaker than any mortar", "", _STRESS),
     "normal_stiffness": _STIFFNESS,
     "shear_stiffness": _STIFFNESS,
-    "stiffness": Plausible("Pa/m", 1e3, math.inf, "softer than any ground", "", (("MPa/m, which is MN/m³", 1e6),)),
-    "modulus": Plausible("Pa", 3e5, 1.5e12, "softer than rubber", "", (("GPa", 1e9), ("MPa", 1e6))),
-    "area": Plausible("m²", 0.0, 10.0, "", "wider than any tie", (("mm²", 1e-6),)),
+    "stiffness": Plausible("Pa/m", 1e3, math.inf, "softer than any ground", "",
+        (("MPa/m, which is MN/m³", 1e6, math.inf),)),
+    "modulus": Plausible("Pa", 3e5, 1.5e12, "softer than rubber", "",
+        (("GPa", 1e9, math.inf), ("MPa", 1e6, math.inf))),
+    "area": Plausible("m²", 0.0, 10.0, "", "wider than any tie", (("mm²", 1e-6, math.inf),)),
 }  # fmt: skip
 
 

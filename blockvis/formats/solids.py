@@ -156,10 +156,11 @@ def _obj(path: Path) -> Bodies:
 def _off(path: Path) -> Bodies:
     """Read an .off file, whose faces may have any number of corners; colours and normals are not taken."""
     data = path.read_bytes()
-    if re.match(rb"\s*(ST|C|N)*OFF[ \t]+BINARY", data):
+    # Binary ones, and those of coordinates that are divided by a fourth or of another number.
+    if re.match(rb"\s*(ST|C|N)*((4n?|n)OFF|OFF[ \t]+BINARY)", data):
         return _scene(path)
     lines = [words for line in data.decode("latin-1").splitlines() if (words := line.partition("#")[0].split())]
-    if lines and lines[0][0].endswith("OFF"):
+    if lines and lines[0][0].upper().endswith("OFF"):
         # The counts may stand on the first line.
         lines[0] = lines[0][1:]
         lines = lines if lines[0] else lines[1:]

@@ -33,7 +33,7 @@ def has_others(
     """
     from scipy.optimize import linprog
 
-    free, d = assembly.free, assembly.dimension
+    free, d = assembly.free & ~state.fallen, assembly.dimension
     n_dof, length = state.velocity.shape[1], assembly.block_size
     equal, least = _rows(assembly, state, associative)
     moving = np.repeat(free, n_dof)

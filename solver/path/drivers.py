@@ -68,9 +68,12 @@ class SupportMotion(Driver):
         rate, vertices = self.rate(0.0), moved_vertices(assembly, start)
         near = find_contacts(assembly, vertices, assembly.block_size / 4.0)
         moved = [(near.points, near.block_a), (near.points, near.block_b)]
-        supports = np.flatnonzero(~assembly.free & np.isin(np.arange(assembly.n_blocks), [near.block_a, near.block_b]))
-        if len(supports) and rate[supports].any(axis=1).all():
-            # All blocks ride on them: the top of a tower goes far.
+        d, touched = assembly.dimension, np.isin(np.arange(assembly.n_blocks), [near.block_a, near.block_b])
+        supports = np.flatnonzero(~assembly.free & touched)
+        as_first = [point_velocities(start.positions[supports], supports[:1].repeat(len(supports)), start, rate)]
+        as_first.append(rate[supports[:1], d:].repeat(len(supports), axis=0))
+        if len(supports) and np.allclose(np.hstack(as_first), rate[supports]):
+            # All blocks ride on supports that move as one: the top of a tower goes far.
             riding = vertices[assembly.free[assembly.block_of_vertex]]
             moved.append((riding, np.full(len(riding), supports[0])))
         speeds = [np.linalg.norm(point_velocities(points, of, start, rate), axis=1) for points, of in moved]

@@ -241,7 +241,9 @@ class Path:
         if not bounds.in_equilibrium:
             yield (frame := next(self.fall.frames(place)))
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, frame.velocity))
-        if not self.stepper.is_stable(place):
+        # The control displacement would hold it.
+        unloaded = Stepper(replace(model, has_live=False), self.driver) if model.has_live else self.stepper
+        if place.multiplier == 0.0 and not unloaded.is_stable(place):
             yield self.reports.falling_increment(place, np.zeros_like(model.load))
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, UNSTABLE)
         # Without friction a program carries what its own check lets pass.

@@ -632,6 +632,7 @@ def test_effective_mass_of_drums_that_may_slide_anywhere_is_on_the_safe_side(flo
     assert "effective_mass_note" not in summary
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flow", ["associative", "non-associative"])
 @pytest.mark.parametrize("portals", [1, 2])
 def test_effective_mass_of_two_portals_alike_is_that_of_neither(portals, flow, tmp_path):

@@ -241,6 +241,7 @@ def test_the_film_goes_in_step(arch_results, other, tmp_path):
     assert [int(row[:half].max()) > 40 for row in change] == [True, True]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_compared_is_refused_in_one_line(arch_results, tmp_path, capsys):
     limit = solver.Structure(generators.arch(), friction_coefficient=2.0).limit_load(acceleration=(1, 0))
     standing = blockvis.write(limit.response, tmp_path / "limit")

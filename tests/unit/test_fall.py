@@ -187,6 +187,7 @@ def test_blocks_never_overlap_by_a_hundredth(structure):
         assert (deep < 0.01 * assembly.block_size).all(), fall.times[k]
 
 
+@pytest.mark.slow
 @EACH
 def test_blocks_come_to_rest_on_something(structure):
     response, fall = structure(), fallen(structure)
@@ -636,6 +637,7 @@ def test_a_block_in_the_air_falls_as_free_bodies_do():
     assert fell[0] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_energy_only_falls_and_all_comes_to_rest_without_overlap():
     engine = engine_of((1.0, 3.0, 0.5, 0.0, 2.0, 1.0))
     energies = [engine.energies.sum()]

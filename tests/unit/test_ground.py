@@ -364,6 +364,7 @@ def test_the_supports_that_a_drawing_has_move_by_sides(tmp_path, capsys, name, p
     assert len(values["roles"]) == moving
 
 
+@pytest.mark.slow
 def test_what_does_not_stand_is_named_with_its_cause_and_marked(tmp_path, capsys):
     hanging = [(3.0, 1.0), (3.4, 1.0), (3.4, 1.2), (3.0, 1.2)]
     drawing = drawn(tmp_path / "wall.json", [*wall([(0.0, 0.0)] * STONES), hanging])

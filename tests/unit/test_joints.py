@@ -29,6 +29,7 @@ import solver
 from solver import mechanics
 
 
+@pytest.mark.slow
 def test_a_block_that_slides_has_slip_and_one_that_rocks_has_opening():
     assembly, slid = stacked(shift=(0.2, 0.0))
     joint = posed(assembly, slid).joints()

@@ -154,6 +154,7 @@ def _stack(roles=("moving", "free", "free")):
     return solver.Assembly.from_outlines(outlines, names=["ground", "low", "top"], roles=roles)
 
 
+@pytest.mark.slow
 def test_laws_loads_and_changes_given_in_python_come_back(tmp_path):
     """The fall, the pictures and the capacity of what is reopened are those of what was written."""
     stack = _stack()

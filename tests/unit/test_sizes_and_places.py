@@ -116,7 +116,7 @@ def test_blocks_of_a_millimetre_and_of_a_hundred_metres_in_one_stack():
 
 @pytest.mark.parametrize(
     ("scale", "density", "words"),
-    [(1.0, 1e-13, "'crumb'"), (1e-3, 1.0, r"unit m in doubt: .*give \[geometry\] unit")],
+    [(1.0, 1e-13, "'crumb'"), (1e-3, 1.0, r"unit m in doubt: .*as \[geometry\] unit")],
 )
 def test_numbers_beyond_what_is_solved_are_named(tmp_path, scale, density, words):
     blocks = [

@@ -212,6 +212,7 @@ def test_the_first_line_of_a_run_says_the_largest_block(capsys):
     )
 
 
+@pytest.mark.slow
 def test_a_speck_among_large_blocks_is_named_where_it_is_read_and_run(tmp_path, capsys):
     stones = [[[0, 0], [1, 0], [1, 0.5], [0, 0.5]], [[0, 0.5], [1, 0.5], [1, 1], [0, 1]]]
     speck = [[0.5, 1], [0.501, 1], [0.501, 1.001], [0.5, 1.001]]
