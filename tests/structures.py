@@ -345,7 +345,7 @@ def parted(assembly: solver.Assembly, path: int, fall: int, settlement: float = 
     Forces are made up too, so that there are as many of them as in a real wall.
     """
     edge = assembly.vertices[assembly.free[assembly.block_of_vertex]].max(axis=0)
-    right = (assembly.centroids[:, 0] > 0.6 * edge[0] + 0.35 * assembly.centroids[:, 1]) & assembly.free
+    right = (assembly.centroids[:, 0] > 0.66 * edge[0] - 0.35 * assembly.centroids[:, 1]) & assembly.free
     random = np.random.default_rng(7)
     velocity = np.zeros((assembly.n_blocks, 3))
     velocity[right | assembly.moving, 1] = -1.0
@@ -360,7 +360,7 @@ def parted(assembly: solver.Assembly, path: int, fall: int, settlement: float = 
         contacts = mechanics.find_contacts(assembly, mechanics.moved_vertices(assembly, pose), 0.002)
         normal = np.where(np.abs(contacts.gaps) < 1e-3, (edge[1] - contacts.points[:, 1] + 0.1) * 1e3, 0.0)
         normal *= random.random(len(normal))
-        forces = np.stack([normal, 0.5 * normal * np.sign(random.random(len(normal)) - 0.5)], axis=1)
+        forces = np.stack([normal, 0.4 * normal], axis=1)
         apart = velocity[contacts.block_a, :2] - velocity[contacts.block_b, :2]
         increments.append(
             solver.Increment(

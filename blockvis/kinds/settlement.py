@@ -160,10 +160,10 @@ class SettlementKind(AnalysisKind):
             loss = loss_of(response)
             what = "Local loss" if loss is not None and loss.local else "Collapse"
             return f"{what} at a settlement of {response.collapse.displacement:.5g} {_unit_and_phase(response)}"
-        if response.losses and response.stop is solver.Status.LIMIT_REACHED:
-            first, lost = response.losses[0], sum(len(loss.blocks) for loss in response.losses)
+        if response.stop is solver.Status.LIMIT_REACHED and (losses := response.losses):
+            first, lost = losses[0], sum(len(loss.blocks) for loss in losses)
             place = f"{first.settlement:.5g} {unit_in(response, first.phase)}{in_phase(response, first.phase)}"
-            when = f"at a settlement of {place}" if len(response.losses) == 1 else f"from a settlement of {place} on"
+            when = f"at a settlement of {place}" if len(losses) == 1 else f"from a settlement of {place} on"
             return f"Part has fallen: {counted(lost, 'block')} {when}; the rest stands at the end"
         return {
             solver.Status.LIMIT_REACHED: "Standing at the end of the settlement",

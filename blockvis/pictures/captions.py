@@ -71,12 +71,16 @@ def new_motions(response: solver.Response) -> list[int]:
 
 def losses_along(response: solver.Response) -> list[tuple[int, float, int]]:
     """List where blocks are lost along a path: the row that first lacks them, the place on the axis, and how many."""
+    # What is lost stays lost, and reading all increments may take long.
+    if not np.isfinite(response.increments[-1].state.fell_at).any():
+        return []
     path, total, found = response.path, response.parameters, []
     per_length = parameter_unit(response)[0]
-    for k in range(1, len(path) if response.settlements else 0):
-        new = path[k].fallen & ~path[k - 1].fallen & ~path[k].removed
+    fell = [increment.state.fell_at for increment in path]
+    for k in range(1, len(path)):
+        new = np.isfinite(fell[k]) & (np.isnan(fell[k - 1]) if len(fell[k - 1]) else True)
         if new.any():
-            at = total[k] - path[k].parameter + float(path[k].state.fell_at[new].min())
+            at = total[k] - path[k].parameter + float(fell[k][new].min())
             found.append((k, per_length * float(np.clip(at, total[k - 1], total[k])), int(new.sum())))
     return found
 

@@ -384,8 +384,12 @@ def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, An
         phase = min(increment.phase, max(len(response.settlements) - 1, 0))
         caption = caption.replace("   ·   ", "  ·  ")
         told = {"caption": caption, "falling": frame.falling, "curve": frame.curve, "phase": phase}
-        lost = np.flatnonzero(increment.fallen & ~increment.removed).tolist()
-        frames.append(told | {"gone": np.flatnonzero(increment.fallen).tolist(), "lost": lost})
+        fell_at = increment.state.fell_at
+        lost = {
+            "gone": np.flatnonzero(~np.isnan(fell_at)).tolist(),
+            "lost": np.flatnonzero(np.isfinite(fell_at)).tolist(),
+        }
+        frames.append(told | lost)
     return frames
 
 

@@ -58,13 +58,13 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     Part -1 is at rest. The others are numbered from 0, the largest volume first. The contact points of two blocks that
     move together come apart, and their corners turn against each other, by next to nothing.
     """
+    # Read once: the arrays may be in a file.
+    increment = increment.with_arrays()
     n, (pairs, apart, slow) = assembly.n_blocks, joint_rates(assembly, increment)
     a, b = pairs[apart <= slow].T
     part = connected_components(sp.coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[1]
     # Corners, not centroids: a block may turn about its own centroid.
-    moves = motion_size(increment.velocity, assembly.block_size) > slow
-    # What gives on a support at rest does not move, however much that comes to over many joints.
-    moves &= assembly.free & ~np.isin(part, part[~assembly.free & ~moves])
+    moves = (motion_size(increment.velocity, assembly.block_size) > slow) & assembly.free
     volume = np.bincount(part, weights=assembly.shapes.volumes * moves)
     rank = np.argsort(np.argsort(-volume, kind="stable"))
     return np.where(moves, rank[part], -1)
@@ -98,6 +98,7 @@ def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
     where any does), and hinges where a point stays while the blocks turn against each other. A hinge may have no other
     point that opens: of a joint that is wide open already, only the corner it turns about is near enough to touch.
     """
+    increment = increment.with_arrays()
     parts = rigid_parts(assembly, increment)
     contacts, velocity, d = increment.contacts, increment.velocity, assembly.dimension
     count = int(parts.max(initial=-1)) + 1

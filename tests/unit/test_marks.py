@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from structures import (
     BENT,
     arch_response,
+    brick,
     dropped_brick,
-    parted,
     portal_response,
     rectangle,
     report_of,
@@ -260,10 +260,13 @@ def test_parts_swing_as_one_body():
     np.testing.assert_allclose(length, np.hypot(*(before[:, 1] - before[:, 0]).T).sum(), rtol=1e-2)
 
 
-def test_a_sinking_wall_is_one_part():
-    response = parted(wall(8, 6), 2, 0)
-    parts = mechanics.rigid_parts(response.assembly, response.increments[-1])
-    assert set(parts) == {-1, 0}
+def test_a_sinking_stack_is_one_part():
+    outlines = [brick(x, y, 1.0, 1.0) for x in (0.0, 1.5) for y in (-1.0, 0.0, 1.0)]
+    roles = ["fixed", "free", "free", "moving", "free", "free"]
+    stacks = solver.Assembly.from_outlines(outlines, roles=roles)
+    sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.01, limit=0.01)
+    for increment in solver.settle(stacks, sinks).path:
+        assert mechanics.rigid_parts(stacks, increment).tolist() == [-1, -1, -1, -1, 0, 0]
 
 
 def test_hatch_stays_inside_the_support():
