@@ -167,9 +167,13 @@ def _off(path: Path) -> Bodies:
     with parsing(".off"):
         n, m = int(lines[0][0]), int(lines[0][1])
         points = np.array([words[:3] for words in lines[1 : n + 1]], dtype=float).reshape(-1, 3)
-        faces = [[int(k) for k in words[1 : int(words[0]) + 1]] for words in lines[n + 1 : n + m + 1]]
-        if len(faces) < m or any(len(face) < int(words[0]) for face, words in zip(faces, lines[n + 1 :], strict=False)):
+        rows = lines[n + 1 : n + m + 1]
+        faces = [[int(k) for k in words[1 : int(words[0]) + 1]] for words in rows]
+        if len(faces) < m:
             raise ValueError(f"it breaks off: {m} faces announced, {len(faces)} there")
+        for k, (words, face) in enumerate(zip(rows, faces, strict=True), start=1):
+            if len(face) < int(words[0]):
+                raise ValueError(f"face {k} announces {words[0]} corners and has {len(face)}")
     return Bodies([Body(path.name, points, fans(faces))] if m else [])
 
 

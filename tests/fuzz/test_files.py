@@ -14,7 +14,7 @@ from blockvis.cli import main
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are set the way Linux has them")
 
 #: Of the hostile files those that hold a drawing all the same: what is hostile in them is not followed.
-HARMLESS = {"uses.svg": "1 block", "face.off": "1 block"}
+HARMLESS = {"uses.svg": "1 block"}
 
 
 @pytest.mark.slow
