@@ -611,6 +611,7 @@ def test_effective_mass_of_a_portal_however_many_courses_its_columns_have(course
     assert "effective_mass_share" not in solved(text + SIDEWAYS.replace("weight_fraction", "force"), tmp_path)[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flow", ["associative", "non-associative"])
 def test_effective_mass_of_drums_that_may_slide_anywhere_is_on_the_safe_side(flow, tmp_path):
     """All of them on their base at least: e* = 1, whatever mechanism is found."""

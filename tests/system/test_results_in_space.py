@@ -183,6 +183,7 @@ def test_slip_is_what_one_block_has_moved_along_another():
     assert joint.cell_data["area"][0] == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_results_come_back_bit_for_bit(tmp_path):
     response = vault_response()
     folder = blockvis.write(response, tmp_path / "out")

@@ -515,6 +515,7 @@ def test_where_nothing_falls_without_the_live_load_the_mechanism_is_that_of_the_
     assert response.collapse.mechanism[response.assembly.index("s5"), 0] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("beyond", "increment"),
     [(0.1, 0.02), *(pytest.param(*case, marks=pytest.mark.thorough) for case in ((0.1, 0.013), (0.1114, 0.02)))],

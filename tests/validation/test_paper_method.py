@@ -29,6 +29,7 @@ def opening():
     return generators.build("wall", {**size, "settling": [1.2, 2.4], "openings": [door]})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("increment", "error"), [(0.02, 3e-4), pytest.param(0.005, 1e-4, marks=pytest.mark.thorough)])
 def test_semicircular_arch_on_spreading_supports(increment, error):
     """Collapse at d/R = 0.14104982; thrust H/W 0.1771150 at first and 0.2420193 at last."""
