@@ -153,15 +153,21 @@ class Fall:
         # Where something is taken away at once the joints of what stays spring back first.
         place = self.relax(place, SPRUNG_BACK)[0] if at_once else place
         for largest in (2.0 * MECHANISM, *[0.2] * max(self.n_frames - 1, 0)):
-            frame = self.reports.falling_increment(start := place, total := np.zeros_like(self.model.load))
+            start, total, ends = place, np.zeros_like(self.model.load), False
             for moved, motion, _, _ in self.time_steps(start, largest):
                 place, total = moved, total + motion
-                frame = self.reports.falling_increment(start, total * self.model.lengths)
-                parted = joint_rates(self.model.assembly, frame)[1].max(initial=0.0) / self.model.length
                 # The first one shows the mechanism once joints have moved by more than they give.
-                if np.abs(total).max() > 0.1 or (largest < 0.1 and parted > MECHANISM):
-                    yield frame
+                ends = np.abs(total).max() > 0.1 or (largest < 0.1 and self._parted(start, total) > MECHANISM)
+                if ends:
                     break
-            else:
-                yield frame
+            yield self.reports.falling_increment(start, total * self.model.lengths)
+            if not ends:
                 return
+
+    def _parted(self, start: Place, motion: np.ndarray) -> float:
+        """How far a motion, (n_blocks, n_dof), parts the blocks of a joint at most, in block sizes."""
+        programs = self.stepper.programs
+        frame = self.reports.falling_increment(start, motion * self.model.lengths)
+        # Those since the last increment belong to the one that is told.
+        self.stepper.programs = programs
+        return float(joint_rates(self.model.assembly, frame)[1].max(initial=0.0)) / self.model.length
