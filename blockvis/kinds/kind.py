@@ -129,8 +129,6 @@ class AnalysisKind(ABC):
     parameter, measured : solver.mechanics.Quantity
     checkpoint : type
         Dataclass from which its increments go on; NoneType where they start again.
-    in_studies : bool
-        Whether studies repeat it.
     has_phases : bool
         Whether blocks and dead loads may change between its settlements.
     keys : tuple of Key
@@ -143,7 +141,6 @@ class AnalysisKind(ABC):
     parameter: mechanics.Quantity
     measured: mechanics.Quantity
     checkpoint: type[Any] = NoneType
-    in_studies: bool = False
     has_phases: bool = False
     keys: tuple[Key, ...] = ()
     sections: tuple[Section, ...] = ()
@@ -193,6 +190,11 @@ class AnalysisKind(ABC):
     def checked(self, case: Case) -> Case:
         """Check that the keys of a case of this kind fit together; returns the case, completed."""
         return case
+
+    @property
+    def capacity(self) -> mechanics.Quantity:
+        """At which value of what a structure collapses, as studies tell it."""
+        return self.parameter
 
     def course(self, case: Case) -> Course:
         """Say what the increments of a case run over and measure."""

@@ -163,6 +163,11 @@ class LimitLoadKind(AnalysisKind):
         stopping = [replace(phase, stops=stops) for phase, stops in zip(case.settlements, reached, strict=True)]
         return replace(case, settlements=tuple(stopping))
 
+    @property
+    def capacity(self) -> mechanics.Quantity:
+        """The load multiplier, also after settlements."""
+        return self.measured
+
     def course(self, case: Case) -> Course:
         """Run over the positions of a load that moves, else over the settlements of a case."""
         if any(load.positions for load in case.loads) or not case.settlements:

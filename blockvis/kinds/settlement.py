@@ -44,7 +44,6 @@ class SettlementKind(AnalysisKind):
     parameter = mechanics.SETTLEMENT
     measured = mechanics.REACTION
     checkpoint = mechanics.PathState
-    in_studies = True
     has_phases = True
     keys = (
         Key("range", TRUE_OR_FALSE, "Whether blockvis run follows a settlement again with friction, compliance of the "

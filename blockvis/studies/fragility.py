@@ -1,4 +1,4 @@
-"""Fragility: probability of collapse against settlement, from runs that collapsed and runs that did not."""
+"""Fragility: probability of collapse against settlement or load, from runs that collapsed and runs that did not."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from .sensitivity import outcome
+from .sensitivity import outcome, without_collapse
 from .study_folder import NO_RESULT, NOT_BUILT
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def fragility_of(table: pd.DataFrame) -> Fragility:
     is broken off there, one of which nothing is known at 0.
     """
     built = table[table["status"] != NOT_BUILT]
-    return fragility(outcome(built), built["collapse_displacement"].notna(), built["status"].isin(NO_RESULT))
+    return fragility(outcome(built), ~without_collapse(built), built["status"].isin(NO_RESULT))
 
 
 def fragility(settlement: ArrayLike, collapsed: ArrayLike, broken_off: ArrayLike = False) -> Fragility:

@@ -25,7 +25,7 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from .fragility import CONFIDENCE, Fragility, fragility_of
-from .sensitivity import Swing, first_order, independent_rows, outcome, swings, without_collapse
+from .sensitivity import Swing, capacity, first_order, independent_rows, outcome, swings, unit_of, without_collapse
 from .study_file import Study
 from .study_folder import NO_RESULT, NOT_BUILT, StudyFolder
 from .summary import classes_of, curve_name, ends_counted, is_sample, is_single
@@ -69,10 +69,10 @@ def draw_study(records: StudyFolder, table: pd.DataFrame) -> list[Path]:
 
 @plain_text
 def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draw the probability of collapse against the settlement, with its confidence band, as PNG, SVG or PDF."""
+    """Draw the probability of collapse against settlement or load, with its confidence band, as PNG, SVG or PDF."""
     rows = independent_rows(study, table)
     curve = fragility_of(rows)
-    factor, unit = _length(table)
+    factor, unit = _scale(study, table)
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     axes = figure.add_subplot()
     colour = palette.hexadecimal(palette.FORCE)
@@ -97,14 +97,14 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
             x = factor * at
             axes.plot([0.0, x, x], [share, share, 0.0], color="#7a7a7a", linewidth=0.9, dashes=(4, 3))
             axes.annotate(
-                f"{words} {by} {x:.3g} {unit}", (x, share), xytext=(6, -4), textcoords="offset points",
+                f"{words} {by} {_with_unit(x, unit)}", (x, share), xytext=(6, -4), textcoords="offset points",
                 va="top", fontsize=0.9 * TEXT, color="#4a4a4a",
             )  # fmt: skip
     axes.set_ylim(0.0, 1.02)
     # Where all runs collapsed nothing is to be seen beyond the last.
     all_fell = curve.n_stood == curve.n_broken_off == 0 and len(curve.settlement) > 0
     axes.set_xlim(0.0, 1.03 * factor * max(float(curve.settlement[-1]) if all_fell else curve.furthest, 1e-12))
-    axes.set_xlabel(f"settlement of the support [{unit}]", fontsize=TEXT)
+    axes.set_xlabel(_label(study.capacity.name, unit), fontsize=TEXT)
     axes.set_ylabel(curve_name(study), fontsize=TEXT)
     _plain_frame(axes)
     axes.legend(loc="upper left", frameon=False, fontsize=0.9 * TEXT)
@@ -114,9 +114,9 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
 
 @plain_text
 def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draw the swing of the collapse displacement with every parameter, and Sobol' indices beside it, if known."""
+    """Draw the swing of where runs collapse with every parameter, and Sobol' indices beside it, if known."""
     found, indices = swings(study, table)[:12], first_order(study, table)
-    factor, unit = _length(table)
+    factor, unit = _scale(study, table)
     names = list(dict.fromkeys([*(swing.name for swing in found), *indices]))
     figure = Figure(figsize=(10.0, 1.9 + 0.6 * len(names)), layout="constrained")
     ratios = (1.6, 1.0) if indices else (1.0,)
@@ -130,7 +130,7 @@ def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Pat
     left.set_ylim(len(names) - 0.4, -0.6)
     stood = int(without_collapse(table).sum())
     bound = f", at least: {counted(stood, 'run')} without collapse" if stood else ""
-    left.set_xlabel(f"mean collapse displacement [{unit}]{bound}", fontsize=TEXT)
+    left.set_xlabel(_label(f"mean {study.capacity.name} at collapse", unit) + bound, fontsize=TEXT)
     left.set_title("mean of the runs with the\nlowest and the highest values", **HEADING)
     for right in others:
         for place, name in enumerate(names):
@@ -178,8 +178,8 @@ def _draw_error(axes: Axes, at: float, place: int, error: float) -> None:
 
 @plain_text
 def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draw the collapse displacement of every run against the parameters with the largest swings, by mechanism."""
-    factor, unit = _length(table)
+    """Draw where every run collapses against the parameters with the largest swings, by mechanism."""
+    factor, unit = _scale(study, table)
     numeric = {p.name for p in study.parameters if p.numeric}
     names = [s.name for s in swings(study, table) if s.name in numeric][:PANELS] or ["run"]
     classes = classes_of(table)
@@ -207,7 +207,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
         if not (x % 1.0).any():
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         _plain_frame(axes)
-    panels[0].set_ylabel(f"collapse displacement [{unit}]", fontsize=TEXT)
+    panels[0].set_ylabel(_label(f"{study.capacity.name} at collapse", unit), fontsize=TEXT)
     # Where nothing ever stands all are 0.
     largest = float(np.nanmax(y)) or 1.0
     panels[0].set_ylim(-0.02 * largest, 1.06 * largest)
@@ -225,7 +225,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
 def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path) -> Path:
     """Draw one run of each mechanism found, the most frequent first."""
     classes = classes_of(table)
-    factor, unit = _length(table)
+    factor, unit = _scale(records.study, table)
     shown = [one for one in classes if records.shape_file(one).is_file()][:DRAWN]
     columns = min(3, max(1, len(shown)))
     rows = -(-len(shown) // columns) if shown else 1
@@ -240,11 +240,11 @@ def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path)
     for place, (one, shape) in enumerate(zip(shown, shapes, strict=True)):
         axes = panels[place]
         _draw_shape(axes, shape, frame.low, frame.high)
-        median = factor * float(table.loc[table["mechanism_class"] == one, "collapse_displacement"].median())
+        median = factor * float(capacity(table)[table["mechanism_class"] == one].median())
         number, part = classes[one], 100 * classes[one] / sum(classes.values())
         runs = counted(number, "run") + (f", {part:.3g} %" if is_sample(records.study) else "")
         share = float(table.loc[table["mechanism_class"] == one, "falling_share"].median())
-        title = f"{place + 1}: {runs}; median {median:.3g} {unit}"
+        title = f"{place + 1}: {runs}; median {_with_unit(median, unit)}"
         if not np.isnan(share):
             percent = f"{100 * share:.2g}" if share < 0.095 else f"{100 * share:.0f}"
             title += f"; {percent} % of the weight fall" + ", a local loss" * (share < LOCAL)
@@ -325,16 +325,23 @@ def runs_counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str
     if never:
         words.append(f"{never} never stood")
     if curve.n_stood:
-        words.append(f"{curve.n_stood} stood (up to {factor * curve.furthest:.3g} {unit})")
+        words.append(f"{curve.n_stood} stood (up to {_with_unit(factor * curve.furthest, unit)})")
     words.append(f"{curve.n_broken_off} without result")
     not_built = int((table["status"] == NOT_BUILT).sum())
     return ", ".join(words) + (f"; {not_built} not built are left out" if not_built else "")
 
 
-def _length(table: pd.DataFrame) -> tuple[float, str]:
-    """Factor and unit of the settlements: mm for lengths below 1 m."""
-    units = [u for u in table["unit"].unique().tolist() if u]
-    unit = units[0] if units else "m"
+def _label(words: str, unit: str) -> str:
+    return f"{words} [{unit}]" if unit else words
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.3g} {unit}".rstrip()
+
+
+def _scale(study: Study, table: pd.DataFrame) -> tuple[float, str]:
+    """Factor and unit of where runs collapse: mm for lengths below 1 m."""
+    unit = unit_of(study, table)
     largest = float(np.nanmax(np.append(outcome(table), 0.0)))
     return (1e3, "mm") if unit == "m" and largest < 1.0 else (1.0, unit)
 

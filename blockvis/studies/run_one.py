@@ -17,10 +17,11 @@ from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly
 from blockvis.dynamics.fall import falls_from, with_mechanism
 from blockvis.kinds.kind import AnalysisRun
+from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.frame import Frame
 from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
-from blockvis.results.about import collapse_phase, least_reaction, loss_in
+from blockvis.results.about import collapse_phase, governing_limit, least_reaction, loss_in
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.results.swinging import swing_factors
 from blockvis.runs.plan import planned
@@ -92,7 +93,8 @@ def _outcome(run: AnalysisRun, number: int, seconds: float | None) -> tuple[dict
     for increment in run.steps:
         falling = increment.status is solver.Status.FALLING
         if not falling:
-            kept = kept[:1]
+            # Each limit load belongs to an increment.
+            kept = kept if run.limits else kept[:1]
             n_path, n_programs = n_path + 1, n_programs + increment.programs
         kept.append(increment)
         # Of what falls the collapse is found already.
@@ -102,34 +104,40 @@ def _outcome(run: AnalysisRun, number: int, seconds: float | None) -> tuple[dict
             break
     response = run.response(kept, ending or run.steps.ending)
     found = _numbers(response) | {"increments": n_path, "programs": n_programs}
-    falls = with_mechanism(response) or falls_from(response)
-    if falls is None or "collapse_displacement" not in found:
+    state = with_mechanism(response) or (response.governing if response.limits else None)
+    state = state if state is not None and state.velocity.any() else falls_from(response)
+    if state is None or "bracket_low" not in found:
         return found, b""
     assembly = response.assembly
-    mechanism = mechanics.mechanism_of(assembly, falls)
+    mechanism = mechanics.mechanism_of(assembly, state)
     found |= {
-        "falling_share": loss_in(assembly, falls).share,
+        "falling_share": loss_in(assembly, state).share,
         "mechanism": str(mechanism),
         "mechanism_class": mechanism_class(mechanism),
         "macro_blocks": len(mechanism.motions),
         "hinges": len(mechanism.hinges),
         "sliding_joints": len(mechanism.sliding),
     }
-    settlement = response.settlements[collapse_phase(response) or 0]
-    return found, _shape(number, assembly, falls, mechanism, settlement, response.ties)
+    settlement = response.settlements[collapse_phase(response) or 0] if response.settlements else None
+    return found, _shape(number, assembly, state, mechanism, settlement, response.ties)
 
 
 def _numbers(response: solver.Response) -> dict[str, Any]:
     """Give what the table says of how a run ended; settlements count from the start of the first phase."""
     before = [0.0, *np.cumsum([s.limit for s in response.settlements])]
     path, collapse, assembly = response.path, response.collapse, response.assembly
+    told = KINDS[response.analysis].capacity
+    by_load, never_stood = told == response.measured, response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
     found: dict[str, Any] = {
         "status": str(response.stop),
         "message": response.message if collapse is None else "",
-        "unit": response.settlements[-1].unit,
-        "last_settlement": float(path[-1].settlement + before[path[-1].phase]) if path else 0.0,
+        "unit": told.unit and response.parameter.unit,
+        "last_settlement": float(path[-1].settlement + before[path[-1].phase])
+        if path and response.parameter.is_path
+        else 0.0,
         "initial_reaction": least_reaction(path[0]) if path else None,
         "collapse_reaction": None,
+        "load_multiplier": None,
         "total_weight": response.total_weight,
     }
     if path:
@@ -144,9 +152,21 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
         found |= {"collapse_displacement": (low + high) / 2.0, "bracket_low": low, "bracket_high": high}
         found["last_settlement"] = low
         found["collapse_reaction"] = float(path[-1].reaction if collapse.reaction is None else collapse.reaction)
-    elif response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
+    elif never_stood and not by_load:
         # It collapses before any settlement.
         found |= {"collapse_displacement": 0.0, "bracket_low": 0.0, "bracket_high": 0.0}
+    if by_load:
+        # What a settlement or its own weight brings down carries no live load.
+        limit = governing_limit(response) if collapse is None and not never_stood else None
+        low, high = (0.0, 0.0) if limit is None else limit.bounds
+        known = limit is None or limit.status is not solver.LimitStatus.NOT_CONVERGED
+        found["load_multiplier"] = (0.0 if limit is None else limit.multiplier) if known else None
+        if np.isfinite(high):
+            found |= {"bracket_low": low, "bracket_high": high}
+        if response.governing is not None:
+            found["last_reaction"] = float(response.governing.reaction)
+    elif response.control is not None and path:
+        found["load_multiplier"] = float(path[0].load_multiplier)
     return found
 
 
@@ -187,13 +207,13 @@ def _shape(
     assembly: solver.Assembly,
     falling: solver.Increment,
     mechanism: mechanics.Mechanism,
-    settlement: solver.Settlement,
+    settlement: solver.Settlement | None,
     ties: Sequence[solver.Tie],
 ) -> bytes:
     """Pack the blocks as the mechanism of the run with a number displaces them, for a small picture.
 
     Of blocks in space these are the faces that are seen, as they are seen. The arrows are where supports settle, and
-    which way.
+    which way, where there is a settlement.
     """
     free = assembly.free[assembly.block_of_vertex]
     at_rest = mechanics.moved_vertices(assembly, falling.pose)
@@ -203,14 +223,17 @@ def _shape(
     vertices, tied = mechanics.moved_vertices(assembly, moved), mechanics.tie_ends(ties, assembly, moved)
     if assembly.dimension == 2:
         low, high = at_rest[free].min(axis=0) - 0.15 * size, at_rest[free].max(axis=0) + 0.15 * size
-        _, places, directions = settlement_arrows(assembly, settlement, falling.pose, Frame(low, high))
+        seen: Frame | None = Frame(low, high)
         offsets, block = assembly.offsets, np.arange(assembly.n_blocks)
     else:
-        _, *arrows = settlement_arrows(assembly, settlement, falling.pose)
-        places, directions = (VIEW.projected(ends) for ends in arrows)
+        seen = None
         tied = VIEW.projected(tied.reshape(-1, 3)).reshape(-1, 2, 2)
         corners, offsets, block = _seen_faces(assembly, vertices)
         vertices, at_rest = (VIEW.projected(points[corners]) for points in (vertices, at_rest))
+    arrows = [np.zeros((0, assembly.dimension))] * 2
+    if settlement is not None:
+        _, *arrows = settlement_arrows(assembly, settlement, falling.pose, seen)
+    places, directions = arrows if assembly.dimension == 2 else (VIEW.projected(ends) for ends in arrows)
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,

@@ -1,4 +1,4 @@
-"""Sensitivity of the collapse displacement to the parameters of a study."""
+"""Sensitivity of where structures collapse to the parameters of a study."""
 
 from __future__ import annotations
 
@@ -42,18 +42,35 @@ class Swing:
     at_least: tuple[bool, bool] = (False, False)
 
 
-def outcome(table: pd.DataFrame) -> np.ndarray:
-    """(n_rows,) array [m or rad]: collapse displacement, or the last settlement of a run that did not collapse.
+def capacity(table: pd.DataFrame) -> pd.Series:
+    """(n_rows,) [m, rad or a number]: where a run collapsed, not a number where that is not known.
 
-    The latter is a lower bound of the collapse displacement, 0 where nothing is known. It is nan of what was not built.
+    It is the load multiplier of limit loads, which alone have no unit, infinite where none brings a run down; else the
+    displacement.
     """
-    least = table["last_settlement"].fillna(0.0).where(table["status"] != NOT_BUILT)
-    return table["collapse_displacement"].fillna(least).to_numpy(dtype=float)
+    return table["collapse_displacement"].where(table["unit"] != "", table["load_multiplier"])
+
+
+def outcome(table: pd.DataFrame) -> np.ndarray:
+    """(n_rows,) array [m, rad or a number]: where a run collapsed, or how far one that did not was followed.
+
+    The latter is a lower bound: 0 where nothing is known, the largest multiplier of all where none brings it down. It
+    is nan of what was not built.
+    """
+    found = capacity(table).to_numpy(dtype=float)
+    most = float(found[np.isfinite(found)].max(initial=0.0))
+    least = table["last_settlement"].fillna(0.0).where(table["status"] != NOT_BUILT).to_numpy(dtype=float)
+    return np.where(np.isnan(found), least, np.minimum(found, most))
+
+
+def unit_of(study: Study, table: pd.DataFrame) -> str:
+    """Give the unit of where runs collapse: empty for load multipliers, rad where supports turn, else m."""
+    return next((unit for unit in table["unit"].unique().tolist() if unit), study.capacity.unit)
 
 
 def without_collapse(table: pd.DataFrame) -> np.ndarray:
     """(n_rows,) bool array: runs that did not collapse as far as they were followed."""
-    return np.asarray(table["collapse_displacement"].isna() & (table["status"] != NOT_BUILT), dtype=bool)
+    return np.asarray(~np.isfinite(capacity(table)) & (table["status"] != NOT_BUILT), dtype=bool)
 
 
 def independent_rows(study: Study, table: pd.DataFrame) -> pd.DataFrame:

@@ -21,7 +21,7 @@ from blockvis.cases.toml_table import Table, shortened
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kinds import KINDS
-from solver.mechanics import counted
+from solver.mechanics import Quantity, counted
 
 from . import study_keys as keys
 from .sampling import Design, designed
@@ -30,7 +30,8 @@ from .sampling import Design, designed
 RESERVED = (
     "run", "status", "collapse_displacement", "bracket_low", "bracket_high", "last_settlement", "unit",
     "mechanism_class", "mechanism", "macro_blocks", "hinges", "sliding_joints", "initial_reaction",
-    "collapse_reaction", "last_reaction", "largest_opening", "total_weight", "falling_share", "lost_share",
+    "collapse_reaction", "last_reaction", "load_multiplier", "largest_opening", "total_weight", "falling_share",
+    "lost_share",
     "increments", "programs", "seconds", "seed", "message",
 )  # fmt: skip
 
@@ -97,6 +98,11 @@ class Study:
             return designed(self.method, self.runs, levels, self.repeats, self.seed, scattered=self.n_seeded > 0)
         except ValueError as error:
             raise ValueError(f"{self.source}: [study] {error}") from None
+
+    @cached_property
+    def capacity(self) -> Quantity:
+        """At which value of what its runs collapse."""
+        return KINDS[case_of(self.values, self.case_source).analysis].capacity
 
     @property
     def n_runs(self) -> int:
@@ -207,17 +213,11 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
 
 def _check(study: Study, where: str) -> None:
     try:
-        base = case_of(study.values, study.case_source)
+        case_of(study.values, study.case_source)
     except ValueError as error:
         if study.n_seeded:
             raise ValueError(f"{where}with its [[imperfections]] behind those of the case, {error}") from None
         raise
-    if not KINDS[base.analysis].in_studies:
-        raise ValueError(
-            f"{base.source}: a study follows settlements, but [analysis] kind is '{base.analysis}'; leave it out, or "
-            f"vary the {base.analysis} in a loop, as blockvis run {base.source.name} --set "
-            "material.friction_coefficient=0.5 -o out-0.5"
-        )
     if study.method == "grid":
         _check_grid(study, where)
     drawn = next((p for p in study.parameters if p.points and study.method != "grid"), None)
@@ -275,13 +275,15 @@ def _check_runs(study: Study, where: str) -> None:
             case = case_of(study.values_of(run), study.case_source)
         except ValueError as error:
             raise ValueError(f"{where}{shown} is no case: {error}") from None
-        for number, settlement in enumerate(case.settlements, start=1):
-            first.setdefault(settlement.unit, f"settlement {number} of {shown}")
+        capacity = KINDS[case.analysis].capacity
+        units = [driver.unit for driver in KINDS[case.analysis].course(case).drivers] if capacity.unit else [""]
+        for number, unit in enumerate((f"in {unit}" if unit else "without unit" for unit in units), start=1):
+            first.setdefault(f"{capacity.name} {unit}", f"{capacity.name} {number} of {shown} is {unit}")
     if len(first) > 1:
-        told = " and ".join(f"{place} is in {unit}" for unit, place in sorted(first.items()))
+        told = " and ".join(place for _, place in sorted(first.items()))
         raise ValueError(
-            f"{where}a study tells the displacements of all its runs in one unit, but {told}; leave out those of one "
-            "unit, or make a study of each"
+            f"{where}a study tells by one number where all its runs collapse, but {told}; leave out those of one, or "
+            "make a study of each"
         )
 
 

@@ -14,7 +14,7 @@ from blockvis.text import rounded_text
 from solver.mechanics import counted
 
 from .fragility import fragility_of
-from .sensitivity import first_order, independent_rows, swings, without_collapse
+from .sensitivity import capacity, first_order, independent_rows, swings, unit_of, without_collapse
 from .study_file import Study
 from .study_folder import NO_RESULT, NOT_BUILT
 
@@ -58,7 +58,6 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     curve = fragility_of(independent_rows(study, table))
     without_result = table[table["status"].isin(NO_RESULT)]
     broken_off = without_result.loc[without_result["status"] != NOT_BUILT, "last_settlement"].fillna(0.0)
-    units = [u for u in table["unit"].unique().tolist() if u]
     reached = {str(p): curve.quantile(p) for p in (0.05, 0.5, 0.95)}
     at_the_end = [float(of[-1]) if len(of) else 0.0 for of in (curve.probability, curve.at_most)]
     return {
@@ -74,7 +73,8 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
         "status": {str(k): int(v) for k, v in table["status"].value_counts().items()},
         "curve": curve_name(study),
         "parameter": study.parameters[0].name if len(study.parameters) == 1 else "",
-        "unit": units[0] if units else "m",
+        "capacity": study.capacity.name,
+        "unit": unit_of(study, table),
         "quantiles": {p: first if first == last else None for p, (first, last) in reached.items()},
         "quantile_bounds": {p: list(ends) for p, ends in reached.items()},
         "probability_at_the_end": at_the_end[0],
@@ -107,8 +107,8 @@ def ends_counted(table: pd.DataFrame) -> dict[str, int]:
 
 
 def _line(name: str, table: pd.DataFrame) -> list[list[Any]]:
-    """List each value of the only parameter, the displacement where it collapsed, else None, and how the run ended."""
-    rows = zip(table[name].tolist(), table["collapse_displacement"].tolist(), table["status"].tolist(), strict=True)
+    """List each value of the only parameter, where it collapsed, else None, and how the run ended."""
+    rows = zip(table[name].tolist(), capacity(table).tolist(), table["status"].tolist(), strict=True)
     return [[value, at if status == solver.Status.COLLAPSED else None, status] for value, at, status in rows]
 
 
@@ -141,18 +141,22 @@ def _left_out_lines(summary: dict[str, Any]) -> list[str]:
     if number:
         lines.append(f"not built, and left out of what follows: {counted(number, 'run')}")
     if summary["broken_off_at"]:
-        far = " to ".join(dict.fromkeys(f"{at:.4g}" for at in summary["broken_off_at"]))
+        least, most = summary["broken_off_at"]
+        far = f"{least:.4g} to " * (f"{least:.4g}" != f"{most:.4g}") + _with_unit(most, summary)
         number = summary["n_without_result"] - number
         runs = f"{counted(number, 'run')} without result {'was' if number == 1 else 'were'}"
-        lines.append(f"{runs} left at {far} {summary['unit']}, and may collapse there or never")
+        lines.append(f"{runs} left at {far}, and may collapse there or never")
     return lines
 
 
 def _line_lines(summary: dict[str, Any]) -> list[str]:
-    unit = summary["unit"]
     ends = [
         f"{_value(value)}: "
-        + (f"{at:.4g} {unit}" if at is not None else f"{'not known' if status in NO_RESULT else 'none'} ({status})")
+        + (
+            _with_unit(at, summary)
+            if at is not None
+            else f"{'not known' if status in NO_RESULT else 'none'} ({status})"
+        )
         for value, at, status in summary["line"][:MOST_VALUES]
     ]
     if len(summary["line"]) > MOST_VALUES:
@@ -161,33 +165,41 @@ def _line_lines(summary: dict[str, Any]) -> list[str]:
 
 
 def _curve_lines(summary: dict[str, Any]) -> list[str]:
-    unit = summary["unit"]
     if summary["n_collapsed"] or summary["n_never_stood"] or summary["broken_off_at"]:
-        quantiles = [f"{100 * float(p):g} % {_reached(ends, unit)}" for p, ends in summary["quantile_bounds"].items()]
+        quantiles = [
+            f"{100 * float(p):g} % {_reached(ends, summary)}" for p, ends in summary["quantile_bounds"].items()
+        ]
         return [f"{summary['curve']}: {', '.join(quantiles)}"]
     if not summary["n_stood"]:
         return []
-    farther = (
-        "what each parameter does to a collapse is not known: let settlement.limit be larger; last reactions and "
-        "largest openings are in table.csv"
-    )
+    if not summary["unit"]:
+        return ["no load multiplier brings any run down: let a live load push what can move"]
+    far = _with_unit(summary["furthest_settlement"], summary)
+    # [settlement] and [control] are called as what they drive begins.
+    driver = summary["capacity"].split()[0]
     return [
-        f"no run collapsed as far as it was followed, at most {summary['furthest_settlement']:.4g} {unit}; {farther}"
+        f"no run collapsed as far as it was followed, at most {far}; what each parameter does to a collapse is not "
+        f"known: let {driver}.limit be larger; last reactions and largest openings are in table.csv"
     ]
 
 
-def _reached(ends: list[float | None], unit: str) -> str:
+def _reached(ends: list[float | None], summary: dict[str, Any]) -> str:
     """Write where a probability is reached at the first and at the last."""
     first, last = ends
     if first is None:
         return "not reached"
     if last is None:
-        return f"not before {first:.4g} {unit}"
-    return f"at {first:.4g} {unit}" if first == last else f"between {first:.4g} and {last:.4g} {unit}"
+        return f"not before {_with_unit(first, summary)}"
+    at = _with_unit(last, summary)
+    return f"at {at}" if first == last else f"between {first:.4g} and {at}"
+
+
+def _with_unit(value: float, summary: dict[str, Any]) -> str:
+    return f"{value:.4g} {summary['unit']}".rstrip()
 
 
 def _parameter_lines(summary: dict[str, Any]) -> list[str]:
-    lines, unit = [], summary["unit"]
+    lines = []
     shares = {
         name: f"{100 * share:.0f}{f' ± {100 * error:.0f}' if error else ''} % of the variance"
         for name, (share, error) in summary["first_order_indices"].items()
@@ -197,8 +209,8 @@ def _parameter_lines(summary: dict[str, Any]) -> list[str]:
         share = f", {shares.pop(name)}" if name in shares else ""
         least = ["at least " * bool(bound) for bound in swing["at_least"]]
         lines.append(
-            f"{name}: {least[0]}{low:.4g} {unit} on average at {_value(low_at)}, {least[1]}{high:.4g} {unit} at "
-            f"{_value(high_at)}{share}"
+            f"{name}: {least[0]}{_with_unit(low, summary)} on average at {_value(low_at)}, "
+            f"{least[1]}{_with_unit(high, summary)} at {_value(high_at)}{share}"
         )
     lines += [f"{name}: {share}" for name, share in shares.items()]
     if lines and summary["n_without_collapse"]:

@@ -21,10 +21,11 @@ import blockvis
 from blockvis.cli import main
 from blockvis.studies import campaign
 from blockvis.studies.fragility import fragility_of
-from blockvis.studies.pictures import draw_mechanisms
+from blockvis.studies.pictures import draw_mechanisms, draw_scatter
 from blockvis.studies.run_one import run_once
 from blockvis.studies.study_file import read_study
 from blockvis.studies.study_folder import StudyFolder, finished_runs
+from blockvis.studies.summary import in_words, summary_of
 
 #: A block 0.5 × 1 on a ground that tilts: it overturns at atan(0.5) or slides at atan(μ), whichever is first.
 TILT = {
@@ -83,6 +84,58 @@ def _made_here(study, folder, runs):
         records.add([run_once(study.values, str(study.case_source), study.order(run), study.n_seeded)])
     records.close()
     return records
+
+
+#: A block 0.5 × 1 that is pushed by a part of its weight: it overturns at 0.5 or slides at μ, whichever is less.
+PUSHED = {
+    "geometry": {"layout": "column", "parameters": {"blocks": 1, "width": 0.5, "block_height": 1.0}},
+    "analysis": {"kind": "limit load"},
+    "loads": [{"kind": "live", "weight_fraction": [1.0, 0.0]}],
+}
+
+
+def test_a_study_of_limit_loads_tells_load_multipliers(tmp_path):
+    given = {
+        "study": {"case": PUSHED, "method": "grid"},
+        "parameters": {"material.friction_coefficient": [0.2, 0.4, 0.8]},
+    }
+    study = read_study(given)
+    records = _made_here(study, tmp_path, range(3))
+    table = records.table()
+    np.testing.assert_allclose(table["load_multiplier"], [0.2, 0.4, 0.5], rtol=1e-6)
+    assert (table["bracket_low"] - table["bracket_high"]).abs().max() < 1e-6
+    assert table["collapse_displacement"].isna().all()
+    summary = summary_of(study, table)
+    assert (summary["capacity"], summary["unit"]) == ("load multiplier", "")
+    words = "collapse by material.friction_coefficient, 0.2: 0.2; 0.4: 0.4; 0.8: 0.5"
+    assert words in in_words(summary)
+    assert "load multiplier at collapse" in draw_scatter(study, table, tmp_path / "scatter.svg").read_text("utf-8")
+
+
+def test_where_no_load_brings_it_down_a_run_stands_beyond_all_others(tmp_path):
+    down = {"kind": "live", "weight_fraction": [0.0, -1.0]}
+    loads = [PUSHED["loads"], [down]]
+    study = read_study({"study": {"case": PUSHED, "method": "grid"}, "parameters": {"loads": loads}})
+    table = _made_here(study, tmp_path, range(2)).table()
+    assert table["status"].tolist() == ["collapsed", "limit reached"]
+    assert table["load_multiplier"].tolist() == [pytest.approx(0.5, rel=1e-6), np.inf]
+    curve = fragility_of(table)
+    assert (curve.n_stood, curve.probability.tolist()) == (1, [0.5])
+    assert "no load multiplier" in in_words(summary_of(study, table.tail(1)) | {"line": []})
+
+
+@pytest.mark.slow
+def test_a_study_of_pushovers_tells_where_the_capacity_is_lost(tmp_path):
+    pushed = PUSHED | {
+        "analysis": {"kind": "pushover"},
+        "control": {"block": "block 1", "direction": [1.0, 0.0], "increment": 0.05, "limit": 0.4},
+    }
+    given = {"study": {"case": pushed, "method": "grid"}, "parameters": {"material.friction_coefficient": [0.6, 0.8]}}
+    table = _made_here(read_study(given), tmp_path, range(2)).table()
+    # Its weight stands over its corner where its centroid has moved by half of its width.
+    np.testing.assert_allclose(table["collapse_displacement"], 0.25, rtol=1e-2)
+    np.testing.assert_allclose(table["load_multiplier"], 0.5, rtol=1e-3)
+    assert table["unit"].tolist() == ["m", "m"]
 
 
 @pytest.mark.thorough

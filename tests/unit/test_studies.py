@@ -260,7 +260,7 @@ def test_settlements_in_m_and_in_rad_are_no_study(study_file, capsys):
     message = capsys.readouterr().err
     assert "settlement 1 of run 0 (" in message
     assert ") is in m and settlement 2 of run 0 (" in message
-    assert ") is in rad; leave out those of one unit" in message
+    assert ") is in rad; leave out those of one" in message
 
 
 def test_runs_in_m_and_in_rad_are_no_study(study_file, capsys):
@@ -318,7 +318,9 @@ def test_an_unreachable_scheduler_is_one_message_and_nothing_started(study_file,
     assert not out.exists()
 
 
-@pytest.mark.parametrize(("name", "runs"), [("arch_friction", 256), ("panel_settlement_friction", 36)])
+@pytest.mark.parametrize(
+    ("name", "runs"), [("arch_friction", 256), ("panel_settlement_friction", 36), ("wall_acceleration", 40)]
+)
 def test_shipped_studies_are_studies(name, runs):
     study = read_study(Path(__file__).parents[2] / "examples" / "studies" / f"{name}.toml")
     assert study.n_runs == runs
@@ -352,6 +354,7 @@ def _table(study, outcome, status=None):
             **{name: [p[name] for p in points] for name in points[0]},
             "collapse_displacement": outcome,
             "last_settlement": np.nan_to_num(outcome),
+            "load_multiplier": np.nan,
             "unit": "m",
             "mechanism_class": "1 part",
             "falling_share": 1.0,
@@ -760,10 +763,13 @@ def test_where_nothing_ever_stands_displacements_are_drawn_without_words_of_matp
         assert pictures.draw_scatter(study, table, tmp_path / "scatter.svg").is_file()
 
 
-def test_a_limit_load_is_no_case_of_a_study_and_the_way_is_told(study_file, capsys):
-    live = '[analysis]\nkind = "limit load"\n[[loads]]\nkind = "live"\nweight_fraction = [1, 0]\n'
+def test_kinds_that_collapse_at_other_numbers_are_no_study(study_file, capsys):
+    live = '[[loads]]\nkind = "live"\nweight_fraction = [1, 0]\n'
     (study_file.parent / "case.toml").write_text(CASE + live, encoding="utf-8")
+    study_file.write_text(
+        '[study]\ncase = "case.toml"\n[parameters]\n"analysis.kind" = ["settlement", "limit load"]\n', encoding="utf-8"
+    )
     assert main(["sweep", str(study_file), "-o", str(study_file.parent / "out")]) == 2
     said = capsys.readouterr().err
-    assert "a study follows settlements, but [analysis] kind is 'limit load'" in said
-    assert "blockvis run case.toml --set material.friction_coefficient=0.5" in said
+    assert re.search(r"load multiplier 1 of run \d+ \(analysis.kind = 'limit load'\) is without unit", said)
+    assert "(analysis.kind = 'settlement') is in m" in said
