@@ -9,9 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from solver import tolerances
 from solver.assembly import Assembly, find_contacts
 from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_matrices
 from solver.loads import Settlement, check_fits, check_steps, set_vectors
+from solver.program.model import Model
 from solver.words import make_plain
 
 
@@ -20,8 +22,6 @@ class Driver(ABC):
 
     #: Name of the parameter.
     what: str
-    #: Largest displacement that it prescribes, per unit of it.
-    lever = 1.0
     #: Message where the multiplier has to change its sign for the parameter to grow; none where supports drive.
     misdirected = ""
     #: Values that are reported, too.
@@ -47,6 +47,10 @@ class Driver(ABC):
     def rate(self, s: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity of the supports per unit of the parameter."""
 
+    def lever(self, model: Model) -> float:
+        """Largest displacement that it prescribes, per unit of it."""
+        return 1.0
+
     def control_displacement(self, pose: Pose) -> float:
         """Control displacement at a pose; 0 where supports drive."""
         return 0.0
@@ -64,20 +68,32 @@ class SupportMotion(Driver):
     def __init__(self, assembly: Assembly, phase: Settlement, start: Pose) -> None:
         super().__init__(assembly, phase, start)
         self.phase, self.stops = phase, phase.stops
-        # Where blocks are near it: how deep a support is drawn counts for nothing.
-        rate, vertices = self.rate(0.0), moved_vertices(assembly, start)
-        near = find_contacts(assembly, vertices, assembly.block_size / 4.0)
-        moved = [(near.points, near.block_a), (near.points, near.block_b)]
-        d, touched = assembly.dimension, np.isin(np.arange(assembly.n_blocks), [near.block_a, near.block_b])
-        supports = np.flatnonzero(~assembly.free & touched)
-        as_first = [point_velocities(start.positions[supports], supports[:1].repeat(len(supports)), start, rate)]
-        as_first.append(rate[supports[:1], d:].repeat(len(supports), axis=0))
-        if len(supports) and np.allclose(np.hstack(as_first), rate[supports]):
-            # All blocks ride on supports that move as one: the top of a tower goes far.
-            riding = vertices[assembly.free[assembly.block_of_vertex]]
-            moved.append((riding, np.full(len(riding), supports[0])))
-        speeds = [np.linalg.norm(point_velocities(points, of, start, rate), axis=1) for points, of in moved]
-        self.lever = float(np.concatenate(speeds).max(initial=0.0)) or 1.0
+
+    def lever(self, model: Model) -> float:
+        """Of the supports, and of blocks that rest on such alone that move as one: the top of a tower goes far."""
+        assembly, start, rate = model.assembly, self.start, self.rate(0.0)
+        vertices, of, d = moved_vertices(assembly, start), assembly.block_of_vertex, assembly.dimension
+        near = model.standing(find_contacts(assembly, vertices, model.length / 4.0))
+        load = model.load[assembly.free, :d].sum(axis=0)
+        upward = near.frames[:, 0] @ -load
+        above, below = np.where(upward > 0.0, (near.block_a, near.block_b), (near.block_b, near.block_a))
+        # Head joints of a drawing are upright to less than a tenth.
+        rests = assembly.free[above] & (np.abs(upward) > 0.1 * np.linalg.norm(load))
+        rests &= near.gaps < tolerances.CLOSED * model.length
+        # Least and largest velocities, those at the origin, of all supports that a block rests on.
+        origin = Pose(np.zeros_like(start.positions), start.rotations)
+        twist = np.column_stack([point_velocities(origin.positions, np.arange(len(rate)), start, rate), rate[:, d:]])
+        least = np.where(assembly.free[:, None], np.inf, np.column_stack([twist, -twist]))
+        before = np.zeros_like(least)
+        while not np.array_equal(before, least):
+            before = least.copy()
+            np.minimum.at(least, above[rests], before[below[rests]])
+        twist, largest = least[:, : rate.shape[1]], -least[:, rate.shape[1] :]
+        riding = (assembly.free & np.isclose(twist, largest).all(axis=1))[of]
+        # Supports where blocks are near them: how deep they are drawn counts for nothing.
+        moved = [point_velocities(near.points, side, start, rate) for side in (near.block_a, near.block_b)]
+        moved.append(point_velocities(vertices[riding], of[riding], origin, twist))
+        return float(np.linalg.norm(np.concatenate(moved), axis=1).max(initial=0.0)) or 1.0
 
     def supports(self, s: float) -> Pose:
         """Of the settlement."""

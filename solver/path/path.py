@@ -149,7 +149,7 @@ class Path:
         if removed.any():
             fell_at = np.where(removed, -np.inf, state.fell_at if len(state.fell_at) else np.nan)
             self._remove_blocks(fell_at)
-            state = replace(state, fell_at=fell_at)
+            state = replace(state, fell_at=fell_at, step=FIRST_STEP * self.stepper.unit)
             self.reports.notes = [(0.0, self.reports.taken_away(removed, np.isnan(state.place.tie_lengths[:, 0])))]
         if ties:
             lengths = state.place.tie_lengths.copy()
