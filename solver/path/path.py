@@ -117,7 +117,7 @@ class Path:
         fell_at = np.zeros(0)
         if before is not None:
             # The equilibrium that was reported at its end: joints keep their forces, blocks not their velocity.
-            place, fell_at = replace(before.history[0], s=0.0, velocity=None, works=(0.0,) * 4), before.fell_at
+            place, fell_at = replace(before.history[0], s=0.0, velocity=None, works=(0.0,) * 5), before.fell_at
             self._remove_blocks(fell_at)
             place = self.stepper.members.installed(place, self.number)
         else:
@@ -403,7 +403,7 @@ class Path:
                 return self._go_back(state, new.s), None
             return replace(state, upper_bound=new.s, refined=True, step=length / 3.0), None
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
-        new = replace(new, s=s, works=tuple(np.add(place.works, works).tolist()))
+        new = replace(new, s=s, works=tuple(np.add(place.works, (*works, sum(map(abs, works)))).tolist()))
         history = (*state.history[:1], *state.history[1:][-5:], place)
         state = replace(state, place=new, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
@@ -474,18 +474,21 @@ class Path:
         return not self.model.has_live and bool(np.isneginf(self.checks.bounds(place).low))
 
     def _works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float, float]:
-        """Works of dead and live loads, on supports and of friction in a step, with the forces at its end."""
+        """Works of dead and live loads, on supports, by the mean of their forces, and of friction in a step."""
         model, contacts = self.model, after.contacts
         assert contacts is not None
         live, live_size = model.scaled_live(after.pose)
         free = model.assembly.free[:, None]
-        resultant = (wrench_matrix(contacts, after.pose, model.length) @ after.forces.ravel()).reshape(motion.shape)
+        on_supports = np.zeros(motion.size)
+        for place in (before, after):
+            if place.contacts is not None:
+                on_supports += wrench_matrix(place.contacts, place.pose, model.length) @ place.forces.ravel() / 2.0
         started, members = self.stepper.measured(contacts, before.pose, before.tie_lengths), is_member(contacts)
         slipped, closed = (contacts.slip - started.slip) / model.length, (contacts.gaps - started.gaps) / model.length
         return (
             float((model.scaled_load_at(after.pose) * free * motion).sum()),
             after.multiplier * live_size * float((live * free * motion).sum()),
-            float((np.where(free, 0.0, resultant) * motion).sum()),
+            float((np.where(free, 0.0, on_supports.reshape(motion.shape)) * motion).sum()),
             -float((after.forces[:, 1:] * slipped).sum() + (after.forces[:, 0] * closed)[members].sum()),
         )
 
