@@ -42,6 +42,9 @@ LIGHTEST = 1e-7
 #: A settlement that ends further than so many times the size of the structure is probably in mm.
 FARTHEST_LIMIT = 5.0
 
+#: Likewise a centre of rotation that is farther away.
+FARTHEST_CENTRE = 50.0
+
 #: Default of blocks for which neither file nor case has a value [m]; for density that of what is inspected.
 THICKNESS = 1.0
 
@@ -209,6 +212,13 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
             notes.append(
                 f"[settlement] {key} = {largest:g} m is {largest / size:.3g} times the {what}, {size:.3g} m: "
                 f"is it in mm? {1e-3 * largest:g} m"
+            )
+    middle = assembly.vertices.mean(axis=0)
+    for centre in {s.rotation_centre: None for s in case.settlements if s.rotation_centre is not None}:
+        if (away := float(np.linalg.norm(middle - centre)) / whole) > FARTHEST_CENTRE:
+            notes.append(
+                f"[settlement] rotation_centre = {list(centre)} m is {away:.3g} times the size of the structure, "
+                f"{whole:.3g} m, away from it: is it in mm? {[1e-3 * x for x in centre]} m"
             )
     for note in notes:
         if note:
