@@ -218,7 +218,7 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
         if (away := float(np.linalg.norm(middle - centre)) / whole) > FARTHEST_CENTRE:
             notes.append(
                 f"[settlement] rotation_centre = {list(centre)} m is {away:.3g} times the size of the structure, "
-                f"{whole:.3g} m, away from it: is it in mm? {[1e-3 * x for x in centre]} m"
+                f"{whole:.3g} m, away from it: is it in mm? [{', '.join(f'{1e-3 * x:g}' for x in centre)}] m"
             )
     for note in notes:
         if note:
