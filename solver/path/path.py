@@ -403,6 +403,8 @@ class Path:
                 return self._go_back(state, new.s), None
             return replace(state, upper_bound=new.s, refined=True, step=length / 3.0), None
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
+        # What supports took within a long step is nearer to the mean of the forces.
+        works = (*works[:2], (works[2] + self._work_on_supports(place, motion)) / 2.0, works[3])
         new = replace(new, s=s, works=tuple(np.add(place.works, (*works, sum(map(abs, works)))).tolist()))
         history = (*state.history[:1], *state.history[1:][-5:], place)
         state = replace(state, place=new, step=self._next_step(state.step, length, measure), history=history)
@@ -474,23 +476,26 @@ class Path:
         return not self.model.has_live and bool(np.isneginf(self.checks.bounds(place).low))
 
     def _works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float, float]:
-        """Works of dead and live loads, on supports, by the mean of their forces, and of friction in a step."""
+        """Works of dead and live loads, on supports and of friction in a step, with the forces at its end."""
         model, contacts = self.model, after.contacts
         assert contacts is not None
         live, live_size = model.scaled_live(after.pose)
         free = model.assembly.free[:, None]
-        on_supports = np.zeros(motion.size)
-        for place in (before, after):
-            if place.contacts is not None:
-                on_supports += wrench_matrix(place.contacts, place.pose, model.length) @ place.forces.ravel() / 2.0
         started, members = self.stepper.measured(contacts, before.pose, before.tie_lengths), is_member(contacts)
         slipped, closed = (contacts.slip - started.slip) / model.length, (contacts.gaps - started.gaps) / model.length
         return (
             float((model.scaled_load_at(after.pose) * free * motion).sum()),
             after.multiplier * live_size * float((live * free * motion).sum()),
-            float((np.where(free, 0.0, on_supports.reshape(motion.shape)) * motion).sum()),
+            self._work_on_supports(after, motion),
             -float((after.forces[:, 1:] * slipped).sum() + (after.forces[:, 0] * closed)[members].sum()),
         )
+
+    def _work_on_supports(self, place: Place, motion: np.ndarray) -> float:
+        """Work of the forces at a place on supports in a motion."""
+        if place.contacts is None:
+            return 0.0
+        resultant = wrench_matrix(place.contacts, place.pose, self.model.length) @ place.forces.ravel()
+        return float((resultant.reshape(motion.shape) * motion)[~self.model.assembly.free].sum())
 
     def _continue_from(self, state: PathState, resting: Place) -> PathState:
         """Continue from the place where blocks came to rest."""
