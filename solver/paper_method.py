@@ -53,6 +53,7 @@ from solver.path.controls import Ending
 from solver.path.drivers import SupportMotion
 from solver.path.reports import no_equilibrium
 from solver.path.state import PathState, Place
+from solver.program.model import Model
 from solver.programs.problem import LinearProgram, SolveError, Unbounded
 from solver.programs.solve import solve_lp
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
@@ -195,7 +196,9 @@ class _Phase:
     def __init__(self, inputs: Inputs, phase: Settlement, number: int, start: Pose) -> None:
         self.inputs, self.assembly, self.phase, self.number = inputs, inputs[0], phase, number
         self.driver, self.start, self.programs = SupportMotion(inputs[0], phase, start), start, 0
-        self.length, movement = self.assembly.block_size, self.driver.lever * phase.increment
+        self.length = self.assembly.block_size
+        self.lever = self.driver.lever(Model(*inputs, self.length, 1.0))
+        movement = self.lever * phase.increment
         #: Largest gap [m] that one program may close, largest displacement [m] in it, largest gap [m] that may be left.
         self.reach = max(min(4.0 * movement, self.length / 2.0), self.length / 4.0)
         self.trust = max(self.length, 10.0 * movement)
@@ -224,7 +227,7 @@ class _Phase:
         contacts, rate = self.contacts(pose), self.driver.rate(s)
         gaps = np.column_stack([np.where(contacts.gaps > self.gap_left, np.inf, 0.0), np.zeros(len(contacts))])
         try:
-            solution = self.solve(pose, contacts, supports=rate, gaps=gaps, trust=UNBALANCED_COST * self.driver.lever)
+            solution = self.solve(pose, contacts, supports=rate, gaps=gaps, trust=UNBALANCED_COST * self.lever)
         except SupportsLocked:
             # No finite reaction belongs to this state, but forces in equilibrium do.
             solution = self.solve(pose, contacts, gaps=gaps)

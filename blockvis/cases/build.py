@@ -36,11 +36,14 @@ from .removals import gone_in, removed_blocks, removed_ties
 from .role_places import with_roles_by_place
 from .ties import check_layers, drawn_ties, ties_of, without_tie_lines
 
-#: The weight of a block lighter than this fraction of the whole may be lost in rounding errors of the other forces.
-LIGHTEST = 1e-14
+#: Fraction of the whole weight of which the forces on a block are known to a tenth: balance is exact to 5e-9 of it.
+LIGHTEST = 1e-7
 
 #: A settlement that ends further than so many times the size of the structure is probably in mm.
 FARTHEST_LIMIT = 5.0
+
+#: Likewise a centre of rotation that is farther away.
+FARTHEST_CENTRE = 50.0
 
 #: Default of blocks for which neither file nor case has a value [m]; for density that of what is inspected.
 THICKNESS = 1.0
@@ -154,14 +157,14 @@ def _refuse_unknown_materials(case: Case, assembly: solver.Assembly) -> None:
 
 
 def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
-    """Warn of blocks too light for double precision."""
+    """Warn of blocks too light beside the others."""
     weight = np.where(assembly.free, assembly.masses, 0.0)
     light = np.flatnonzero(assembly.free & (weight < LIGHTEST * weight.sum()))
     if len(light):
         warnings.warn(
             f"{source}: {counted(len(light), 'block weighs', 'blocks weigh')} less than {LIGHTEST:g} of the whole "
-            f"({assembly.listed(light, 6)}), less than rounding errors of the others, and may stay in the air; "
-            "remove what is so light, or check size and density",
+            f"({assembly.listed(light, 6)}), whose forces balance to 5e-9 of it, and may stay in the air, or collapse "
+            "elsewhere; check size and density, remove what is so light, or run what it is part of alone",
             stacklevel=3,
         )
 
@@ -209,6 +212,13 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
             notes.append(
                 f"[settlement] {key} = {largest:g} m is {largest / size:.3g} times the {what}, {size:.3g} m: "
                 f"is it in mm? {1e-3 * largest:g} m"
+            )
+    middle = assembly.vertices.mean(axis=0)
+    for centre in {s.rotation_centre: None for s in case.settlements if s.rotation_centre is not None}:
+        if (away := float(np.linalg.norm(middle - centre)) / whole) > FARTHEST_CENTRE:
+            notes.append(
+                f"[settlement] rotation_centre = {list(centre)} m is {away:.3g} times the size of the structure, "
+                f"{whole:.3g} m, away from it: is it in mm? [{', '.join(f'{1e-3 * x:g}' for x in centre)}] m"
             )
     for note in notes:
         if note:

@@ -143,6 +143,8 @@ class Progress:
         if not self._line.due:
             return
         measured, driver, part, where = self.course.measured, self._driver(increment.phase), None, ""
+        if driver is not None and measured.is_force:
+            measured = mechanics.reaction_to(driver.unit)
         what = f"{measured.name} {increment.measured:.5g} {measured.unit}".rstrip()
         if increment.status == solver.Status.FALLING:
             what = "falls"

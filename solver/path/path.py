@@ -117,7 +117,7 @@ class Path:
         fell_at = np.zeros(0)
         if before is not None:
             # The equilibrium that was reported at its end: joints keep their forces, blocks not their velocity.
-            place, fell_at = replace(before.history[0], s=0.0, velocity=None, works=(0.0,) * 4), before.fell_at
+            place, fell_at = replace(before.history[0], s=0.0, velocity=None, works=(0.0,) * 5), before.fell_at
             self._remove_blocks(fell_at)
             place = self.stepper.members.installed(place, self.number)
         else:
@@ -149,7 +149,7 @@ class Path:
         if removed.any():
             fell_at = np.where(removed, -np.inf, state.fell_at if len(state.fell_at) else np.nan)
             self._remove_blocks(fell_at)
-            state = replace(state, fell_at=fell_at)
+            state = replace(state, fell_at=fell_at, step=FIRST_STEP * self.stepper.unit)
             self.reports.notes = [(0.0, self.reports.taken_away(removed, np.isnan(state.place.tie_lengths[:, 0])))]
         if ties:
             lengths = state.place.tie_lengths.copy()
@@ -403,7 +403,9 @@ class Path:
                 return self._go_back(state, new.s), None
             return replace(state, upper_bound=new.s, refined=True, step=length / 3.0), None
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
-        new = replace(new, s=s, works=tuple(np.add(place.works, works).tolist()))
+        # What supports took within a long step is nearer to the mean of the forces.
+        works = (*works[:2], (works[2] + self._work_on_supports(place, motion)) / 2.0, works[3])
+        new = replace(new, s=s, works=tuple(np.add(place.works, (*works, sum(map(abs, works)))).tolist()))
         history = (*state.history[:1], *state.history[1:][-5:], place)
         state = replace(state, place=new, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
@@ -479,15 +481,21 @@ class Path:
         assert contacts is not None
         live, live_size = model.scaled_live(after.pose)
         free = model.assembly.free[:, None]
-        resultant = (wrench_matrix(contacts, after.pose, model.length) @ after.forces.ravel()).reshape(motion.shape)
         started, members = self.stepper.measured(contacts, before.pose, before.tie_lengths), is_member(contacts)
         slipped, closed = (contacts.slip - started.slip) / model.length, (contacts.gaps - started.gaps) / model.length
         return (
             float((model.scaled_load_at(after.pose) * free * motion).sum()),
             after.multiplier * live_size * float((live * free * motion).sum()),
-            float((np.where(free, 0.0, resultant) * motion).sum()),
+            self._work_on_supports(after, motion),
             -float((after.forces[:, 1:] * slipped).sum() + (after.forces[:, 0] * closed)[members].sum()),
         )
+
+    def _work_on_supports(self, place: Place, motion: np.ndarray) -> float:
+        """Work of the forces at a place on supports in a motion."""
+        if place.contacts is None:
+            return 0.0
+        resultant = wrench_matrix(place.contacts, place.pose, self.model.length) @ place.forces.ravel()
+        return float((resultant.reshape(motion.shape) * motion)[~self.model.assembly.free].sum())
 
     def _continue_from(self, state: PathState, resting: Place) -> PathState:
         """Continue from the place where blocks came to rest."""

@@ -33,9 +33,7 @@ class Reports:
         self.fell_at = fell_at
         self.overlapping: set[tuple[int, int]] = set()
 
-    def increment(
-        self, check: EquilibriumCheck, velocity: np.ndarray, works: tuple[float, float, float, float]
-    ) -> Increment:
+    def increment(self, check: EquilibriumCheck, velocity: np.ndarray, works: tuple[float, ...]) -> Increment:
         """The increment of an equilibrium and the movement that follows, with the notes since the last one."""
         model, place, contacts, bounds = self.model, check.place, check.contacts, check.bounds
         resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
@@ -56,7 +54,7 @@ class Reports:
             carrying_gap=carrying_gap(in_place, check.forces[between]),
             largest_penetration=max(largest_penetration(in_place), self._overlap(place)),
             duality_gap=bounds.gap,
-            energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
+            energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(works[4], 1e-12),
         )
         where = f"{self.driver.unit}{f' in phase {self.number + 1}' if self.number else ''}"
         notes, self.notes = tuple(f"at {s:.6g} {where}: {words}" for s, words in self.notes), []

@@ -24,8 +24,8 @@ class Place:
     followed: np.ndarray  #: (n_contacts,): normal forces of the friction bounds, B = μ times these
     multiplier: float = 0.0
     velocity: np.ndarray | None = None  #: (n_blocks, n_dof) [m, rad] per parameter, or time in a fall; None at rest
-    #: Of dead and live loads, on supports, and of friction and ties since the start of the phase.
-    works: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    #: Of dead and live loads, on supports, and of friction and ties since the start of the phase; sum of sizes by step.
+    works: tuple[float, ...] = (0.0,) * 5
     #: (n_ties, 2) [m]: when they were installed, nan where absent; and without force, nan where broken, too.
     tie_lengths: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     bonds: Bonds = field(default_factory=Bonds)  #: of the contact points, with those that are lost

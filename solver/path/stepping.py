@@ -139,7 +139,7 @@ class Stepper:
         across = 2.0 * np.maximum.reduceat(arms, assembly.shapes.offsets[:-1])
         turning = np.minimum(across[self.free] / model.length, 1.0)
         self._shares = np.column_stack([np.ones_like(turning)] * d + [turning] * (model.n_dof - d)).ravel()
-        self.unit = model.length / driver.lever
+        self.unit = model.length / driver.lever(model)
         self.programs = 0
         self._last: tuple[Pose, Contacts] | None = None
         support_motion = driver.rate(0.0)[assembly.moving, :d]

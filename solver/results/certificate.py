@@ -30,8 +30,8 @@ class Certificate:
     duality_gap : float
         Relative difference of the static and the kinematic value of the programs that bound the result.
     energy_residual : float
-        |works of dead and live loads - on the supports - of friction| / the sum of their sizes, since the start of the
-        phase: the energy that viscosity, compliance and steps dissipate. Not a number where no path led there.
+        |works of dead and live loads - on the supports - of friction| / the sum of their sizes in each step, since the
+        phase began: the energy that viscosity, compliance and steps dissipate. Not a number where no path led there.
     kinematic_violation : float
         max (μ |T(q)| - N(q), 0) / max |q| of the mechanism q of a limit load. Not a number where there is none.
     """

@@ -165,6 +165,14 @@ class Terminal(io.StringIO):
         return True
 
 
+def standing(phase=0):
+    """An increment in equilibrium at 0.05, with 7 of whatever is measured."""
+    nothing = np.zeros((0, 2))
+    state = mechanics.State(None, None, nothing, nothing, nothing, nothing, nothing)
+    certificate, status = solver.Certificate(), solver.Status.EQUILIBRIUM
+    return solver.Increment(0.05, 7.0, phase, 7.0, 7.0, certificate, status, 1, 0.1, state)
+
+
 @pytest.mark.parametrize(
     ("analysis", "extra", "line"),
     [
@@ -188,13 +196,23 @@ def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_pat
         text += '[control]\nblock = "block 1"\n'
     course = KINDS[analysis].course(case_from(text, tmp_path))
     stream = Terminal()
-    certificate = solver.Certificate()
-    nothing = np.zeros((0, 2))
-    state = mechanics.State(None, None, nothing, nothing, nothing, nothing, nothing)
-    standing = solver.Increment(0.05, 7.0, 0, 7.0, 7.0, certificate, solver.Status.EQUILIBRIUM, 1, 0.1, state)
     monkeypatch.setattr("sys.stderr", stream)
-    Progress(course, None).increment(standing)
+    Progress(course, None).increment(standing())
     assert f"] {line}" in stream.getvalue()
+
+
+def test_the_bar_of_several_settlements_has_the_unit_of_each(tmp_path, monkeypatch):
+    """The reaction to a second one that moved supports was told in N·m, after a first that turned them."""
+    turns = "[[settlement]]\nrotation_centre = [0, 0]\nrotation = 1\nlimit = 0.1\n"
+    text = '[geometry]\nlayout = "arch"\n' + turns + "[[settlement]]\ndirection = [0, -1]\nlimit = 0.1\n"
+    stream = Terminal()
+    monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
+    monkeypatch.setattr("sys.stderr", stream)
+    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), None)
+    for phase in (0, 1):
+        bar.increment(standing(phase))
+    assert "0.1 rad, reaction 7 N·m, 1 increment" in stream.getvalue()
+    assert "0.1 m, reaction 7 N, 2 increments" in stream.getvalue()
 
 
 def test_a_single_step_that_takes_long_is_told_too(tmp_path, monkeypatch):

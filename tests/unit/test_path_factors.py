@@ -15,7 +15,7 @@ def stepper(**factors):
     arch = build("arch", {"voussoirs": 6})
     model = mechanics.model_of(arch, solver.self_weight(arch), solver.Interfaces(), solver.Controls(**factors))
     to_the_right = np.tile([1.0, 0.0, 0.0], (arch.n_blocks, 1))
-    driver = SimpleNamespace(lever=arch.block_size, rate=lambda s: to_the_right)
+    driver = SimpleNamespace(lever=lambda model: arch.block_size, rate=lambda s: to_the_right)
     return mechanics.Stepper(model, driver), solver.Pose.initial(arch)
 
 
@@ -41,7 +41,9 @@ def test_motions_that_cancel_choose_no_direction():
 
     def largest(left, right):
         motions = np.array([[left, 0.0, 0.0], [right, 0.0, 0.0], [0.0, 0.0, 0.0]])
-        return np.abs(mechanics.Stepper(model, SimpleNamespace(lever=1.0, rate=lambda s: motions)).imperfection).max()
+        return np.abs(
+            mechanics.Stepper(model, SimpleNamespace(lever=lambda model: 1.0, rate=lambda s: motions)).imperfection
+        ).max()
 
     assert largest(-1.0, 1.0 + 1e-15) < 1e-12 * largest(1.0, 1.0)
 

@@ -80,6 +80,10 @@ COLUMN = '[geometry]\nlayout = "column"\n'
             "[settlement]\ndirection = [0, -1]\nincrement = 50\nlimit = 100",
             "increment = 50 m is .* times the size of the median block, .* m: is it in mm\\? 0.05 m",
         ),
+        (
+            "[settlement]\nrotation_centre = [800, -1500]\nincrement = 1e-4\nlimit = 1e-3",
+            r"rotation_centre = \[800.0, -1500.0\] m .* away from it: is it in mm\? \[0.8, -1.5\] m",
+        ),
     ],
 )
 def test_likely_unit_mistakes_are_named(tmp_path, keys, note):
