@@ -366,8 +366,8 @@ def check_steps(path: Any, what: str) -> None:
         value = getattr(path, name)
         if not (np.isfinite(value) and value > 0.0):
             raise ValueError(f"{what} {name} is {value:g}; it must be a positive number")
-    # Paths take parameters that differ by no more for the same.
-    if path.tolerance < (least := 1e-12 * path.limit):
+    # Paths take parameters that differ by no more for the same; none has the increments to come where the default does.
+    if path.tolerance < (least := min(1e-12 * path.limit, path.increment / 100.0)):
         part = f"less than 1e-12 of its limit of {path.limit:g}"
         raise ValueError(f"{what} tolerance is {path.tolerance:g}, {part}; give at least {1.1 * least:.2g}")
 

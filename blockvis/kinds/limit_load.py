@@ -421,16 +421,22 @@ def _effective_mass(
         return {}
     share = float((weights * travel).sum() ** 2 / spread)
     found = {"effective_mass_share": share, "spectral_acceleration": state.load_multiplier * size / share}
-    if limit is None or limit.torsion != "points" or response.ties or not response.interfaces.dry:
+    if share > 1.0 - 1e-9 or limit is None:
         return found
     live, associative = loads.live_at(assembly, state.pose), limit.flow == FLOWS[0]
-    if share > 1.0 - 1e-9 or not has_others(assembly, state, live, fastest, associative=associative):
+    if limit.torsion != TORSIONS[0]:
+        others = "whether other mechanisms have this multiplier is not known where torsion is uniform: that found"
+    elif response.settlements and any(law.bonds for law in response.interfaces.laws):
+        others = "whether other mechanisms have this multiplier is not known of mortar after a settlement: that found"
+    elif has_others(assembly, response.interfaces, response.ties, state, live, fastest, associative=associative):
+        others = "several mechanisms have this multiplier, and the one found"
+    else:
         return found
     return {
         "effective_mass_share": 1.0,
         "spectral_acceleration": state.load_multiplier * size,
-        "effective_mass_note": f"several mechanisms have this multiplier, and the one found, of effective mass "
-        f"{share:.6g}, need not be the least favourable; 1, which none exceeds, is on the safe side",
+        "effective_mass_note": f"{others}, of effective mass {share:.6g}, need not be the least favourable; 1, which "
+        "none exceeds, is on the safe side",
     }
 
 

@@ -24,6 +24,7 @@ from blockvis.results.about import (
     unit_in,
 )
 from blockvis.results.bearing import bearings
+from blockvis.results.tables import changes_told
 from blockvis.text import force_text
 from solver import mechanics
 from solver.mechanics import counted
@@ -115,7 +116,8 @@ class SettlementKind(AnalysisKind):
                 return f"{value:12.6g} N·m"
             return f"{value:12.6g} N   {value / weight:.6f} W"
 
-        lines = [f"loss: {note}" for note in losses_of(response)]
+        lines = [": ".join(told) for told in changes_told(response)]
+        lines += [f"loss: {note}" for note in losses_of(response)]
         if _method(response) == LINEAR_PROGRAM:
             lines.append("increments by linear program: reactions are the least that equilibrium allows")
         if path:
@@ -144,8 +146,6 @@ class SettlementKind(AnalysisKind):
             ]
             loss = loss_of(response)
             lines += [] if loss is None else [str(loss)]
-            if response.changes and high == 0.0:
-                lines.append(f"at once: {response.message.partition('; ')[0]}")
         elif len(path) > 1:
             last = path[-1]
             lines.append(f"last reaction        {reaction(last.reaction, last.phase)}")
@@ -180,7 +180,7 @@ class SettlementKind(AnalysisKind):
             over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
             return force_text(value, moment) + over
 
-        rows = [("loss", note) for note in losses_of(response)]
+        rows = [*changes_told(response), *(("loss", note) for note in losses_of(response))]
         if c is not None:
             place = _unit_and_phase(response)
             rows.append(("collapse displacement", f"{c.displacement:.6g} {place}"))

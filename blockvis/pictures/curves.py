@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw
 import solver
 from blockvis.results.about import about, collapse_phase, counts_text, in_phase, losing
 from blockvis.results.reaction_range import ReactionRange
-from blockvis.results.tables import removals
+from blockvis.results.tables import change_words
 from blockvis.results.ties import TieForceCurves, tie_force_curves
 from solver import mechanics
 
@@ -397,14 +397,7 @@ def _mark_phases(axes: Axes, response: solver.Response, letters: int) -> float:
         if path[k].phase == path[k - 1].phase:
             continue
         words = ["reaction along another motion"] * (k in others)
-        taken = int(path[k].removed.sum()) - int(path[k - 1].removed.sum())
-        if taken:
-            words.append(f"{mechanics.counted(taken, 'block')} taken away")
-        changes = [change for change in response.changes if change.phase == path[k].phase]
-        gone = [one["ties"] for one in removals(response) if one["phase"] == path[k].phase + 1]
-        words += [f"'{name}' taken away" for names in gone for name in names]
-        words += ["dead load changed"] * any(change.dead is not None for change in changes)
-        words += [f"'{tie.name}' installed" for tie in response.ties if tie.phase == path[k].phase + 1]
+        words += change_words(response, path[k].phase)
         axes.axvline(total[k - 1], color=GREY, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1)
         _word(axes, str(path[k].phase + 1), (total[k - 1], 1.0), (0, 2), AT, ha="center", **style)
         where = f"phase {path[k].phase + 1} from {total[k - 1]:.4g} {unit}"

@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from PIL import Image
 
 import solver
-from blockvis.dynamics.fall import Fall, fall_of, falls_from
+from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.layout.sights import Cut, Sight, read_cut, read_sight
-from blockvis.results.about import loss_of
+from blockvis.results.about import collapse_phase, loss_of
 from blockvis.results.increments import numbered
+from blockvis.results.tables import change_words
 from blockvis.system.atomic_files import atomic_file
 from solver import mechanics
 
@@ -222,13 +222,9 @@ def _mechanism_note(response: solver.Response, n: int) -> str:
 
 
 def _collapse_place(response: solver.Response, collapse: solver.Collapse) -> str:
-    """Say between which parameters a structure collapses; of what falls as a phase begins what was taken away there."""
-    falling = falls_from(response)
-    if collapse.reaction is None and falling is not None:
-        before = response.path[-1].removed if response.path else np.zeros(response.assembly.n_blocks, dtype=bool)
-        taken = np.flatnonzero(falling.removed & ~before)
-        away = [f"{response.assembly.listed(taken, 4)} taken away"] if len(taken) else []
-        return "   ·   ".join([*away, "falls before anything moves"])
+    """Say between which parameters a structure collapses; of what falls as a phase begins what changes there."""
+    if collapse.reaction is None:
+        return "   ·   ".join([*change_words(response, collapse_phase(response) or 0), "falls before anything moves"])
     factor, unit = parameter_unit(in_one_unit(response))
     low, high = (f"{factor * end:.{_digits(collapse.bracket)}g} {unit}" for end in collapse.bracket)
     return f"{collapse.lost} at {low}, none at {high}"

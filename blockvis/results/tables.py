@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.text import force_text
 from solver import mechanics
 
 from .about import collapse_mechanism, collapse_phase, least_reaction, loss_of, mechanism_text, unit_in
@@ -137,6 +138,27 @@ def removals(response: solver.Response) -> list[dict[str, Any]]:
                 }
             )
     return removed
+
+
+def change_words(response: solver.Response, phase: int) -> list[str]:
+    """Say what changes before a settlement, its number from 0: blocks and ties that go, dead loads, new ties."""
+    words, names = [], response.assembly.names
+    for one in removals(response):
+        if one["phase"] == phase + 1 and one["blocks"]:
+            listed = response.assembly.listed(np.flatnonzero(np.isin(names, one["blocks"])), 4)
+            many = "s" * (len(one["blocks"]) > 1)
+            words.append(f"block{many} {listed} taken away, {force_text(one['weight'])}")
+        if one["phase"] == phase + 1:
+            words += [f"'{name}' taken away" for name in one["ties"]]
+    words += ["dead load changed"] * any(of.phase == phase and of.dead is not None for of in response.changes)
+    return words + [f"'{tie.name}' installed" for tie in response.ties if phase and tie.phase == phase + 1]
+
+
+def changes_told(response: solver.Response) -> list[tuple[str, str]]:
+    """Say before which settlement what changes, of those that the path comes to."""
+    last = max([collapse_phase(response) or 0, *(i.phase for i in response.path[-1:])])
+    told = ((phase, ", ".join(change_words(response, phase))) for phase in range(last + 1))
+    return [(f"before settlement {phase + 1}", words) for phase, words in told if words]
 
 
 def _joint_counts(response: solver.Response) -> dict[str, int | None]:

@@ -627,16 +627,44 @@ def test_effective_mass_of_drums_that_may_slide_anywhere_is_on_the_safe_side(flo
     assert summary["effective_mass_share"] == 1.0
     assert summary["spectral_acceleration"] == pytest.approx(0.1)
     assert "several mechanisms have this multiplier" in summary["effective_mass_note"]
+    if flow == "associative":
+        _, summary = solved(case.format(0.1).replace("flow", 'torsion = "uniform"\nflow'), tmp_path)
+        assert summary["effective_mass_share"] == 1.0
+        assert "not known where torsion is uniform" in summary["effective_mass_note"]
     # They rock as one in one way only.
     _, summary = solved(case.format(0.9), tmp_path)
     assert summary["effective_mass_share"] == pytest.approx(1.0)
     assert "effective_mass_note" not in summary
 
 
+MORTAR = "[material]\ncohesion = 1e4\ntensile_strength = 5e3\n"
+CRUSHING = "[material]\ncompressive_strength = 1e6\n"
+BESIDE = '[[ties]]\nname = "t"\nfrom = [-0.05, 1.1]\nto = { fixed = [-0.8, 1.1] }\nstiffness = 1e6\n'
+PROP = BESIDE + 'kind = "prop"\n'
+YIELDS = BESIDE + "strength = 1.0\n"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("flow", ["associative", "non-associative"])
 @pytest.mark.parametrize("portals", [1, 2])
-def test_effective_mass_of_two_portals_alike_is_that_of_neither(portals, flow, tmp_path):
+@pytest.mark.parametrize("more", ["", MORTAR, CRUSHING, MORTAR + PROP])
+def test_effective_mass_of_two_portals_alike_is_that_of_neither(portals, flow, more, tmp_path):
+    """Joints with strength and props that hang slack let either go as dry ones do."""
+    _, summary = pushed_portals(portals, f'flow = "{flow}"\n' + more, tmp_path)
+    assert ("effective_mass_note" in summary) == (portals == 2)
+    assert summary["effective_mass_share"] == pytest.approx((0.905956, 1.0)[portals - 1], rel=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("tie", "several"), [(PROP, True), (BESIDE, False), (YIELDS, False)])
+def test_a_tie_that_holds_one_of_two_portals_leaves_the_other_as_the_only_one_to_go(tie, several, tmp_path):
+    _, summary = pushed_portals(2, tie, tmp_path)
+    assert ("effective_mass_note" in summary) == several
+    assert summary["effective_mass_share"] == pytest.approx(1.0 if several else 0.905956, rel=1e-5)
+
+
+def pushed_portals(portals, more, tmp_path):
+    """So many portals beside each other under a horizontal acceleration."""
     shapes = []
     for x in (0.0, 3.0)[:portals]:
         shapes += [rectangle(x, 0, x + 0.2, 1), rectangle(x + 1.2, 0, x + 1.4, 1), rectangle(x - 0.1, 1, x + 1.5, 1.3)]
@@ -644,7 +672,5 @@ def test_effective_mass_of_two_portals_alike_is_that_of_neither(portals, flow, t
     blockvis.save_layout(
         solver.Assembly.from_outlines([*shapes, rectangle(-1, -0.2, 6, 0)], roles=roles), tmp_path / "portals.json"
     )
-    case = f'[geometry]\nfile = "portals.json"\n[analysis]\nkind = "limit load"\nflow = "{flow}"\n' + SIDEWAYS
-    _, summary = solved(case, tmp_path)
-    assert ("effective_mass_note" in summary) == (portals == 2)
-    assert summary["effective_mass_share"] == pytest.approx((0.905956, 1.0)[portals - 1], rel=1e-5)
+    case = f'[geometry]\nfile = "portals.json"\n[analysis]\nkind = "limit load"\n{more}' + SIDEWAYS
+    return solved(case, tmp_path)

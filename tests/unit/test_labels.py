@@ -360,7 +360,10 @@ def test_the_mechanism_of_what_falls_as_a_stone_is_taken_away_names_stone_and_ph
     )
     (said,) = words
     assert said["title"] == "Settlement 0.00 mm"
-    assert "   'voussoir 3' taken away   ·   falls before anything moves   ·   2 moving parts   " in said["detail"]
+    assert (
+        "   block 'voussoir 3' taken away, 1.73 kN   ·   falls before anything moves   ·   2 moving parts   "
+        in said["detail"]
+    )
     assert said["detail"].endswith("50 % of the weight fall   ·   phase 2 of 2")
 
 

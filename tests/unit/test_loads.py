@@ -328,6 +328,7 @@ def test_a_tolerance_below_the_rounding_of_the_limit_is_refused(path):
     with pytest.raises(ValueError, match=said):
         path(tolerance=1e-17)
     assert path(tolerance=1.1e-12).tolerance == 1.1e-12
+    assert path(limit=1e12).tolerance == 1e-4, "a tolerance that nobody gave was refused"
 
 
 @pytest.mark.parametrize(

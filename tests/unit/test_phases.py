@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 from pathlib import Path
@@ -54,6 +55,22 @@ def test_what_a_prop_carried_goes_to_the_piers_when_it_is_taken_away() -> None:
     assert [name for name, gone in zip(structure.assembly.names, after.removed, strict=True) if gone] == ["prop"]
     assert response.losses == ()
     assert any("'prop' taken away before settlement 2" in note for note in response.notes)
+
+
+@pytest.mark.slow
+def test_what_changes_before_a_settlement_is_told_where_the_structure_falls_of_it() -> None:
+    """A tie goes, and a load pushes the load off: report and command line named neither."""
+    structure = beam_on_a_prop()
+    tie = solver.Tie("iron", (0, 4), ((0.0, 0.5), (0.0, 1.1)), 1e5)
+    structure = dataclasses.replace(structure, ties=[tie])
+    push = np.zeros((6, 3))
+    push[5, 0] = 2.0 * weight_above(structure)
+    change = solver.PhaseChange(1, dead=push, ties=("iron",))
+    response = structure.settle([DOWN, DOWN], changes=[change], controls=solver.Controls(falling_frames=1))
+    assert response.collapse is not None
+    page = report_of(response)
+    assert "before settlement 2" in page
+    assert "taken away, dead load changed" in page
 
 
 def test_what_has_been_taken_away_stays_where_it_was() -> None:
@@ -480,7 +497,7 @@ def test_what_falls_before_anything_moves_is_a_collapse_at_no_settlement(
     said, summary = run_told(tmp_path, ARCH + SPREADING + removed + ranged, capsys)
     assert "collapse displacement           0 m   between 0 and 0\n" in said
     assert "last reaction" not in said
-    assert "at once: block 'voussoir 3' taken away before settlement 1" in said
+    assert "before settlement 1: block 'voussoir 3' taken away, " in said
     assert (summary["status"], summary["collapse_displacement"]) == ("collapsed", 0.0)
     # Both neighbours of the stone fall, of the four that are left and weigh alike.
     assert summary["falling_share"] == pytest.approx(0.5)
