@@ -311,12 +311,7 @@ def _parser() -> argparse.ArgumentParser:
         "--joint-thickness", default="0", metavar="M", help='close mortar joints up to this, or "auto"'
     )
     convert.add_argument("--force", action="store_true", help="replace OUT if it is there already")
-    layout = _verb(
-        verbs,
-        _layout,
-        help="a parametric layout as a file",
-        add_help=False,
-    )
+    layout = _verb(verbs, _layout, help="a parametric layout as a file", add_help=False)
     layout.add_argument("-h", "--help", action=_LayoutHelp, help="show this help, or the parameters of NAME")
     layout.add_argument("name", metavar="NAME")
     layout.add_argument(

@@ -145,9 +145,7 @@ _LAYOUT = ValueKind(
 )
 _UNIT = ValueKind("text", {"anyOf": [{"enum": list(UNITS)}, {"type": "string"}]}, TEXT.read)
 _THICKNESS_OR_AUTO = ValueKind(
-    'number of at least 0, or "auto"',
-    {"anyOf": [NOT_NEGATIVE.schema, {"const": "auto"}]},
-    _thickness_or_auto,
+    'number of at least 0, or "auto"', {"anyOf": [NOT_NEGATIVE.schema, {"const": "auto"}]}, _thickness_or_auto
 )
 _endings = "|".join("".join(f"[{c}{c.upper()}]" if c.isalpha() else re.escape(c) for c in s) for s in VIDEO_SUFFIXES)
 _FILM = ValueKind(

@@ -364,10 +364,7 @@ def _load(table: Table) -> LoadCase:
 
 
 def _controls(
-    asked: Mapping[str, Any],
-    phases: Sequence[Mapping[str, Any]],
-    control: Table,
-    overlap_tolerance: float | None,
+    asked: Mapping[str, Any], phases: Sequence[Mapping[str, Any]], control: Table, overlap_tolerance: float | None
 ) -> solver.Controls:
     """Make the controls; what drives a path says how exact its steps are to be, and a case has one path."""
     tolerances = [one["step_tolerance"] for one in phases] + [CONTROL.key("step_tolerance").read(control)]

@@ -79,9 +79,7 @@ TEXTS = ValueKind(
 )
 PAIR = pair_of("[x, y]")
 VECTOR = ValueKind(
-    "two numbers, in space three",
-    list_of({"type": "number"}, 2, 3),
-    lambda table, key: table.vector(key.name),
+    "two numbers, in space three", list_of({"type": "number"}, 2, 3), lambda table, key: table.vector(key.name)
 )
 TRIPLE = ValueKind(
     "three numbers",
@@ -206,9 +204,7 @@ class Forms:
         if key.name not in self.needed[form]:
             return key
         return replace(
-            key,
-            required=True,
-            remedy=key.remedy or f"{self.by} '{form}' needs {' and '.join(self.needed[form])}",
+            key, required=True, remedy=key.remedy or f"{self.by} '{form}' needs {' and '.join(self.needed[form])}"
         )
 
     def schemas(self, names: Sequence[str]) -> list[dict[str, Any]]:

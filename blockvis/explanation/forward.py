@@ -125,13 +125,7 @@ def lever_of(assembly: solver.Assembly, settlement: solver.Settlement) -> float:
     return float(np.max(speeds)) or 1.0
 
 
-def ordered(
-    case: Case,
-    assembly: solver.Assembly,
-    motions: Any,
-    variant: Variant,
-    reach: tuple[float, float],
-) -> Order:
+def ordered(case: Case, assembly: solver.Assembly, motions: Any, variant: Variant, reach: tuple[float, float]) -> Order:
     """State the run of a candidate, by its motions of supports that are all fixed, as far as :func:`reach_of` says."""
     roles = assembly.roles.astype("<U6").copy()
     roles[[assembly.index(name) for name in motions]] = mechanics.MOVING

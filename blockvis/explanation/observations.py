@@ -90,9 +90,7 @@ class Observations:
 
 
 def read_observations(
-    source: str | Path | Sequence[Mapping[str, Any]],
-    assembly: solver.Assembly,
-    drawn: solver.Assembly | None = None,
+    source: str | Path | Sequence[Mapping[str, Any]], assembly: solver.Assembly, drawn: solver.Assembly | None = None
 ) -> Observations:
     """Read a table (.csv), its rows, or a drawing of the damaged state in any layout format.
 

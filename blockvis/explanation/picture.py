@@ -309,13 +309,7 @@ def _observed(canvas: _Canvas, found: Explanation) -> list[_Label]:
 
 
 def _computed(
-    canvas: _Canvas,
-    found: Explanation,
-    cause: Cause,
-    pose: solver.Pose,
-    shown: solver.Pose,
-    number: int,
-    factor: float,
+    canvas: _Canvas, found: Explanation, cause: Cause, pose: solver.Pose, shown: solver.Pose, number: int, factor: float
 ) -> list[_Label]:
     """Draw what a cause makes; gives the labels, that of the next measurement first."""
     assembly, compared, given, panel = found.assembly, found.comparison, found.observations, canvas.panel

@@ -235,9 +235,7 @@ def solids_of_bodies(found: Bodies, reading: Reading) -> Layout:
         if not volume(points, faces) > NO_VOLUME * asked.size**3:
             x, y, z = points.mean(axis=0)
             raise _refused(
-                f"body '{body.name}' around ({x:.6g}, {y:.6g}, {z:.6g}) has no volume; remove or redraw it",
-                found,
-                body,
+                f"body '{body.name}' around ({x:.6g}, {y:.6g}, {z:.6g}) has no volume; remove or redraw it", found, body
             )
         if plane.warp:
             warped.append((plane.warp, body.name, plane.place))
@@ -255,11 +253,7 @@ def solids_of_bodies(found: Bodies, reading: Reading) -> Layout:
         blocks=tuple(solids),
         names=tuple(body.name for body in asked.bodies),
         unit=found.unit,
-        notes=(
-            *(Note(CHANGED, text) for text in said),
-            *_accepted(asked.bodies),
-            *found.notes,
-        ),
+        notes=(*(Note(CHANGED, text) for text in said), *_accepted(asked.bodies), *found.notes),
     )
     return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", reading.ignore))
 
@@ -425,12 +419,7 @@ def _projected(axis: int, bodies: Sequence[Body], size: float) -> _Projection:
 
 
 def _hidden(
-    axis: int,
-    bodies: Sequence[Body],
-    outlines: Sequence[np.ndarray],
-    low: np.ndarray,
-    high: np.ndarray,
-    size: float,
+    axis: int, bodies: Sequence[Body], outlines: Sequence[np.ndarray], low: np.ndarray, high: np.ndarray, size: float
 ) -> str:
     """Say which body lies behind which, or that no plane cuts them all; "" if they are side by side in one leaf."""
     import shapely

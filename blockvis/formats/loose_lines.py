@@ -419,12 +419,7 @@ def _crossed(area: Any, lines: list[Any], reach: float) -> bool:
 
 
 def _add_faces(
-    lines: list[Line],
-    segments: list[Any],
-    outlines: Sequence[np.ndarray],
-    every: Any,
-    size: float,
-    found: Faces,
+    lines: list[Line], segments: list[Any], outlines: Sequence[np.ndarray], every: Any, size: float, found: Faces
 ) -> None:
     """Add the faces between lines that cut no outline, and the lines that enclose nothing."""
     import shapely

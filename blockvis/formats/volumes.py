@@ -35,19 +35,11 @@ VTK_SOLIDS: dict[int, Faces] = {
 }  # fmt: skip
 
 #: By the beginning of meshio's name of the cell type.
-MESHIO_SOLIDS: dict[str, Faces] = {
-    "tetra": TETRAHEDRON,
-    "hexahedron": HEXAHEDRON,
-    "wedge": WEDGE,
-    "pyramid": PYRAMID,
-}
+MESHIO_SOLIDS: dict[str, Faces] = {"tetra": TETRAHEDRON, "hexahedron": HEXAHEDRON, "wedge": WEDGE, "pyramid": PYRAMID}
 
 
 def bodies_of_cells(
-    points: np.ndarray,
-    cells: Sequence[tuple[Faces, np.ndarray]],
-    owner: np.ndarray,
-    rows: Sequence[dict[str, Any]],
+    points: np.ndarray, cells: Sequence[tuple[Faces, np.ndarray]], owner: np.ndarray, rows: Sequence[dict[str, Any]]
 ) -> list[Body]:
     """Find the skin of each body: the faces that belong to one of its cells only.
 

@@ -297,11 +297,7 @@ def _placed(
     placed = []
     for number, values in enumerate(openings, start=1):
         opening = checked_opening(
-            values,
-            number,
-            brick_length=bond.brick_length,
-            brick_height=bond.brick_height,
-            wall_height=height,
+            values, number, brick_length=bond.brick_length, brick_height=bond.brick_height, wall_height=height
         )
         where, right = f"opening {number}", opening.x + opening.width
         if right > width * (1.0 + 1e-9):

@@ -259,9 +259,7 @@ class LimitLoadKind(AnalysisKind):
         low, high = said["limit_load_bounds"]
         kind = "bounds" if said["limit_load_flow"] == "associative" else "values, no bounds,"
         known = f", static and kinematic {kind} differ by {high - low:.1e}" if converged else ""
-        lines = [
-            f"load multiplier      {state.load_multiplier:12.6g}     {said['limit_load_flow']} friction{known}",
-        ]
+        lines = [f"load multiplier      {state.load_multiplier:12.6g}     {said['limit_load_flow']} friction{known}"]
         # Moments have no resultant.
         if state.reaction:
             share = state.reaction / response.total_weight

@@ -44,10 +44,7 @@ COLUMNS = (
 
 #: Columns of supports.csv before those of the forces, and these in the plane and in space.
 SUPPORT_COLUMNS = ("increment", "phase", "settlement", "support", "role")
-FORCES = {
-    2: ("force_x", "force_y", "moment"),
-    3: ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z"),
-}
+FORCES = {2: ("force_x", "force_y", "moment"), 3: ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")}
 
 #: Limit loads over the positions of a load that moves, and over the settlement.
 LIMIT_TABLES = ("envelope.csv", "capacity.csv")
@@ -152,11 +149,7 @@ def _loss(response: solver.Response) -> dict[str, Any]:
     loss = loss_of(response)
     if loss is None:
         return {"loss": None, "falling_weight": None, "falling_share": None}
-    return {
-        "loss": "local" if loss.local else "structure",
-        "falling_weight": loss.weight,
-        "falling_share": loss.share,
-    }
+    return {"loss": "local" if loss.local else "structure", "falling_weight": loss.weight, "falling_share": loss.share}
 
 
 def own_columns(parameter: mechanics.Quantity) -> tuple[str, ...]:

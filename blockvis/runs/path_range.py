@@ -37,9 +37,7 @@ class Variation:
         """Vary a case."""
         laws = {pair: law.with_friction(self.friction_factor) for pair, law in case.interfaces.items()}
         controls = replace(
-            case.controls,
-            compliance_factor=self.compliance_factor,
-            imperfection_factor=self.imperfection_factor,
+            case.controls, compliance_factor=self.compliance_factor, imperfection_factor=self.imperfection_factor
         )
         law = case.law.with_friction(self.friction_factor)
         friction, tension = law.friction_coefficient, law.tensile_strength

@@ -318,10 +318,7 @@ def _frame(shapes: Sequence[dict[str, np.ndarray]]) -> Frame:
 def runs_counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:
     """Count the runs, rows that the curve is made of, by how they ended: the title of the fragility curve."""
     collapsed, local, never = ends_counted(table).values()
-    words = [
-        counted(curve.n_runs, "run"),
-        f"{collapsed} collapsed" + f" ({local} of a few blocks only)" * (local > 0),
-    ]
+    words = [counted(curve.n_runs, "run"), f"{collapsed} collapsed" + f" ({local} of a few blocks only)" * (local > 0)]
     if never:
         words.append(f"{never} never stood")
     if curve.n_stood:

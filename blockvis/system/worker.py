@@ -61,10 +61,7 @@ class Worker:
         self._errors = tempfile.TemporaryFile() if errors else None  # noqa: SIM115
         with _deaf():
             self._process = subprocess.Popen(
-                [sys.executable, "-c", start],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=self._errors,
+                [sys.executable, "-c", start], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors
             )
         self._heard: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
         # What it says is read at once: it never waits for this process.

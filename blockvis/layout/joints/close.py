@@ -170,11 +170,7 @@ def _pockets(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray], thicknes
 
 
 def _to_nearest_stone(
-    outlines: Sequence[np.ndarray],
-    thickness: float,
-    overlap: float,
-    anchored: np.ndarray,
-    mortar: Sequence[LeftOut],
+    outlines: Sequence[np.ndarray], thickness: float, overlap: float, anchored: np.ndarray, mortar: Sequence[LeftOut]
 ) -> Closing:
     found = facing_edges(outlines, thickness, overlap)
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())

@@ -122,10 +122,7 @@ def facing_edges(
     shortest = np.minimum(a1 - a0, b1 - b0)
 
     def heights(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return (
-            ha0 + (at - a0) / (a1 - a0) * (ha1 - ha0),
-            hb0 + (at - b0) / (b1 - b0) * (hb1 - hb0),
-        )
+        return (ha0 + (at - a0) / (a1 - a0) * (ha1 - ha0), hb0 + (at - b0) / (b1 - b0) * (hb1 - hb0))
 
     full = last - first
     with np.errstate(divide="ignore", invalid="ignore"):

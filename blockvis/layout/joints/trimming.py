@@ -68,12 +68,7 @@ def extended_to_lines(
 
 
 def _extended_edges(
-    edges: Edges,
-    found: Facing,
-    uncommon: list[int],
-    lines: dict[int, Line],
-    anchored: np.ndarray,
-    thickness: float,
+    edges: Edges, found: Facing, uncommon: list[int], lines: dict[int, Line], anchored: np.ndarray, thickness: float
 ) -> tuple[dict[int, float], dict[int, list[np.ndarray]]]:
     """Choose the edges that are extended: by how much [m], and to which midlines, by the edge."""
     overshoot: dict[int, float] = {}
