@@ -38,14 +38,8 @@ GROUPS = ("group", "layer", "kind", "class", "type", "category")
 
 #: Types of GeoJSON objects that hold outlines.
 GEOJSON = (
-    "FeatureCollection",
-    "Feature",
-    "GeometryCollection",
-    "Polygon",
-    "MultiPolygon",
-    "LineString",
-    "MultiLineString",
-)
+    "FeatureCollection", "Feature", "GeometryCollection", "Polygon", "MultiPolygon", "LineString", "MultiLineString",
+)  # fmt: skip
 
 #: What a file without a coordinate system draws so many of its widths away from 0 is a park or a country in degrees.
 FAR = 50.0

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .linked import linked
+from .outlines import ROUNDING
 from .solids import Solid, cross, off_planes, planes_of, triangles_of, volume, width_of
 from .surfaces import cleaned
 
 #: Triangles that lie within this fraction of the width of a block of one plane are one face: modellers warp the faces
 #: of stones by a tenth of it.
 WARPED = 0.01
-
-#: Warps below this fraction of the width of a block are the rounding of a file of single precision.
-ROUNDING = 2e-6
 
 #: Neighbouring triangles whose normals differ by more than this angle (15 degrees) are different faces.
 SAME_FACE = np.cos(np.radians(15.0))

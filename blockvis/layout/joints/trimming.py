@@ -148,8 +148,6 @@ def merge_close_corners(
 ) -> list[np.ndarray]:
     """Merge corners closer than ``reach`` [m] that cutting leaves in the blocks involved, and in all that share them.
 
-    Notes
-    -----
     Steps far smaller than a block are artefacts of cutting and mislead the search for contacts. Every corner within
     ``closed`` [m] of an edge of a neighbour is added to that neighbour first, so that both sides move alike.
     """
