@@ -12,7 +12,7 @@ import shapely
 import shapely.affinity
 
 import solver
-from blockvis.layout.outlines import rectangle
+from blockvis.layout.outlines import ROUNDING, rectangle
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -22,9 +22,6 @@ from .bonds import BONDS, SHORTEST_BRICK
 from .bricks import LOWEST_BRICK, Bond, cut_bricks, places_in
 from .dimensions import MOST_BLOCKS, above_zero, choice, finite, pair, whole
 from .openings import Opening, checked_opening, head_joints_of, head_outlines, opening_ring
-
-#: An edge of an opening closer to a joint than this fraction of the spacing of joints is moved onto it.
-ROUNDING = 1e-6
 
 
 def wall(
