@@ -55,7 +55,7 @@ from solver import mechanics
 _FRICTION = solver.InterfaceLaw.friction_coefficient
 _CONTROLS = solver.Controls()
 
-#: More increments or frames than this are taken for a typing error.
+#: More increments, frames or runs than this are taken for a typing error.
 MOST_STEPS = 1_000_000
 
 
@@ -474,23 +474,7 @@ OUTPUT = Section(
 
 #: Every table of the case file with its keys.
 SECTIONS = (
-    GEOMETRY,
-    PARAMETERS,
-    BOND,
-    ROLES,
-    SUPPORTS,
-    MATERIAL,
-    MATERIALS,
-    INTERFACES,
-    IMPERFECTIONS,
-    SETTLEMENT,
-    PROFILE,
-    LOADS,
-    BACKFILL,
-    REMOVE,
-    TIES,
-    ANALYSIS,
-    *(section for kind in KINDS.values() for section in kind.sections),
-    EXPLAIN,
-    OUTPUT,
-)
+    GEOMETRY, PARAMETERS, BOND, ROLES, SUPPORTS, MATERIAL, MATERIALS, INTERFACES, IMPERFECTIONS, SETTLEMENT, PROFILE,
+    LOADS, BACKFILL, REMOVE, TIES, ANALYSIS, *(section for kind in KINDS.values() for section in kind.sections),
+    EXPLAIN, OUTPUT,
+)  # fmt: skip

@@ -14,7 +14,7 @@ import shapely
 
 import solver
 from blockvis.layout.names import blocks_called
-from blockvis.layout.outlines import pieces_of
+from blockvis.layout.outlines import TOUCHING, pieces_of
 from blockvis.text import listed, nearest
 from solver import mechanics
 from solver.mechanics import counted
@@ -24,9 +24,6 @@ from .toml_table import Table, is_number, shortened
 
 #: Pieces of a support narrower than this fraction of the block size are not cut off.
 NARROWEST = 0.02
-
-#: Blocks stand on a support that is within this fraction of the block size.
-TOUCHING = 2e-3
 
 #: Upright part of the normal of a joint from which on a block stands on a support.
 UPRIGHT = 1e-3
