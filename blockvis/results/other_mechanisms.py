@@ -8,11 +8,10 @@ import scipy.sparse as sp
 import solver
 from solver import mechanics
 
+from .about import EXACT
+
 #: Points with less than this part of the largest force have none, and shear within it of its bound has reached it.
 CARRIES, USED_UP = 1e-7, 1e-5
-
-#: Relative velocities below this part of the fastest block's are none.
-STILL = 1e-6
 
 #: Of movements up to 1, those that are another mechanism; less is the tolerance of the program.
 ANOTHER = 1e-3
@@ -86,10 +85,10 @@ def _rows(assembly: solver.Assembly, state: solver.Increment, associative: bool)
     equal = [relative[stuck], opening[frictionless], opening[used] - sp.diags_array(lift[used]) @ slip]
     if d == 3:
         equal.append(along(used, np.stack([-way[:, 1], way[:, 0]], axis=1)))
-    least = [slip[np.einsum("ij,ij->i", way, moved[used, 1:]) <= STILL]]
+    least = [slip[np.einsum("ij,ij->i", way, moved[used, 1:]) <= EXACT]]
     size = np.linalg.norm(moved[:, 1:], axis=1)
-    closed = ~presses & (moved[:, 0] - lift * size <= STILL)
-    slides = closed & (size > STILL)
+    closed = ~presses & (moved[:, 0] - lift * size <= EXACT)
+    slides = closed & (size > EXACT)
     least.append(opening[slides] - sp.diags_array(lift[slides]) @ along(slides, moved[slides, 1:] / size[slides, None]))
     rests = closed & ~slides
     angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS

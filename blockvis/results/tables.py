@@ -23,24 +23,10 @@ MEASURES = tuple(field.name for field in fields(solver.Certificate))
 
 #: Columns of response.csv.
 COLUMNS = (
-    "increment",
-    "phase",
-    "settlement",
-    "reaction",
-    "reaction_over_weight",
-    "load_multiplier",
-    "least_admissible",
-    "largest_admissible",
-    *MEASURES,
-    "contacts_open",
-    "contacts_sticking",
-    "contacts_sliding",
-    "contacts_hinging",
-    "hinges",
-    "sliding_joints",
-    "programs",
-    "seconds",
-)
+    "increment", "phase", "settlement", "reaction", "reaction_over_weight", "load_multiplier", "least_admissible",
+    "largest_admissible", *MEASURES, "contacts_open", "contacts_sticking", "contacts_sliding", "contacts_hinging",
+    "hinges", "sliding_joints", "programs", "seconds",
+)  # fmt: skip
 
 #: Columns of supports.csv before those of the forces, and these in the plane and in space.
 SUPPORT_COLUMNS = ("increment", "phase", "settlement", "support", "role")
