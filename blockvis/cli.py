@@ -697,7 +697,7 @@ def _filled_walls(options: argparse.Namespace, choice: dict[str, Any]) -> tuple[
 
 def _schema(options: argparse.Namespace) -> int:
     from .case_files.schema import case_schema
-    from .studies.study_schema import study_schema
+    from .studies.study_keys import study_schema
 
     # ASCII, so that it is valid JSON in whatever encoding a shell writes it to a file.
     schema = study_schema() if options.file == "study" else case_schema()
@@ -843,13 +843,13 @@ def _say_range(options: argparse.Namespace, run: Run) -> None:
     from .results.fall_files import known_fall
     from .results.folder import RANGE
     from .runs.outputs import draw_curves, write_report_of
-    from .runs.path_range import UNFINISHED, find_range, wants_range
+    from .runs.path_range import UNFINISHED, find_range
     from .runs.step_check import stored_case
 
     # What has no path has no range, and says why.
     failed = run.response.stop in (solver.Status.NO_INITIAL_EQUILIBRIUM, *UNFINISHED)
     stopped = failed or not run.response.path
-    asked = options.range or wants_range(stored_case(run.folder))
+    asked = options.range or stored_case(run.folder).settings is True
     if stopped or not asked or (run.had_finished and not options.range and (run.folder / RANGE).is_file()):
         return
     seconds = sum(increment.seconds for increment in run.response.increments)

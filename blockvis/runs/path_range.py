@@ -17,12 +17,13 @@ from blockvis.results.folder import RANGE, add_to_summary
 from blockvis.results.reaction_range import COMPLIANCE, FRICTION, WORDS, ReactionRange
 from blockvis.system.atomic_files import write_atomic
 from blockvis.system.processes import cores
+from blockvis.system.worker import LOOK
 from blockvis.text import force_text
 from solver.mechanics import counted
 
 from .once_more import OnceMore, Traced, takes_steps, traced
 from .reopen import open_results
-from .step_check import LOOK, stored_case
+from .step_check import stored_case
 
 
 @dataclass(frozen=True)
@@ -133,11 +134,6 @@ class PathRange:
     def _place(self, phase: int, settlement: float) -> str:
         within = f" in phase {phase + 1}" if len(self.units) > 1 else ""
         return f"{settlement:.6g} {self.units[phase]}{within}"
-
-
-def wants_range(case: Case) -> bool:
-    """Whether a case asks for its range."""
-    return case.settings is True
 
 
 def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda *_: None) -> PathRange:
