@@ -17,10 +17,8 @@ from blockvis.text import listed, nearest
 
 from .block_at import ON_EDGE
 from .key import NOT_NEGATIVE, NUMBER, POSITIVE, TEXTS, Key, Section
+from .profiles import UPRIGHT
 from .toml_table import Table
-
-#: Faces whose normal rises by less than this stand upright.
-UPRIGHT = 1e-9
 
 BACKFILL = Section(
     "backfill",

@@ -25,7 +25,7 @@ from .toml_table import Table, is_number, shortened
 #: Pieces of a support narrower than this fraction of the block size are not cut off.
 NARROWEST = 0.02
 
-#: Upright part of the normal of a joint from which on a block stands on a support.
+#: Upright part of the normal of a joint from which on a block stands on a support, and of a face that bears a fill.
 UPRIGHT = 1e-3
 
 #: A profile that leaves the chord over a support by less than this fraction of its largest value tilts it as it is.

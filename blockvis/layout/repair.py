@@ -83,7 +83,7 @@ def repaired(
     anchored: np.ndarray,
     closing: str = "auto",
     mortar: Sequence[LeftOut] = (),
-    laid: np.ndarray | None = None,
+    laid: np.ndarray,
 ) -> tuple[list[np.ndarray], list[str]]:
     """Resolve the overlaps of the outlines of an assembly without duplicates, close its joints, and tell the changes.
 
@@ -97,7 +97,6 @@ def repaired(
     tolerance = DEFAULT_OVERLAP * width if overlap_tolerance is None else float(overlap_tolerance)
     found = [(i, j, d) for i, j, d in overlaps(assembly, ROUNDING * width) if not (anchored[i] and anchored[j])]
     refuse_overlaps(assembly, found, tolerance)
-    laid = np.zeros(assembly.n_blocks, dtype=bool) if laid is None else laid
     measured = [outlines[i] for i in np.flatnonzero(free)]
     thickness, closing, notes = _thickness(joint_thickness, closing, measured, laid[free])
     if not found and thickness == 0:

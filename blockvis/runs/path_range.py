@@ -136,7 +136,7 @@ class PathRange:
         return f"{settlement:.6g} {self.units[phase]}{within}"
 
 
-def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda *_: None) -> PathRange:
+def find_range(folder: str | Path, waiting: Callable[[int, int], None]) -> PathRange:
     """Follow the settlement of a results folder again, varied, on all cores, and write what comes out.
 
     ``range.csv`` has the range of the reaction, ``range`` in ``summary.json`` that of the collapse. ``waiting`` is
