@@ -902,8 +902,6 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _convert(options: argparse.Namespace) -> int:
-    from solver.mechanics import counted
-
     from .formats.read import read_layout, write_layout
     from .layout.assemble import assemble, without_twins
     from .layout.layout import layout_of
@@ -921,7 +919,13 @@ def _convert(options: argparse.Namespace) -> int:
         # An assembly says of every block what the drawing may leave open: thickness, density and role.
         layout = replace(layout, blocks=layout_of(assemble(layout, joint_thickness=joint)).blocks)
     write_layout(layout, target)
-    print(f"{counted(layout.n_blocks, 'block')} written to {target}")
+    return _say_written(layout.n_blocks, target)
+
+
+def _say_written(n_blocks: int, target: Path) -> int:
+    from solver.mechanics import counted
+
+    print(f"{counted(n_blocks, 'block')} written to {target}")
     return 0
 
 
@@ -977,8 +981,6 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
 
 
 def _bond(options: argparse.Namespace) -> int:
-    from solver.mechanics import counted
-
     from .cases.bonds import bonded, read_bond
     from .cases.toml_table import Table
     from .formats.read import read_outlines, write_layout
@@ -994,21 +996,17 @@ def _bond(options: argparse.Namespace) -> int:
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
     write_layout(layout, target)
-    print(f"{counted(layout.n_blocks, 'block')} written to {target}")
-    return 0
+    return _say_written(layout.n_blocks, target)
 
 
 def _layout(options: argparse.Namespace) -> int:
-    from solver.mechanics import counted
-
     from .formats.read import save_layout
     from .generators import build
 
     target = _new_file(options.output, options.force)
     assembly = build(options.name, dict(_parameter(given) for given in options.parameters))
     save_layout(assembly, target)
-    print(f"{counted(assembly.n_blocks, 'block')} written to {target}")
-    return 0
+    return _say_written(assembly.n_blocks, target)
 
 
 def _render(options: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import ROUNDING, flattened, loops_of
 from blockvis.layout.refusal import Refused, carrying
-from blockvis.layout.solids import area_vectors, fans
+from blockvis.layout.solids import area_vectors, fans, sides_of
 from blockvis.layout.surfaces import same_points, turned_faces
 from blockvis.text import listed
 from solver.mechanics import counted
@@ -55,8 +55,7 @@ def closed_bodies(part: Body, size: float) -> list[Body]:
     faces = every[np.sort(np.unique(np.sort(every, axis=1), axis=0, return_index=True)[1])]
     if len(faces) == 0:
         raise OpenSurface(f"body '{name}' has no face with an area; export closed bodies")
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    unique, inverse, counts = np.unique(sides_of(faces), axis=0, return_inverse=True, return_counts=True)
     if (counts != 2).any():
         piece = _touching_bodies(points, every)
         if piece is not None:
@@ -65,8 +64,7 @@ def closed_bodies(part: Body, size: float) -> list[Body]:
     closed = _with_holes_closed(points, faces, holes) if len(holes) and counts.max() == 2 else None
     if closed is not None:
         points, faces = closed
-        edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+        unique, inverse, counts = np.unique(sides_of(faces), axis=0, return_inverse=True, return_counts=True)
     if (counts == 1).any():
         x, y, z = points[unique[counts == 1][0]].mean(axis=0)
         raise OpenSurface(
