@@ -311,12 +311,7 @@ def _parser() -> argparse.ArgumentParser:
         "--joint-thickness", default="0", metavar="M", help='close mortar joints up to this, or "auto"'
     )
     convert.add_argument("--force", action="store_true", help="replace OUT if it is there already")
-    layout = _verb(
-        verbs,
-        _layout,
-        help="a parametric layout as a file",
-        add_help=False,
-    )
+    layout = _verb(verbs, _layout, help="a parametric layout as a file", add_help=False)
     layout.add_argument("-h", "--help", action=_LayoutHelp, help="show this help, or the parameters of NAME")
     layout.add_argument("name", metavar="NAME")
     layout.add_argument(
@@ -702,7 +697,7 @@ def _filled_walls(options: argparse.Namespace, choice: dict[str, Any]) -> tuple[
 
 def _schema(options: argparse.Namespace) -> int:
     from .case_files.schema import case_schema
-    from .studies.study_schema import study_schema
+    from .studies.study_keys import study_schema
 
     # ASCII, so that it is valid JSON in whatever encoding a shell writes it to a file.
     schema = study_schema() if options.file == "study" else case_schema()
@@ -848,13 +843,13 @@ def _say_range(options: argparse.Namespace, run: Run) -> None:
     from .results.fall_files import known_fall
     from .results.folder import RANGE
     from .runs.outputs import draw_curves, write_report_of
-    from .runs.path_range import UNFINISHED, find_range, wants_range
+    from .runs.path_range import UNFINISHED, find_range
     from .runs.step_check import stored_case
 
     # What has no path has no range, and says why.
     failed = run.response.stop in (solver.Status.NO_INITIAL_EQUILIBRIUM, *UNFINISHED)
     stopped = failed or not run.response.path
-    asked = options.range or wants_range(stored_case(run.folder))
+    asked = options.range or stored_case(run.folder).settings is True
     if stopped or not asked or (run.had_finished and not options.range and (run.folder / RANGE).is_file()):
         return
     seconds = sum(increment.seconds for increment in run.response.increments)
@@ -907,8 +902,6 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _convert(options: argparse.Namespace) -> int:
-    from solver.mechanics import counted
-
     from .formats.read import read_layout, write_layout
     from .layout.assemble import assemble, without_twins
     from .layout.layout import layout_of
@@ -926,7 +919,13 @@ def _convert(options: argparse.Namespace) -> int:
         # An assembly says of every block what the drawing may leave open: thickness, density and role.
         layout = replace(layout, blocks=layout_of(assemble(layout, joint_thickness=joint)).blocks)
     write_layout(layout, target)
-    print(f"{counted(layout.n_blocks, 'block')} written to {target}")
+    return _say_written(layout.n_blocks, target)
+
+
+def _say_written(n_blocks: int, target: Path) -> int:
+    from solver.mechanics import counted
+
+    print(f"{counted(n_blocks, 'block')} written to {target}")
     return 0
 
 
@@ -982,8 +981,6 @@ def _convert_results(options: argparse.Namespace, target: Path) -> int:
 
 
 def _bond(options: argparse.Namespace) -> int:
-    from solver.mechanics import counted
-
     from .cases.bonds import bonded, read_bond
     from .cases.toml_table import Table
     from .formats.read import read_outlines, write_layout
@@ -999,21 +996,17 @@ def _bond(options: argparse.Namespace) -> int:
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
     write_layout(layout, target)
-    print(f"{counted(layout.n_blocks, 'block')} written to {target}")
-    return 0
+    return _say_written(layout.n_blocks, target)
 
 
 def _layout(options: argparse.Namespace) -> int:
-    from solver.mechanics import counted
-
     from .formats.read import save_layout
     from .generators import build
 
     target = _new_file(options.output, options.force)
     assembly = build(options.name, dict(_parameter(given) for given in options.parameters))
     save_layout(assembly, target)
-    print(f"{counted(assembly.n_blocks, 'block')} written to {target}")
-    return 0
+    return _say_written(assembly.n_blocks, target)
 
 
 def _render(options: argparse.Namespace) -> int:

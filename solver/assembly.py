@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from solver.words import Kept, counted, kept, numbers_of, plain
 
 from .geometry.contacts import Contacts
-from .geometry.outlines import Outlines, self_crossings
+from .geometry.outlines import self_crossings
 from .geometry.polygons import Polygons
 from .geometry.polyhedra import Polyhedra
 from .geometry.surfaces import SMALLEST_SHAPE_FACTOR, polyhedra_of, refuse_infinite
@@ -96,7 +96,7 @@ class Assembly(Kept, Shown):
         names = labels["names"]
         rings = [_checked_ring(outline, name) for outline, name in zip(outlines, names, strict=True)]
         offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
-        drawn = Outlines(np.concatenate(rings), offsets, np.ones(len(rings)))
+        drawn = Polygons(np.concatenate(rings), offsets, np.ones(len(rings)))
         areas, perimeter = drawn.areas, np.add.reduceat(drawn.edge_lengths, offsets[:-1])
         for i in np.flatnonzero(np.abs(areas) <= SMALLEST_SHAPE_FACTOR * perimeter**2).tolist():
             raise ValueError(

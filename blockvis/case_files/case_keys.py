@@ -55,7 +55,7 @@ from solver import mechanics
 _FRICTION = solver.InterfaceLaw.friction_coefficient
 _CONTROLS = solver.Controls()
 
-#: More increments or frames than this are taken for a typing error.
+#: More increments, frames or runs than this are taken for a typing error.
 MOST_STEPS = 1_000_000
 
 
@@ -145,9 +145,7 @@ _LAYOUT = ValueKind(
 )
 _UNIT = ValueKind("text", {"anyOf": [{"enum": list(UNITS)}, {"type": "string"}]}, TEXT.read)
 _THICKNESS_OR_AUTO = ValueKind(
-    'number of at least 0, or "auto"',
-    {"anyOf": [NOT_NEGATIVE.schema, {"const": "auto"}]},
-    _thickness_or_auto,
+    'number of at least 0, or "auto"', {"anyOf": [NOT_NEGATIVE.schema, {"const": "auto"}]}, _thickness_or_auto
 )
 _endings = "|".join("".join(f"[{c}{c.upper()}]" if c.isalpha() else re.escape(c) for c in s) for s in VIDEO_SUFFIXES)
 _FILM = ValueKind(
@@ -476,23 +474,7 @@ OUTPUT = Section(
 
 #: Every table of the case file with its keys.
 SECTIONS = (
-    GEOMETRY,
-    PARAMETERS,
-    BOND,
-    ROLES,
-    SUPPORTS,
-    MATERIAL,
-    MATERIALS,
-    INTERFACES,
-    IMPERFECTIONS,
-    SETTLEMENT,
-    PROFILE,
-    LOADS,
-    BACKFILL,
-    REMOVE,
-    TIES,
-    ANALYSIS,
-    *(section for kind in KINDS.values() for section in kind.sections),
-    EXPLAIN,
-    OUTPUT,
-)
+    GEOMETRY, PARAMETERS, BOND, ROLES, SUPPORTS, MATERIAL, MATERIALS, INTERFACES, IMPERFECTIONS, SETTLEMENT, PROFILE,
+    LOADS, BACKFILL, REMOVE, TIES, ANALYSIS, *(section for kind in KINDS.values() for section in kind.sections),
+    EXPLAIN, OUTPUT,
+)  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -29,7 +30,12 @@ from blockvis.text import as_key, files_like
 from solver import mechanics
 
 from . import case_keys as keys
-from .decimal_comma import decimal_comma
+
+#: Line and column where a parser of TOML stopped.
+STOPPED = re.compile(r"\(at line (\d+), column (\d+)\)")
+
+#: A number with a decimal comma at the end of a line, a comment apart.
+COMMA = re.compile(r"^\s*([\w.\"'-]+)\s*=\s*([+-]?\d+),(\d+(?:[eE][+-]?\d+)?)\s*(#.*)?$")
 
 
 def read_case(path: str | Path, changes: str | Sequence[str] = ()) -> Case:
@@ -113,11 +119,30 @@ def parsed_toml(text: str, source: Path, kind: str = "case file", example: str =
     except RecursionError:
         raise ValueError(f"{source}: nests lists or tables without end; a {kind} has a handful of them") from None
     except ValueError as error:
-        comma = decimal_comma(text, str(error))
+        comma = _decimal_comma(text, str(error))
         if comma:
             raise ValueError(f"{source}: {comma}") from None
         hint = "; write paths with / or in single quotes" if "\\" in text else ""
         raise ValueError(f"{source}: {error}; a {kind} is TOML, for instance: {example}{hint}") from None
+
+
+def _decimal_comma(text: str, error: str) -> str:
+    """Write how a number is to be written where a parser of TOML stopped at its decimal comma, by its message; else "".
+
+    Examples
+    --------
+    >>> _decimal_comma("limit = 0,5", "Expected newline (at line 1, column 10)")
+    'line 1: limit = 0,5 has a decimal comma; numbers have a point: limit = 0.5'
+    """
+    place = STOPPED.search(error)
+    lines = text.splitlines()
+    line = lines[int(place[1]) - 1] if place and int(place[1]) <= len(lines) else ""
+    found = COMMA.match(line)
+    if found is None:
+        return ""
+    key, whole, part, _ = found.groups()
+    where = f"line {place[1] if place else 1}: {key} = {whole},{part}"
+    return f"{where} has a decimal comma; numbers have a point: {key} = {whole}.{part}"
 
 
 def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
@@ -364,10 +389,7 @@ def _load(table: Table) -> LoadCase:
 
 
 def _controls(
-    asked: Mapping[str, Any],
-    phases: Sequence[Mapping[str, Any]],
-    control: Table,
-    overlap_tolerance: float | None,
+    asked: Mapping[str, Any], phases: Sequence[Mapping[str, Any]], control: Table, overlap_tolerance: float | None
 ) -> solver.Controls:
     """Make the controls; what drives a path says how exact its steps are to be, and a case has one path."""
     tolerances = [one["step_tolerance"] for one in phases] + [CONTROL.key("step_tolerance").read(control)]

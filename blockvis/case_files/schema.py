@@ -28,11 +28,7 @@ def case_values() -> dict[str, Any]:
     for section in case_keys.SECTIONS:
         name, _, rest = section.name.partition(".")
         if rest == "*":
-            tables[name] = {
-                "type": "object",
-                "description": section.meaning,
-                "additionalProperties": section.schema,
-            }
+            tables[name] = {"type": "object", "description": section.meaning, "additionalProperties": section.schema}
         elif not rest:
             # A table within a table is the value of a key of that one.
             tables[name] = one_or_several(section)

@@ -281,10 +281,7 @@ def _with_densities(case: Case, sketch: layout.Layout) -> layout.Layout:
 def case_interfaces(case: Case) -> solver.Interfaces:
     """Build the interface laws of a case."""
     return solver.Interfaces(
-        case.law,
-        dict(case.interfaces),
-        scatter=joint_scatter(case.imperfections),
-        ground=case.ground,
+        case.law, dict(case.interfaces), scatter=joint_scatter(case.imperfections), ground=case.ground
     )
 
 
@@ -309,10 +306,7 @@ def case_changes(case: Case, assembly: solver.Assembly, ties: Sequence[solver.Ti
         added = loads_of(case.loads, assembly, case.source, gone_in(case.removals, assembly, phase), phase)
         changes.append(
             solver.PhaseChange(
-                phase - 1,
-                dead=added.dead,
-                dead_arms=added.dead_arms,
-                dead_acceleration=added.dead_acceleration,
+                phase - 1, dead=added.dead, dead_arms=added.dead_arms, dead_acceleration=added.dead_acceleration
             )
         )
     return tuple(changes)

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 import solver
 from blockvis.layout.linked import middles, within_reach
+from blockvis.layout.repair import DRAWN_GAP
 
 from .distributions import DISTRIBUTION_KEYS, FORMS, Distribution, distribution_of
 from .key import Key, Section, one_of, whole
@@ -35,10 +36,6 @@ IMPERFECTIONS = Section(
     forms=FORMS.with_default("mean"),
 )  # fmt: skip
 
-#: Corners closer than this fraction of the width of the thinnest block are one corner of several blocks: the overlap
-#: that an assembly accepts.
-SAME_PLACE = 1e-3
-
 #: A corner moves by at most this fraction of the distance to the next corner, and of the width of its blocks, so that
 #: no block turns inside out.
 LARGEST_SHARE = 0.25
@@ -49,10 +46,6 @@ LARGEST_CHANGE, HALVINGS = 0.5, 12
 
 #: If the displacements of more than this fraction of the corners are too large, the imperfections are refused.
 MOST_HELD_BACK = 0.1
-
-#: Iterations of Newton's method for corners that slide along edges: displacements are small compared with the edges,
-#: so that four reach rounding error; one more is in reserve.
-ITERATIONS = 5
 
 
 @dataclass(frozen=True)
@@ -117,13 +110,11 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
 
     Faces stay plane and joints closed. ValueError for displacements that are too large for the blocks.
 
-    Notes
-    -----
     Corners at one place move together. A corner on the edge of another block slides along this edge and moves with it:
     bed joints of a wall stay straight from end to end, head joints move and tilt. Corners of supports stay.
     """
     vertices, owner = assembly.vertices, assembly.block_of_vertex
-    near = SAME_PLACE * float(assembly.widths.min())
+    near = DRAWN_GAP * float(assembly.widths.min())
     place = within_reach(vertices, near)
     n = int(place.max()) + 1
     positions = middles(vertices, place)
@@ -217,7 +208,8 @@ def _on_rails(
     unknown = np.full(len(positions), -1)
     unknown[on] = np.arange(len(on))
     row = np.arange(len(on))
-    for _ in range(ITERATIONS):
+    # Displacements are small compared with the edges: four iterations reach rounding error, one more is in reserve.
+    for _ in range(5):
         along, beside = (new[end] - new[start]) / length[:, None], (new[on] - new[start]) / length[:, None]
         off = along[:, 0] * beside[:, 1] - along[:, 1] * beside[:, 0]
         slid = (new[on] * direction).sum(axis=1) - target

@@ -12,17 +12,13 @@ from typing import Any
 from .toml_table import Table, is_number, shortened
 
 
-def _as_it_is(table: Table, key: Key) -> Any:
-    return table.take(key.name)
-
-
 @dataclass(frozen=True)
 class ValueKind:
     """A kind of value: in words for people, as JSON schema has it, and the function that reads and checks one."""
 
     words: str
     schema: Mapping[str, Any]
-    read: Callable[[Table, Key], Any] = _as_it_is
+    read: Callable[[Table, Key], Any] = lambda table, key: table.take(key.name)
 
 
 def list_of(item: Mapping[str, Any], least: int, most: int | None = None) -> dict[str, Any]:
@@ -79,9 +75,7 @@ TEXTS = ValueKind(
 )
 PAIR = pair_of("[x, y]")
 VECTOR = ValueKind(
-    "two numbers, in space three",
-    list_of({"type": "number"}, 2, 3),
-    lambda table, key: table.vector(key.name),
+    "two numbers, in space three", list_of({"type": "number"}, 2, 3), lambda table, key: table.vector(key.name)
 )
 TRIPLE = ValueKind(
     "three numbers",
@@ -109,35 +103,20 @@ def one_of(choices: Sequence[str]) -> ValueKind:
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a TOML file, required or not.
-
-    Attributes
-    ----------
-    meaning : str
-        In words of the field, beginning with a capital letter, without a full stop at its end.
-    example : Any
-        A value as Python has it.
-    default : Any
-        The value that holds where the key is missing; None where there is none.
-    otherwise : str
-        What holds where the key is missing, in words, if that is no value.
-    elsewhere : bool
-        Whether the value may stand elsewhere, as in the layout file: a missing key is read as None, and the default
-        holds where nothing says otherwise.
-    remedy : str
-        What to do where a required key is missing.
-    """
+    """A key of a TOML file, required or not."""
 
     name: str
     kind: ValueKind
-    meaning: str
-    example: Any
+    meaning: str  #: In words of the field, beginning with a capital letter, without a full stop at its end.
+    example: Any  #: A value as Python has it.
     unit: str = ""
-    default: Any = None
-    otherwise: str = ""
+    default: Any = None  #: The value that holds where the key is missing; None where there is none.
+    otherwise: str = ""  #: What holds where the key is missing, in words, if that is no value.
     required: bool = False
+    #: Whether the value may stand elsewhere, as in the layout file: a missing key is read as None, and the default
+    #: holds where nothing says otherwise.
     elsewhere: bool = False
-    remedy: str = ""
+    remedy: str = ""  #: What to do where a required key is missing.
 
     def read(self, table: Table) -> Any:
         """Read and check its value; where it is missing the default, or None where it may stand elsewhere."""
@@ -206,9 +185,7 @@ class Forms:
         if key.name not in self.needed[form]:
             return key
         return replace(
-            key,
-            required=True,
-            remedy=key.remedy or f"{self.by} '{form}' needs {' and '.join(self.needed[form])}",
+            key, required=True, remedy=key.remedy or f"{self.by} '{form}' needs {' and '.join(self.needed[form])}"
         )
 
     def schemas(self, names: Sequence[str]) -> list[dict[str, Any]]:
@@ -228,25 +205,16 @@ class Forms:
 
 @dataclass(frozen=True)
 class Section:
-    """A table of a TOML file, required or not; there may be ``several``, ``[[name]]``.
+    """A table of a TOML file, required or not; there may be ``several``, ``[[name]]``."""
 
-    Attributes
-    ----------
-    name : str
-        With dots, as its header has it; "*" for a name that the user chooses.
-    names : ValueKind, optional
-        Of the values, where the user chooses the names of the keys; ``example`` holds such keys.
-    forms : Forms, optional
-        Which of the keys a table has, where this depends on one of them.
-    """
-
-    name: str
+    name: str  #: With dots, as its header has it; "*" for a name that the user chooses.
     meaning: str
     keys: tuple[Key, ...] = ()
     several: bool = False
+    #: Of the values, where the user chooses the names of the keys; ``example`` holds such keys.
     names: ValueKind | None = None
     required: bool = False
-    forms: Forms | None = None
+    forms: Forms | None = None  #: Which of the keys a table has, where this depends on one of them.
     example: Mapping[str, Any] = field(default_factory=dict)
 
     @property

@@ -14,7 +14,7 @@ import shapely
 
 import solver
 from blockvis.layout.names import blocks_called
-from blockvis.layout.outlines import pieces_of
+from blockvis.layout.outlines import TOUCHING, pieces_of
 from blockvis.text import listed, nearest
 from solver import mechanics
 from solver.mechanics import counted
@@ -25,10 +25,7 @@ from .toml_table import Table, is_number, shortened
 #: Pieces of a support narrower than this fraction of the block size are not cut off.
 NARROWEST = 0.02
 
-#: Blocks stand on a support that is within this fraction of the block size.
-TOUCHING = 2e-3
-
-#: Upright part of the normal of a joint from which on a block stands on a support.
+#: Upright part of the normal of a joint from which on a block stands on a support, and of a face that bears a fill.
 UPRIGHT = 1e-3
 
 #: A profile that leaves the chord over a support by less than this fraction of its largest value tilts it as it is.

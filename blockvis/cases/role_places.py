@@ -8,15 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blockvis.layout.layout import Layout
+from blockvis.layout.repair import DRAWN_GAP
 from solver import mechanics
 
 from .toml_table import Table, is_number, shortened
 
 #: Keys of [roles] that choose blocks by their place.
 PLACES = ("below", "touching", "box")
-
-#: A block touches a plane up to this, in sizes of the median block.
-TOUCHING = 1e-3
 
 #: What is said to whoever means blocks in space, where a drawing of bodies side by side was read as one in the plane.
 INTO_SPACE = "or take the blocks into space by dimension = 3 under [geometry]"
@@ -76,7 +74,7 @@ def with_roles_by_place(layout: Layout, places: Sequence[RolePlace]) -> Layout:
         return layout
     lows = np.array([corners.min(axis=0) for corners in layout.every_corner])
     highs = np.array([corners.max(axis=0) for corners in layout.every_corner])
-    near = TOUCHING * float(np.median(layout.sizes))
+    near = DRAWN_GAP * float(np.median(layout.sizes))
     axes = "xy" if layout.dimension == 2 else "xyz"
     roles = list(layout.roles)
     for place in places:

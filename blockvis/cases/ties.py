@@ -20,13 +20,11 @@ from solver.mechanics import counted
 
 from .block_at import ON_EDGE, block_at, distances_to, note_outside
 from .key import NOT_NEGATIVE, POSITIVE, TEXT, TRUE_OR_FALSE, VECTOR, Key, Section, ValueKind, one_of, whole
+from .profiles import STRAIGHT
 from .toml_table import Table, shortened
 
 #: Layout files whose lines may be ties.
 DRAWN_IN = (".dxf", ".svg")
-
-#: A line is straight where its corners lie within this part of its length of the line between its ends.
-STRAIGHT = 1e-3
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from blockvis.results.fall_files import stored_fall
 from blockvis.results.folder import RESULTS
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.results.record import case_text
+from blockvis.runs.once_more import SAME
 from blockvis.runs.reopen import open_results
 from blockvis.text import force_text, quantity_text
 
@@ -35,28 +36,15 @@ STATIONS = 3
 #: Openings below this are none [m].
 CLOSED = 1e-6
 
-#: Layouts are the same where no corner is farther off than this, in block sizes.
-SAME = 1e-9
-
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two runs.
+    """One of the two runs."""
 
-    Attributes
-    ----------
-    label : str
-        What tables and pictures call it.
-    response : solver.Response
-        With an increment in equilibrium at least.
-    case : dict
-        Values of its case by key, as "material.friction_coefficient"; empty where it was written from Python.
-    """
-
-    label: str
-    response: solver.Response
+    label: str  #: What tables and pictures call it.
+    response: solver.Response  #: With an increment in equilibrium at least.
     fall: Fall | None
-    case: dict[str, Any]
+    case: dict[str, Any]  #: Values by key, as "material.friction_coefficient"; empty where it was written from Python.
 
     @property
     def end(self) -> float:
@@ -166,11 +154,8 @@ class Comparison:
     def cracks(self, at: float) -> list[tuple[str, np.ndarray]]:
         """Compare the joints at which crack lines of either run are widest at a parameter over all phases [m or rad].
 
-        Returns
-        -------
-        list of (str, (2,) array [m])
-            The two blocks of each joint, and its opening in both runs, the widest first; nan where the run has no such
-            joint, or a block of it has fallen.
+        Of each joint its two blocks and its opening in both runs, (2,) array [m], the widest first; nan where the run
+        has no such joint, or a block of it has fallen.
         """
         (lines, one), (more_lines, other) = (_cracks_at(side, at) for side in self.sides)
         crack_at = {frozenset(line.widest.split(" | ")): line.widest for line in [*more_lines, *lines]}
@@ -181,10 +166,7 @@ class Comparison:
 def compared(one: str | Path, other: str | Path) -> Comparison:
     """Open two results folders for a comparison.
 
-    Raises
-    ------
-    ValueError
-        If a folder holds no results or no equilibrium, if both are the same, or if what they run over differs.
+    ValueError if a folder holds no results or no equilibrium, if both are the same, or if what they run over differs.
     """
     folders = Path(one), Path(other)
     if folders[0].resolve() == folders[1].resolve():

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
+from blockvis.dynamics.fall import RATE
 from blockvis.pictures import palette
 from blockvis.pictures.captions import (
     drops_at_start,
@@ -41,8 +42,8 @@ TALL_PANEL, WIDE_PANEL = (800, 620), (1280, 480)
 #: Structures wider than this for their height stand below each other.
 WIDE = 1.8
 
-#: Frames per second, and seconds for the path to the last equilibrium of both.
-FPS, SECONDS = 25.0, 6.0
+#: Seconds for the path to the last equilibrium of both.
+SECONDS = 6.0
 
 #: Height of the strip with the name of the run [pixels].
 STRIP = 40
@@ -156,13 +157,13 @@ def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int,
     pair = Pair(comparison, Look(colour_by="mechanism"), falls=True)
     end = max(side.end for side in comparison.sides)
     longest = max(_seconds(side, end) for side in comparison.sides)
-    count = max(2, int(np.ceil((longest + PAUSE + END) * FPS)))
+    count = max(2, int(np.ceil((longest + PAUSE + END) * RATE)))
 
     def pictures() -> Iterator[Image.Image]:
         last: list[Image.Image | None] = [None, None]
         shown: list[object] = [None, None]
         for frame in range(count):
-            time = frame / FPS
+            time = frame / RATE
             for k, side in enumerate(comparison.sides):
                 what, at = moment = _moment(side, time, end)
                 if moment != shown[k] or last[k] is None:
@@ -172,7 +173,7 @@ def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int,
                 progress(frame + 1, count)
             yield pair.picture([image for image in last if image is not None])
 
-    return write_film(pictures(), path, size=pair.size, fps=FPS)
+    return write_film(pictures(), path, size=pair.size, fps=RATE)
 
 
 def _aspect(side: Side) -> float:

@@ -46,27 +46,15 @@ MOST = 0.5
 
 @dataclass(frozen=True)
 class Fall:
-    """A fall in time.
+    """A fall in time."""
 
-    Attributes
-    ----------
-    times : (n,) array [s]
-        Since the last equilibrium.
-    positions : (n, n_blocks, d) array [m]
-    rotations : (n, n_blocks, n_rot) array [rad]
-    ground : float [m]
-        Height of the ground line.
-    tie_forces : (n, n_ties) array [N]
-        Of ties, props and bars, tension positive.
-    tie_rest : (n, n_ties) array [m]
-        Their lengths without force; nan for those that are absent or broken.
-    """
-
-    times: np.ndarray
-    positions: np.ndarray
-    rotations: np.ndarray
-    ground: float
+    times: np.ndarray  #: (n,) array [s]: since the last equilibrium.
+    positions: np.ndarray  #: (n, n_blocks, d) array [m].
+    rotations: np.ndarray  #: (n, n_blocks, n_rot) array [rad].
+    ground: float  #: [m] Height of the ground line.
+    #: (n, n_ties) array [N]: of ties, props and bars, tension positive.
     tie_forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    #: (n, n_ties) array [m]: their lengths without force; nan for those that are absent or broken.
     tie_rest: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __len__(self) -> int:

@@ -7,19 +7,9 @@ import numpy as np
 import solver
 from solver import mechanics
 
-#: Iterations of the midpoint rule.
-ITERATIONS = 8
-
 
 def principal_inertia(assembly: solver.Assembly) -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments of inertia of blocks, and the axes as drawn.
-
-    Returns
-    -------
-    moments : (n_blocks, n_rot) array [kg m²]
-    axes : (n_blocks, d, d) array
-        As columns.
-    """
+    """Principal moments of inertia of blocks, (n_blocks, n_rot) [kg m²], and the axes as drawn, (n_blocks, d, d)."""
     if assembly.dimension == 2:
         moments = assembly.masses * assembly.shapes.gyration
         return moments[:, None], np.tile(np.eye(2), (assembly.n_blocks, 1, 1))
@@ -30,23 +20,13 @@ def principal_inertia(assembly: solver.Assembly) -> tuple[np.ndarray, np.ndarray
 
 
 def free_spin(inertia: np.ndarray, spin: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Turn of bodies in a time, and spin after it, about their principal axes, which turn with them.
+    """(n, 3) arrays: turn of bodies in a time, and spin after it, about their principal axes, which turn with them.
 
-    Parameters
-    ----------
-    inertia, spin : (n, 3) arrays
-
-    Returns
-    -------
-    turn, spin : (n, 3) arrays
-
-    Notes
-    -----
     Euler's equations I ω̇ = I ω × ω by the midpoint rule, and the turn by Cayley's map: together they keep energy and
     angular momentum in space exactly (Simo & Wong 1991, https://doi.org/10.1002/nme.1620310103).
     """
     middle = spin.copy()
-    for _ in range(ITERATIONS):
+    for _ in range(8):
         momentum = inertia * middle
         residual = 2.0 * (momentum - inertia * spin) + time * np.cross(middle, momentum)
         if np.abs(residual).max(initial=0.0) <= 1e-15 * np.abs(momentum).max(initial=0.0):

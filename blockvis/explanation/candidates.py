@@ -11,7 +11,8 @@ import numpy as np
 
 import solver
 from blockvis.cases.explain_settings import DIRECTIONS, ExplainSettings
-from blockvis.cases.profiles import Profile, bearing_points, bearings, cut_ground, uncut_names
+from blockvis.cases.profiles import STRAIGHT, Profile, bearing_points, bearings, cut_ground, uncut_names
+from blockvis.layout.outlines import TOUCHING
 from blockvis.text import nearest
 from solver import mechanics
 
@@ -38,12 +39,6 @@ FEWEST_FEET = 3
 
 #: Slopes of the ground begin at these fractions of the width of the structure, from the side that goes down.
 SLOPES = (0.25, 0.375, 0.5, 0.625, 0.75)
-
-#: A trough that moves all feet alike within this fraction of its depth is none.
-LEAST_DIFFERENCE = 1e-3
-
-#: Blocks touch within this fraction of the block size.
-TOUCHING = 2e-3
 
 #: Blocks stand on faces longer than this, in block sizes.
 SHORTEST_FOOT = 0.05
@@ -276,7 +271,7 @@ def _troughs(ground: Ground, settings: ExplainSettings) -> list[Candidate]:
                 words = f"the ground slopes down to the {side}"
                 if any(any(motion) for motion in motions.values()):
                     found.append(Candidate(words, motions, detail=f"from x = {hinge:.3g} m on", bends=True))
-    return [one for one in found if differential(ground.assembly, scaled_motions(one)) > LEAST_DIFFERENCE]
+    return [one for one in found if differential(ground.assembly, scaled_motions(one)) > STRAIGHT]
 
 
 def _extent(ground: Ground) -> tuple[float, float]:

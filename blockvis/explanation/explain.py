@@ -40,7 +40,7 @@ from .candidates import (
 from .forward import Order, Run, Variant, all_followed, ordered, reach_of, workers_for
 from .likelihood import EXPLAINED, Comparison, Trial, Trust, tried
 from .observations import Observations, read_observations
-from .ranking import Cause, next_measurement, ranked, unexplained
+from .ranking import WORTH_A_WORD, Cause, next_measurement, ranked, unexplained
 from .result import Explanation
 from .words import in_words
 from .write import FILES, write_explanation
@@ -48,8 +48,8 @@ from .write import FILES, write_explanation
 #: Range of the coefficient of friction, as fractions of that of the case, where the case gives none.
 FRICTIONS = (0.8, 1.25)
 
-#: Causes that are looked at more closely: so probable at least, and at most so many.
-WORTH_IT, MOST_REFINED = 0.01, 4
+#: Most causes that are looked at more closely, of those worth a word.
+MOST_REFINED = 4
 
 #: Candidates of which runs with other coefficients of friction are made, too, at most.
 MOST_VARIED = 6
@@ -235,7 +235,7 @@ def _likeliest(causes: Sequence[Cause]) -> list[Trial]:
     ]
     found: list[Trial] = []
     for probability, trial in sorted(trials, key=lambda one: -one[0]):
-        if probability > WORTH_IT and not any(trial.candidate == other.candidate for other in found):
+        if probability > WORTH_A_WORD and not any(trial.candidate == other.candidate for other in found):
             found.append(trial)
     return found[:MOST_VARIED]
 
@@ -283,7 +283,7 @@ class _Search:
     def carry_out(self, first: Sequence[Candidate], processes: Executor | None, bar: RunsProgress) -> None:
         """Follow candidates, others around the best of them, and the likeliest with other coefficients of friction."""
         self.follow([pair for one in first for pair in self.usual(one)], processes, bar)
-        worth = [c for c in self.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
+        worth = [c for c in self.ranked() if c.probability > WORTH_A_WORD][:MOST_REFINED]
         # What opens the same cracks as a cause may have moved obliquely as well.
         alike = [trial.candidate for cause in worth for trial in self.trials if trial.candidate.cause in cause.also]
         around = refined(self.ground, [cause.best.candidate for cause in worth] + alike, first)

@@ -18,6 +18,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.profiles import by_bearing
 from blockvis.kinds.kind import RunInput
 from blockvis.kinds.settlement import SettlementKind
+from blockvis.layout.outlines import TOUCHING
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.runs.path_range import Variation
 from blockvis.runs.progress import RunsProgress
@@ -114,8 +115,7 @@ def pose_of(assembly: solver.Assembly, moved: np.ndarray) -> solver.Pose:
 
 def lever_of(assembly: solver.Assembly, settlement: solver.Settlement) -> float:
     """Largest movement of a support where it carries something, per unit of the settlement [m or m/rad]."""
-    reach = 2e-3 * assembly.block_size
-    contacts = mechanics.find_contacts(assembly, assembly.vertices, 2.0 * reach)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 2.0 * TOUCHING * assembly.block_size)
     pose = solver.Pose.initial(assembly)
     rate = settlement.rate(assembly, pose, 0.0)
     speeds = [
@@ -125,13 +125,7 @@ def lever_of(assembly: solver.Assembly, settlement: solver.Settlement) -> float:
     return float(np.max(speeds)) or 1.0
 
 
-def ordered(
-    case: Case,
-    assembly: solver.Assembly,
-    motions: Any,
-    variant: Variant,
-    reach: tuple[float, float],
-) -> Order:
+def ordered(case: Case, assembly: solver.Assembly, motions: Any, variant: Variant, reach: tuple[float, float]) -> Order:
     """State the run of a candidate, by its motions of supports that are all fixed, as far as :func:`reach_of` says."""
     roles = assembly.roles.astype("<U6").copy()
     roles[[assembly.index(name) for name in motions]] = mechanics.MOVING

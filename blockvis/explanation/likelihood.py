@@ -14,13 +14,13 @@ from blockvis.results.joints import InitialJoints, carried_faces, initial_joints
 from solver import mechanics
 
 from .candidates import Candidate, Twin
-from .forward import Run, Variant, pose_of
+from .forward import COLLAPSE, Run, Variant, pose_of
 from .observations import Observations
 from .places import corners_of, on_faces
 
-#: Amounts at which the likelihood is worked out, each larger than the one before by the same factor: from this fraction
-#: of the largest on.
-AMOUNTS, LEAST_AMOUNT = 320, 2e-3
+#: Amounts at which the likelihood is worked out, each larger than the one before by the same factor: from the fraction
+#: of the largest on within which a collapse is found.
+AMOUNTS = 320
 
 #: An observation may be of a joint that lies about so many blocks farther than its place is certain.
 NEIGHBOURHOOD = 0.5
@@ -272,7 +272,7 @@ def tried(
     largest: float,
 ) -> Trial:
     """Compare the run of the candidate ``shared`` with the observations, at every amount up to a largest [m or rad]."""
-    amounts = largest * np.geomspace(LEAST_AMOUNT, 1.0, AMOUNTS)
+    amounts = largest * np.geomspace(COLLAPSE, 1.0, AMOUNTS)
     if len(run.amounts) < 2:
         widths = np.zeros((AMOUNTS, len(comparison.observations.widths)))
         gaps = np.zeros((1, len(comparison.joints.rings.points)))

@@ -35,7 +35,9 @@ WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4
 #: Uncertainty of a displaced point [m] where the observations give none.
 POINT_UNCERTAINTY = 1e-3
 
-#: A place farther than this from its joint or block, in block sizes, is a mistake in its coordinates or their unit.
+#: A place farther than this from its joint or block, in block sizes, is a mistake in its coordinates or their unit, and
+#: so is an uncertainty of more than this, in largest widths or displacements; blocks of a drawing that are paired by
+#: their shapes have moved by less, in block sizes, or are others.
 FARTHEST = 2.0
 
 #: A width of more than this, in block sizes, is a mistake in its unit.
@@ -43,12 +45,6 @@ WIDEST = 1.0
 
 #: A point that is displaced by more than this fraction of the structure is a mistake in its unit.
 FARTHEST_POINT = 0.3
-
-#: Blocks of a drawing that are paired by their shapes have moved by less than this, in block sizes, or are others.
-FARTHEST_BLOCK = 1.5
-
-#: An uncertainty of more than this, in largest widths or displacements, is a mistake in its unit.
-LEAST_CERTAIN = 2.0
 
 #: A width [m] below this nobody can measure.
 LEAST_WIDTH = 5e-5
@@ -90,9 +86,7 @@ class Observations:
 
 
 def read_observations(
-    source: str | Path | Sequence[Mapping[str, Any]],
-    assembly: solver.Assembly,
-    drawn: solver.Assembly | None = None,
+    source: str | Path | Sequence[Mapping[str, Any]], assembly: solver.Assembly, drawn: solver.Assembly | None = None
 ) -> Observations:
     """Read a table (.csv), its rows, or a drawing of the damaged state in any layout format.
 
@@ -258,7 +252,7 @@ def _of_rows(
         raise ValueError(f"{where}: has no observation; give a row for each crack or displaced point")
     found = _observations(widths, points, where, assembly.dimension)
     for cells in given:
-        if (cells.length("uncertainty") or 0.0) > LEAST_CERTAIN * found.largest:
+        if (cells.length("uncertainty") or 0.0) > FARTHEST * found.largest:
             raise cells.error(
                 "uncertainty",
                 f"is {cells.length('uncertainty'):g} m, and the largest width or displacement {found.largest:.3g} m: "
@@ -557,7 +551,7 @@ def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: so
     # Two blocks of unlike size are not the same stone, however near they lie.
     cost = apart + np.abs(np.log(assembly.areas[:, None] / areas[None]))
     rows, columns = linear_sum_assignment(cost)
-    return {int(i): int(k) for i, k in zip(rows, columns, strict=True) if cost[i, k] < FARTHEST_BLOCK}
+    return {int(i): int(k) for i, k in zip(rows, columns, strict=True) if cost[i, k] < FARTHEST}
 
 
 def _moved(assembly: solver.Assembly, block: int, ring: np.ndarray) -> tuple[np.ndarray, float]:

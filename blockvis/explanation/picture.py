@@ -20,11 +20,12 @@ from matplotlib.transforms import BboxBase
 import solver
 from blockvis.layout.sights import BELOW, Sight
 from blockvis.pictures import palette
+from blockvis.pictures.cracks_in_space import PIECES
 from blockvis.pictures.drawer import WHOLE, magnified
 from blockvis.pictures.figures import plain_text, saved
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.sight_lines import SightLines
-from blockvis.pictures.solid_view import ABOVE, View, hiding_supports, views_from
+from blockvis.pictures.solid_view import ABOVE, ALIKE, IN_FRONT, View, hiding_supports, views_from
 from blockvis.results.cracks import SMALLEST_OPENING
 from blockvis.results.joint_faces import Rings
 from blockvis.results.joints import carried_faces
@@ -56,12 +57,9 @@ WIDE = 4.0
 #: Pixels of matplotlib per inch, and of the blocks in space.
 DPI, FINE = 130, 260
 
-#: What it is worth to have the cracks, and what has moved far, in front by the size of the structure, beside seeing all
-#: of them; what it costs to look from below; views that are as good as the best, within ``ALIKE``, are equal.
-IN_FRONT, FROM_BELOW, ALIKE = 0.35, 0.3, 0.02
-
-#: Each edge of a joint is looked for at so many places.
-PIECES = 6
+#: What it costs to look from below, beside having the cracks, and what has moved far, in front by the size of the
+#: structure, and seeing all of them.
+FROM_BELOW = 0.3
 
 #: A joint has its largest width written, too, where that is so many times the one at an observed place.
 GAPES = 1.5
@@ -309,13 +307,7 @@ def _observed(canvas: _Canvas, found: Explanation) -> list[_Label]:
 
 
 def _computed(
-    canvas: _Canvas,
-    found: Explanation,
-    cause: Cause,
-    pose: solver.Pose,
-    shown: solver.Pose,
-    number: int,
-    factor: float,
+    canvas: _Canvas, found: Explanation, cause: Cause, pose: solver.Pose, shown: solver.Pose, number: int, factor: float
 ) -> list[_Label]:
     """Draw what a cause makes; gives the labels, that of the next measurement first."""
     assembly, compared, given, panel = found.assembly, found.comparison, found.observations, canvas.panel

@@ -15,9 +15,10 @@ import numpy as np
 
 from blockvis.layout.outlines import chords_of, sagitta
 
-#: A corner lies on a curve within this fraction of the size of the median outline with curves: less than the width of
-#: any joint, more than what rounding of coordinates leaves.
-ON_CURVE = 1e-4
+#: Ends of lines that miss another line by up to this fraction of the size of the drawing meet it, and so do the ends of
+#: an outline that misses itself by this fraction of its own size, and corners and the curves on which they lie: what
+#: drawing by hand, or in single precision, leaves.
+MEETS = 1e-4
 
 #: Ellipses with half axes of a larger ratio are lines.
 FLATTEST = 1e6
@@ -179,7 +180,7 @@ def with_shared_corners(
     if not own:
         return list(outlines)
     seen = [outline[:, :2] for outline in outlines]
-    meets = ON_CURVE * float(np.median([np.ptp(seen[k], axis=0).max() for k, _ in own]))
+    meets = MEETS * float(np.median([np.ptp(seen[k], axis=0).max() for k, _ in own]))
     corners = _corners(seen, curves, meets)
     drawn = [
         np.take(seen[k], np.arange(curve.first, curve.first + curve.chords + 1), axis=0, mode="wrap")

@@ -20,7 +20,7 @@ from blockvis.layout.refusal import Refused
 from blockvis.layout.selection import MORTAR
 from blockvis.layout.solids import fans, volume
 from blockvis.layout.views import VIEWS, axis_across, view_along
-from blockvis.text import listed
+from blockvis.text import LARGEST, listed
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -36,9 +36,6 @@ LEVEL = 1e-5
 #: inexactly neighbours are drawn.
 COVERS = 0.01
 
-#: Sizes beyond this are damage: their squares, or those of their products, could not be computed.
-LARGEST_SIZE = 1e50
-
 #: Roles by the word with which the name or group of a body may begin.
 ROLE_WORDS = {
     "fixed": mechanics.FIXED,
@@ -47,20 +44,15 @@ ROLE_WORDS = {
     "moving": mechanics.MOVING,
 }
 
-#: Bodies compared with all others at a time.
-AT_A_TIME = 20
-
 #: More faces are no stone, but a scan or a curved surface in small triangles.
 MOST_FACES = 400
 
-#: Change of a block's volume, as a part of it, that is told: far above what planes fitted to drawn faces change.
-NOTED_VOLUME = 1e-3
+#: Change of a block's volume, as a part of it, that is told, far above what planes fitted to drawn faces change; so are
+#: middle planes further apart than this fraction of the size of the drawing.
+NOTED = 1e-3
 
 #: A body of less than this fraction of the cube around the drawing has no volume.
 NO_VOLUME = 1e-15
-
-#: Middle planes further apart than this fraction of the size of the drawing are noted.
-ECCENTRIC = 1e-3
 
 
 @dataclass(frozen=True)
@@ -182,7 +174,7 @@ def layout_of_bodies(found: Bodies, reading: Reading) -> Layout:
         "(dimension = 3 takes them into space)"
     ]
     middle = (best.low + best.high) / 2.0
-    if np.ptp(middle) > ECCENTRIC * size:
+    if np.ptp(middle) > NOTED * size:
         first, last = bodies[int(middle.argmin())].name, bodies[int(middle.argmax())].name
         differ = (
             f"the middle planes of the bodies along {along} differ by up to {np.ptp(middle):.3g} in the file's unit "
@@ -235,9 +227,7 @@ def solids_of_bodies(found: Bodies, reading: Reading) -> Layout:
         if not volume(points, faces) > NO_VOLUME * asked.size**3:
             x, y, z = points.mean(axis=0)
             raise _refused(
-                f"body '{body.name}' around ({x:.6g}, {y:.6g}, {z:.6g}) has no volume; remove or redraw it",
-                found,
-                body,
+                f"body '{body.name}' around ({x:.6g}, {y:.6g}, {z:.6g}) has no volume; remove or redraw it", found, body
             )
         if plane.warp:
             warped.append((plane.warp, body.name, plane.place))
@@ -255,11 +245,7 @@ def solids_of_bodies(found: Bodies, reading: Reading) -> Layout:
         blocks=tuple(solids),
         names=tuple(body.name for body in asked.bodies),
         unit=found.unit,
-        notes=(
-            *(Note(CHANGED, text) for text in said),
-            *_accepted(asked.bodies),
-            *found.notes,
-        ),
+        notes=(*(Note(CHANGED, text) for text in said), *_accepted(asked.bodies), *found.notes),
     )
     return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", reading.ignore))
 
@@ -275,7 +261,7 @@ def _plane_faces_said(
             f"planes were fitted to warped faces of {len(warped)} of {counted(len(changed), 'block')}: up to "
             f"{most:.3g} in the file's unit, of '{name}' at ({', '.join(f'{x:.6g}' for x in place)})"
         )
-    coarser = [one for one in changed if abs(one[0]) > NOTED_VOLUME]
+    coarser = [one for one in changed if abs(one[0]) > NOTED]
     if coarser:
         most, name = max(coarser, key=lambda one: abs(one[0]))
         said.append(
@@ -356,7 +342,7 @@ def _selected(found: Bodies, reading: Reading) -> _Selection:
         raise ValueError(f"body '{bare}' has no surface, as of cells that are there twice; export it once")
     every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
     size = float(spread_of(every).max())
-    if not 0.0 < size < LARGEST_SIZE:
+    if not 0.0 < size < LARGEST:
         raise ValueError(f"it spreads over {size:.3g} units of length; repair the file")
     return _Selection(bodies, size, dropped)
 
@@ -425,12 +411,7 @@ def _projected(axis: int, bodies: Sequence[Body], size: float) -> _Projection:
 
 
 def _hidden(
-    axis: int,
-    bodies: Sequence[Body],
-    outlines: Sequence[np.ndarray],
-    low: np.ndarray,
-    high: np.ndarray,
-    size: float,
+    axis: int, bodies: Sequence[Body], outlines: Sequence[np.ndarray], low: np.ndarray, high: np.ndarray, size: float
 ) -> str:
     """Say which body lies behind which, or that no plane cuts them all; "" if they are side by side in one leaf."""
     import shapely
@@ -440,8 +421,9 @@ def _hidden(
     area = shapely.area(shapes)
     tree = shapely.STRtree(shapes)
     # A few at a time: in a wrong view every body may cover every other, and the first such pair is enough.
-    for start in range(0, len(shapes), AT_A_TIME):
-        one, other = tree.query(shapes[start : start + AT_A_TIME], predicate="intersects")
+    few = 20
+    for start in range(0, len(shapes), few):
+        one, other = tree.query(shapes[start : start + few], predicate="intersects")
         one = one + start
         apart = (one < other) & (np.maximum(low[one], low[other]) >= np.minimum(high[one], high[other]) - LEVEL * size)
         one, other = one[apart], other[apart]

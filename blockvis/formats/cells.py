@@ -53,10 +53,7 @@ def owners(data: Mapping[str, np.ndarray], n_cells: int) -> tuple[str | None, li
 
 
 def layout_of_cells(
-    points: np.ndarray,
-    rings: Sequence[np.ndarray],
-    data: Mapping[str, np.ndarray],
-    view: str | None = None,
+    points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray], view: str | None = None
 ) -> Layout | Bodies:
     """Make a layout of surface cells; if they do not lie in a plane, find the bodies that they enclose.
 

@@ -10,19 +10,15 @@ import numpy as np
 
 from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, Note
-from blockvis.layout.outlines import FLAT, flattened, loops_of
+from blockvis.layout.outlines import ROUNDING, flattened, loops_of
 from blockvis.layout.refusal import Refused, carrying
-from blockvis.layout.solids import area_vectors, fans
+from blockvis.layout.solids import area_vectors, fans, sides_of
 from blockvis.layout.surfaces import same_points, turned_faces
 from blockvis.text import listed
 from solver.mechanics import counted
 
 from .bodies import Bodies, Body, as_drawn
 from .reading import Reading
-
-#: Points closer than this fraction of the size of the drawing are one: single precision is accurate to 6e-8.
-SAME_POINT = 2e-6
-
 
 #: Faces around an edge whose angles differ by less than this [rad] coincide.
 SAME_ANGLE = 1e-4
@@ -38,7 +34,7 @@ class OpenSurface(Refused):
 
 def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Merge points that coincide, in the order of their coordinates, and drop the faces that have no area then."""
-    same = same_points(points, SAME_POINT * size)
+    same = same_points(points, ROUNDING * size)
     kept = np.unique(same)
     kept = kept[np.lexsort(points[kept].T[::-1])]
     number = np.empty(len(points), dtype=np.int64)
@@ -59,8 +55,7 @@ def closed_bodies(part: Body, size: float) -> list[Body]:
     faces = every[np.sort(np.unique(np.sort(every, axis=1), axis=0, return_index=True)[1])]
     if len(faces) == 0:
         raise OpenSurface(f"body '{name}' has no face with an area; export closed bodies")
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    unique, inverse, counts = np.unique(sides_of(faces), axis=0, return_inverse=True, return_counts=True)
     if (counts != 2).any():
         piece = _touching_bodies(points, every)
         if piece is not None:
@@ -69,8 +64,7 @@ def closed_bodies(part: Body, size: float) -> list[Body]:
     closed = _with_holes_closed(points, faces, holes) if len(holes) and counts.max() == 2 else None
     if closed is not None:
         points, faces = closed
-        edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+        unique, inverse, counts = np.unique(sides_of(faces), axis=0, return_inverse=True, return_counts=True)
     if (counts == 1).any():
         x, y, z = points[unique[counts == 1][0]].mean(axis=0)
         raise OpenSurface(
@@ -209,7 +203,7 @@ def enclosed(parts: Sequence[Body], size: float, reading: Reading | None = None)
 def _is_plane(points: np.ndarray, size: float) -> bool:
     """Whether points lie in a plane, within what is nothing in a drawing of this size."""
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(spread[-1] <= FLAT * size * np.sqrt(len(points)))
+    return bool(spread[-1] <= ROUNDING * size * np.sqrt(len(points)))
 
 
 def bodies_of_surfaces(

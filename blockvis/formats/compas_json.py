@@ -24,10 +24,7 @@ from solver.mechanics import counted
 
 from .bodies import Bodies
 from .cells import Mesh, found_in_meshes, layout_of_cells
-from .reading import Reading
-
-#: Objects nested deeper than this are not looked into.
-DEEPEST = 40
+from .reading import DEEPEST, Reading
 
 #: Keys of what lies between blocks, which may hold meshes of its own.
 _BETWEEN = {"edge", "adjacency", "interfaces", "interface", "contacts", "interactions", "facedata", "edgedata"}

@@ -14,10 +14,7 @@ from blockvis.layout.units import unit_of
 from blockvis.system.extras import require
 
 from .bodies import Bodies, Body, drawn_row
-from .reading import parsing
-
-#: Nodes nested deeper than this are refused: nodes may place each other.
-DEEPEST = 100
+from .reading import DEEPEST, parsing
 
 #: Coordinates in the order in which the last points up, by the file's word for it.
 UP = {"X_UP": ([1, 2, 0], "z"), "Y_UP": ([0, 1, 2], "y"), "Z_UP": ([0, 1, 2], "z")}

@@ -17,15 +17,11 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import drawing_plane, spread_of
 from solver.mechanics import counted
 
-from .arcs import Curve
+from .arcs import MEETS, Curve
 from .reading import Reading
 
 #: Lines are intersected on a grid of this fraction of the size of the drawing.
 GRID = 1e-6
-
-#: Ends of lines that miss another line by up to this fraction of the size of the drawing meet it, and so do the ends of
-#: an outline that misses itself by this fraction of its own size: what drawing by hand, or in single precision, leaves.
-MEETS = 1e-4
 
 
 S = TypeVar("S", bound="Stroke")

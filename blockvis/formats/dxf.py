@@ -19,7 +19,7 @@ from blockvis.layout.choice import look_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import CHANGED, Note, kind_of
-from blockvis.layout.outlines import chords_of, filled
+from blockvis.layout.outlines import ROUNDING, chords_of, filled
 from blockvis.layout.units import metres_per
 from solver.mechanics import counted
 
@@ -51,9 +51,6 @@ DEEPEST_INSERT = 16
 #: Layer of AutoCAD that holds the points of dimensions and is never printed.
 NEVER_DRAWN = "Defpoints"
 
-#: Outlines closer than this fraction of their size are the same.
-CLOSES = 1e-6
-
 #: An arc of a smaller opening [rad] is a whole ellipse.
 WHOLE_TURN = 1e-9
 
@@ -81,7 +78,8 @@ class _Found(Drawing):
 
     def _row(self, entity: Any, name: str) -> dict[str, Any]:
         """Row of an outline on its layer, with what our own writer put beside it."""
-        layer, own = str(entity.dxf.layer), _own_data(entity)
+        layer, tags = str(entity.dxf.layer), entity.get_xdata(APPLICATION) if entity.has_xdata(APPLICATION) else ()
+        own = json_object("".join(str(tag.value) for tag in tags if tag.code == 1000))
         moved = bool(own) and _layer_name(own).lower() != layer.lower()
         row = {**said_by_layer(layer), "name": name, **(on_layer(own, layer) if moved else own)}
         self.moved += [(own, row)] if moved else []
@@ -325,12 +323,9 @@ def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None)
 
 
 def _clamped(points: Any, weights: Any, knots: Any, degree: int) -> tuple[Any, Any, Any]:
-    """Write a spline with knots at whose ends it begins and ends: ezdxf splits others, as periodic ones, wrongly.
+    """Give points, weights and knots of a spline that begins and ends at the ends of its knots.
 
-    Returns
-    -------
-    points : sequence of vectors
-    weights, knots : sequences of float
+    ezdxf splits others, as periodic ones, wrongly.
     """
     from scipy.interpolate import BSpline, make_interp_spline
 
@@ -521,7 +516,7 @@ def _loops_of(edges: Sequence[Stroke]) -> list[Stroke]:
     edges = [edge for edge in edges if len(edge.points) > 1]
     if not edges:
         return []
-    near = CLOSES * float(np.ptp(np.concatenate([edge.points for edge in edges]), axis=0).max())
+    near = ROUNDING * float(np.ptp(np.concatenate([edge.points for edge in edges]), axis=0).max())
     loops = [edges[0]]
     for edge in edges[1:]:
         loop = loops[-1]
@@ -565,12 +560,7 @@ def _drawn_already(ring: np.ndarray, found: _Found) -> bool:
     if not found.outlines or len(found.outlines[-1].points) != len(ring):
         return False
     last = found.outlines[-1].points.mean(0)
-    return bool(np.abs(last - ring.mean(0)).max() <= CLOSES * float(np.ptp(ring, axis=0).max()))
-
-
-def _own_data(entity: Any) -> dict[str, Any]:
-    tags = entity.get_xdata(APPLICATION) if entity.has_xdata(APPLICATION) else ()
-    return json_object("".join(str(tag.value) for tag in tags if tag.code == 1000))
+    return bool(np.abs(last - ring.mean(0)).max() <= ROUNDING * float(np.ptp(ring, axis=0).max()))
 
 
 def _layer_name(row: Mapping[str, Any]) -> str:

@@ -38,14 +38,8 @@ GROUPS = ("group", "layer", "kind", "class", "type", "category")
 
 #: Types of GeoJSON objects that hold outlines.
 GEOJSON = (
-    "FeatureCollection",
-    "Feature",
-    "GeometryCollection",
-    "Polygon",
-    "MultiPolygon",
-    "LineString",
-    "MultiLineString",
-)
+    "FeatureCollection", "Feature", "GeometryCollection", "Polygon", "MultiPolygon", "LineString", "MultiLineString",
+)  # fmt: skip
 
 #: What a file without a coordinate system draws so many of its widths away from 0 is a park or a country in degrees.
 FAR = 50.0
@@ -292,10 +286,10 @@ def layout_of_features(
     reading: Reading,
     *,
     unit: str = "",
-    degrees: str = "",
+    degrees: str,
     lengths: bool = False,
-    mercator: tuple[float, float] | None = None,
-    skipped: Mapping[str, int] | None = None,
+    mercator: tuple[float, float] | None,
+    skipped: Mapping[str, int],
 ) -> Layout:
     """Make a layout of polygons, and of the faces between lines.
 
@@ -303,7 +297,7 @@ def layout_of_features(
     ``lengths`` says whether the file says that it has no system, ``mercator`` is the scale of a Mercator at the equator
     and its northing there, and ``skipped`` counts by its kind what is no outline.
     """
-    found, rows = Drawing(skipped=Counter(skipped or {})), _rows(features)
+    found, rows = Drawing(skipped=Counter(skipped)), _rows(features)
     roles = dict.fromkeys(row.pop("role") for row in rows if row.get("role", mechanics.FREE) not in mechanics.ROLES)
     for feature, row in zip(features, rows, strict=True):
         first = len(found.outlines)

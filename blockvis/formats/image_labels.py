@@ -39,10 +39,8 @@ CODEC = 16
 #: ... where this share of pixels, or more, is like those right of it and below, and less than EXACT of what varies.
 PAINTED = 0.95
 
-#: A flat place of a noisy image is so many pixels from its border.
-WIDE = 3.0
-
-#: Pixels so near to the background may be of its border [pixels].
+#: Pixels so near to the background may be of its border, and a flat place of a noisy image is so far from its own
+#: [pixels].
 BORDER = 3.0
 
 #: Lines are nowhere wider than this fraction of the image's smaller side ...
@@ -332,7 +330,7 @@ def _of_noise(image: Image.Image) -> _Found:
     pieces, n = ndimage.label(flat)
     # What is flat along a border, where the noise is, is narrow.
     wide = ndimage.maximum(ndimage.distance_transform_edt(flat), pieces, np.arange(1, n + 1)) if n else np.zeros(0)
-    large = np.flatnonzero(np.asarray(wide) >= WIDE) + 1
+    large = np.flatnonzero(np.asarray(wide) >= BORDER) + 1
     if len(large) == 0 or flat.mean() < LEAST_FLAT:
         raise Photograph
     weight = np.bincount(pieces.ravel(), minlength=n + 1)[large]

@@ -16,8 +16,8 @@ from blockvis.layout.outlines import ring_width
 from blockvis.layout.refusal import Refused
 from solver.mechanics import counted
 
-from .arcs import with_shared_corners
-from .drawing import GRID, MEETS, Drawing, Line, Outline, joined_note
+from .arcs import MEETS, with_shared_corners
+from .drawing import GRID, Drawing, Line, Outline, joined_note
 from .reading import Reading
 
 #: An end moves at most by this fraction of the length of its line.
@@ -125,7 +125,10 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[Outline], ignored: 
     _add_faces([lines[k] for k in rest], [segments[k] for k in rest], kept, every, size, found)
     mortar = [] if matches(["face"], only) else _without_mortar(found, 4 * GRID * size)
     found.notes += [*_cut_notes(found, len(cutting), openings), *mortar]
-    found.notes += [_faces_note(found, lines)] if found.faces else []
+    if found.faces:
+        said = f"{counted(len(found.faces), 'block is a face', 'blocks are faces')} between "
+        said += f"{counted(len(lines), 'loose line')}; an opening enclosed by lines counts as a block too: "
+        found.notes.append(Note(CHANGED, f"{said}erase it or draw closed outlines"))
     return found
 
 
@@ -249,15 +252,6 @@ def _crossing_notes(
             said.append(f"{many} on layer '{layer}'{f' ({types})' if types else ''} around {counted(n, 'face')}")
     words = f"lines run across those of other layers: {', '.join(said)}; leave them out (ignore) if they are no joints"
     return [Note(CHANGED, words)] if said else []
-
-
-def _faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
-    return Note(
-        CHANGED,
-        f"{counted(len(faces.faces), 'block is a face', 'blocks are faces')} between "
-        f"{counted(len(lines), 'loose line')}; an opening enclosed by lines counts as a block too: "
-        "erase it or draw closed outlines",
-    )
 
 
 def refuse_open(found: Drawing, what: str, remedy: str, unit: str, factors: Sequence[float] = (1, 1)) -> None:
@@ -419,12 +413,7 @@ def _crossed(area: Any, lines: list[Any], reach: float) -> bool:
 
 
 def _add_faces(
-    lines: list[Line],
-    segments: list[Any],
-    outlines: Sequence[np.ndarray],
-    every: Any,
-    size: float,
-    found: Faces,
+    lines: list[Line], segments: list[Any], outlines: Sequence[np.ndarray], every: Any, size: float, found: Faces
 ) -> None:
     """Add the faces between lines that cut no outline, and the lines that enclose nothing."""
     import shapely

@@ -26,7 +26,7 @@ from solver.mechanics import counted
 from .bodies import Bodies, Body, body_of_polygons, in_dimension
 from .cells import flat_beside, layout_of_cells, merged, owners, rows_of_cells
 from .node_order import VTK, VTK_LINES, VTK_OTHER_FACES, ring_of_nodes
-from .reading import Reading, naming
+from .reading import DEEPEST, Reading, naming
 from .volumes import VTK_SOLIDS, bodies_of_cells
 from .vtk_arrays import announced_bytes, largest_number
 
@@ -44,9 +44,6 @@ MOST_PER_BYTE = 1100
 
 #: Numbers that all arrays of a file may hold together: 400 MB, a thousand times a large drawing.
 MOST_NUMBERS = 50_000_000
-
-#: XML elements nested deeper than this are refused; VTK nests a handful.
-DEEPEST = 64
 
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:

@@ -10,6 +10,9 @@ from typing import Any
 
 from blockvis.layout.left_out import matches
 
+#: What a file nests deeper than this, groups or nodes, is damaged, or places itself; no program nests as deep.
+DEEPEST = 200
+
 
 @dataclass(frozen=True)
 class Reading:

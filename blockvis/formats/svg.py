@@ -30,7 +30,7 @@ from solver import mechanics
 from .arcs import MOST_CHORDS, Arc, Bezier, Curve, bezier_chords
 from .drawing import Drawing, Line, Outline, Stroke, is_chain, joined_ends
 from .loose_lines import refuse_open, with_faces
-from .reading import Reading, json_object
+from .reading import DEEPEST, Reading, json_object
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
@@ -67,9 +67,6 @@ _LAYER = "blocks"
 
 #: Numbers that follow each path command.
 _TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
-
-#: Groups nested deeper than this are refused.
-DEEPEST = 200
 
 
 class _Part(NamedTuple):
@@ -547,7 +544,9 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
             pairs = [base + pair for pair in np.array(v).reshape(-1, 2)]
             smooth = 2 * at - control if before in ("CS" if kind in "CS" else "QT") and before else at
             pairs = [smooth, *pairs] if kind in "ST" else pairs
-            curve = _bezier(len(points) - 1, np.array([at, *pairs]), where)
+            controls = np.array([at, *pairs])
+            chords = bezier_chords(controls @ where.matrix[:2, :2].T, where.tolerance)
+            curve = Bezier(len(points) - 1, chords, controls)
             curves.append(curve)
             points += [*curve.at(np.linspace(0.0, 1.0, curve.chords + 1)[1:-1]), pairs[-1]]
             control, at = pairs[-2], pairs[-1]
@@ -555,11 +554,6 @@ def _path(element: ElementTree.Element, where: _Context) -> list[_Part]:
     if len(points) > 1:
         parts.append(_Part(np.array(points), False, tuple(curves)))
     return parts
-
-
-def _bezier(first: int, controls: np.ndarray, where: _Context) -> Bezier:
-    """Make a quadratic or cubic Bézier curve with as many chords as it needs where it is drawn."""
-    return Bezier(first, bezier_chords(controls @ where.matrix[:2, :2].T, where.tolerance), controls)
 
 
 def _add_arc(

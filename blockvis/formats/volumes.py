@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.layout.linked import linked
+from blockvis.layout.linked import equal_rows, linked
 
 from .bodies import Body
 
@@ -35,19 +35,11 @@ VTK_SOLIDS: dict[int, Faces] = {
 }  # fmt: skip
 
 #: By the beginning of meshio's name of the cell type.
-MESHIO_SOLIDS: dict[str, Faces] = {
-    "tetra": TETRAHEDRON,
-    "hexahedron": HEXAHEDRON,
-    "wedge": WEDGE,
-    "pyramid": PYRAMID,
-}
+MESHIO_SOLIDS: dict[str, Faces] = {"tetra": TETRAHEDRON, "hexahedron": HEXAHEDRON, "wedge": WEDGE, "pyramid": PYRAMID}
 
 
 def bodies_of_cells(
-    points: np.ndarray,
-    cells: Sequence[tuple[Faces, np.ndarray]],
-    owner: np.ndarray,
-    rows: Sequence[dict[str, Any]],
+    points: np.ndarray, cells: Sequence[tuple[Faces, np.ndarray]], owner: np.ndarray, rows: Sequence[dict[str, Any]]
 ) -> list[Body]:
     """Find the skin of each body: the faces that belong to one of its cells only.
 
@@ -82,9 +74,7 @@ def bodies_of_cells(
 
 def _pieces(faces: np.ndarray, cell_of_face: np.ndarray, owner: np.ndarray) -> np.ndarray:
     """(n_cells,) int array: number of the piece of each cell, those of one owner one after another."""
-    order = np.lexsort(faces.T[::-1])
-    same = (faces[order][1:] == faces[order][:-1]).all(axis=1)
-    one, other = cell_of_face[order][:-1][same], cell_of_face[order][1:][same]
+    one, other = (cell_of_face[face] for face in equal_rows(faces))
     kept = owner[one] == owner[other]
     one, other = one[kept], other[kept]
     piece = linked(one, other, len(owner))

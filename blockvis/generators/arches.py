@@ -274,12 +274,7 @@ def _bearings(joints: np.ndarray) -> np.ndarray:
 
 
 def _on_springers(
-    outlines: list[np.ndarray],
-    bearings: np.ndarray,
-    angles: np.ndarray,
-    thickness: float,
-    density: float,
-    depth: float,
+    outlines: list[np.ndarray], bearings: np.ndarray, angles: np.ndarray, thickness: float, density: float, depth: float
 ) -> solver.Assembly:
     """Put an arch between a fixed springer on the left and a moving one on the right, twice its thickness deep."""
     springers = []

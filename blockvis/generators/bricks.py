@@ -18,10 +18,11 @@ from .slivers import without_slivers
 #: All corners lie on a grid of this fraction of the brick height, so that cuts leave no slivers of rounding errors.
 GRID = 1e-10
 
-#: A piece lower than this fraction of a course is joined to a neighbour.
+#: A piece lower than this fraction of a course, or smaller than this fraction of a brick, is joined to a neighbour.
 LOWEST_BRICK = 0.3
 
-#: So is a piece into which no circle of this fraction of the brick height in diameter fits: the end of a wedge.
+#: So is a piece into which no circle of this fraction of the brick height in diameter fits, the end of a wedge; parts
+#: narrower than this, and longer, are cut off.
 NARROWEST = 0.25
 
 

@@ -21,9 +21,6 @@ from .heads import HEADS, LESS, Units, head_of, top_of
 from .patterns import LEANS, PATTERNS, bedded, coursed, rubble
 from .slivers import in_simple_pieces, without_slivers
 
-#: What is cut of a brick is joined to its neighbour if it is smaller than this fraction of a brick.
-CLOSER = 0.3
-
 #: What is smaller than this fraction of a brick and has no brick beside it is joined to a head.
 CRUMB = 0.1
 
@@ -33,13 +30,8 @@ GRID = 1e-12
 #: An opening has wall over it where a strip of this fraction of a course over its top is wall at all.
 OVER = 0.1
 
-#: Parts of a brick narrower than this fraction of its height, and longer than that, are cut off.
-TONGUE = 0.25
-
-#: The stones fill the wall to this fraction of its area.
-KEPT = 1e-9
-
-#: What is left over when shapes are cut that share an edge is dropped below this fraction of a brick.
+#: What is left over when shapes are cut that share an edge is dropped below this fraction of a brick; the stones fill
+#: the wall to this fraction of its area.
 DUST = 1e-9
 
 #: Values that only some bonds, or heads, have: the key that chooses these, and its words.
@@ -219,7 +211,7 @@ def filled(
     rest = _without(rest, quoins, grid)
     stones = _with_crumbs(_laid(rest, wall.bounds, pattern, grid), stones, pattern, grid)
     kept = sum(shape.area for _, shape in stones)
-    if abs(kept - area) > KEPT * area:
+    if abs(kept - area) > DUST * area:
         raise ValueError(
             f"the stones fill {kept:.9g} of {area:.9g} m² of the wall; its outline may touch itself: redraw it"
         )
@@ -424,11 +416,11 @@ def _without_tongues(piece: shapely.Polygon, height: float, grid: float) -> list
     """Cut off strips that a head leaves of a brick, so that they join what they lie on."""
     if len(piece.exterior.coords) < 6:
         return [piece]
-    half = TONGUE * height / 2.0
+    half = NARROWEST * height / 2.0
     body = piece.buffer(-half, join_style="mitre").buffer(half, join_style="mitre")
     strips = [
         strip for strip in pieces_of(shapely.difference(piece, body, grid_size=grid))
-        if strip.length > 2.0 * TONGUE * height
+        if strip.length > 2.0 * NARROWEST * height
         and strip.area > 0.98 * strip.envelope.area
     ]  # fmt: skip
     rest = in_simple_pieces(shapely.difference(piece, shapely.union_all(strips), grid_size=grid), grid)
@@ -436,7 +428,7 @@ def _without_tongues(piece: shapely.Polygon, height: float, grid: float) -> list
 
 
 def _is_sliver(shape: shapely.Polygon, length: float, height: float) -> bool:
-    if shape.area < CLOSER * (1.0 - 1e-6) * length * height:
+    if shape.area < LOWEST_BRICK * (1.0 - 1e-6) * length * height:
         return True
     low, high = shape.bounds[1::2]
     return high - low < LOWEST_BRICK * height or bool(shape.buffer(-NARROWEST / 2.0 * height).is_empty)

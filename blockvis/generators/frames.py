@@ -18,12 +18,7 @@ MIRROR = np.array([-1.0, 1.0])
 
 
 def column(
-    *,
-    blocks: int = 5,
-    width: float = 0.5,
-    block_height: float = 0.4,
-    density: float = 2000.0,
-    depth: float = 1.0,
+    *, blocks: int = 5, width: float = 0.5, block_height: float = 0.4, density: float = 2000.0, depth: float = 1.0
 ) -> solver.Assembly:
     """Build a column of equal blocks on a ground that moves.
 
@@ -205,13 +200,7 @@ def buttressed_arch(
 
 
 def _arch_and_pier(
-    span: float,
-    rise: float,
-    thickness: float,
-    voussoirs: int,
-    pier_width: float,
-    pier_height: float,
-    pier_blocks: int,
+    span: float, rise: float, thickness: float, voussoirs: int, pier_width: float, pier_height: float, pier_blocks: int
 ) -> tuple[list[tuple[str, np.ndarray]], list[np.ndarray]]:
     """Named voussoirs, and the blocks of the right pier from the bottom."""
     joints, _ = segmental_joints(span, rise, thickness, voussoirs)

@@ -18,10 +18,7 @@ LEAST_OF_PERIMETER = 0.05
 
 
 def without_slivers(
-    shapes: Sequence[shapely.Polygon],
-    is_sliver: Callable[[shapely.Polygon, int], bool],
-    height: float,
-    grid: float,
+    shapes: Sequence[shapely.Polygon], is_sliver: Callable[[shapely.Polygon, int], bool], height: float, grid: float
 ) -> list[tuple[shapely.Polygon, int]]:
     """Join slivers to the neighbours with which they make the most convex blocks, the smallest first.
 

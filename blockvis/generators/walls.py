@@ -12,7 +12,7 @@ import shapely
 import shapely.affinity
 
 import solver
-from blockvis.layout.outlines import rectangle
+from blockvis.layout.outlines import ROUNDING, rectangle
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -22,9 +22,6 @@ from .bonds import BONDS, SHORTEST_BRICK
 from .bricks import LOWEST_BRICK, Bond, cut_bricks, places_in
 from .dimensions import MOST_BLOCKS, above_zero, choice, finite, pair, whole
 from .openings import Opening, checked_opening, head_joints_of, head_outlines, opening_ring
-
-#: An edge of an opening closer to a joint than this fraction of the spacing of joints is moved onto it.
-ROUNDING = 1e-6
 
 
 def wall(
@@ -297,11 +294,7 @@ def _placed(
     placed = []
     for number, values in enumerate(openings, start=1):
         opening = checked_opening(
-            values,
-            number,
-            brick_length=bond.brick_length,
-            brick_height=bond.brick_height,
-            wall_height=height,
+            values, number, brick_length=bond.brick_length, brick_height=bond.brick_height, wall_height=height
         )
         where, right = f"opening {number}", opening.x + opening.width
         if right > width * (1.0 + 1e-9):

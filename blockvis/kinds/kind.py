@@ -25,21 +25,12 @@ Steps = Generator[solver.Increment, None, mechanics.Ending]
 
 @dataclass(frozen=True)
 class Course:
-    """What the increments of an analysis run over and what is measured along them.
-
-    Attributes
-    ----------
-    parameter, measured : solver.mechanics.Quantity
-    settlements : tuple of solver.Settlement
-        Whose phases the parameter belongs to.
-    control : solver.mechanics.Control, optional
-        What drives the parameter where no settlement does.
-    """
+    """What the increments of an analysis run over and what is measured along them."""
 
     parameter: mechanics.Quantity
     measured: mechanics.Quantity
-    settlements: tuple[solver.Settlement, ...] = ()
-    control: mechanics.Control | None = None
+    settlements: tuple[solver.Settlement, ...] = ()  #: Whose phases the parameter belongs to.
+    control: mechanics.Control | None = None  #: What drives the parameter where no settlement does.
 
     @property
     def drivers(self) -> tuple[mechanics.Control, ...]:
@@ -67,34 +58,17 @@ class RunInput:
 
 @dataclass
 class AnalysisRun:
-    """An analysis that is ready to run.
+    """An analysis that is ready to run."""
 
-    Attributes
-    ----------
-    analysis : str
-        Name of the kind.
-    given : RunInput
-    course : Course
-    steps : solver.mechanics.Increments
-        None by default, for those that fill in the other fields as they go.
-    limits : list of solver.LimitLoad
-        Filled as the steps go, one per limit state.
-    """
-
-    analysis: str
+    analysis: str  #: Name of the kind.
     given: RunInput
     course: Course
+    #: None by default, for those that fill in the other fields as they go.
     steps: mechanics.Increments = field(default_factory=lambda: without_increments())
-    limits: list[solver.LimitLoad] = field(default_factory=list)
+    limits: list[solver.LimitLoad] = field(default_factory=list)  #: Filled as the steps go, one per limit state.
 
     def recorded(self, increments: Sequence[solver.Increment]) -> None:
-        """Let the last limit load share the written arrays of the increment that reports it.
-
-        Parameters
-        ----------
-        increments : sequence of solver.Increment
-            Written so far.
-        """
+        """Let the last limit load share the arrays of the increment that reports it, the last that is written."""
         if len(self.limits) == len(increments):
             self.limits[-1] = replace(self.limits[-1], held=increments[-1].held)
 
@@ -120,71 +94,30 @@ class AnalysisRun:
 
 
 class AnalysisKind(ABC):
-    """A kind of analysis.
+    """A kind of analysis."""
 
-    Attributes
-    ----------
-    name : str
-        As ``[analysis] kind`` has it.
-    parameter, measured : solver.mechanics.Quantity
-    checkpoint : type
-        Dataclass from which its increments go on; NoneType where they start again.
-    has_phases : bool
-        Whether blocks and dead loads may change between its settlements.
-    keys : tuple of Key
-        That it reads from [analysis].
-    sections : tuple of Section
-        Tables of the case file that it has for itself.
-    """
-
-    name: str
+    name: str  #: As ``[analysis] kind`` has it.
     parameter: mechanics.Quantity
     measured: mechanics.Quantity
-    checkpoint: type[Any] = NoneType
-    has_phases: bool = False
-    keys: tuple[Key, ...] = ()
-    sections: tuple[Section, ...] = ()
+    checkpoint: type[Any] = NoneType  #: Dataclass from which its increments go on; NoneType where they start again.
+    has_phases: bool = False  #: Whether blocks and dead loads may change between its settlements.
+    keys: tuple[Key, ...] = ()  #: That it reads from [analysis].
+    sections: tuple[Section, ...] = ()  #: Tables of the case file that it has for itself.
 
     @abstractmethod
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
         """Prepare the analysis of a case, its input checked.
 
-        Parameters
-        ----------
-        given : RunInput
-        resume : of type ``checkpoint``, optional
-            Where to go on.
-        found : sequence of solver.Increment
-            Found up to there.
-
-        Raises
-        ------
-        ValueError
-            For input that cannot be analysed.
+        It goes on from a ``checkpoint``, if there is one to resume, after the increments found up to there. ValueError
+        for input that cannot be analysed.
         """
 
     def read(self, top: Table, analysis: Table) -> Any:
-        """Read the keys of this kind from the case file: by name, by default; the same keys give equal values.
-
-        Parameters
-        ----------
-        top : Table
-            The whole file.
-        analysis : Table
-            Its [analysis].
-        """
+        """Read the keys of this kind from the whole file and its [analysis]; the same keys give equal values."""
         return read_keys(self.keys, analysis)
 
     def refuse(self, settings: Any, case: Case) -> None:
-        """Raise ValueError where a case of another kind gives keys of this one.
-
-        Parameters
-        ----------
-        settings
-            As :meth:`read` gives them.
-        case : Case
-            Of another kind.
-        """
+        """Raise ValueError where a case of another kind gives keys of this one, as :meth:`read` gives them."""
         return
 
     def checked(self, case: Case) -> Case:

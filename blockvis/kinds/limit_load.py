@@ -15,9 +15,9 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
-from blockvis.results.about import collapse_phase, governing_limit, in_phase, unit_in
+from blockvis.results.about import collapse_phase, governing_limit, in_phase, unit_and_phase
 from blockvis.results.other_mechanisms import has_others
-from blockvis.results.swinging import swing_factors, swung_increment
+from blockvis.results.swinging import SWING, swing_factors, swung_increment
 from blockvis.results.tables import csv_text, finite
 from blockvis.text import force_text
 from solver import mechanics
@@ -42,7 +42,7 @@ TORSIONS = ("points", "uniform")
 
 #: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the
 #: structure.
-SWINGING_FRAMES, SWING = 30, 0.05
+SWINGING_FRAMES = 30
 
 #: Displacement within which joints that a settlement has opened may close, in block sizes. It changes nothing for an
 #: arch whose hinges have opened; without it the capacity of a wall of many bricks is that of its loosest brick.
@@ -81,21 +81,11 @@ class Standing:
 
 @dataclass(frozen=True)
 class LimitLoadCheckpoint:
-    """Where limit loads go on from, after one of them, to the same bits.
+    """Where limit loads go on from, after one of them, to the same bits."""
 
-    Attributes
-    ----------
-    limits : tuple of solver.LimitLoad
-        Found so far, in the order of the increments that report them; numbers alone.
-    settlement : solver.mechanics.PathState, optional
-        Where the settlement stands along which they are asked for.
-    standing : Standing
-        Where the settlement ended that comes before the places of a load.
-    """
-
-    limits: tuple[solver.LimitLoad, ...]
-    settlement: mechanics.PathState | None = None
-    standing: Standing = Standing()
+    limits: tuple[solver.LimitLoad, ...]  #: Found so far, in the order of their increments; numbers alone.
+    settlement: mechanics.PathState | None = None  #: Where the settlement stands along which they are asked for.
+    standing: Standing = Standing()  #: Where the settlement ended that comes before the places of a load.
 
 
 class LimitLoadKind(AnalysisKind):
@@ -264,9 +254,7 @@ class LimitLoadKind(AnalysisKind):
         low, high = said["limit_load_bounds"]
         kind = "bounds" if said["limit_load_flow"] == "associative" else "values, no bounds,"
         known = f", static and kinematic {kind} differ by {high - low:.1e}" if converged else ""
-        lines = [
-            f"load multiplier      {state.load_multiplier:12.6g}     {said['limit_load_flow']} friction{known}",
-        ]
+        lines = [f"load multiplier      {state.load_multiplier:12.6g}     {said['limit_load_flow']} friction{known}"]
         # Moments have no resultant.
         if state.reaction:
             share = state.reaction / response.total_weight
@@ -284,9 +272,9 @@ class LimitLoadKind(AnalysisKind):
         if not response.parameter.is_path and len(path) > 1:
             lines.append(f"the lowest of {len(path)} positions: load at x = {state.parameter:.6g} m")
         elif response.settlements:
-            place = f"{unit_in(response, state.phase)}{in_phase(response, state.phase)}"
             before = _before(response)
             drawn = "" if before is None else f"   before it {before:.6g}"
+            place = unit_and_phase(response, state.phase)
             lines.append(f"after a settlement of{state.parameter:12.6g} {place}{drawn}")
         lines += [f"note: {note}" for note in _notes_on_places(response)]
         if response.collapse is not None:
@@ -307,7 +295,7 @@ class LimitLoadKind(AnalysisKind):
             return response.message or f"Limit load: {response.stop}"
         where = ""
         if len(response.path) > 1:
-            place = f"{unit_in(response, state.phase)}{in_phase(response, state.phase)}"
+            place = unit_and_phase(response, state.phase)
             where = f" at {response.parameter.name} {state.parameter:.5g} {place}"
         return f"Limit load: α = {state.load_multiplier:.5g}{where}"
 
@@ -337,8 +325,7 @@ class LimitLoadKind(AnalysisKind):
         if not response.parameter.is_path and len(path) > 1:
             rows.append(("lowest of", f"{len(path)} positions, at x = {state.parameter:.5g} m"))
         elif response.settlements:
-            place = f"{unit_in(response, state.phase)}{in_phase(response, state.phase)}"
-            rows.append(("after a settlement of", f"{state.parameter:.6g} {place}"))
+            rows.append(("after a settlement of", f"{state.parameter:.6g} {unit_and_phase(response, state.phase)}"))
             before = _before(response)
             if before is not None:
                 rows.append(("before it", f"{before:.6g}"))
@@ -488,7 +475,7 @@ def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, foun
     for increment in steps:
         programs += increment.programs
         if increment.status == solver.Status.FALLING:
-            yield _read_for_multipliers(increment)
+            yield replace(increment, measured=increment.load_multiplier)
         elif _wanted(case, increment):
             # In equilibrium under the dead load: the settlement has proved it.
             state = _limit_state(run, run.given.loads, Standing.at(increment), programs)
@@ -524,7 +511,7 @@ def _over_places(
         programs += increment.programs
         standing = Standing.at(increment)
         if increment.status == solver.Status.FALLING:
-            yield _read_for_multipliers(increment)
+            yield replace(increment, measured=increment.load_multiplier)
     if steps.ending.stop is not solver.Status.LIMIT_REACHED:
         return not_reached(steps.ending, "it carries no live load")
     chosen, shown = 0, None
@@ -555,11 +542,6 @@ def _over_places(
     failed = [limit.status is solver.LimitStatus.NOT_CONVERGED for limit in run.limits]
     note = _unconverged([float(x) for x, lacks in zip(places, failed, strict=False) if lacks], len(places))
     return replace(ending, message="; ".join(filter(None, (ending.message, note))))
-
-
-def _read_for_multipliers(increment: solver.Increment) -> solver.Increment:
-    """Measure the load multiplier of an increment of the settlement."""
-    return replace(increment, measured=increment.load_multiplier)
 
 
 def _numbers(run: AnalysisRun) -> tuple[solver.LimitLoad, ...]:

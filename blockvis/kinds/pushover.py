@@ -15,7 +15,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import FRACTION, POSITIVE, TEXT, VECTOR, Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.layout.names import blocks_called
-from blockvis.results.about import mechanism_text
+from blockvis.results.about import EXACT, mechanism_text
 from blockvis.text import nearest
 from solver import mechanics
 
@@ -48,9 +48,6 @@ CONTROL = Section(
             "[settlement] holds over it", 0.002, default=solver.Controls.step_tolerance, elsewhere=True),
     ),
 )  # fmt: skip
-
-#: Part of a multiplier by which increments of a plateau differ: programs are solved to less.
-EQUAL = 1e-6
 
 
 class PushoverKind(AnalysisKind):
@@ -172,7 +169,7 @@ def _largest(response: solver.Response) -> solver.Increment | None:
     path = response.path[1:] if response.interfaces.elastic else response.path
     found = [increment for increment in path if math.isfinite(increment.load_multiplier)]
     most = max((increment.load_multiplier for increment in found), default=0.0)
-    return next((i for i in found if i.load_multiplier >= most - EQUAL * abs(most)), None)
+    return next((i for i in found if i.load_multiplier >= most - EXACT * abs(most)), None)
 
 
 def _lost(response: solver.Response) -> str:

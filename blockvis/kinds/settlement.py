@@ -21,6 +21,7 @@ from blockvis.results.about import (
     mechanism_text,
     reaction_size,
     told_reaction,
+    unit_and_phase,
     unit_in,
 )
 from blockvis.results.bearing import bearings
@@ -149,8 +150,7 @@ class SettlementKind(AnalysisKind):
         elif len(path) > 1:
             last = path[-1]
             lines.append(f"last reaction        {reaction(last.reaction, last.phase)}")
-            place = f"{unit_in(response, last.phase)}{in_phase(response, last.phase)}"
-            lines.append(f"last settlement      {last.parameter:12.6g} {place}")
+            lines.append(f"last settlement      {last.parameter:12.6g} {unit_and_phase(response, last.phase)}")
         return lines + [str(bearing) for bearing in (bearings(response, path[-1]) if path else [])]
 
     def title(self, response: solver.Response) -> str:
@@ -161,7 +161,7 @@ class SettlementKind(AnalysisKind):
             return f"{what} at a settlement of {response.collapse.displacement:.5g} {_unit_and_phase(response)}"
         if response.stop is solver.Status.LIMIT_REACHED and (losses := response.losses):
             first, lost = losses[0], sum(len(loss.blocks) for loss in losses)
-            place = f"{first.settlement:.5g} {unit_in(response, first.phase)}{in_phase(response, first.phase)}"
+            place = f"{first.settlement:.5g} {unit_and_phase(response, first.phase)}"
             when = f"at a settlement of {place}" if len(losses) == 1 else f"from a settlement of {place} on"
             return f"Part has fallen: {counted(lost, 'block')} {when}; the rest stands at the end"
         return {
@@ -200,7 +200,7 @@ def losses_of(response: solver.Response) -> list[str]:
         names, more = ", ".join(loss.blocks[:4]), len(loss.blocks) - 4
         names += f" and {more} more" if more > 0 else ""
         weight = f"{force_text(loss.weight)}, {100.0 * loss.share:.2g} % of the weight"
-        place = f"{loss.settlement:.6g} {unit_in(response, loss.phase)}{in_phase(response, loss.phase)}"
+        place = f"{loss.settlement:.6g} {unit_and_phase(response, loss.phase)}"
         said.append(f"{names} at {place}, {weight}; the structure stands without")
     return said
 

@@ -18,16 +18,13 @@ from .facing import faced, facing_tolerance
 from .inspect import DENSITY, inspected
 from .joints.close import WAYS
 from .layout import Layout
-from .notes import changes_analysis
+from .notes import REPORTED, kind_of
 from .outlines import ring_width
-from .repair import overlaps, refuse_overlaps, repaired
+from .repair import DRAWN_GAP, overlaps, refuse_overlaps, repaired
 from .roles import checked_role, roles_of, told_apart, twins_note
 from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
 from .solids import prism, width_of
-
-#: Overlaps below this fraction of the width of the thinnest block are contacts without a word.
-DRAWN_GAP = 1e-3
 
 #: Joints thicker than this multiple of the width of a typical block are a mistake.
 THICKEST_JOINT = 2.0
@@ -84,7 +81,7 @@ def assemble(
     _check_lengths(layout, joint_thickness, overlap_tolerance, closing, outline_tolerance)
     where = layout.source or "layout"
     for note in layout.notes:
-        if changes_analysis(note):
+        if kind_of(note) in REPORTED:
             warnings.warn(f"{where}: {note}", stacklevel=2)
     if isinstance(joint_thickness, str) and layout.dimension == 3:
         joint_thickness = inspected(layout).joint_thickness

@@ -11,11 +11,8 @@ import shapely
 from .layout import Layout
 from .left_out import LeftOut
 from .notes import CHANGED, Note
-from .outlines import around_hole, pieces_of, ring_of, without_collinear
+from .outlines import ROUNDING, around_hole, pieces_of, ring_of, without_collinear
 from .surfaces import same_points
-
-#: Points nearer to each other than this fraction of the size of what they belong to are one.
-SAME = 1e-6
 
 #: The largest piece of an outline that crosses itself is the block if it holds at least this share of its area.
 WHOLE = 0.98
@@ -84,7 +81,7 @@ def crossings_of(ring: np.ndarray) -> np.ndarray:
         return np.zeros((0, 2))
     lines = shapely.get_parts(shapely.node(shapely.LinearRing(ring)))
     ends = np.array([line.coords[k] for line in lines for k in (0, -1)])
-    same = same_points(ends, SAME * float(np.ptp(ring, axis=0).max()))
+    same = same_points(ends, ROUNDING * float(np.ptp(ring, axis=0).max()))
     # A ring that is cut where it meets nothing has two ends there.
     places, counts = np.unique(same, return_counts=True)
     return np.asarray(ends[places[counts > 2]])

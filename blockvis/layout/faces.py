@@ -7,16 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .linked import linked
-from .solids import Solid, cross, off_planes, planes_of, triangles_of, volume, width_of
+from .linked import equal_rows, linked
+from .outlines import ROUNDING
+from .solids import Solid, cross, off_planes, planes_of, sides_of, triangles_of, volume, width_of
 from .surfaces import cleaned
 
 #: Triangles that lie within this fraction of the width of a block of one plane are one face: modellers warp the faces
 #: of stones by a tenth of it.
 WARPED = 0.01
-
-#: Warps below this fraction of the width of a block are the rounding of a file of single precision.
-ROUNDING = 2e-6
 
 #: Neighbouring triangles whose normals differ by more than this angle (15 degrees) are different faces.
 SAME_FACE = np.cos(np.radians(15.0))
@@ -136,7 +134,7 @@ def _regions(points: np.ndarray, triangles: np.ndarray, near: float) -> list[np.
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     normal = normal / np.maximum(double, 1e-300)[:, None]
     sliver = double <= near * longest
-    one, other = _neighbours(triangles)
+    one, other = (side // 3 for side in equal_rows(sides_of(triangles)))
     large, small = np.where(double[one] >= double[other], (one, other), (other, one))
     apart = np.abs(np.einsum("ijk,ik->ij", corners[small] - corners[large][:, :1], normal[large])).max(axis=1)
     along = np.einsum("ij,ij->i", normal[one], normal[other]) >= SAME_FACE
@@ -183,14 +181,6 @@ def _grown(
                     front.append(k)
         found.append(np.array(members))
     return found
-
-
-def _neighbours(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of triangles that share an edge."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    order = np.lexsort(edges.T[::-1])
-    same = (edges[order][1:] == edges[order][:-1]).all(axis=1)
-    return order[:-1][same] // 3, order[1:][same] // 3
 
 
 def _warp(points: np.ndarray, triangles: np.ndarray) -> float:

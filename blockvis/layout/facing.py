@@ -11,8 +11,9 @@ import shapely
 import solver
 from solver.mechanics import counted
 
-from .faces import ROUNDING, flattened
+from .faces import flattened
 from .linked import linked
+from .outlines import ROUNDING
 from .solids import Solid, area_vectors, planes_of, volume, width_of
 from .surfaces import cleaned, is_closed
 

@@ -10,8 +10,9 @@ import shapely
 
 import solver
 
-from .crossings import SAME, crossings_of
+from .crossings import crossings_of
 from .layout import Layout, Outline
+from .outlines import ROUNDING
 from .solids import Solid
 from .surfaces import same_points
 
@@ -73,7 +74,7 @@ def _open_ends(layout: Layout) -> np.ndarray:
     lines = [item.points for item in layout.left_out if item.kind == "open" and len(item.points) > 1]
     if not lines:
         return np.zeros((0, 2))
-    near = SAME * float(np.ptp(np.concatenate(lines), axis=0).max())
+    near = ROUNDING * float(np.ptp(np.concatenate(lines), axis=0).max())
     tree = shapely.STRtree([shapely.LineString(points) for points in lines])
     ends = np.array([points[k] for points in lines for k in (0, -1)])
     end, other = tree.query(shapely.points(ends), "dwithin", near)
@@ -87,7 +88,7 @@ def _open_edges(points: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarra
     """(n, 2, 3) array: edges of a surface that are those of one face, or of more than two."""
     if not np.isfinite(points).all():
         return np.zeros((0, 2, 3))
-    same = same_points(points, SAME * float(np.ptp(points, axis=0).max()))
+    same = same_points(points, ROUNDING * float(np.ptp(points, axis=0).max()))
     pairs = np.array([(face[k - 1], face[k]) for face in faces for k in range(len(face))])
     edges = np.sort(same[pairs], axis=1)
     edges = edges[edges[:, 0] != edges[:, 1]]

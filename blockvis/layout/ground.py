@@ -19,7 +19,7 @@ from .assemble import as_simplified
 from .facing import facing_tolerance
 from .inspect import Inspection
 from .layout import Layout
-from .outlines import largest_piece, pieces_of, rectangle, ring_of, touching, without_collinear
+from .outlines import ROUNDING, largest_piece, pieces_of, rectangle, ring_of, touching, without_collinear
 from .repair import repaired
 from .solids import size_of
 
@@ -40,9 +40,6 @@ NARROW = 0.2
 
 #: Slope of what is level; corners within this fraction of its height above the bottom are in a bottom face in space.
 LEVEL = 0.01
-
-#: Corners of the ground closer to a straight line than this fraction of the median block are left out.
-STRAIGHT = 1e-6
 
 #: Parts of the names and layers of blocks that are supports, where the drawing says nothing of roles.
 SUPPORT_WORDS = ("springer", "support", "ground", "foundation", "footing", "abutment", "bearing")
@@ -325,9 +322,9 @@ def _bedded(
     top.append(beds[-1][-1] + [depth, 0.0])
     floor = min(float(ring[:, 1].min()) for ring in outlines) - depth
     (start, _), (end, _) = top[0], top[-1]
-    line = shapely.simplify(shapely.LineString(top), STRAIGHT * depth)
+    line = shapely.simplify(shapely.LineString(top), ROUNDING * depth)
     ground = shapely.Polygon([[start, floor], [end, floor], *shapely.get_coordinates(line)[::-1]])
-    ground = _dug(ground, outlines, [np.array(top[:1]), *beds, np.array(top[-1:])], opening, STRAIGHT * depth)
+    ground = _dug(ground, outlines, [np.array(top[:1]), *beds, np.array(top[-1:])], opening, ROUNDING * depth)
     halves: list[Mapping[str, Any]] = []
     for name, role, left, right in (
         ("ground left", mechanics.FIXED, start, split.at),
@@ -456,7 +453,7 @@ def _pads(found: Inspection, beds: Sequence[_Foot], split: _Split) -> list[Mappi
         thick = rounded_length(0.5 * float(np.ptp(foot.bed, axis=0).max()))
         levels = [foot.level - thick, foot.level]
         most, plan = STAND_OFF * math.sqrt(bed.area) + opening, bed
-        for j in np.flatnonzero((low < levels[1] - STRAIGHT * thick) & (high > levels[0])):
+        for j in np.flatnonzero((low < levels[1] - ROUNDING * thick) & (high > levels[0])):
             off = min(levels[1] - low[j] + opening, most)
             plan = plan.difference(_below(corners[j], levels[1]).buffer(off, join_style="mitre"))
         # Of what is all around the bed, as no hull can be, the run tells that it overlaps.

@@ -19,8 +19,9 @@ from .facing import faced, facing_tolerance
 from .joints.close import Proposal, proposed
 from .joints.facing_edges import Facing, open_shares, rounded_up
 from .layout import Layout
+from .outlines import ROUNDING
 from .refusal import carrying
-from .repair import DEFAULT_OVERLAP, ROUNDING, overlaps
+from .repair import DEFAULT_OVERLAP, overlaps
 from .roles import roles_of, told_apart
 from .simplify import default_tolerance, simplified
 from .solids import size_of, width_of
@@ -46,50 +47,30 @@ Row = tuple[str, str]
 
 @dataclass(frozen=True)
 class Inspection:
-    """Measurements of a layout, as read, duplicates included.
-
-    Attributes
-    ----------
-    kept : (n_kept,) int array
-        Blocks that are no duplicates; ``twins`` are the others, the first and the later copy of each.
-    sizes : (n_kept,) array [m²], in space [m³]
-    low, high : (d,) arrays [m]
-        Corners of the box around all blocks.
-    overlapping : tuple of (int, int, float)
-        Pairs of blocks that overlap and the depth [m], deepest first; in space those that a run does not face.
-    overlap_tolerance : float [m]
-        Deepest overlap that is resolved by default.
-    joint_thickness : float [m]
-        That closes the joints; 0 if there are none, and if most of their length touches.
-    rows, joint_rows : tuples of (str, str)
-        Titles and texts of the report on weights and corners, and on joints.
-    joints : joints.facing_edges.Facing
-        In the plane, stretches where edges face each other across a gap; block numbers count the kept blocks.
-    facing : facing.Facing
-        In space, joints whose faces do not lie in one plane, as a run closes them; block numbers count the kept blocks.
-    open_joints : tuple of (int, int, float)
-        In space, pairs of blocks of which faces cover each other across a gap, and the gap [m], widest first.
-    refused, remedy : str
-        Why a run would refuse the blocks, and what to leave out where they overlap, or "".
-    """
+    """Measurements of a layout, as read, duplicates included."""
 
     layout: Layout
-    kept: np.ndarray
-    twins: tuple[tuple[int, int], ...]
+    kept: np.ndarray  #: (n_kept,) int array: blocks that are no duplicates.
+    twins: tuple[tuple[int, int], ...]  #: Duplicates, the first and the later copy of each.
     roles: tuple[str, ...]
-    sizes: np.ndarray
+    sizes: np.ndarray  #: (n_kept,) array [m²], in space [m³].
+    #: (d,) arrays [m]: corners of the box around all blocks.
     low: np.ndarray
     high: np.ndarray
+    #: Pairs of blocks that overlap and the depth [m], deepest first; in space those that a run does not face.
     overlapping: tuple[tuple[int, int, float], ...]
-    overlap_tolerance: float
-    joint_thickness: float
-    rows: tuple[Row, ...]
-    joint_rows: tuple[Row, ...]
+    overlap_tolerance: float  #: [m] Deepest overlap that is resolved by default.
+    joint_thickness: float  #: [m] That closes the joints; 0 if there are none, and if most of their length touches.
+    rows: tuple[Row, ...]  #: Report on weights and corners.
+    joint_rows: tuple[Row, ...]  #: Report on joints.
+    #: In the plane, stretches where edges face each other across a gap; block numbers count the kept blocks.
     joints: Facing = field(default_factory=Facing.none)
+    #: In space, joints whose faces do not lie in one plane, as a run closes them; block numbers count the kept blocks.
     facing: FacedJoints = field(default_factory=lambda: FacedJoints(()))
+    #: In space, pairs of blocks of which faces cover each other across a gap, and the gap [m], widest first.
     open_joints: tuple[tuple[int, int, float], ...] = ()
-    refused: str = ""
-    remedy: str = ""
+    refused: str = ""  #: Why a run would refuse the blocks, or "".
+    remedy: str = ""  #: What to leave out where they overlap, or "".
 
     def __str__(self) -> str:
         """Write the measurements as lines of a table."""

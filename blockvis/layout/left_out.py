@@ -39,14 +39,9 @@ NEARLY = 0.01
 class LeftOut:
     """Something drawn that is no block, of a kind in :data:`KINDS`.
 
-    Attributes
-    ----------
-    points : (n, 2) array [m]
-        Its outline if it is closed, else line; inside a format's reader in the unit of the file, as its holes.
-    message : str
-        Refuses the file where no block is left, and if ``serious`` unless the caller asks to leave it out.
-    looks : tuple of str
-        Kind of entity and colour; see :mod:`blockvis.layout.choice`.
+    ``points`` (n, 2) [m] are its outline if it is closed, else line; inside a format's reader in the unit of the file,
+    as its holes. Its message refuses the file where no block is left, and if ``serious`` unless the caller asks to
+    leave it out. ``looks`` are kind of entity and colour; see :mod:`blockvis.layout.choice`.
     """
 
     kind: str

@@ -40,11 +40,6 @@ class Note(str):
         return Note, (self.kind, str(self))
 
 
-def changes_analysis(note: str) -> bool:
-    """Whether a note changes what is analysed."""
-    return kind_of(note) in REPORTED
-
-
 def kind_of(note: str) -> str:
     """Return what a note is about; "" for a remark."""
     return note.kind if isinstance(note, Note) else ""

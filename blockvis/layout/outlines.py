@@ -13,18 +13,18 @@ from .left_out import LeftOut
 from .notes import CHANGED, UPRIGHT, Note
 from .views import VIEWS, axis_across, upright_note
 
-#: A point this close to the line between its neighbours, as a fraction of the size of the block, lies on it: in files
-#: of single precision (VTK, STL) a coordinate is accurate to 6e-8 of its size.
-COLLINEAR = 1e-6
-
-#: Spread of the third coordinate, as a fraction of the size of the drawing, that still counts as flat.
-FLAT = 1e-6
+#: What is nearer than this fraction of the size of a block or a drawing is at one place, on one line or in one plane:
+#: in files of single precision (VTK, STL) a coordinate is accurate to 6e-8 of its size.
+ROUNDING = 2e-6
 
 #: Relief of a drawing, as a fraction of its smaller extent, and sine of its lean, with which it still is a plane one.
 RELIEF = 0.05
 
-#: Part of an outline that may stick out of another one in which it lies, or by which it may be smaller and the same.
-WITHIN = 1e-6
+#: Blocks touch, and stand on each other, where they are apart by at most this fraction of the block size.
+TOUCHING = 2e-3
+
+#: A block that loses more of its area than this when its outline is changed has been cut or folded.
+LOST = 0.3
 
 #: Largest angle of a chord, whatever the tolerance: twelve chords make a circle.
 LARGEST_CHORD = math.pi / 6.0
@@ -55,7 +55,7 @@ def is_flat(points: np.ndarray) -> bool:
     if points.shape[1] == 2:
         return True
     spread = np.ptp(points, axis=0)
-    return not np.isfinite(spread).all() or bool((spread <= FLAT * spread.max()).any())
+    return not np.isfinite(spread).all() or bool((spread <= ROUNDING * spread.max()).any())
 
 
 def flattened(points: np.ndarray, view: str | None = None) -> tuple[np.ndarray, str]:
@@ -91,7 +91,7 @@ def drawing_plane(lines: Sequence[np.ndarray], view: str | None = None) -> tuple
     turn, notes = np.eye(3)[[*VIEWS[chosen], axis_across(chosen)]], [] if chosen == "xy" else [upright_note(chosen)]
     if flat:
         return turn, list(notes)
-    level = max(float(np.ptp(line[:, 2])) for line in lines) <= FLAT * spread.max()
+    level = max(float(np.ptp(line[:, 2])) for line in lines) <= ROUNDING * spread.max()
     upright = None if level or view == "xy" else _upright(points)
     if upright is None:
         seen = "from above" if chosen == "xy" else f"along {'xyz'[axis_across(chosen)]}"
@@ -99,14 +99,14 @@ def drawing_plane(lines: Sequence[np.ndarray], view: str | None = None) -> tuple
     first, relief = upright
     angle = math.degrees(math.atan2(first[1], first[0]))
     text = f"the drawing stands upright at {angle:.3g}° to x: its lengths in that direction and z were read as (x, y)"
-    ignored = f"; its relief of {relief:.3g} across was ignored" if relief > FLAT * spread.max() else ""
+    ignored = f"; its relief of {relief:.3g} across was ignored" if relief > ROUNDING * spread.max() else ""
     return np.array([first, [0.0, 0.0, 1.0], [first[1], -first[0], 0.0]]), [Note(UPRIGHT, text + ignored)]
 
 
 def _flat_views(points: np.ndarray, view: str | None) -> tuple[np.ndarray, list[str]]:
     """(3,) array: how far points spread, and in which views they are flat; ValueError for a view in which not."""
     spread = spread_of(points)
-    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
+    flat = [name for name in VIEWS if spread[axis_across(name)] <= ROUNDING * spread.max()]
     if view is not None and flat and view not in flat:
         raise ValueError(f'it lies in {flat[0]}: seen as {view} it has no area; give view = "{flat[0]}", or none')
     return spread, flat
@@ -148,11 +148,11 @@ def touching(shapes: np.ndarray, near: float) -> list[set[int]]:
     return others
 
 
-def folded(drawn: Sequence[np.ndarray], changed: Sequence[np.ndarray], lost: float) -> np.ndarray:
-    """(n,) int array: outlines that cross themselves, or lose more than a part of their area, when they are changed."""
+def folded(drawn: Sequence[np.ndarray], changed: Sequence[np.ndarray]) -> np.ndarray:
+    """(n,) int array: outlines that cross themselves, or lose much of their area, when they are changed."""
     before = shapely.area(np.array([shapely.Polygon(ring) for ring in drawn]))
     after = np.array([shapely.Polygon(ring) if len(ring) > 2 else shapely.Polygon() for ring in changed])
-    return np.flatnonzero(~shapely.is_valid(after) | (shapely.area(after) < (1.0 - lost) * before))
+    return np.flatnonzero(~shapely.is_valid(after) | (shapely.area(after) < (1.0 - LOST) * before))
 
 
 def ring_of(polygon: Any) -> np.ndarray:
@@ -174,7 +174,7 @@ def share_in(inner: Any, outer: Any) -> float:
     return float(inner.intersection(outer).area / inner.area) if inner.intersects(outer) else 0.0
 
 
-def filled(rings: Sequence[np.ndarray], out: float = WITHIN) -> list[tuple[int, list[int]]]:
+def filled(rings: Sequence[np.ndarray], out: float = ROUNDING) -> list[tuple[int, list[int]]]:
     """Numbers of the (n, d) outlines of one shape in a plane that are filled, each with those of its holes.
 
     Of outlines that lie in each other every second is filled; one that crosses itself lies in none and holds none. The
@@ -310,7 +310,7 @@ def loops_of(edges: Sequence[Sequence[int]]) -> tuple[list[list[int]], int | Non
     return loops, None
 
 
-def without_collinear(ring: np.ndarray, tolerance: float = COLLINEAR) -> np.ndarray:
+def without_collinear(ring: np.ndarray, tolerance: float = ROUNDING) -> np.ndarray:
     """Drop the points of a (n, 2) ring that are within a fraction of its extent of the edge that replaces them.
 
     Examples

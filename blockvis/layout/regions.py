@@ -16,12 +16,12 @@ from solver import mechanics
 from .layout import Layout
 from .left_out import LeftOut, matches
 from .notes import CHANGED, Note
-from .outlines import filled, largest_piece, ring_of, share_in
+from .outlines import ROUNDING, filled, largest_piece, ring_of, share_in
 from .roles import roles_of
 from .selection import ANNOTATIONS, labels_of
 
-#: An outline lies in a wall if this fraction of its area does, outside if less than the second does.
-INSIDE, OUTSIDE = 0.5, 1e-6
+#: An outline lies in a wall if this fraction of its area does.
+INSIDE = 0.5
 
 #: Outlines are the same if what only one of them covers is below this fraction of its area.
 SAME = 1e-4
@@ -100,7 +100,7 @@ def _take_out(every: Sequence[tuple[Region, int]]) -> None:
     for region, number in every:
         region.taken.extend(
             other.wall for other, n in every
-            if n != number and other.wall.area < region.wall.area and share_in(other.wall, region.wall) > OUTSIDE
+            if n != number and other.wall.area < region.wall.area and share_in(other.wall, region.wall) > ROUNDING
         )  # fmt: skip
 
 
@@ -143,7 +143,7 @@ def _opened_by(
         region for region, number in every
         if (number in asked or not choices[number].openings)
         and (asked or (one.shape.area < region.wall.area and not _is_beside(one)))
-        and share_in(one.shape, region.wall) > (OUTSIDE if asked else INSIDE)
+        and share_in(one.shape, region.wall) > (ROUNDING if asked else INSIDE)
     ]  # fmt: skip
     if asked and not opened:
         x, y = one.shape.centroid.coords[0]
@@ -228,7 +228,7 @@ def _smallest_gap(lines: Sequence[LeftOut]) -> tuple[float, np.ndarray]:
     ends = np.array([one.points[k] for one in lines for k in (0, -1)])
     apart = np.hypot(*(ends[:, None] - ends).transpose(2, 0, 1))
     size = float(np.ptp(np.concatenate([one.points for one in lines]), axis=0).max())
-    apart[apart <= 1e-6 * size] = np.inf
+    apart[apart <= ROUNDING * size] = np.inf
     i, j = np.unravel_index(int(np.argmin(apart)), apart.shape)
     return float(apart[i, j]), ends[i] + 0.0
 

@@ -12,16 +12,15 @@ from solver.mechanics import counted
 from .joints.close import Closing, FoldedOutline, close_joints, proposed
 from .joints.trimming import overlapping
 from .left_out import LeftOut
+from .outlines import ROUNDING
 from .surfaces import same_points
 
-#: Outlines closer than this fraction of the narrowest extent of a block, corner by corner, are one drawn twice.
-SAME = 1e-3
+#: Outlines closer than this fraction of the narrowest extent of a block, corner by corner, are one drawn twice, and
+#: overlaps below this fraction of the width of the thinnest block are contacts without a word.
+DRAWN_GAP = 1e-3
 
 #: Deepest overlap that is resolved unless the caller says otherwise, as a fraction of the width of a typical block.
 DEFAULT_OVERLAP = 0.04
-
-#: Overlaps below this fraction of the width of a typical block are rounding errors and are not resolved.
-ROUNDING = 2e-6
 
 
 def duplicates(blocks: Sequence[np.ndarray]) -> list[tuple[int, int]]:
@@ -30,7 +29,7 @@ def duplicates(blocks: Sequence[np.ndarray]) -> list[tuple[int, int]]:
     sizes = np.array([float(np.ptp(corners, axis=0).max()) for corners in blocks])
     found: list[tuple[int, int]] = []
     unlike: dict[int, list[int]] = {}
-    for i, place in enumerate(same_points(centres, 2.0 * SAME * float(np.median(sizes))).tolist()):
+    for i, place in enumerate(same_points(centres, 2.0 * DRAWN_GAP * float(np.median(sizes))).tolist()):
         earlier = unlike.setdefault(place, [])
         twin = next((k for k in earlier if _same(blocks[k], blocks[i])), None)
         if twin is None:
@@ -45,7 +44,7 @@ def _same(one: np.ndarray, other: np.ndarray) -> bool:
         return False
     about = one - one.mean(axis=0)
     _, _, axes = np.linalg.svd(about, full_matrices=False)
-    tolerance = SAME * float(np.ptp(about @ axes.T, axis=0).min())
+    tolerance = DRAWN_GAP * float(np.ptp(about @ axes.T, axis=0).min())
     distance = np.abs(one[:, None, :] - other[None, :, :]).max(axis=2)
     return bool((distance.min(axis=0) <= tolerance).all() and (distance.min(axis=1) <= tolerance).all())
 
@@ -84,7 +83,7 @@ def repaired(
     anchored: np.ndarray,
     closing: str = "auto",
     mortar: Sequence[LeftOut] = (),
-    laid: np.ndarray | None = None,
+    laid: np.ndarray,
 ) -> tuple[list[np.ndarray], list[str]]:
     """Resolve the overlaps of the outlines of an assembly without duplicates, close its joints, and tell the changes.
 
@@ -98,7 +97,6 @@ def repaired(
     tolerance = DEFAULT_OVERLAP * width if overlap_tolerance is None else float(overlap_tolerance)
     found = [(i, j, d) for i, j, d in overlaps(assembly, ROUNDING * width) if not (anchored[i] and anchored[j])]
     refuse_overlaps(assembly, found, tolerance)
-    laid = np.zeros(assembly.n_blocks, dtype=bool) if laid is None else laid
     measured = [outlines[i] for i in np.flatnonzero(free)]
     thickness, closing, notes = _thickness(joint_thickness, closing, measured, laid[free])
     if not found and thickness == 0:

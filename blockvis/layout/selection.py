@@ -208,8 +208,6 @@ def without_debris(layout: Layout) -> Layout:
 def without_surroundings(layout: Layout, only: Sequence[str] = ()) -> Layout:
     """Leave out what by its name or place is no block, and not asked for: annotations, frames, title blocks, mortar.
 
-    Notes
-    -----
     An outline around others cannot be a block beside them, so nothing is left out that could be analysed. Mortar is
     left out where it is one surface around the stones or in pieces; mortar drawn as blocks of its own stays.
     """

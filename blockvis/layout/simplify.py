@@ -21,9 +21,6 @@ FINE = 24
 #: Corners go within this fraction of the size of the median block (the root of its area).
 TOLERANCE = 0.01
 
-#: A block that loses more of its area than this has not been simplified but folded.
-LOST = 0.2
-
 
 def default_tolerance(outlines: Sequence[np.ndarray]) -> float:
     """Find the tolerance [m] within which outlines are simplified by default; 0 where they are not fine."""
@@ -37,8 +34,6 @@ def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[n
 
     And say what was dropped, and which blocks could not be simplified; "" for nothing.
 
-    Notes
-    -----
     Outlines are divided into the chains that two blocks share, and every chain is simplified once (Douglas and Peucker
     1973, doi:10.3138/FM57-6770-U75U-7727). Blocks that this would fold, or push into another, keep their corners.
     """
@@ -134,7 +129,7 @@ def _key(chain: tuple[int, ...]) -> tuple[int, ...]:
 
 def _spoilt(found: list[np.ndarray], drawn: Sequence[np.ndarray], tolerance: float) -> set[int]:
     """Find the blocks that simplifying folds, or pushes into another."""
-    bad = set(folded(drawn, found, LOST).tolist())
+    bad = set(folded(drawn, found).tolist())
     if bad:
         return bad
     after, already = (

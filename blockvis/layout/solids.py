@@ -33,6 +33,11 @@ def fans(faces: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
     return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
+def sides_of(triangles: np.ndarray) -> np.ndarray:
+    """(3 m, 2) int array: the sides of triangles, one triangle after another, the lower corner of each first."""
+    return np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+
+
 def volume(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> float:
     """Volume of a block; negative if its faces are seen clockwise from outside."""
     a, b, c = (points - points.mean(axis=0))[fans(faces).T]

@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .linked import linked, within_reach
+from .outlines import ROUNDING
 from .solids import Solid, outward, size_of
-
-#: Corners of a block nearer to each other than this fraction of its diagonal are one: files of triangles repeat them,
-#: in single precision.
-WELDED = 1e-6
 
 
 def cleaned(points: np.ndarray, faces: list[list[int]]) -> Solid:
@@ -23,7 +20,7 @@ def cleaned(points: np.ndarray, faces: list[list[int]]) -> Solid:
     >>> cleaned(corners, [[0, 1, 2], [0, 1, 3], [1, 3, 2], [0, 2, 3]])[1]
     [[2, 1, 0], [0, 1, 3], [2, 3, 1], [3, 2, 0]]
     """
-    same = same_points(points, WELDED * size_of(points)).tolist()
+    same = same_points(points, ROUNDING * size_of(points)).tolist()
     rings = [_without_repeats([same[corner] for corner in face]) for face in faces]
     rings = [ring for ring in rings if len(ring) > 2]
     used = sorted({corner for ring in rings for corner in ring})
@@ -75,8 +72,6 @@ def turned_faces(edges: np.ndarray, edge: np.ndarray, face: np.ndarray) -> np.nd
     ``edges`` are the first and last corners, (n, 2) ints, of the edges of all faces, one face after another; ``edge``
     says which each is, whatever its sense, and is that of two faces; ``face`` are ascending numbers of faces.
 
-    Notes
-    -----
     Each face is there twice, as it is and turned round, and goes with the one of each neighbour that fits: of a surface
     that encloses something there are two sets, and the one with its first face as it is is taken.
     """

@@ -16,8 +16,6 @@ def cells_of_ring(ring: np.ndarray) -> list[tuple[int, ...]]:
 def triangles_of_ring(ring: np.ndarray) -> np.ndarray:
     """(n - 2, 3) int array: triangles that fill a simple (n, 2) ring, and turn as it does, by cutting its ears off.
 
-    Notes
-    -----
     Every simple polygon has two ears (Meisters 1975, doi:10.2307/2319703). Of the ears the one with the widest
     smallest angle goes first, so that slivers stay few.
     """

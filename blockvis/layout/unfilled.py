@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from .left_out import LeftOut
 from .outlines import share_in
 
 if TYPE_CHECKING:
@@ -45,7 +44,8 @@ def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
         # Around a wall there may be a hatch of it, or the frame of the sheet.
         if not wall.is_valid or wall.area == 0.0 or any(share_in(one, wall) > 0.99 for one in walls):
             continue
-        inside = [i for i in np.flatnonzero(~counted).tolist() if _lies_in(blocks[i], wall)]
+        small = [i for i in np.flatnonzero(~counted).tolist() if 0.0 < blocks[i].area < 0.9 * wall.area]
+        inside = [i for i in small if share_in(blocks[i], wall) > 0.99]
         is_page = black and inside and all(WHITE in layout.looks[i] for i in inside)
         if not _are_openings(wall, [blocks[i] for i in inside], holes) or (is_page and not pages):
             continue
@@ -56,24 +56,17 @@ def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
     return found
 
 
-def _may_be_wall(item: LeftOut) -> bool:
-    return item.closed and item.kind in ("background", "hole") and len(item.points) > 2
-
-
 def _possible_walls(layout: Layout, blocks: list[Any]) -> list[tuple[Any, str, tuple[Any, ...], bool]]:
     """List shape, layer or name, holes, and whether it is black, of whatever may be a wall, the smallest first."""
     around: list[tuple[Any, str, tuple[Any, ...], bool]] = [
         (shapely.Polygon(item.points), item.layer or item.name, tuple(map(shapely.Polygon, item.holes)),
          BLACK in item.looks)
-        for item in layout.left_out if _may_be_wall(item)
+        for item in layout.left_out
+        if item.closed and item.kind in ("background", "hole") and len(item.points) > 2
     ]  # fmt: skip
     labels = [group or name for group, name in zip(layout.groups, layout.names, strict=True)]
     around += [(blocks[i], label, (), BLACK in layout.looks[i]) for i, label in enumerate(labels)]
     return sorted(around, key=lambda one: float(one[0].area))
-
-
-def _lies_in(shape: Any, wall: Any) -> bool:
-    return bool(0.0 < shape.area < 0.9 * wall.area and share_in(shape, wall) > 0.99)
 
 
 def _are_openings(wall: Any, shapes: list[Any], holes: Iterable[Any]) -> bool:

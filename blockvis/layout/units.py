@@ -12,17 +12,9 @@ from .notes import UNIT, UNIT_CLASH, UNIT_TAKEN, Note
 
 #: Metres per unit.
 UNITS = {
-    "m": 1.0,
-    "mm": 1e-3,
-    "cm": 1e-2,
-    "dm": 1e-1,
-    "km": 1e3,
-    "in": 0.0254,
-    "ft": 0.3048,
-    "yd": 0.9144,
-    "pt": 0.0254 / 72.0,
-    "px": 0.0254 / 96.0,
-}
+    "m": 1.0, "mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "km": 1e3, "in": 0.0254, "ft": 0.3048, "yd": 0.9144,
+    "pt": 0.0254 / 72.0, "px": 0.0254 / 96.0,
+}  # fmt: skip
 
 _OTHER_NAMES = {
     "metre": "m", "meter": "m", "metres": "m", "meters": "m", "millimetre": "mm", "millimeter": "mm",

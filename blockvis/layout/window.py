@@ -12,10 +12,8 @@ from solver.mechanics import counted
 from .layout import Layout
 from .left_out import LeftOut
 from .notes import LEFT_OUT, Note
+from .outlines import ROUNDING
 from .units import doubt
-
-#: What reaches beyond the window by this fraction of its size lies within it.
-BEYOND = 1e-6
 
 
 def checked_window(window: Sequence[float] | None) -> tuple[float, ...]:
@@ -40,7 +38,7 @@ def within_window(layout: Layout, window: Sequence[float]) -> Layout:
     if len(window) == 0:
         return layout
     low, high = np.array(window[:2]), np.array(window[2:])
-    near = BEYOND * float((high - low).max())
+    near = ROUNDING * float((high - low).max())
 
     def place(points: np.ndarray) -> str:
         if len(points) == 0 or (points.max(axis=0) <= low + near).any() or (points.min(axis=0) >= high - near).any():

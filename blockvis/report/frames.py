@@ -27,8 +27,6 @@ from .packing import (
     FINENESS,
     FORCE_FINENESS,
     TOLD_FINENESS,
-    TOLD_FROM,
-    TURN_UNIT,
     counted_steps,
     deflated,
     rounded,
@@ -65,7 +63,7 @@ def model_of_frames(
         "fill": None,
         "force_unit": FORCE_FINENESS * largest,
         "force_length": length_per_force(sizes, largest, 1.5 * assembly.block_size, extent),
-        "told_forces": [TOLD_FROM * largest, TOLD_FINENESS],
+        "told_forces": [FINENESS * largest, TOLD_FINENESS],
         "force_scale": [shown_force, force_text(shown_force)],
         "packed": {
             "vertices": deflated(rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
@@ -160,10 +158,10 @@ class FrameTables:
             # What was taken away goes out of the picture.
             moved[increment.removed, d - 1] -= AWAY * unit / FINENESS
             self._travel.append(rounded(moved[:, :d], unit))
-            self._turn.append(rounded(moved[:, d:], TURN_UNIT))
+            self._turn.append(rounded(moved[:, d:], FINENESS))
             states, told = joint_states(assembly, joints, increment), slice(len(joints))
             carried = np.stack([states.normal_force[told], states.shear_force[told]], axis=1)
-            self._told.append(counted_steps(carried, TOLD_FROM * largest))
+            self._told.append(counted_steps(carried, FINENESS * largest))
             points, forces, pairs = resultants(increment)
             size = np.linalg.norm(forces, axis=1) * (not falling)
             kept = size > SMALLEST_RESULTANT * largest

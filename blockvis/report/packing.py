@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-#: Lengths are stored in this fraction of the extent of the structure, rotations in this many radians.
-FINENESS, TURN_UNIT = 1e-6, 1e-6
+#: Lengths are stored in this fraction of the extent of the structure, rotations and directions in this unit; forces
+#: that are told are 0 below this fraction of the largest: equilibria are that exact.
+FINENESS = 1e-6
 
 #: Forces that are drawn are stored in this fraction of the largest.
 FORCE_FINENESS = 1e-3
 
-#: Forces that are told are stored to this fraction of themselves, below this one of the largest as 0: equilibria are
-#: that exact.
-TOLD_FINENESS, TOLD_FROM = 2e-4, 1e-6
+#: Forces that are told are stored to this fraction of themselves.
+TOLD_FINENESS = 2e-4
 
 
 def deflated(values: np.ndarray, rows: int) -> dict[str, Any]:

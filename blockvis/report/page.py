@@ -56,7 +56,7 @@ from solver import mechanics
 from solver.mechanics import counted
 
 from .frames import model_of_frames
-from .packing import TURN_UNIT, deflated, rounded
+from .packing import FINENESS, deflated, rounded
 from .space import model_in_space
 
 #: Endings of a report.
@@ -270,7 +270,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
     fills = palette.block_colours(assembly.materials, assembly.free)
     return own | {
         "space": assembly.dimension == 3,
-        "turn_unit": TURN_UNIT,
+        "turn_unit": FINENESS,
         "block_size": assembly.block_size,
         "smallest_opening": SMALLEST_OPENING * assembly.block_size,
         "widest": [WIDEST * assembly.block_size, STEEPEST],

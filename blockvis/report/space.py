@@ -15,10 +15,7 @@ from blockvis.pictures.swing import Swing
 from blockvis.results.joint_faces import initial_joints
 
 from .frames import model_of_frames
-from .packing import deflated, rounded
-
-#: Directions are stored in this unit.
-DIRECTION_UNIT = 1e-6
+from .packing import FINENESS, deflated, rounded
 
 
 def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.Increment]) -> dict[str, Any]:
@@ -43,7 +40,7 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
             "edges": deflated(edges, len(edges)),
             "ring_first": deflated(rings.offsets, len(rings.offsets)),
             "ring_points": deflated(corners, len(rings.points)),
-            "ring_normals": deflated(rounded(joints.normals, DIRECTION_UNIT), len(joints)),
+            "ring_normals": deflated(rounded(joints.normals, FINENESS), len(joints)),
         },
     }
 

@@ -23,6 +23,10 @@ LOCAL = 0.05
 #: A reaction below this part of the weight, of moments at a block's length, is none: programs are solved to a tenth of it.
 NOTHING = 1e-6
 
+#: Equilibria are exact to this: openings and slips in block sizes, forces and multipliers in the largest, motions in
+#: those of the fastest block.
+EXACT = 1e-6
+
 
 @dataclass(frozen=True)
 class About:
@@ -71,6 +75,11 @@ def least_reaction(first: solver.Increment) -> float:
 def in_phase(response: solver.Response, phase: int) -> str:
     """Say in which of several settlements, by its number from 0, a place is; empty where there is but one."""
     return f" in phase {phase + 1}" if len(response.settlements) > 1 else ""
+
+
+def unit_and_phase(response: solver.Response, phase: int) -> str:
+    """Write the unit of the parameter in a phase, and which of several settlements it is."""
+    return f"{unit_in(response, phase)}{in_phase(response, phase)}"
 
 
 def reaction_size(response: solver.Response, moment: bool) -> float:

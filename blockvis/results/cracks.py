@@ -17,6 +17,7 @@ from blockvis.layout.linked import linked
 from blockvis.text import width_text
 from solver.mechanics import counted
 
+from .about import EXACT
 from .joint_faces import InitialJoints, initial_joints
 from .joints import Faces, carried_faces, opening_and_slip
 from .places import Places
@@ -48,9 +49,6 @@ HAIRLINE = 0.01
 #: strip: many hairlines are no crack.
 CORE, BESIDES = 0.25, 0.1
 
-#: Strips and gains are alike up to this part: of two courses that gain the same the shorter one is taken.
-EQUAL = 1e-6
-
 #: Most crack lines that a summary lists, the widest first.
 MOST_LISTED = 100
 
@@ -59,9 +57,6 @@ MOST_MAIN, LEAST_MAIN = 6, 0.05
 
 #: Joints in space belong to one crack where their blocks part by the same, up to this part of it.
 ALIKE = 0.5
-
-#: Of more points than this the corners of their convex hull are found first.
-MANY = 100
 
 
 @dataclass(frozen=True)
@@ -205,7 +200,7 @@ def _courses(
     # What opens across the line, times the length along it; a joint along the line that only slides parts nothing.
     shut = np.maximum(np.abs(slip) - opening, 0.0)[:, None]
     gains = sizes[:, None] * ((normals @ across) * (parted @ across) - SLIDING * shut)
-    apart, half = np.linalg.norm(parted, axis=1), (1.0 + EQUAL) * STRIP * block_size
+    apart, half = np.linalg.norm(parted, axis=1), (1.0 + EXACT) * STRIP * block_size
     beside = half * np.arange(-BESIDE, BESIDE + 1) / (BESIDE + 0.5)
     found, left = [], _groups(meeting, np.arange(len(chosen)))
     while left:
@@ -219,12 +214,12 @@ def _courses(
         most = np.einsum("nd,ndb->db", np.maximum(gained[members], 0.0), inside)
         course, largest = np.array([widest]), float(gained[widest].max())
         for direction, line in zip(*np.unravel_index(np.argsort(-most, axis=None), most.shape), strict=True):
-            margin = EQUAL * abs(largest)
+            margin = EXACT * abs(largest)
             if most[direction, line] < largest - margin:
                 break
             strip = members[inside[:, direction, line]]
             tried, gain = _course_through(widest, strip, meeting, apart, gained[:, direction])
-            shorter = sizes[tried].sum() < (1.0 - EQUAL) * sizes[course].sum()
+            shorter = sizes[tried].sum() < (1.0 - EXACT) * sizes[course].sum()
             if gain > largest + margin or (gain >= largest - margin and shorter):
                 course, largest = tried, gain
         found.append(chosen[course])
@@ -250,7 +245,7 @@ def _course_through(
     one, other = one[pairs], other[pairs]
     own, gained = apart[members], gains[members]
     # Of three joints that meet the widest lies between the others.
-    joined = np.minimum(own[one], own[other]) + EQUAL * np.maximum(own[one], own[other])
+    joined = np.minimum(own[one], own[other]) + EXACT * np.maximum(own[one], own[other])
     narrow = 2.0 * own.max() - joined
     tree = minimum_spanning_tree(sp.coo_array((narrow, (one, other)), shape=(n, n)))
     order, before = breadth_first_order(tree, place[start], directed=False)
@@ -347,8 +342,8 @@ def _distance(points: np.ndarray, faces: np.ndarray, normals: np.ndarray) -> np.
 
 def _farthest(points: np.ndarray) -> np.ndarray:
     """(2, d) array: the two points that are farthest apart, the lower one first, or the left one of a level line."""
-    # Only corners of the hull can be; a line has none.
-    if points.shape[1] == 3 and len(points) > MANY:
+    # Only corners of the hull can be; a line has none. Of few points it takes longer than to compare all.
+    if points.shape[1] == 3 and len(points) > 100:
         points = points[ConvexHull(points, qhull_options="QJ").vertices]
     elif points.shape[1] == 2 and len(points) > 2:
         points = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(points)))

@@ -10,10 +10,8 @@ import numpy as np
 import shapely
 
 import solver
+from blockvis.layout.outlines import TOUCHING
 from solver import mechanics
-
-#: Faces count as one initial joint when they are apart by at most this fraction of the block size.
-TOUCHING = 2e-3
 
 #: Faces of the plane count as parallel up to this sine.
 PARALLEL = 0.05

@@ -10,11 +10,9 @@ import numpy as np
 import solver
 from solver import mechanics
 
+from .about import EXACT
 from .joint_faces import InitialJoints, Rings, faces_of, grouped_by_face, initial_joints, lines
 from .tables import csv_text
-
-#: Opening and slip, in block sizes, up to which a joint has not moved: equilibria are that exact.
-CLOSED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -222,7 +220,7 @@ class LargestMovements:
             place = sizes[here] @ middles[here] / sizes[here].sum()
             widest = here[self._largest[here].argmax(axis=0)]
             largest, at, phase = (values[widest, [0, 1]] for values in (self._largest, self._at, self._phases))
-            seen = largest > CLOSED * self.assembly.block_size
+            seen = largest > EXACT * self.assembly.block_size
             largest, at, phase = (np.where(seen, found, 0.0) for found in (largest, at, phase))
             measured = (largest[0], at[0], largest[1], at[1], *(phase if phases else ()))
             rows.append((f"{names[a]} | {names[b]}", *place, sizes[here].sum(), *measured))

@@ -10,11 +10,10 @@ import scipy.sparse as sp
 import solver
 from solver import mechanics
 
+from .about import EXACT
+
 #: Points with less than this part of the largest force have none, and what is within it of its bound has reached it.
 CARRIES, USED_UP = 1e-7, 1e-5
-
-#: Relative velocities below this part of the fastest block's are none.
-STILL = 1e-6
 
 #: Of movements up to 1, those that are another mechanism; less is the tolerance of the program.
 ANOTHER = 1e-3
@@ -105,13 +104,13 @@ def _rows(
     if d == 3:
         equal.append(along(used, np.stack([-ways[used, 1], ways[used, 0]], axis=1)))
     at_least = [
-        slip[used & (slipped <= STILL)],
-        lifts[holds & ~presses & ~full & (lifted <= STILL)],
-        -lifts[presses & full & (lifted >= -STILL)],
+        slip[used & (slipped <= EXACT)],
+        lifts[holds & ~presses & ~full & (lifted <= EXACT)],
+        -lifts[presses & full & (lifted >= -EXACT)],
     ]
     size = np.linalg.norm(moved[:, 1:], axis=1)
-    closed = ~(presses | holds | full) & (moved[:, 0] - lift * size <= STILL)
-    slides = closed & (size > STILL)
+    closed = ~(presses | holds | full) & (moved[:, 0] - lift * size <= EXACT)
+    slides = closed & (size > EXACT)
     directions = moved[slides, 1:] / size[slides, None]
     at_least.append(opening[slides] - sp.diags_array(lift[slides]) @ along(slides, directions))
     rests = closed & ~slides
@@ -140,7 +139,7 @@ def _carried(
     features = mechanics.present_members(ties, state.ties.rest)
     members = mechanics.member_contacts(ties, assembly, state.pose, state.ties.rest, features)
     carried = np.where(features[:, 2] == 1, -1.0, 1.0) * state.ties.forces[features[:, 1]]
-    taut = (members.gaps <= STILL * assembly.block_size) | (carried > 0.0)
+    taut = (members.gaps <= EXACT * assembly.block_size) | (carried > 0.0)
     members, carried, number = members[taut], np.maximum(carried[taut], 0.0), features[taut, 1]
     forces, none = np.zeros((len(carried), assembly.dimension)), np.zeros(len(carried))
     forces[:, 0] = carried

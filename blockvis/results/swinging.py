@@ -9,6 +9,9 @@ import numpy as np
 import solver
 from solver import mechanics
 
+#: How far the fastest block of a mechanism is swung to be shown, in extents of the structure.
+SWING = 0.05
+
 
 def corner_speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
     """(n_blocks,) array: speed of the fastest corner of each block in a motion (n_blocks, n_dof), zero for supports."""

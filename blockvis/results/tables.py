@@ -24,31 +24,14 @@ MEASURES = tuple(field.name for field in fields(solver.Certificate))
 
 #: Columns of response.csv.
 COLUMNS = (
-    "increment",
-    "phase",
-    "settlement",
-    "reaction",
-    "reaction_over_weight",
-    "load_multiplier",
-    "least_admissible",
-    "largest_admissible",
-    *MEASURES,
-    "contacts_open",
-    "contacts_sticking",
-    "contacts_sliding",
-    "contacts_hinging",
-    "hinges",
-    "sliding_joints",
-    "programs",
-    "seconds",
-)
+    "increment", "phase", "settlement", "reaction", "reaction_over_weight", "load_multiplier", "least_admissible",
+    "largest_admissible", *MEASURES, "contacts_open", "contacts_sticking", "contacts_sliding", "contacts_hinging",
+    "hinges", "sliding_joints", "programs", "seconds",
+)  # fmt: skip
 
 #: Columns of supports.csv before those of the forces, and these in the plane and in space.
 SUPPORT_COLUMNS = ("increment", "phase", "settlement", "support", "role")
-FORCES = {
-    2: ("force_x", "force_y", "moment"),
-    3: ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z"),
-}
+FORCES = {2: ("force_x", "force_y", "moment"), 3: ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")}
 
 #: Limit loads over the positions of a load that moves, and over the settlement.
 LIMIT_TABLES = ("envelope.csv", "capacity.csv")
@@ -174,11 +157,7 @@ def _loss(response: solver.Response) -> dict[str, Any]:
     loss = loss_of(response)
     if loss is None:
         return {"loss": None, "falling_weight": None, "falling_share": None}
-    return {
-        "loss": "local" if loss.local else "structure",
-        "falling_weight": loss.weight,
-        "falling_share": loss.share,
-    }
+    return {"loss": "local" if loss.local else "structure", "falling_weight": loss.weight, "falling_share": loss.share}
 
 
 def own_columns(parameter: mechanics.Quantity) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text
 from solver import mechanics
 
-from .about import certified, in_phase, unit_in
+from .about import EXACT, certified, unit_and_phase
 from .npz import packed, read_stored
 from .tables import place_in_table
 
@@ -23,9 +23,6 @@ TIES = "ties.npz"
 
 #: Words of the states, in the order of ``solver.mechanics.TieForces.states``.
 STATE_WORDS = ("absent", "slack", "elastic", "yielding", "broken")
-
-#: Part of the largest force of a joint, or of a tie, below which a tie is told to carry nothing: rounding.
-NEGLIGIBLE = 1e-6
 
 #: Part of its prestress that a tie has as it begins, below which that is told: blocks that stand leave it all.
 KEPT = 0.9
@@ -119,7 +116,7 @@ class TieCourses:
         if not self.ties or increment.status != solver.Status.EQUILIBRIUM:
             return
         found, at, phase = increment.ties, float(increment.parameter), increment.phase + 1
-        least = NEGLIGIBLE * float(np.abs(increment.forces).max(initial=0.0))
+        least = EXACT * float(np.abs(increment.forces).max(initial=0.0))
         courses = self.courses or [TieCourse(tie.name, tie.kind, 0.0, at, phase) for tie in self.ties]
         self.courses = tuple(
             _after(before, tie, float(force), int(state), at, phase, least)
@@ -180,7 +177,7 @@ def tie_force_curves(response: solver.Response) -> TieForceCurves | None:
     forces = np.where(np.isin(states, (mechanics.ELASTIC, mechanics.YIELDING)), forces, 0.0)
     forces[states == mechanics.ABSENT] = np.nan
     largest = np.nan_to_num(np.abs(forces)).max(axis=0)
-    told = (largest > NEGLIGIBLE * largest.max()) | (states == mechanics.BROKEN).any(axis=0)
+    told = (largest > EXACT * largest.max()) | (states == mechanics.BROKEN).any(axis=0)
     chosen = [k for k in np.argsort(-largest, kind="stable").tolist() if told[k]][:MOST_CURVES]
     if not chosen:
         return None
@@ -191,7 +188,7 @@ def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, s
     """Say what a tie of a response is, its largest force and where, and what became of it."""
 
     def place(at: float, phase: int) -> str:
-        return f"{at:.4g} {unit_in(response, phase - 1)}{in_phase(response, phase - 1)}"
+        return f"{at:.4g} {unit_and_phase(response, phase - 1)}"
 
     name = f"{course.name} ({course.kind})" if course.kind not in course.name.split() else course.name
 

@@ -19,9 +19,6 @@ from .datasets import grids_of
 from .mechanism_arrays import as_shown
 from .viewer_files import output_times
 
-#: Level of zlib.
-COMPRESSION = 4
-
 
 def write_vtkhdf(response: solver.Response, path: Path) -> Path:
     """Write the path of a response as one .vtkhdf file: blocks, contact points, joints and ties, time is the parameter.
@@ -37,7 +34,7 @@ def write_vtkhdf(response: solver.Response, path: Path) -> Path:
     writer.SetWriteAllTimeSteps(True)
     # As many values as a step has: longer pieces leave most of each empty.
     writer.SetChunkSize(max(len(response.assembly.vertices), 100))
-    writer.SetCompressionLevel(COMPRESSION)
+    writer.SetCompressionLevel(4)
     with atomic_file(path) as partial:
         writer.SetFileName(str(partial))
         if writer.Write() != 1:

@@ -11,12 +11,10 @@ import numpy as np
 import solver
 from blockvis.cases.contents import Case
 from blockvis.layout.linked import linked
+from blockvis.layout.outlines import TOUCHING
 from solver import mechanics
 
 from .plan import planned
-
-#: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
-AS_DRAWN = 0.002
 
 #: Most blocks whose first equilibrium is found in some seconds, in the plane and in space.
 MOST_BLOCKS = {2: 2500, 3: 250}
@@ -72,7 +70,7 @@ def _first_of(case: Case, assembly: solver.Assembly) -> tuple[solver.Increment |
 
 def _cause(case: Case, assembly: solver.Assembly, falling: Sequence[int]) -> str:
     """Say why blocks fall: they touch nothing that stands, they slide, or they tip."""
-    contacts = mechanics.find_contacts(assembly, assembly.vertices, AS_DRAWN * assembly.block_size)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, TOUCHING * assembly.block_size)
     part = linked(contacts.block_a, contacts.block_b, assembly.n_blocks)
     loose = np.flatnonzero(assembly.free & ~np.isin(part, part[~assembly.free]))
     if len(loose):

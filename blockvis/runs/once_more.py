@@ -21,14 +21,12 @@ from solver import mechanics
 
 from .plan import planned
 
-#: Increments at parameters no farther apart than this, as a fraction of the largest, are of the same place.
+#: Increments at parameters no farther apart than this, as a fraction of the largest, are of the same place, and layouts
+#: the same where no corner is farther off, in block sizes.
 SAME = 1e-9
 
 #: The way to find increments that has no steps of its own.
 LINEAR_PROGRAM = mechanics.INCREMENTS[1]
-
-#: How much less urgent the other path is, where the system knows such a thing: it is not to slow the first.
-LESS_URGENT = 5
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ def _answer(say: Say, word: str, about: Any) -> bool:
     os.dup2(nowhere, 1)
     os.dup2(nowhere, 2)
     if hasattr(os, "nice"):
-        os.nice(LESS_URGENT)
+        os.nice(5)  # It is not to slow the first path.
     found = None
     with contextlib.suppress(Exception):
         found = followed(case, case_assembly(case) if folder is None else stored_assembly(folder))

@@ -17,12 +17,13 @@ from blockvis.results.folder import RANGE, add_to_summary
 from blockvis.results.reaction_range import COMPLIANCE, FRICTION, WORDS, ReactionRange
 from blockvis.system.atomic_files import write_atomic
 from blockvis.system.processes import cores
+from blockvis.system.worker import LOOK
 from blockvis.text import force_text
 from solver.mechanics import counted
 
 from .once_more import OnceMore, Traced, takes_steps, traced
 from .reopen import open_results
-from .step_check import LOOK, stored_case
+from .step_check import stored_case
 
 
 @dataclass(frozen=True)
@@ -37,9 +38,7 @@ class Variation:
         """Vary a case."""
         laws = {pair: law.with_friction(self.friction_factor) for pair, law in case.interfaces.items()}
         controls = replace(
-            case.controls,
-            compliance_factor=self.compliance_factor,
-            imperfection_factor=self.imperfection_factor,
+            case.controls, compliance_factor=self.compliance_factor, imperfection_factor=self.imperfection_factor
         )
         law = case.law.with_friction(self.friction_factor)
         friction, tension = law.friction_coefficient, law.tensile_strength
@@ -137,12 +136,7 @@ class PathRange:
         return f"{settlement:.6g} {self.units[phase]}{within}"
 
 
-def wants_range(case: Case) -> bool:
-    """Whether a case asks for its range."""
-    return case.settings is True
-
-
-def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda *_: None) -> PathRange:
+def find_range(folder: str | Path, waiting: Callable[[int, int], None]) -> PathRange:
     """Follow the settlement of a results folder again, varied, on all cores, and write what comes out.
 
     ``range.csv`` has the range of the reaction, ``range`` in ``summary.json`` that of the collapse. ``waiting`` is

@@ -7,13 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import solver
-from blockvis.cases.build import (
-    case_changes,
-    case_controls,
-    case_interfaces,
-    case_loads,
-    case_ties,
-)
+from blockvis.cases.build import case_changes, case_controls, case_interfaces, case_loads, case_ties
 from blockvis.cases.contents import Case
 from blockvis.cases.profiles import with_profiles
 from blockvis.kinds.kind import AnalysisRun, RunInput

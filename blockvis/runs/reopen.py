@@ -25,17 +25,9 @@ def case_of(folder: Path) -> Case | None:
 def open_results(folder: str | Path) -> solver.Response:
     """Reopen a results folder as the response it was written from, without solving.
 
-    Returns
-    -------
-    solver.Response
-        Whose increments read their arrays from the folder when they are asked for. Laws and loads are those of the
-        case file, or, of a case made or changed in Python, those that the folder holds; a warning names what it does
-        not hold: the scatter of friction from joint to joint.
-
-    Raises
-    ------
-    ValueError
-        If the folder holds no results.
+    Its increments read their arrays from the folder when they are asked for. Laws and loads are those of the case file,
+    or, of a case made or changed in Python, those that the folder holds; a warning names what it does not hold: the
+    scatter of friction from joint to joint. ValueError if the folder holds no results.
     """
     folder = Path(folder)
     response, summary = stored_response(folder)

@@ -148,10 +148,7 @@ def run_case(
 
 
 def resume_run(
-    folder: str | Path,
-    *,
-    outputs: Sequence[Drawing] | None = None,
-    increment_seconds: float | None = None,
+    folder: str | Path, *, outputs: Sequence[Drawing] | None = None, increment_seconds: float | None = None
 ) -> Run:
     """Go on with a run that was stopped, from its results folder alone, to the result it would have had.
 

@@ -15,6 +15,7 @@ from blockvis.cases.contents import Case
 from blockvis.results.about import unit_in
 from blockvis.results.folder import STEP_CHECK, add_to_summary
 from blockvis.results.record import read_json, write_json
+from blockvis.system.worker import LOOK
 from solver import mechanics
 
 from .once_more import LINEAR_PROGRAM, OnceMore, Traced, followed, takes_steps, traced
@@ -36,8 +37,8 @@ NOTABLE, SMALLEST, SMALLEST_PLACE = 0.01, 1e-4, 1e-5
 #: What may be unknown of a check: nan, and null in files.
 UNKNOWN = ("difference", "collapse", "position")
 
-#: Seconds between looks for Ctrl-C while waiting, and after which waiting is worth a word.
-LOOK, WORTH_A_WORD = 0.2, 2.0
+#: Seconds after which waiting is worth a word.
+WORTH_A_WORD = 2.0
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from blockvis.pictures import palette
+from blockvis.pictures.curves import TEXT
 from blockvis.pictures.figures import plain_frame, plain_text, saved
 from blockvis.pictures.frame import Frame, frame_around
 from blockvis.pictures.ties import COLOURS
@@ -28,13 +29,13 @@ from .fragility import CONFIDENCE, Fragility, fragility_of
 from .sensitivity import Swing, capacity, first_order, independent_rows, outcome, swings, unit_of, without_collapse
 from .study_file import Study
 from .study_folder import NO_RESULT, NOT_BUILT, StudyFolder
-from .summary import classes_of, curve_name, ends_counted, is_sample, is_single
+from .summary import MOST_MECHANISMS, classes_of, curve_name, ends_counted, is_sample, is_single
 
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Classes of mechanisms with their own colour in the scatter, and classes that are drawn.
-COLOURED, DRAWN = 6, 12
+#: Classes of mechanisms that are drawn.
+DRAWN = 12
 
 #: Empty border of a tile, and how far beyond the blocks it shows supports, in sizes of the structure.
 MARGIN, SUPPORTS = 0.05, 0.25
@@ -45,8 +46,6 @@ PANELS = 3
 #: Colours and marks of the classes, the most frequent first; the marks distinguish them in grey as well.
 CLASSES = ("#145ca8", "#e24e1b", "#00796b", "#7e37b2", "#b08a00", "#7a4a2b")
 MARKS = ("o", "s", "^", "D", "v", "P")
-
-TEXT = 11.0
 
 HEADING: dict[str, Any] = {"fontsize": 0.95 * TEXT, "loc": "left", "color": "#4a4a4a"}
 
@@ -183,7 +182,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     numeric = {p.name for p in study.parameters if p.numeric}
     names = [s.name for s in swings(study, table) if s.name in numeric][:PANELS] or ["run"]
     classes = classes_of(table)
-    shown = list(classes)[:COLOURED]
+    shown = list(classes)[:MOST_MECHANISMS]
     width = 8.0 if len(names) == 1 else 2.0 + 3.6 * len(names)
     labels = [textwrap.fill(f"{k + 1}: {one} ({classes[one]})", round(13.5 * width)) for k, one in enumerate(shown)]
     lines = sum(label.count("\n") + 1 for label in labels) + 2
@@ -318,10 +317,7 @@ def _frame(shapes: Sequence[dict[str, np.ndarray]]) -> Frame:
 def runs_counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:
     """Count the runs, rows that the curve is made of, by how they ended: the title of the fragility curve."""
     collapsed, local, never = ends_counted(table).values()
-    words = [
-        counted(curve.n_runs, "run"),
-        f"{collapsed} collapsed" + f" ({local} of a few blocks only)" * (local > 0),
-    ]
+    words = [counted(curve.n_runs, "run"), f"{collapsed} collapsed" + f" ({local} of a few blocks only)" * (local > 0)]
     if never:
         words.append(f"{never} never stood")
     if curve.n_stood:

@@ -23,7 +23,7 @@ from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import collapse_phase, governing_limit, least_reaction, loss_in
 from blockvis.results.joints import initial_joints, opening_and_slip
-from blockvis.results.swinging import swing_factors
+from blockvis.results.swinging import SWING, swing_factors
 from blockvis.runs.plan import planned
 from solver import mechanics
 
@@ -34,9 +34,6 @@ FAILED, NOT_BUILT = "failed", "not built"
 
 #: Most joints that a class names; of more joints it gives the number.
 NAMED_JOINTS = 8
-
-#: Largest movement in the picture of a mechanism, as a fraction of the size of the structure.
-SWING = 0.05
 
 #: From where blocks in space are seen: the same in all runs, so that their mechanisms compare.
 VIEW = View(AROUND[0], ABOVE)

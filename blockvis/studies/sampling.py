@@ -8,11 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from blockvis.case_files.case_keys import MOST_STEPS
+
 #: Methods of sampling; "saltelli" is for Sobol' indices of first order and total.
 METHODS = ("grid", "latin hypercube", "sobol", "random", "saltelli")
-
-#: Most runs of one study: their table is made in memory.
-MOST_RUNS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ def designed(method: str, runs: int, levels: Sequence[int], repeats: int, seed: 
     et al., Variance based sensitivity analysis of model output, Computer Physics Communications 181 (2010) 259-270,
     https://doi.org/10.1016/j.cpc.2009.09.018: for each point of two independent samples A and B the rows A, A with one
     column from B for each factor, B. Raises ``ValueError`` for a Sobol' sequence of runs that are no power of 2, and
-    for more than :data:`MOST_RUNS`.
+    for more than :data:`MOST_STEPS`.
 
     Examples
     --------
@@ -52,8 +51,8 @@ def designed(method: str, runs: int, levels: Sequence[int], repeats: int, seed: 
     """
     n, grid = len(levels), method == "grid"
     total = repeats * math.prod(levels) if grid else runs * (n + scattered + 2 if method == "saltelli" else 1)
-    if total > MOST_RUNS:
-        raise ValueError(f"makes {total:,} runs; at most {MOST_RUNS:,} make one study")
+    if total > MOST_STEPS:
+        raise ValueError(f"makes {total:,} runs; at most {MOST_STEPS:,} make one study")
     if grid:
         axes = [(np.arange(k) + 0.5) / k for k in levels]
         points = np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=1) if n else np.zeros((1, 0))

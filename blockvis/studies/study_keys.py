@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from blockvis.case_files.schema import DRAFT, case_values, one_or_several
 from blockvis.cases import imperfections
 from blockvis.cases.distributions import DISTRIBUTION_KEYS, FORMS, KINDS
 from blockvis.cases.key import NUMBERS, POSITIVE, TEXT, TEXTS, Key, Section, ValueKind, one_of, whole
@@ -141,3 +142,31 @@ IMPERFECTIONS = replace(
 
 #: Every table of the study file with its keys.
 SECTIONS = (STUDY, PARAMETER, IMPERFECTIONS)
+
+
+def study_schema() -> dict[str, Any]:
+    """Make the JSON schema of the study file."""
+    study, parameter, imperfections = SECTIONS
+    head = study.schema
+    head["properties"]["case"] = {
+        "anyOf": [{"type": "string"}, case_values()],
+        "description": head["properties"]["case"]["description"],
+    }
+    varied = parameter.schema
+    varied["allOf"].append({"anyOf": [{"required": ["values"]}, {"required": ["distribution"]}]})
+    return {
+        "$schema": DRAFT,
+        "title": "blockvis study file",
+        "type": "object",
+        "properties": {
+            "study": head,
+            "parameters": {
+                "type": "object",
+                "description": parameter.meaning,
+                "additionalProperties": {"anyOf": [{"type": "array", "minItems": 1}, varied]},
+            },
+            "imperfections": one_or_several(imperfections),
+        },
+        "required": ["study"],
+        "additionalProperties": False,
+    }

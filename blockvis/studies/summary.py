@@ -21,7 +21,7 @@ from .study_folder import NO_RESULT, NOT_BUILT
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Most mechanisms that the summary lists.
+#: Most mechanisms that the summary lists, and that have their own colour in the scatter.
 MOST_MECHANISMS = 6
 
 #: Most values of a single parameter whose outcome is written.

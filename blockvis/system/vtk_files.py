@@ -25,11 +25,7 @@ _FACES = re.compile(r'<DataArray [^>]*Name="face_connectivity".*Name="polyhedron
 
 
 def write_vtu(
-    dataset: vtkUnstructuredGrid,
-    path: str | os.PathLike[str],
-    *,
-    strings: bool = True,
-    durable: bool = True,
+    dataset: vtkUnstructuredGrid, path: str | os.PathLike[str], *, strings: bool = True, durable: bool = True
 ) -> Path:
     """Write a dataset as VTU, whole or not at all.
 

@@ -28,15 +28,7 @@ Say = Callable[[str, Any], None]
 
 
 class WorkerEnded(RuntimeError):
-    """A worker ended before it gave its answer.
-
-    Attributes
-    ----------
-    code : int
-        That it ended with.
-    errors : str
-        What it wrote to its standard error, where that was kept.
-    """
+    """A worker ended before it gave its answer: its code, and what it wrote to its standard error if that was kept."""
 
     def __init__(self, code: int, errors: str) -> None:
         super().__init__(f"the process ended with code {code}")
@@ -46,13 +38,8 @@ class WorkerEnded(RuntimeError):
 class Worker:
     """A fresh interpreter that serves a module.
 
-    Parameters
-    ----------
-    errors : bool
-        Whether its standard error is kept for :class:`WorkerEnded`; it is that of this process by default.
+    Its standard error is kept for :class:`WorkerEnded` if ``errors``; it is that of this process by default.
 
-    Notes
-    -----
     Not a fork: that would share the solver's threads, and ``multiprocessing`` would run the caller's script again.
     """
 
@@ -61,10 +48,7 @@ class Worker:
         self._errors = tempfile.TemporaryFile() if errors else None  # noqa: SIM115
         with _deaf():
             self._process = subprocess.Popen(
-                [sys.executable, "-c", start],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=self._errors,
+                [sys.executable, "-c", start], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors
             )
         self._heard: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
         # What it says is read at once: it never waits for this process.
@@ -135,11 +119,8 @@ class Worker:
 def serve(answer: Callable[[Say, str, Any], bool | None]) -> None:
     """Answer in a worker what comes in, until ``answer`` returns True or nobody listens any more.
 
-    Parameters
-    ----------
-    answer : callable
-        Called with what says something to the caller, and with the word and what it is about that came in. What it
-        raises is raised where the caller waits.
+    It is called with what says something to the caller, and with the word and what it is about that came in. What it
+    raises is raised where the caller waits.
     """
     # Where it was not started deaf, as on Windows.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -106,7 +106,7 @@ def find_limit_load(
     told = ties_as_drawn(ties, assembly, pose) if ties_at is None else ties_at
     told = told.held(ties, gone)
     force = mean_load(left, loads) or float(np.abs(loads.live[left.free]).max())
-    model = Model(left, interfaces, loads, left.block_size, force, has_live=True, ties=tuple(ties))
+    model = Model(left, interfaces, loads, left.block_size, force, gone, has_live=True, ties=tuple(ties))
     model = model.without(gone) if gone.any() else model
     problem = _Problem(model, pose, closed_gap, displacement, torsion, told, bonds_at)
     program, status = problem.program, LimitStatus.FOUND
@@ -262,7 +262,7 @@ class _Problem:
             friction=program.friction[between],
             velocity=mechanism,
             support_forces=np.where(model.assembly.free[:, None], 0.0, on_blocks),
-            fell_at=np.zeros(0) if model.fallen is None else np.where(model.fallen, -np.inf, np.nan),
+            fell_at=np.where(model.fallen, -np.inf, np.nan) if model.fallen.any() else np.zeros(0),
             ties=plastic_forces(program.contacts, forces, model.ties, self.ties_at),
             crushing=at_strength[between] if np.isfinite(program.limits.most[between]).any() else at_strength[:0],
         )

@@ -144,6 +144,7 @@ def model_of(
         loads,
         assembly.block_size,
         force,
+        np.zeros(assembly.n_blocks, dtype=bool),
         has_live=has_live,
         ties=ties,
         compliance=controls.compliance_factor,

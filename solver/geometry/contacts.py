@@ -13,9 +13,9 @@ from .broad_phase import expand_ranges
 #: Faces that cover each other on a strip may touch if its gap is at most this part of its width; others slide past.
 STEEPEST_LANDING = 0.25
 
-#: Distance, in block sizes, up to which a point takes over from one that has vanished, twice the longest step; what a
-#: normal turned by 1 counts for beside it; and difference of distances up to which points are equally near.
-FAR_SUCCESSOR, TURNED_NORMAL, SAME_PLACE = 0.1, 1e-2, 1e-6
+#: Distance, in block sizes, up to which a point takes over from one that has vanished, twice the longest step, and for
+#: which a normal turned by 1 counts beside it; and difference of distances up to which points are equally near.
+FAR_SUCCESSOR, SAME_PLACE = 0.1, 1e-6
 
 #: Cosine from which on two normals are the same.
 SAME_NORMAL = 1.0 - 1e-6
@@ -108,7 +108,7 @@ def successors(
     apart = np.linalg.norm(before.points[earlier] - contacts.points[successor], axis=1)
     turned = np.linalg.norm(sense * before.frames[earlier, 0] - contacts.frames[successor, 0], axis=1)
     near, least = apart < FAR_SUCCESSOR * size, np.full(len(vanished), np.inf)
-    measure = apart + TURNED_NORMAL * size * turned
+    measure = apart + FAR_SUCCESSOR * size * turned
     np.minimum.at(least, row[near], measure[near])
     chosen = (measure <= least[row] + SAME_PLACE * size) & near
     row = row[chosen]

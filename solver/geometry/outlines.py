@@ -7,7 +7,6 @@ from typing import Self
 
 import numpy as np
 
-from solver.tolerances import GEOMETRY_TOLERANCE
 from solver.words import Kept, kept
 
 from .broad_phase import box_pairs, boxes, expand_ranges
@@ -40,59 +39,6 @@ class Bodies(Kept):
     def shifted(self, by: np.ndarray) -> Self:
         """Move the drawing by (d,) [m]."""
         return replace(self, vertices=self.vertices + by)
-
-
-@dataclass(frozen=True)
-class Outlines(Bodies):
-    """Polygons with a thickness as flat arrays, and what follows from their drawing; corners run counter-clockwise."""
-
-    thickness: np.ndarray  #: (n,) [m], out of plane
-
-    @kept
-    def _integrals(self) -> tuple[np.ndarray, np.ndarray]:
-        return polygon_integrals(self.vertices, self.offsets)
-
-    @property
-    def areas(self) -> np.ndarray:
-        """(n,) array [m²]."""
-        return self._integrals[0]
-
-    @property
-    def centroids(self) -> np.ndarray:
-        """(n, 2) array [m], before any movement."""
-        return self._integrals[1]
-
-    @property
-    def volumes(self) -> np.ndarray:
-        """(n,) array [m³]."""
-        return self.areas * self.thickness
-
-    @kept
-    def next_vertex(self) -> np.ndarray:
-        """(n_vertices,) int array: the vertex that follows counter-clockwise; edge i runs from i to it."""
-        return next_vertices(self.offsets)
-
-    @kept
-    def previous_vertex(self) -> np.ndarray:
-        """(n_vertices,) int array: the vertex before."""
-        return np.argsort(self.next_vertex)
-
-    @kept
-    def edge_lengths(self) -> np.ndarray:
-        """(n_vertices,) array [m]: length of the edge that starts at each vertex."""
-        return np.hypot(*(self.vertices[self.next_vertex] - self.vertices).T)
-
-    @kept
-    def convex_vertex(self) -> np.ndarray:
-        """(n_vertices,) bool array: false at re-entrant corners and, to rounding, straight ones: no contact points."""
-        along = (self.vertices[self.next_vertex] - self.vertices) / self.edge_lengths[:, None]
-        before = along[self.previous_vertex]
-        return before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0] > GEOMETRY_TOLERANCE
-
-    @kept
-    def widths(self) -> np.ndarray:
-        """(n,) array [m]: twice the area over the perimeter of each polygon, near b for a long a × b."""
-        return 2.0 * self.areas / np.add.reduceat(self.edge_lengths, self.offsets[:-1])
 
 
 def polygon_integrals(vertices: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

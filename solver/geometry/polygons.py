@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
+from solver.tolerances import CORNER_TOLERANCE, GEOMETRY_TOLERANCE, PENETRATION_FRACTION
+from solver.words import kept
 
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .contacts import STEEPEST_LANDING, Contacts, are_known
-from .outlines import Outlines, overlap_depths
+from .outlines import Bodies, next_vertices, overlap_depths, polygon_integrals
 from .solids import dot
 
 #: Sine of the angle by which the flanks of a corner may tilt into the edge it faces, as those of an open joint.
@@ -27,8 +28,59 @@ ON_EDGE, ON_CORNER = 0, 1
 
 
 @dataclass(frozen=True)
-class Polygons(Outlines):
-    """Blocks in the plane: their corners have two coordinates."""
+class Polygons(Bodies):
+    """Blocks in the plane, polygons with a thickness, and what follows from their drawing.
+
+    Corners have two coordinates and run counter-clockwise.
+    """
+
+    thickness: np.ndarray  #: (n,) [m], out of plane
+
+    @kept
+    def _integrals(self) -> tuple[np.ndarray, np.ndarray]:
+        return polygon_integrals(self.vertices, self.offsets)
+
+    @property
+    def areas(self) -> np.ndarray:
+        """(n,) array [m²]."""
+        return self._integrals[0]
+
+    @property
+    def centroids(self) -> np.ndarray:
+        """(n, 2) array [m], before any movement."""
+        return self._integrals[1]
+
+    @property
+    def volumes(self) -> np.ndarray:
+        """(n,) array [m³]."""
+        return self.areas * self.thickness
+
+    @kept
+    def next_vertex(self) -> np.ndarray:
+        """(n_vertices,) int array: the vertex that follows counter-clockwise; edge i runs from i to it."""
+        return next_vertices(self.offsets)
+
+    @kept
+    def previous_vertex(self) -> np.ndarray:
+        """(n_vertices,) int array: the vertex before."""
+        return np.argsort(self.next_vertex)
+
+    @kept
+    def edge_lengths(self) -> np.ndarray:
+        """(n_vertices,) array [m]: length of the edge that starts at each vertex."""
+        return np.hypot(*(self.vertices[self.next_vertex] - self.vertices).T)
+
+    @kept
+    def convex_vertex(self) -> np.ndarray:
+        """(n_vertices,) bool array: false at re-entrant corners and, to rounding, straight ones: no contact points."""
+        along = (self.vertices[self.next_vertex] - self.vertices) / self.edge_lengths[:, None]
+        before = along[self.previous_vertex]
+        return before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0] > GEOMETRY_TOLERANCE
+
+    @kept
+    def widths(self) -> np.ndarray:
+        """(n,) array [m]: twice the area over the perimeter of each polygon, near b for a long a × b."""
+        return 2.0 * self.areas / np.add.reduceat(self.edge_lengths, self.offsets[:-1])
 
     @property
     def gyration(self) -> np.ndarray:
@@ -107,7 +159,7 @@ def corners_and_edges(features: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _measured(
-    shapes: Outlines, vertices: np.ndarray, features: np.ndarray, areas: np.ndarray | None = None
+    shapes: Polygons, vertices: np.ndarray, features: np.ndarray, areas: np.ndarray | None = None
 ) -> Contacts:
     """Frames and gaps of given pairs of features, (n, 4) int, where the corners, (n_vertices, 2) [m], now are.
 
@@ -142,7 +194,7 @@ def _measured(
     return replace(contacts, areas=_areas(shapes, contacts)) if areas is None else contacts
 
 
-def _areas(shapes: Outlines, contacts: Contacts) -> np.ndarray:
+def _areas(shapes: Polygons, contacts: Contacts) -> np.ndarray:
     """(n,) array [m²]: tributary area of each contact point of the faces between blocks.
 
     A face is where a side of one block lies over a side of another. Half the distance to the neighbours along it times
@@ -172,7 +224,7 @@ def _areas(shapes: Outlines, contacts: Contacts) -> np.ndarray:
     return length.reshape(-1, 2).sum(axis=1) * thickness
 
 
-def _side_of_edge(shapes: Outlines) -> np.ndarray:
+def _side_of_edge(shapes: Polygons) -> np.ndarray:
     """(n_vertices,) int array: first edge of the side that each edge is a part of.
 
     A straight or slightly re-entrant corner, which has no contact point of its own, does not end a side.
@@ -190,7 +242,7 @@ def _side_of_edge(shapes: Outlines) -> np.ndarray:
 
 
 def _passed_edges(
-    shapes: Outlines, before: np.ndarray, after: np.ndarray, i: np.ndarray, j: np.ndarray
+    shapes: Polygons, before: np.ndarray, after: np.ndarray, i: np.ndarray, j: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Corners of blocks that have gone through edges of others in a movement, and these edges, (n,) int arrays.
 
@@ -221,7 +273,7 @@ def _passed_edges(
 
 
 def _vertex_edge_candidates(
-    shapes: Outlines, vertices: np.ndarray, pair_a: np.ndarray, pair_b: np.ndarray, reach: float
+    shapes: Polygons, vertices: np.ndarray, pair_a: np.ndarray, pair_b: np.ndarray, reach: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Corners of block a in front of edges of block b, by distance and direction alone."""
     offsets, following = shapes.offsets, shapes.next_vertex
@@ -262,7 +314,7 @@ def _vertex_edge_candidates(
 
 
 def _is_behind_face(
-    shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, gap: np.ndarray, end: np.ndarray
+    shapes: Polygons, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, gap: np.ndarray, end: np.ndarray
 ) -> np.ndarray:
     """Whether a corner behind an edge penetrates that face, and not a neighbouring one that is nearer or before it."""
     through = np.ones(len(vertex), dtype=bool)
@@ -292,7 +344,7 @@ def _is_behind_face(
 
 
 def _seen_from_edges(
-    shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray
+    shapes: Polygons, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Directions of edges, (n, 2), and how far corners are along and before them, (n,) arrays [m]."""
     tangent = _unit(vertices[shapes.next_vertex[edge]] - vertices[edge])
@@ -300,7 +352,7 @@ def _seen_from_edges(
     return tangent, dot(offset, tangent), offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
 
 
-def _flanks(shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _flanks(shapes: Polygons, vertices: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Give the unit vectors from corners to the next and to the previous corner, (n, 2) arrays."""
     to_next = vertices[shapes.next_vertex[vertex]] - vertices[vertex]
     to_previous = vertices[shapes.previous_vertex[vertex]] - vertices[vertex]
@@ -313,7 +365,7 @@ def _inward(to_next: np.ndarray, to_previous: np.ndarray) -> np.ndarray:
 
 
 def _classified_ends(
-    shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray
+    shapes: Polygons, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Drop corners past the end of their edge, and find those on the corner there."""
     following = shapes.next_vertex
@@ -341,7 +393,7 @@ def _classified_ends(
 
 
 def _closest_faces(
-    shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
+    shapes: Polygons, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
 ) -> np.ndarray:
     """Whether to keep each pair: of two corners that meet along two pairs of faces, only where these are closest.
 
@@ -361,7 +413,7 @@ def _closest_faces(
 
 
 def _without_duplicates(
-    shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
+    shapes: Polygons, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Keep each pair of corners once, seen from the lower numbered vertex, and sort the pairs by vertex and edge."""
     swap, facing = (corner >= 0) & (vertex > corner), _facing_edge(shapes, vertex, edge, corner)
@@ -374,7 +426,7 @@ def _without_duplicates(
     return vertex[first], edge[first], corner[first]
 
 
-def _facing_edge(shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
+def _facing_edge(shapes: Polygons, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
     """Find the edge of the corner's block that lies over ``edge`` where ``vertex`` stands on ``corner``.
 
     Both outlines run counter-clockwise, so facing edges run against each other: where one starts the other ends.
@@ -382,7 +434,7 @@ def _facing_edge(shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner:
     return np.where(corner == edge, shapes.previous_vertex[vertex], vertex)
 
 
-def end_zone(shapes: Outlines, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+def end_zone(shapes: Polygons, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
     """(n,) array [m]: how near the end of the edge the corner counts as standing on the corner there."""
     length = shapes.edge_lengths
     shortest = np.minimum(length[vertex], length[shapes.previous_vertex[vertex]])

@@ -43,7 +43,7 @@ class Members:
         self.brittle = np.array([tie.brittle for tie in self.ties], dtype=bool)
         # In units of the program.
         self.compliance = model.force / (self.stiffness * model.length)
-        self.held = held_ties(self.ties, np.zeros(len(model.load)) if model.fallen is None else model.fallen)
+        self.held = held_ties(self.ties, model.fallen)
 
     def installed(self, place: Place, phase: int, told: TieForces | None = None) -> Place:
         """Install the members of a phase, from 0, at the geometry of a place, or all as an increment tells of them."""

@@ -22,7 +22,7 @@ from .collapse import MECHANISM, Fall
 from .controls import Controls, Ending
 from .drivers import Driver
 from .equilibrium_check import EquilibriumChecks
-from .reports import UNSTABLE, Reports, no_equilibrium
+from .reports import Reports, no_equilibrium
 from .state import EquilibriumCheck, PathState, Place
 from .stepping import CARRIES, StepError, Stepper
 
@@ -245,7 +245,11 @@ class Path:
         unloaded = Stepper(replace(model, has_live=False), self.driver) if model.has_live else self.stepper
         if place.multiplier == 0.0 and not unloaded.is_stable(place):
             yield self.reports.falling_increment(place, np.zeros_like(model.load))
-            return Ending(Status.NO_INITIAL_EQUILIBRIUM, UNSTABLE)
+            message = (
+                "no stable equilibrium before any settlement: what leans a little leans on, on joints or ground of the "
+                "given stiffness; check normal_stiffness and the stiffness of supports"
+            )
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, message)
         # Without friction a program carries what its own check lets pass.
         least = ACCEPTED_ERROR * model.total_load / max(model.scaled_live(place.pose)[1], 1e-300)
         if model.has_live and bounds.high == np.inf:

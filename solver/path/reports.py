@@ -64,11 +64,10 @@ class Reports:
 
     def _overlap(self, place: Place) -> float:
         """Deepest overlap [m] of blocks that no contact point keeps apart; told of each two once."""
-        assembly, fallen = self.model.assembly, self.model.fallen
+        assembly, left, deepest = self.model.assembly, self.model.fallen, 0.0
         if self.model.interfaces.elastic:
             return 0.0
         found = assembly.shapes.overlaps(moved_vertices(assembly, place.pose), OVERLAP * float(assembly.widths.min()))
-        left, deepest = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else fallen, 0.0
         for a, b, depth in zip(*found, strict=True):
             if (assembly.free[a] or assembly.free[b]) and not (left[a] or left[b]):
                 deepest = max(deepest, float(depth))
@@ -196,13 +195,6 @@ def falling_blocks(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
     """Numbers of the free blocks that move a tenth as fast as the fastest, or more, (n_blocks, n_dof) array."""
     size = np.abs(motion[:, : assembly.dimension]).max(axis=1)
     return np.flatnonzero(assembly.free & (size >= 0.1 * size.max()))
-
-
-#: Message where the equilibrium at the start is one from which blocks lean ever farther.
-UNSTABLE = (
-    "no stable equilibrium before any settlement: what leans a little leans on, on joints or ground of the given "
-    "stiffness; check normal_stiffness and the stiffness of supports"
-)
 
 
 def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:

@@ -147,8 +147,7 @@ class Stepper:
         sense = support_motion.sum(axis=0) / max(float(np.linalg.norm(support_motion, axis=1).sum()), 1e-300)
         self.imperfection = np.zeros_like(model.load)
         self.imperfection[:, :d] = model.imperfection * tolerances.IMPERFECTION * self.weights[:, :1] * sense
-        if model.fallen is not None:
-            self.imperfection[model.fallen] = 0.0
+        self.imperfection[model.fallen] = 0.0
 
     def unloaded(
         self, pose: Pose, phase: int, ties_at: TieForces | None = None, bonds_at: Bonds | None = None
@@ -349,12 +348,11 @@ class Stepper:
         if not self.gives(place):
             return True
         positions, n, d = place.pose.positions, len(self.free), self.model.dimension
-        standing = self.free if self.model.fallen is None else self.free & ~self.model.fallen
         lean = np.append(np.zeros(d), np.full(self.model.n_dof - d, LEAN))[None]
         about = Pose(positions[~self.free].mean(axis=0)[None], lean[:, d:])
         turning = point_velocities(positions, np.zeros(n, dtype=np.int64), about, lean)
         motion = np.column_stack([turning, np.repeat(lean[:, d:], n, axis=0)])
-        leaning = put_together(standing, moved(place.pose, motion), place.pose)
+        leaning = put_together(self.free & ~self.model.fallen, moved(place.pose, motion), place.pose)
         still = self.standing(replace(place, pose=leaning))
         # Friction that the lean has taken from joints lets them shift.
         return (

@@ -30,8 +30,8 @@ class Model:
     loads: Loads
     length: float  #: [m]: unit of the programs, the block size
     force: float  #: [N]: likewise, the mean load of a free block
+    fallen: np.ndarray  #: (n_blocks,) bool: blocks that have left, without loads and contact points
     has_live: bool = False  #: whether the multiplier of the live load is an unknown of every program
-    fallen: np.ndarray | None = None  #: (n_blocks,) bool: blocks that have left, without loads and contact points
     ties: tuple[Tie, ...] = ()
     compliance: float = 1.0  #: times that of :mod:`solver.tolerances`
     imperfection: float = 1.0  #: likewise
@@ -42,8 +42,6 @@ class Model:
 
     def standing(self, contacts: Contacts) -> Contacts:
         """Return the contact points between blocks that have not left."""
-        if self.fallen is None:
-            return contacts
         return contacts[~(self.fallen[contacts.block_a] | self.fallen[contacts.block_b])]
 
     @cached_property

@@ -38,9 +38,6 @@ STRAIGHT = 0.85
 #: More pockets than this fraction of the area of the joints that are closed between faces, and mortar is shared out.
 POCKETS = 0.03
 
-#: A block that loses more of its area than this has not been closed but cut.
-LOST = 0.3
-
 #: A proposed thickness above this fraction of how far was looked is the limit of the search.
 LIMIT = 0.95
 
@@ -136,7 +133,7 @@ def close_joints(
         method = chosen_method(outlines, facing_edges(outlines, reach, laid=laid)) if thickness else "faces"
         if method == "faces":
             closing = _between_faces(outlines, thickness, overlap, anchored, laid)
-            whole = not len(folded(outlines, closing.outlines, LOST))
+            whole = not len(folded(outlines, closing.outlines))
             if whole and (not thickness or _pockets(outlines, closing.outlines, thickness) <= POCKETS):
                 return closing
         # Without gaps there is nothing to share out.
@@ -145,7 +142,7 @@ def close_joints(
         # Pockets between stones of a bond are none of mortar.
         return _to_nearest_stone(outlines, thickness, overlap, anchored if laid is None else anchored | laid, mortar)
     closing = _between_faces(outlines, thickness, overlap, anchored, laid)
-    blocks = folded(outlines, closing.outlines, LOST)
+    blocks = folded(outlines, closing.outlines)
     if len(blocks):
         raise FoldedOutline(int(blocks[0]))
     return closing
@@ -170,11 +167,7 @@ def _pockets(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray], thicknes
 
 
 def _to_nearest_stone(
-    outlines: Sequence[np.ndarray],
-    thickness: float,
-    overlap: float,
-    anchored: np.ndarray,
-    mortar: Sequence[LeftOut],
+    outlines: Sequence[np.ndarray], thickness: float, overlap: float, anchored: np.ndarray, mortar: Sequence[LeftOut]
 ) -> Closing:
     found = facing_edges(outlines, thickness, overlap)
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())

@@ -91,8 +91,6 @@ def facing_edges(
 ) -> Facing:
     """Find where edges of different blocks face each other: stretches with gaps, and overlaps, up to so much [m].
 
-    Notes
-    -----
     The gap between two edges is measured across the bisector of their lines, so that both have the same midline. Of
     stretches that lie behind one another only the nearest counts.
     """
@@ -122,10 +120,7 @@ def facing_edges(
     shortest = np.minimum(a1 - a0, b1 - b0)
 
     def heights(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return (
-            ha0 + (at - a0) / (a1 - a0) * (ha1 - ha0),
-            hb0 + (at - b0) / (b1 - b0) * (hb1 - hb0),
-        )
+        return (ha0 + (at - a0) / (a1 - a0) * (ha1 - ha0), hb0 + (at - b0) / (b1 - b0) * (hb1 - hb0))
 
     full = last - first
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -175,8 +170,6 @@ def _nearest(found: Facing, edges: Edges) -> Facing:
 def proposed_thickness(outlines: Sequence[np.ndarray], laid: np.ndarray | None = None) -> tuple[float, Facing]:
     """Propose the thickness [m] that closes the joints of a drawing, 0 without gaps; and give the stretches with gaps.
 
-    Notes
-    -----
     Edges face each other across at most half the width of a typical block (twice its area over its perimeter): a
     wider gap is an opening. Joints are longer than wide; what is not, such as the way across a crossing from one
     bevelled corner to another, says nothing of them. Of the joints, the share JOINTS of their length bounds the

@@ -32,8 +32,6 @@ def common_lines(found: Facing, edges: Edges, anchored: np.ndarray, closed: floa
 
     A gap up to ``closed`` [m] is a rounding error.
 
-    Notes
-    -----
     Stretches are taken longest first; each joins the lines of its two edges into one if a straight fit through all
     their midlines stays within the fraction SHARED_LINE of every gap.
     """

@@ -80,10 +80,7 @@ class Gaps:
 
 
 def share_out(
-    outlines: Sequence[np.ndarray],
-    thickness: float,
-    anchored: np.ndarray,
-    mortar: Sequence[LeftOut] = (),
+    outlines: Sequence[np.ndarray], thickness: float, anchored: np.ndarray, mortar: Sequence[LeftOut] = ()
 ) -> list[np.ndarray]:
     """Give mortar to the nearest stone that is not anchored: gaps up to a thickness [m], and pockets between such gaps.
 

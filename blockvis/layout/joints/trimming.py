@@ -68,12 +68,7 @@ def extended_to_lines(
 
 
 def _extended_edges(
-    edges: Edges,
-    found: Facing,
-    uncommon: list[int],
-    lines: dict[int, Line],
-    anchored: np.ndarray,
-    thickness: float,
+    edges: Edges, found: Facing, uncommon: list[int], lines: dict[int, Line], anchored: np.ndarray, thickness: float
 ) -> tuple[dict[int, float], dict[int, list[np.ndarray]]]:
     """Choose the edges that are extended: by how much [m], and to which midlines, by the edge."""
     overshoot: dict[int, float] = {}
@@ -153,8 +148,6 @@ def merge_close_corners(
 ) -> list[np.ndarray]:
     """Merge corners closer than ``reach`` [m] that cutting leaves in the blocks involved, and in all that share them.
 
-    Notes
-    -----
     Steps far smaller than a block are artefacts of cutting and mislead the search for contacts. Every corner within
     ``closed`` [m] of an edge of a neighbour is added to that neighbour first, so that both sides move alike.
     """
