@@ -255,10 +255,11 @@ def write_labels(
         if free.any():
             best = int(np.where(free, cost, np.inf).argmin())
             written.append(_Label(place, lows[best], lows[best] + size, leaders[:, best], label, colour))
-    for one in written:
-        # Grey and with a dot at its end: a coloured one would look like a crack.
-        draw.line((*one.place, *one.leader[-1]), fill=palette.FAINT, width=max(1, text // 16))
-        draw.circle(tuple(one.place.tolist()), text / 8.0, fill=palette.FAINT)
+    # Grey and with a dot at its end: a coloured one would look like a crack. On a paper rim, over whatever colours.
+    for colour, grown in ((palette.PAPER, max(1, text // 10)), (palette.FAINT, 0)):
+        for one in written:
+            draw.line((*one.place, *one.leader[-1]), fill=colour, width=max(1, text // 16) + 2 * grown)
+            draw.circle(tuple(one.place.tolist()), text / 8.0 + grown, fill=colour)
     for one in written:
         box = (*one.low.tolist(), *one.high.tolist())
         draw.rounded_rectangle(box, 0.25 * text, fill=palette.PAPER, outline=one.colour, width=max(1, text // 15))
