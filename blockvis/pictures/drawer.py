@@ -380,10 +380,12 @@ class Drawer:
         )
 
     def _moves(self, time: float) -> bool:
-        """Whether something moves visibly from a time [s] of the fall on, or in the last moment that is known of it."""
+        """Whether something moves visibly after a time [s] of the fall, or in the last moment that is known of it."""
         assert self.fall is not None
-        start = max(min(time, float(self.fall.times[-1]) - MOMENT), 0.0)
-        now, then = (mechanics.moved_vertices(self.assembly, self.fall.at(t)) for t in (start, start + MOMENT))
+        end = float(self.fall.times[-1])
+        start = max(min(time, end - MOMENT), 0.0)
+        # Until the end: what is tall begins to fall slower than is seen in a moment.
+        now, then = (mechanics.moved_vertices(self.assembly, self.fall.at(t)) for t in (start, end))
         return bool(np.linalg.norm(then - now, axis=1).max(initial=0.0) > VISIBLE * self.scene.pixel)
 
     def show_motion(self, swing: Swing) -> None:

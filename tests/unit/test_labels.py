@@ -341,6 +341,10 @@ def test_what_lies_still_has_no_badge_of_falling(words):
     short = replace(fall, times=fall.times[:half], positions=fall.positions[:half], rotations=fall.rotations[:half])
     Drawer(response, Look(colour_by="mechanism"), SMALL, response.path, fall=short).falling_picture(99.0)
     assert words[-1]["badge"] == FALL_BADGE
+    # So it does where it begins so slowly that nothing is seen to move in a moment.
+    slow = replace(fall, times=100.0 * fall.times)
+    Drawer(response, Look(colour_by="mechanism"), SMALL, response.path, fall=slow).falling_picture(0.0)
+    assert words[-1]["badge"] == FALL_BADGE
     pixels = np.asarray(last).astype(int)
     assert not (np.abs(pixels - palette.WARNING) <= 8).all(axis=2).any()
 
