@@ -10,7 +10,6 @@ from structures import arch_response, case_from, dropped_brick, parted, partly_u
 import blockvis
 import solver
 from blockvis import draw_curve
-from blockvis.pictures.captions import new_motions
 from solver import mechanics
 
 
@@ -270,13 +269,15 @@ def test_a_capacity_that_is_unbounded_before_a_settlement_is_on_its_curve(tmp_pa
 def test_a_settlement_along_any_direction_is_one_motion():
     """A direction that is divided by its length once more has another last digit: each step was a motion of its own."""
     askew = solver.Settlement(direction=(0.6, -1.0), increment=0.02, limit=0.5)
-    longer = replace(askew, limit=1.0)
+    longer = solver.Settlement(direction=(0.6, -1.0), increment=0.02, limit=1.0)
     response = replace(arch_response(), settlements=(askew, askew))
-    assert new_motions(response) == []
+    assert '"breaks":[]' in report_of(response)
     halves = tuple(replace(one, phase=k % 2) for k, one in enumerate(response.path))
-    assert new_motions(replace(response, increments=halves)) == []
-    other = replace(response, settlements=(askew, replace(longer, direction=(1.0, 0.0))), increments=halves)
-    assert new_motions(other) == list(range(1, len(halves)))
+    turned = replace(longer, direction=(1.0, 0.0))
+    for second, told in ((longer, ""), (turned, ",".join(map(str, range(1, len(halves)))))):
+        assert f'"breaks":[{told}]' in report_of(
+            replace(response, increments=halves, settlements=(askew, second), collapse=None)
+        )
 
 
 def test_words_of_losses_stand_clear_of_those_of_the_collapse(tmp_path, monkeypatch):
