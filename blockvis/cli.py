@@ -225,6 +225,10 @@ class _Parser(argparse.ArgumentParser):
             )
         super()._check_value(action, value)
 
+    def _print_message(self, message: str, file: Any = None) -> None:
+        # That of argparse keeps it to itself that an output is full.
+        (file or sys.stderr).write(message or "")
+
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = _parser()

@@ -155,6 +155,8 @@ def _notes(
             "mortar to the nearest stone: faces are not straight, or corners blunt; "
             f"{sum(map(len, closing.outlines)) / len(closing.outlines):.3g} corners a block"
         )
+    elif thickness and not closing.n_joints:
+        notes.append(f"no gaps of up to joint_thickness {thickness:g} m lie between facing edges: nothing was closed")
     elif thickness:
         notes.append(
             f"{counted(closing.n_joints, 'stretch', 'stretches')} of joints of up to "

@@ -25,6 +25,9 @@ FAILED_BADGE = "SOLVER FAILED"
 #: without limit.
 MOST_OVER_LOWEST = 8.0
 
+#: What of a settlement is no motion but how far it goes, and in which steps.
+STEPS = ("increment", "limit", "tolerance", "stops")
+
 #: Drop of the reaction from that at rest, as a part of the largest, that is seen in a curve.
 NOTABLE = 0.05
 
@@ -60,13 +63,13 @@ def new_motions(response: solver.Response) -> list[int]:
 
     A multiplier is that of the live load, however supports move.
     """
-    path, found = response.path, []
-    for k in range(1, len(path) if response.settlements and response.measured.is_force else 0):
-        before, now = (response.settlements[path[row].phase] for row in (k - 1, k))
-        steps = {name: getattr(now, name) for name in ("increment", "limit", "tolerance", "stops")}
-        if replace(before, **steps) != now:
-            found.append(k)
-    return found
+    # Not by a settlement made anew, whose direction would be divided by its length once more.
+    motions = [
+        {name: value for name, value in vars(settlement).items() if name not in STEPS}
+        for settlement in response.settlements * response.measured.is_force
+    ]
+    phases = [increment.phase for increment in response.path]
+    return [k for k in range(1, len(phases) if motions else 0) if motions[phases[k - 1]] != motions[phases[k]]]
 
 
 def losses_along(response: solver.Response) -> list[tuple[int, float, int]]:

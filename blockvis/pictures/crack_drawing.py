@@ -126,13 +126,11 @@ def _drawn_in_plane(
         scene.polygons(f"crack edge/{k}", _bars(joints.ends[crack.joints], half), colour)
     picture = scene.image()
     if main:
-        spread = np.concatenate([joints.ends[crack.joints] for crack in cracks])
-        dots = along_lines(spread)
-        lines = [scene.at_pixel(along_lines(joints.ends[crack.joints])) for crack in main]
+        dots = along_lines(np.concatenate([joints.ends[crack.joints] for crack in cracks]))
         places = scene.at_pixel(np.array([_widest_point(crack, joints, openings) for crack in main]))
         words = [width_text(crack.width) for crack in main]
         colours = palette.SURVEYED[: len(main)]
-        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours, lines)
+        write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours)
     named = zip(_numbers(main, cracks), palette.SURVEYED, strict=False)
     keys = [Key("line", f"crack {number}", colour) for number, colour in named]
     if others:

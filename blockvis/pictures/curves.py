@@ -52,8 +52,8 @@ SMALL = 0.05
 #: Losses of blocks that have words, the largest.
 MOST_LOSSES = 3
 
-#: Words beside a collapse take so much of the width.
-WORDS = 0.35
+#: Words beside a collapse take so much of the width, and so many heights of the text.
+WORDS, COLLAPSE_LINES = 0.35, 4.2
 
 #: The word in a band that takes less of the width than this stands upright.
 WIDE_BAND = 0.2
@@ -258,9 +258,20 @@ class _Plot:
                 low, high = self.axes.get_ylim()
                 near = self.values[row - 1 : row + 1].mean()
                 above = near < (low + high) / 2.0
+                # Clear of the words of a collapse.
+                places = collapse_places(self.response)
+                room = COLLAPSE_LINES * self.text * (places is not None and self._above(places[1]) == above)
                 style = {"ha": "right", "va": "top" if above else "bottom", "rotation": 90, "color": RED, "bbox": PATCH}
                 told = f"{mechanics.counted(number, 'block')} lost"
-                _word(self.axes, told, (place, 0.96 if above else 0.04), (-3, 0), AT, fontsize=0.9 * self.text, **style)
+                offset = -3, -room if above else room
+                _word(self.axes, told, (place, 0.96 if above else 0.04), offset, AT, fontsize=0.9 * self.text, **style)
+
+    def _above(self, middle: float) -> bool:
+        """Whether the words of a collapse stand above the curve, on the side that it leaves free."""
+        near = self.total >= middle - WORDS * (self.total[-1] - self.total[0])
+        beside = self.values[near & np.isfinite(self.values)]
+        foot, head = self.axes.get_ylim()
+        return len(beside) > 0 and bool(head - beside.max() > beside.min() - foot)
 
     def _failure(self) -> None:
         """Mark where the solver gave up: the curve ends there, the structure need not."""
@@ -336,10 +347,7 @@ class _Plot:
             return
         lost = lost_text(self.response)
         what = "no capacity" if collapse.lost == "capacity" else lost.removeprefix("a ").replace(" is", "")
-        # On the side that the curve leaves free.
-        beside = self.values[(total >= middle - WORDS * (total[-1] - total[0])) & np.isfinite(self.values)]
-        foot, head = axes.get_ylim()
-        above = len(beside) > 0 and head - beside.max() > beside.min() - foot
+        above = self._above(middle)
         # Other runs may go on for long.
         left = middle >= sum(axes.get_xlim()) / 2.0
         factor, unit = parameter_unit(self.response)

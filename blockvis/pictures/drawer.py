@@ -380,10 +380,12 @@ class Drawer:
         )
 
     def _moves(self, time: float) -> bool:
-        """Whether something moves visibly from a time [s] of the fall on, or in the last moment that is known of it."""
+        """Whether something moves visibly after a time [s] of the fall, or in the last moment that is known of it."""
         assert self.fall is not None
-        start = max(min(time, float(self.fall.times[-1]) - MOMENT), 0.0)
-        now, then = (mechanics.moved_vertices(self.assembly, self.fall.at(t)) for t in (start, start + MOMENT))
+        end = float(self.fall.times[-1])
+        start = max(min(time, end - MOMENT), 0.0)
+        # Until the end: what is tall begins to fall slower than is seen in a moment.
+        now, then = (mechanics.moved_vertices(self.assembly, self.fall.at(t)) for t in (start, end))
         return bool(np.linalg.norm(then - now, axis=1).max(initial=0.0) > VISIBLE * self.scene.pixel)
 
     def show_motion(self, swing: Swing) -> None:
@@ -575,7 +577,6 @@ class Drawer:
     ) -> None:
         """Write the forces of ties, and the widths of the widest crack lines, beside them, where there is room."""
         points, words, colours = self.ties.labels(increment, shown)
-        lines = [np.zeros((0, 2))] * len(words)
         if widths:
             # Between blocks that have parted no crack is drawn: what is air counts for none, and of a crack with other
             # joints the widest of these has the label.
@@ -588,12 +589,12 @@ class Drawer:
             points = np.concatenate([points, found.middles[widest, openings.argmax(axis=1)]])
             words += [width_text(width) for width in openings.max(axis=1, initial=0.0).tolist()]
             colours += [palette.OPEN] * len(main)
-            own = [found.middles[np.isin(found.joints, cracks[k].joints)] for k in main]
-            lines += [self.scene.at_pixel(along_lines(middles)) for middles in own]
+            across = along_lines(found.cracks[:, [0, 3]]), along_lines(found.cracks[:, [1, 2]])
+            dots = np.concatenate([dots, along_lines(np.stack(across, axis=1))])
         if words:
             dots = np.concatenate([dots, *self._along_arrows.values(), self.ties.along(increment, shown)])
             places, dots = self.scene.at_pixel(points), self.scene.at_pixel(dots)
-            write_labels(picture, places, words, self.sheet.text, dots, colours, lines)
+            write_labels(picture, places, words, self.sheet.text, dots, colours)
 
     def _draw_forces(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if self.force_scale == 0.0:

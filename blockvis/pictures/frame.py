@@ -18,6 +18,7 @@ from blockvis.text import bar_text, rounded_length
 from solver import mechanics
 
 from . import palette
+from .surface import left_blocks
 
 #: Height of the text as a fraction of the height of the picture, and its least size in pixels.
 TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 36.0, 12
@@ -226,13 +227,11 @@ def write_labels(
     text: int,
     dots: np.ndarray,
     colours: Sequence[tuple[int, int, int]] = (),
-    cracks: Sequence[np.ndarray] = (),
 ) -> None:
     """Write labels on paper beside places (n, 2) of a picture, in their order, each where none lies yet.
 
-    They leave dots (n, 2) free where there is room beside them; farther from its place, and where it lies nearer to
-    another of the ``cracks``, points (m, 2) of what each label is of, a label has a leader. All lengths are in pixels;
-    the rims have the colour of open joints by default.
+    They leave dots (n, 2) free where there is room beside them, and each has a leader to its place. All lengths are in
+    pixels; the rims have the colour of open joints by default.
     """
     draw, font = ImageDraw.Draw(picture), _font(round(0.85 * text))
     rim, written = 0.4 * text, list[_Label]()
@@ -240,7 +239,7 @@ def write_labels(
     dots = np.concatenate([dots, np.repeat(places, CROSSED, axis=0)])
     away = np.repeat(np.multiply(LABELS_AWAY, text), len(BESIDE))
     beside = np.tile(BESIDE, (len(LABELS_AWAY), 1))
-    for k, (place, label, colour) in enumerate(zip(places, words, colours or [palette.OPEN] * len(words), strict=True)):
+    for place, label, colour in zip(places, words, colours or [palette.OPEN] * len(words), strict=True):
         if not ((place >= 0.0) & (place <= picture.size)).all():
             continue
         size = np.array([font.getlength(label) + 0.5 * text, 1.2 * text])
@@ -248,24 +247,19 @@ def write_labels(
         nearest = np.clip(place, lows, lows + size)
         leaders = np.linspace(np.broadcast_to(place, nearest.shape), nearest, 12)[1:]
         free = (lows >= 0.0).all(axis=1) & (lows + size <= picture.size).all(axis=1)
-        others = np.concatenate([np.zeros((0, 2)), *cracks[:k], *cracks[k + 1 :]])
-        taken = np.concatenate([dots, others])
-        cost = _inside(taken[:, None], lows - rim, lows + size + rim).sum(axis=0) + away / text
+        cost = _inside(dots[:, None], lows - rim, lows + size + rim).sum(axis=0) + away / text
         for other in written:
             free &= ~((lows < other.high) & (other.low < lows + size)).all(axis=1)
             over = _inside(other.leader[:, None], lows, lows + size).any(axis=0)
             cost += CROSSED * (over.astype(int) + _inside(leaders, other.low, other.high).any(axis=0))
         if free.any():
             best = int(np.where(free, cost, np.inf).argmin())
-            away_from = np.hypot(*(nearest[best] - place))
-            beyond = np.hypot(*(others - np.clip(others, lows[best], lows[best] + size)).T)
-            led = bool(away_from > text or (beyond < away_from).any())
-            written.append(_Label(place, lows[best], lows[best] + size, leaders[:, best], label, colour, led))
-    for one in written:
-        if one.led:
-            # Grey and with a dot at its end: a coloured one would look like a crack.
-            draw.line((*one.place, *one.leader[-1]), fill=palette.FAINT, width=max(1, text // 16))
-            draw.circle(tuple(one.place.tolist()), text / 8.0, fill=palette.FAINT)
+            written.append(_Label(place, lows[best], lows[best] + size, leaders[:, best], label, colour))
+    # Grey and with a dot at its end: a coloured one would look like a crack. On a paper rim, over whatever colours.
+    for colour, grown in ((palette.PAPER, max(1, text // 10)), (palette.FAINT, 0)):
+        for one in written:
+            draw.line((*one.place, *one.leader[-1]), fill=colour, width=max(1, text // 16) + 2 * grown)
+            draw.circle(tuple(one.place.tolist()), text / 8.0 + grown, fill=colour)
     for one in written:
         box = (*one.low.tolist(), *one.high.tolist())
         draw.rounded_rectangle(box, 0.25 * text, fill=palette.PAPER, outline=one.colour, width=max(1, text // 15))
@@ -287,7 +281,6 @@ class _Label(NamedTuple):
     leader: np.ndarray
     words: str
     colour: tuple[int, int, int]
-    led: bool
 
 
 def _inside(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -434,6 +427,7 @@ def _left_by(cut: np.ndarray, assembly: solver.Assembly, corners: np.ndarray) ->
     across = (heights[start] < 0.0) & (heights[end] > 0.0)
     start, end = start[across], end[across]
     share = (heights[start] / (heights[start] - heights[end]))[:, None]
-    kept, owner = heights >= 0.0, assembly.block_of_vertex
+    owner = assembly.block_of_vertex
+    kept = (heights >= 0.0) & left_blocks(assembly, heights)[owner]
     points = np.concatenate([corners[kept], corners[start] + share * (corners[end] - corners[start])])
     return points, np.concatenate([owner[kept], owner[start]])

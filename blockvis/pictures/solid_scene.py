@@ -25,7 +25,7 @@ from .frame import Frame, framed, room_in
 from .marks import Marks, arrow_shapes
 from .painting import painted
 from .scene import Scene
-from .solid_view import ABOVE, AROUND, View, showing_faces
+from .solid_view import ABOVE, AROUND, View, kept_blocks, showing_faces
 from .surface import section_of, sharp_edges, triangles_of
 from .swing import MOST_PARTS, Swing
 from .ties import DASH, Strands, dashed
@@ -144,10 +144,11 @@ class SolidScene(Scene):
         """Put the blocks where they are drawn, in new colours (n_blocks, 3) uint8 where these are given."""
         corners = mechanics.moved_vertices(self.assembly, shown)
         corners[self._feet, 2] = np.minimum(corners[self._feet, 2], self._floor)
-        if self._gone.any():
+        # Of what ends in the plane of a section its faces there would stay, as sheets.
+        gone, owner = self._gone | ~kept_blocks(self._cut, self.assembly, shown), self.assembly.block_of_vertex
+        if gone.any():
             # What is a point has no faces to draw.
-            owner = self.assembly.block_of_vertex
-            corners = np.where(self._gone[owner][:, None], shown.positions[owner], corners)
+            corners = np.where(gone[owner][:, None], shown.positions[owner], corners)
         self._surface.points = corners
         self._edges.points = self._traces.points = corners
         if self._shadow is not None:

@@ -14,6 +14,7 @@ from blockvis.results.joint_faces import InitialJoints
 from solver import mechanics
 
 from .sight_lines import SightLines
+from .surface import left_blocks
 
 #: Directions that are tried, from the structure to the eye: three-quarter views, in degrees around and above the level.
 AROUND = (-60.0, -30.0, -120.0, -150.0, 30.0, 60.0, 120.0, 150.0)
@@ -148,15 +149,19 @@ def section_words(plane: np.ndarray | None) -> list[str]:
     axis = int(np.abs(normal).argmax())
     if abs(normal[axis]) > 1.0 - 1e-9:
         # No minus before a zero.
-        return [f"section {'xyz'[axis]} = {point[axis] + 0.0:.4g} m"]
-    place, towards = (", ".join(f"{x:.4g}" for x in np.round(vector, 9) + 0.0) for vector in (point, normal))
+        return [f"section {'xyz'[axis]} = {_to_millimetres(point)[axis]} m"]
+    place, towards = ", ".join(_to_millimetres(point)), ", ".join(f"{x:.4g}" for x in np.round(normal, 9) + 0.0)
     return [f"section through ({place}) m across ({towards})"]
+
+
+def _to_millimetres(point: np.ndarray) -> list[str]:
+    """Write coordinates [m], however far from the origin a drawing lies."""
+    return [f"{x:.12g}" for x in np.round(point, 3) + 0.0]
 
 
 def kept_blocks(plane: np.ndarray | None, assembly: solver.Assembly, pose: solver.Pose) -> np.ndarray:
     """(n_blocks,) bool array: blocks of which a section at a plane leaves something; all where there is none."""
-    inside = heights_over(plane, mechanics.moved_vertices(assembly, pose)) > 0.0
-    return np.bincount(assembly.block_of_vertex, inside, assembly.n_blocks) > 0
+    return left_blocks(assembly, heights_over(plane, mechanics.moved_vertices(assembly, pose)))
 
 
 def into_sight(plane: np.ndarray | None, points: np.ndarray) -> np.ndarray:

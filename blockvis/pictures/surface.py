@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+import solver
 from blockvis.layout import solids
 from solver import mechanics
 
@@ -59,6 +60,15 @@ def sharp_edges(shapes: mechanics.Polyhedra) -> np.ndarray:
     # Of two unit vectors, half the square of their sum is one more than their product.
     flat = (counts == 2) & (0.5 * (total**2).sum(axis=1) - 1.0 >= FLAT)
     return np.asarray(ends[once[~flat]])
+
+
+def left_blocks(assembly: solver.Assembly, heights: np.ndarray) -> np.ndarray:
+    """(n_blocks,) bool array: blocks with corners, at heights (n_vertices,) [m] over a plane, above it.
+
+    To rounding: what ends in the plane has a face there and nothing above.
+    """
+    inside = heights > IN_PLANE * float(np.ptp(assembly.vertices, axis=0).max())
+    return np.bincount(assembly.block_of_vertex, inside, assembly.n_blocks) > 0
 
 
 def section_of(

@@ -490,6 +490,8 @@ def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tu
     status = str(response.stop if limit is None else limit.status)
     if limit is not None and limit.status is solver.LimitStatus.FOUND:
         status = "limit load found"
+    if path and response.parameter.is_path:
+        status = ", ".join([status, *loss_words(path[-1])])
     rows = [("analysis", response.analysis), ("status", status), *KINDS[response.analysis].rows(response)]
     apart = len(response.increments) - len(path)
     loss = loss_of(response)

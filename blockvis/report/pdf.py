@@ -113,20 +113,24 @@ def _states(response: solver.Response) -> tuple[str, Sequence[str], list[tuple[s
     path, weight = response.path, response.total_weight
     # Of states that stand by themselves the lowest decides; a loss ends what the row before it carries.
     extreme, sign = ("largest", 1.0) if response.parameter.is_path else ("lowest", -1.0)
+    phases = {phase: in_one_unit(response, phase) for phase in {increment.phase for increment in path}}
+    units = np.array([phases[increment.phase].measured.unit for increment in path])
+    sizes = np.nan_to_num(sign * response.values, nan=-np.inf)
     kept = [
-        int(np.nan_to_num(sign * response.values, nan=-np.inf).argmax()),
+        # Forces and moments are not compared.
+        *(int(np.where(units == unit, sizes, -np.inf).argmax()) for unit in np.unique(units)),
         *(row - 1 for row, _, _ in losses_along(response)),
     ]
     chosen = sorted({*evenly(np.arange(len(path)), MOST_STATES).tolist(), *kept})
     title = "States"
     if len(chosen) < len(path):
         loss = ", the last before blocks are lost" * bool(response.losses)
-        title += f": {len(chosen)} of {len(path)}, evenly chosen, with the {extreme}{loss} and the last"
+        each = " of each unit" * (len(np.unique(units)) > 1)
+        title += f": {len(chosen)} of {len(path)}, evenly chosen, with the {extreme}{each}{loss} and the last"
     head = [response.parameter.name, response.measured.name, "of the weight W"]
     rows: list[tuple[str, ...]] = []
     for k in chosen:
-        increment = path[k]
-        here = in_one_unit(response, increment.phase)
+        increment, here = path[k], phases[path[k].phase]
         measured, moment = here.measured, here.measured.unit == "N·m"
         value = force_text(increment.measured, moment) if measured.is_force else f"{increment.measured:.5g}"
         share = f"{increment.measured / weight:.4f}" if measured.is_force and not moment else ""

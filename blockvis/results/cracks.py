@@ -52,8 +52,8 @@ CORE, BESIDES = 0.25, 0.1
 #: Most crack lines that a summary lists, the widest first.
 MOST_LISTED = 100
 
-#: Most main cracks, and the least part of the largest area of opening that one of them has.
-MOST_MAIN, LEAST_MAIN = 6, 0.05
+#: Most main cracks.
+MOST_MAIN = 6
 
 #: Joints in space belong to one crack where their blocks part by the same, up to this part of it.
 ALIKE = 0.5
@@ -151,7 +151,7 @@ def main_cracks(cracks: Sequence[Crack]) -> list[Crack]:
 def main_areas(areas: Sequence[float]) -> list[int]:
     """Choose the largest of the areas of opening of cracks, by their numbers in the given order; none that is 0."""
     largest = sorted(range(len(areas)), key=lambda k: -areas[k])[:MOST_MAIN]
-    return sorted(k for k in largest if areas[k] > LEAST_MAIN * max(areas))
+    return sorted(k for k in largest if areas[k] > 0.0)
 
 
 def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:

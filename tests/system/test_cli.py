@@ -322,11 +322,11 @@ def test_streams_that_take_nothing_end_no_run(case, streams):
     assert (">&-" in streams.split()) != (f"results in {case.parent / 'out'}/" in done.stdout)
 
 
-@pytest.mark.parametrize("words", ["info {}", "--help"])
+@pytest.mark.parametrize(("words", "buffer"), [("info {}", ""), ("--help", ""), ("--help", "none")])
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no stream that is full")
-def test_an_output_that_is_full_is_named(case, words):
+def test_an_output_that_is_full_is_named(case, words, buffer):
     command = [sys.executable, "-m", "blockvis", *words.format(case.parent / "arch.msh").split()]
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    environment = os.environ | {"PYTHONUNBUFFERED": buffer}
     with open("/dev/full", "w", encoding="utf-8") as full:
         done = subprocess.run(
             command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=ROOT, env=environment

@@ -16,16 +16,6 @@ from solver import mechanics
 
 PVPYTHON, XVFB = shutil.which("pvpython"), shutil.which("xvfb-run")
 
-CASE = """
-[geometry]
-layout = "arch"
-parameters = {voussoirs = 5}
-[settlement]
-direction = [1, 0]
-increment = 0.01
-limit = 0.02
-"""
-
 READ = """
 import json, sys
 from paraview.simple import OpenDataFile, UpdatePipeline

@@ -118,3 +118,14 @@ def test_states_that_are_left_out_are_told_and_what_matters_stays(tmp_path, monk
     before = max(i.parameter for i in response.path if not i.fallen.any())
     largest = max(response.path, key=lambda increment: increment.measured).parameter
     assert {f"{at:.4f} m" for at in (before, largest, last)} <= {row[0] for row in rows}
+
+
+@pytest.mark.slow
+def test_the_largest_force_and_the_largest_moment_are_not_compared(tmp_path, monkeypatch):
+    response = moved_and_turned()
+    largest = max(response.path[:2], key=lambda increment: increment.measured)
+    monkeypatch.setattr("blockvis.report.pdf.MOST_STATES", 2)
+    title, _, rows, _ = states_on_paper(response, tmp_path, monkeypatch)
+    assert "with the largest of each unit and the last" in title
+    assert f"{1e3 * largest.parameter:.2f} mm, phase 1" in [row[0] for row in rows]
+    assert {row[1].split()[-1] for row in rows} == {"kN", "N·m"}

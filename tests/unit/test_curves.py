@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import arch_response, case_from, parted, partly_unbounded, pixels, report_of, wall
+from structures import arch_response, case_from, dropped_brick, parted, partly_unbounded, pixels, report_of, wall
 
 import blockvis
 import solver
@@ -264,3 +264,41 @@ def test_a_capacity_that_is_unbounded_before_a_settlement_is_on_its_curve(tmp_pa
     text = draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8")
     assert "<!-- unbounded -->" in text
     assert "<!-- 0 -->" in text[text.index('id="xtick_1"') : text.index('id="xtick_2"')]
+
+
+def test_a_settlement_along_any_direction_is_one_motion():
+    """A direction that is divided by its length once more has another last digit: each step was a motion of its own."""
+    askew = solver.Settlement(direction=(0.6, -1.0), increment=0.02, limit=0.5)
+    longer = solver.Settlement(direction=(0.6, -1.0), increment=0.02, limit=1.0)
+    response = replace(arch_response(), settlements=(askew, askew))
+    assert '"breaks":[]' in report_of(response)
+    halves = tuple(replace(one, phase=k % 2) for k, one in enumerate(response.path))
+    turned = replace(longer, direction=(1.0, 0.0))
+    for second, told in ((longer, ""), (turned, ",".join(map(str, range(1, len(halves)))))):
+        assert f'"breaks":[{told}]' in report_of(
+            replace(response, increments=halves, settlements=(askew, second), collapse=None)
+        )
+
+
+def test_words_of_losses_stand_clear_of_those_of_the_collapse(tmp_path, monkeypatch):
+    """They were covered by them, but for their ends."""
+    stands, falls = dropped_brick(0.05), arch_response().collapse
+    level = tuple(replace(increment, measured=1.0) for increment in stands.increments)
+    stands = replace(stands, increments=level)
+    end = stands.path[-1].parameter
+    falls = replace(
+        falls, displacement=end, bracket=(end, end + 1e-4), mechanism=np.zeros_like(stands.path[-1].velocity)
+    )
+    offsets = []
+    for response in (stands, replace(stands, collapse=falls)):
+        said = {}
+        monkeypatch.setattr(
+            "blockvis.pictures.curves._word",
+            lambda _, words, place, offset, *__, said=said, **___: said.update({words: (place, offset)}),
+        )
+        draw_curve(response, tmp_path / "curve.png")
+        offsets.append(said["1 block lost"])
+    (place, (_, alone)), (same, (_, beside)) = offsets
+    told = next(where for words, where in said.items() if words.startswith("collapse at"))
+    assert place[1] == same[1] == told[0][1], "all stand below the curve"
+    assert (alone, beside > 40.0) == (0.0, True)

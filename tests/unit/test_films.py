@@ -494,3 +494,19 @@ kind = "live"
         y = point[1] if abs(along[1]) < 1e-6 else point[1] - tip[2]
         np.testing.assert_allclose(tip[:2], [x, y], atol=1e-6)
         assert tip[2] > 0.9
+
+
+@pytest.mark.slow
+def test_a_section_in_faces_leaves_nothing_of_the_blocks_before_it(tmp_path):
+    """A block that ends in the plane, with nothing behind it, was left as a sheet."""
+    images = []
+    for high in (1, 2):
+        boxes = [box((0, -1, 0), (1, 0, high)), box((0, 0, 0), (1, 1, 1)), box((-1, -3, -1), (2, 2, 0))]
+        assembly = solver.Assembly.from_solids(boxes, roles=["free", "free", "fixed"])
+        response = replace(posed(assembly, solver.Pose.initial(assembly)), settlements=())
+        path = blockvis.draw_still(
+            response, -1, tmp_path / "cut.png", section="y = 0", view={"azimuth": -60, "elevation": 20}, size=SIZE
+        )
+        images.append(pixels(path)[44:150].astype(int))
+    # Corners are shaded over a part of the whole, which is higher.
+    assert np.abs(images[0] - images[1]).max() < 30

@@ -77,3 +77,9 @@ def test_a_plate_that_overlaps_would_fold_is_refused(tmp_path):
     path = drawn(tmp_path / "plate.json", outlines)
     with pytest.raises(ValueError, match=r"block 1 .* folds its outline; redraw what overlaps it, or .* overlap_tol"):
         read(path, overlap_tolerance=0.02)
+
+
+def test_a_joint_thickness_that_closes_nothing_says_so(tmp_path):
+    path = drawn(tmp_path / "a.json", [rectangle(0.0, 0.0, 1.0, 1.0), rectangle(1.0, 0.0, 2.0, 1.0)])
+    with pytest.warns(UserWarning, match=r"no gaps of up to joint_thickness 0\.01 m .*: nothing was closed"):
+        read(path, joint_thickness=0.01)

@@ -50,6 +50,7 @@ def test_a_loss_is_in_every_output_and_told_apart(tmp_path):
     assert re.fullmatch(r"loss: brick at 0\.15\d+ m, 1\.962 kN, 1\.2 % of the weight; the structure stands .*", line)
     page = report_of(response)
     assert "the structure stands without" in page
+    assert "<td>limit reached, 1 block lost</td>" in page
     assert re.search(
         r"<h1>Part has fallen: 1 block at a settlement of 0\.15\d+ m; the rest stands at the end</h1>", page
     )
