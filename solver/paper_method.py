@@ -197,7 +197,7 @@ class _Phase:
         self.inputs, self.assembly, self.phase, self.number = inputs, inputs[0], phase, number
         self.driver, self.start, self.programs = SupportMotion(inputs[0], phase, start), start, 0
         self.length = self.assembly.block_size
-        self.lever = self.driver.lever(Model(*inputs, self.length, 1.0))
+        self.lever = self.driver.lever(Model(*inputs, self.length, 1.0, np.zeros(len(start.positions), dtype=bool)))
         movement = self.lever * phase.increment
         #: Largest gap [m] that one program may close, largest displacement [m] in it, largest gap [m] that may be left.
         self.reach = max(min(4.0 * movement, self.length / 2.0), self.length / 4.0)

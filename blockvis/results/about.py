@@ -20,7 +20,7 @@ from .record import Record, read_json, read_record, versions
 #: A mechanism that takes less than this share of the weight with it is the loss of a few blocks: the structure stands.
 LOCAL = 0.05
 
-#: A reaction below this part of the weight, of moments at a block's length, is none: programs are solved to a tenth of it.
+#: A reaction below this part of the weight, of moments at a block's length, is none: programs reach a tenth of it.
 NOTHING = 1e-6
 
 #: Equilibria are exact to this: openings and slips in block sizes, forces and multipliers in the largest, motions in
