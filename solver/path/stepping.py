@@ -65,9 +65,6 @@ STANDSTILL, SHORT, STANDING, STANDSTILLS = 1e3, 1e-3, 1e-7, 300
 #: Lean [rad] from which blocks come back on joints and ground that carry them.
 LEAN = 1e-5
 
-#: Part of the viscosity at the start of a settlement; it grows as the memory of velocities fills.
-STARTING = 0.1
-
 #: Damping of steps in time, in units of mass · √(g / block size): critical for a block that rocks.
 DAMPING = 2.0
 
@@ -467,9 +464,9 @@ class Stepper:
         # What the points of one joint hand to each other does not change its friction.
         works = np.bincount(new.contacts.joints()[1], change * np.minimum(slip, size))
         # Differences of friction grow while bounds follow, by e in a step as long as the memory; longer ones miss that.
-        growth = (1.0 + size / tolerances.FRICTION_MEMORY) ** 3
-        # Half of it, as bounds depart from what was expected in the course of the step, and joints err to either side.
-        return 0.25 * growth * float(np.abs(works).sum())
+        growth = (1.0 + size / min(tolerances.FRICTION_MEMORY, new.s / self.unit)) ** 3
+        # All of what errs to one side, as bounds do that grow together; a quarter of what joints err by to either side.
+        return growth * max(0.25 * float(np.abs(works).sum()), abs(float(works.sum())))
 
     def _penetration(self, points: _StepPoints, new: Place) -> float:
         """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""
@@ -519,11 +516,7 @@ class Stepper:
     ) -> tuple[np.ndarray, np.ndarray]:
         """(n_dof,) arrays: force per movement by viscosity or inertia, and the movement that has none of it."""
         weights, kept = self.weights[self.free].ravel(), 1.0
-        # It is beyond the velocity that blocks had: at the start they have none, and all of it would choose the hinges.
-        # A pushover begins with the mechanism of its limit load.
-        memory = tolerances.VELOCITY_MEMORY * self.unit
-        found = 1.0 if self.model.has_live else min(max(place.s / memory, STARTING), 1.0)
-        resisting = tolerances.VISCOSITY * found * viscosity * self.unit / length * weights
+        resisting = tolerances.VISCOSITY * viscosity * self.unit / length * weights
         if in_time:
             resisting, kept = (1.0 / length**2 + DAMPING / length) * weights, 1.0 / (1.0 + DAMPING * length)
         if place.velocity is None:
@@ -533,7 +526,9 @@ class Stepper:
     def _velocity(self, place: Place, motion: np.ndarray, length: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity after a step, averaged with those before."""
         before = np.zeros_like(motion) if place.velocity is None else place.velocity
-        return before + (motion - length * before) / (length + tolerances.VELOCITY_MEMORY * self.unit)
+        # What they had before the start they do not remember.
+        memory = min(tolerances.VELOCITY_MEMORY * self.unit, place.s)
+        return before + (motion - length * before) / (length + memory)
 
     def _with_missed(self, stepped: Contacts, before: Place, pose: Pose, movement_size: float) -> Contacts:
         """Contact points of a step with those that it has missed, where they were: at its end a corner is in a block.
