@@ -296,8 +296,7 @@ class Stepper:
         start = self.contacts_at(place) if candidates is None else candidates
         place = self.mortar.renamed(place, start)
         # A larger share alternates where the normal force falls as the bound grows.
-        memory = min(tolerances.FRICTION_MEMORY, s / self.unit)
-        share = 0.9 if in_time else min(0.5, size / (size + memory))
+        share = 0.9 if in_time else min(0.5, size / (size + min(tolerances.FRICTION_MEMORY, s / self.unit)))
         points = self._points(place, start, share)
         joints, loads = points.joints, 0.0 if in_time else viscosity
         resisting, before = self._resistance(place, length, in_time, viscosity)
@@ -311,9 +310,8 @@ class Stepper:
         motion = np.where(free[:, None], self._of_blocks(motion_so_far), place.pose.movement_to(new.pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
         new = self._arrived(place, replace(new, velocity=velocity), points, left, share)
-        work = self.members.work_beyond(place.tie_lengths, new.tie_lengths)
-        if not in_time:
-            work += self._work_in_error(points, new, joints.cohesion - left.cohesion, size, memory)
+        work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size)
+        work += self.members.work_beyond(place.tie_lengths, new.tie_lengths)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * self._largest((motion_so_far - before) * self._shares)
         return new, motion / model.lengths, StepError(work, turn, movement_size, self._penetration(points, new))
@@ -460,7 +458,7 @@ class Stepper:
         bonds = self.mortar.bonds(place, points.start, left.left)
         return replace(new, followed=after, tie_lengths=lengths, bonds=bonds)
 
-    def _work_in_error(self, points: _StepPoints, new: Place, lost: np.ndarray, size: float, memory: float) -> float:
+    def _work_in_error(self, points: _StepPoints, new: Place, lost: np.ndarray, size: float) -> float:
         """Work of friction bounds that are not what was expected, and of lost cohesion (n,)."""
         assert new.contacts is not None
         # What slips faster than the supports move does so however short the step is.
@@ -469,9 +467,9 @@ class Stepper:
         # What the points of one joint hand to each other does not change its friction.
         works = np.bincount(new.contacts.joints()[1], change * np.minimum(slip, size))
         # Differences of friction grow while bounds follow, by e in a step as long as the memory; longer ones miss that.
-        growth = (1.0 + size / memory) ** 3
-        # All of what errs to one side, as bounds do that grow together; a quarter of what joints err by to either side.
-        return growth * max(0.25 * float(np.abs(works).sum()), abs(float(works.sum())))
+        growth = (1.0 + size / tolerances.FRICTION_MEMORY) ** 3
+        # Half of it, as bounds depart from what was expected in the course of the step, and joints err to either side.
+        return 0.25 * growth * float(np.abs(works).sum())
 
     def _penetration(self, points: _StepPoints, new: Place) -> float:
         """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""
