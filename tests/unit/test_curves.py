@@ -280,6 +280,7 @@ def test_a_settlement_along_any_direction_is_one_motion():
         )
 
 
+@pytest.mark.slow
 def test_words_of_losses_stand_clear_of_those_of_the_collapse(tmp_path, monkeypatch):
     """They were covered by them, but for their ends."""
     stands, falls = dropped_brick(0.05), arch_response().collapse
