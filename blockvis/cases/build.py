@@ -214,8 +214,11 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
                 f"is it in mm? {1e-3 * largest:g} m"
             )
     middle = assembly.vertices.mean(axis=0)
-    for centre in {s.rotation_centre: None for s in case.settlements if s.rotation_centre is not None}:
-        if (away := float(np.linalg.norm(middle - centre)) / whole) > FARTHEST_CENTRE:
+    turns = {(s.rotation_centre, s.rotation_axis) for s in case.settlements if s.rotation_centre is not None}
+    for centre, axis in sorted(turns):
+        # Along an axis its centre may be anywhere.
+        across = middle - centre if axis is None else np.cross(middle - centre, axis) / np.linalg.norm(axis)
+        if (away := float(np.linalg.norm(across)) / whole) > FARTHEST_CENTRE:
             notes.append(
                 f"[settlement] rotation_centre = {list(centre)} m is {away:.3g} times the size of the structure, "
                 f"{whole:.3g} m, away from it: is it in mm? [{', '.join(f'{1e-3 * x:g}' for x in centre)}] m"

@@ -91,6 +91,16 @@ def test_likely_unit_mistakes_are_named(tmp_path, keys, note):
         assembled(tmp_path, COLUMN + keys)
 
 
+@pytest.mark.parametrize(("centre", "doubted"), [("[0, 900, 0]", False), ("[900, 0, 0]", True)])
+def test_a_centre_far_along_its_axis_is_as_good_as_a_near_one(tmp_path, centre, doubted):
+    turn = f"[settlement]\nrotation_centre = {centre}\nrotation_axis = [0, 2, 0]\nincrement = 1e-4\nlimit = 1e-3\n"
+    case = case_from('[geometry]\nlayout = "column"\ndimension = 3\n' + turn, tmp_path)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        assembly_of(case)
+    assert any("rotation_centre" in str(one.message) for one in said) is doubted
+
+
 TIE = '[[ties]]\nname = "iron"\nfrom = { fixed = [-5, 0] }\nto = [0, 0.2]\n'
 FILL = '[[backfill]]\nover = "*"\nsurface = 9\n'
 
