@@ -17,7 +17,6 @@ from blockvis.text import listed, nearest
 
 from .block_at import ON_EDGE
 from .key import NOT_NEGATIVE, NUMBER, POSITIVE, TEXTS, Key, Section
-from .profiles import UPRIGHT
 from .toml_table import Table
 
 BACKFILL = Section(
@@ -215,7 +214,7 @@ def _triangles(
 ) -> tuple[list[np.ndarray], list[int]]:
     shapes, solids = assembly.polyhedra, assembly.polyhedra.parts.solids
     faces = shapes.faces(shapes.vertices)
-    chosen_faces = np.flatnonzero(chosen[shapes.block_of_face] & (faces.normals[:, 2] > UPRIGHT))
+    chosen_faces = np.flatnonzero(chosen[shapes.block_of_face] & (faces.normals[:, 2] > ON_EDGE))
     plans = [shapes.vertices[shapes.corners[slice(*shapes.face_offsets[f : f + 2])]] for f in chosen_faces]
     seen = np.array([shapely.Polygon(plan[:, :2]) for plan in plans])
     bodies = [solids.surface(k) for k in range(len(solids))]
