@@ -148,6 +148,8 @@ def _decimal_comma(text: str, error: str) -> str:
 def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     """Make a case of the values of a parsed TOML text; paths in it are relative to the folder of ``source``."""
     top = Table(values, "", source)
+    if "study" in values:
+        raise ValueError(f"{source}: [study] makes it a study; carry it out by: blockvis sweep {source}")
     geometry = _geometry(top.table("geometry"))
     phases = [keys.SETTLEMENT.read(table) for table in top.tables("settlement")]
     motions = [_settlement(table, one) for table, one in zip(top.tables("settlement"), phases, strict=True)]

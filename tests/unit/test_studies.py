@@ -763,6 +763,11 @@ def test_where_nothing_ever_stands_displacements_are_drawn_without_words_of_matp
         assert pictures.draw_scatter(study, table, tmp_path / "scatter.svg").is_file()
 
 
+def test_a_study_that_is_run_as_a_case_is_told_its_command(study_file, capsys):
+    assert main(["run", str(study_file)]) == 2
+    assert f"[study] makes it a study; carry it out by: blockvis sweep {study_file}" in capsys.readouterr().err
+
+
 def test_kinds_that_collapse_at_other_numbers_are_no_study(study_file, capsys):
     live = '[[loads]]\nkind = "live"\nweight_fraction = [1, 0]\n'
     (study_file.parent / "case.toml").write_text(CASE + live, encoding="utf-8")
