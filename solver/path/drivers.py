@@ -11,7 +11,6 @@ import numpy as np
 
 from solver import tolerances
 from solver.assembly import Assembly, find_contacts
-from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_matrices
 from solver.loads import Settlement, check_fits, check_steps, set_vectors
 from solver.program.model import Model
@@ -71,18 +70,29 @@ class SupportMotion(Driver):
         self.phase, self.stops = phase, phase.stops
 
     def lever(self, model: Model) -> float:
-        """Of the supports, and of blocks that rest on nothing else: the top of a tower goes far."""
+        """Of the supports, and of blocks that rest on such alone that move as one: the top of a tower goes far."""
         assembly, start, rate = model.assembly, self.start, self.rate(0.0)
-        vertices, of = moved_vertices(assembly, start), assembly.block_of_vertex
+        vertices, of, d = moved_vertices(assembly, start), assembly.block_of_vertex, assembly.dimension
         near = model.standing(find_contacts(assembly, vertices, model.length / 4.0))
+        load = model.load[assembly.free, :d].sum(axis=0)
+        upward = near.frames[:, 0] @ -load
+        above, below = np.where(upward > 0.0, (near.block_a, near.block_b), (near.block_b, near.block_a))
+        # Head joints of a drawing are upright to less than a tenth.
+        rests = assembly.free[above] & (np.abs(upward) > 0.1 * np.linalg.norm(load))
+        rests &= near.gaps < tolerances.CLOSED * model.length
+        # Least and largest velocities, those at the origin, of all supports that a block rests on.
+        origin = Pose(np.zeros_like(start.positions), start.rotations)
+        twist = np.column_stack([point_velocities(origin.positions, np.arange(len(rate)), start, rate), rate[:, d:]])
+        least = np.where(assembly.free[:, None], np.inf, np.column_stack([twist, -twist]))
+        before = np.zeros_like(least)
+        while not np.array_equal(before, least):
+            before = least.copy()
+            np.minimum.at(least, above[rests], before[below[rests]])
+        twist, largest = least[:, : rate.shape[1]], -least[:, rate.shape[1] :]
+        riding = (assembly.free & np.isclose(twist, largest).all(axis=1))[of]
         # Supports where blocks are near them: how deep they are drawn counts for nothing.
         moved = [point_velocities(near.points, side, start, rate) for side in (near.block_a, near.block_b)]
-        origin = Pose(np.zeros_like(start.positions), start.rotations)
-        every, turning = np.arange(assembly.n_blocks), rate[:, assembly.dimension :]
-        twists = np.column_stack([point_velocities(origin.positions, every, start, rate), turning])
-        twists, rides = _handed_up(model, near, twists)
-        riding = rides[of]
-        moved.append(point_velocities(vertices[riding], of[riding], origin, twists))
+        moved.append(point_velocities(vertices[riding], of[riding], origin, twist))
         return float(np.linalg.norm(np.concatenate(moved), axis=1).max(initial=0.0)) or 1.0
 
     def supports(self, s: float) -> Pose:
@@ -92,40 +102,6 @@ class SupportMotion(Driver):
     def rate(self, s: float) -> np.ndarray:
         """Of the settlement."""
         return self.phase.rate(self.assembly, self.start, s)
-
-
-def _handed_up(model: Model, contacts: Contacts, twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Hand the motions of supports up to what rests on them, and say which blocks ride on a single one.
-
-    Velocities of what is at the origin with each support, and angular ones, (n_blocks, n_dof); (n_blocks,) bool array.
-    """
-    free, d, n = model.assembly.free, model.dimension, twists.shape[1]
-    load = model.load[free, :d].sum(axis=0)
-    upward = contacts.frames[:, 0] @ -load
-    pairs = (contacts.block_a, contacts.block_b)
-    above, below = np.where(upward > 0.0, pairs, pairs[::-1])
-    # Head joints of a drawing are upright to less than a tenth.
-    rests = free[above] & (np.abs(upward) > 0.1 * np.linalg.norm(load))
-    rests &= contacts.gaps < tolerances.CLOSED * model.length
-    # The least of all that a block rests on, and the negative of the largest.
-    least = np.where(free[:, None], np.inf, np.column_stack([twists, -twists]))
-    on = np.flatnonzero(rests & ~free[below])
-    np.minimum.at(least, above[on], least[below[on]])
-    # What bridges supports that move differently turns as they do at its joints.
-    bridging = np.isfinite(least[:, 0]) & ~np.isclose(least[:, :n], -least[:, n:]).all(axis=1)
-    spins = cross_rows(contacts.points[on]).swapaxes(1, 2)
-    velocity = np.concatenate([np.broadcast_to(np.eye(d), (len(on), d, d)), spins], axis=2)
-    sums, weighted = np.zeros((len(free), n, n)), contacts.areas[on, None, None] * velocity.swapaxes(1, 2) @ velocity
-    np.add.at(sums, above[on], weighted)
-    right = np.zeros_like(twists)
-    np.add.at(right, above[on], (weighted @ twists[below[on], :, None])[:, :, 0])
-    fitted = (np.linalg.pinv(sums[bridging], hermitian=True) @ right[bridging, :, None])[:, :, 0]
-    least[bridging], rests = np.column_stack([fitted, -fitted]), rests & ~bridging[above]
-    before = np.zeros_like(least)
-    while not np.array_equal(before, least):
-        before = least.copy()
-        np.minimum.at(least, above[rests], before[below[rests]])
-    return least[:, :n], free & ~bridging & np.isclose(least[:, :n], -least[:, n:]).all(axis=1)
 
 
 @dataclass(frozen=True)

@@ -33,19 +33,6 @@ def test_the_lever_of_a_tilt_is_the_farthest_block_that_rests_on_it_alone(beside
     assert 1e-5 * assembly.block_size / first.checkpoint.step == pytest.approx(np.hypot(*farthest))
 
 
-def test_the_lever_of_what_bridges_two_supports_is_the_farthest_block_that_turns_with_it():
-    """A plinth over one that stays and one that sinks turns as a line through its four ends, by 5/13 rad per m."""
-    drums = [brick(1.0, k, 1.0, 1.0) for k in range(1, 7)]
-    supports = [brick(0.0, -1.0, 0.5, 1.0), brick(2.5, -1.0, 0.5, 1.0)]
-    roles = ["free"] * 7 + ["fixed", "moving"]
-    assembly = solver.Assembly.from_outlines([brick(0.0, 0.0, 3.0, 1.0), *drums, *supports], roles=roles)
-    sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.01, limit=0.02)
-    options = {"interfaces": solver.Interfaces(), "loads": solver.self_weight(assembly)}
-    first = next(iter(mechanics.settlement_increments(assembly, [sinks], **options)))
-    lever = np.hypot(7.0 * 5.0 / 13.0, 0.5 + 0.5 * 5.0 / 13.0)
-    assert 1e-5 * assembly.block_size / first.checkpoint.step == pytest.approx(lever)
-
-
 @pytest.mark.slow
 def test_no_energy_is_lost_where_a_block_is_lifted_over_its_support_and_lowered_again():
     """Work that cancels made all that was left of it the residual: 1 where the net work came to zero."""
@@ -56,20 +43,20 @@ def test_no_energy_is_lost_where_a_block_is_lifted_over_its_support_and_lowered_
     assert max(increment.certificate.energy_residual for increment in path) < 0.02
 
 
-def arcade(drums=12, rigid_pier=False, footing=((1.0, 2.8),)):
-    """Two semicircular arches, 3 m wide, on fixed abutments and a pier of drums, 0.8 × 0.5 m, on footings."""
+def arcade(rigid_pier=False):
+    """Two semicircular arches, 3 m wide, on fixed abutments and a pier of twelve drums, 0.8 × 6 m, and its footing."""
     angles, corners = np.linspace(np.pi, 0.0, 12), []
     for centre in (0.0, 3.8):
         inner, outer = (
-            np.array([centre, 0.5 * drums]) + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+            np.array([centre, 6.0]) + radius * np.column_stack([np.cos(angles), np.sin(angles)])
             for radius in (1.5, 1.9)
         )
         corners += [[inner[k], inner[k + 1], outer[k + 1], outer[k]] for k in range(11)]
-    pier = [brick(1.5, 0.5 * k, 0.8, 0.5) for k in range(drums)]
-    supports = [brick(x, -1.0, 0.8, 0.5 * drums + 1.0) for x in (-2.3, 5.3)]
-    supports += [brick(left, -1.0, right - left, 1.0) for left, right in footing]
-    roles = ["free"] * 22 + ["moving" if rigid_pier else "free"] * drums + ["fixed"] * len(supports[1:]) + ["moving"]
-    return solver.Assembly.from_outlines([*corners, *pier, *supports], roles=roles, density=2000.0)
+    drums = [brick(1.5, 0.5 * k, 0.8, 0.5) for k in range(12)]
+    supports = [brick(1.0, -1.0, 1.8, 1.0), brick(-2.3, -1.0, 0.8, 7.0), brick(5.3, -1.0, 0.8, 7.0)]
+    pier = ["moving" if rigid_pier else "free"] * 12
+    roles = ["free"] * 22 + pier + ["moving", "fixed", "fixed"]
+    return solver.Assembly.from_outlines([*corners, *drums, *supports], roles=roles, density=2000.0)
 
 
 @pytest.mark.slow
@@ -80,9 +67,7 @@ def test_a_pier_of_drums_turns_with_its_footing_under_two_arches_as_a_rigid_one_
     about its toe where that comes to half its width times what stands on it.
     """
     turn = solver.Settlement(rotation_centre=(1.9, 0.0), rotation=-1, increment=0.02, limit=0.2, tolerance=1e-5)
-    drums, rigid = (
-        solver.Structure(arcade(rigid_pier=rigid), friction_coefficient=0.7).settle(turn) for rigid in (False, True)
-    )
+    drums, rigid = (solver.Structure(arcade(rigid), friction_coefficient=0.7).settle(turn) for rigid in (False, True))
     pier = 12 * 0.8 * 0.5 * 2000.0 * 9.81
     for increment, other in zip(drums.path[1:4], rigid.path[1:4], strict=True):
         by_hand = other.reaction + pier * 3.0 * np.sin(increment.settlement)
@@ -92,19 +77,6 @@ def test_a_pier_of_drums_turns_with_its_footing_under_two_arches_as_a_rigid_one_
     assert rigid.notes[0].startswith("at 0.0678")
     assert drums.collapse.displacement == pytest.approx(0.06784, abs=2e-5)
     last = drums.path[-1]
-    pressed = -last.support_forces[-1, 1]
+    pressed = -last.support_forces[34, 1]
     assert last.reaction == pytest.approx(0.4 * pressed, rel=0.02)
     assert last.reaction < 0.4 * pressed
-
-
-@pytest.mark.slow
-def test_a_pier_turns_as_a_part_of_its_ground_sinks():
-    """Its top goes twelve times as fast as that ground: held to its speed, the arcade fell at 0.0357 m.
-
-    By linear programs in increments of 1 mm, which know no viscosity, it falls between 0.036859 and 0.036867 m.
-    """
-    sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.01, limit=0.2, tolerance=1e-5)
-    structure = solver.Structure(arcade(18, footing=((1.0, 1.51), (2.1, 2.8))), friction_coefficient=0.7)
-    response = structure.settle(sinks)
-    assert response.collapse.displacement == pytest.approx(0.03686, rel=5e-4)
-    assert max(increment.certificate.energy_residual for increment in response.path) < 0.02
