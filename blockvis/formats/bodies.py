@@ -47,6 +47,9 @@ ROLE_WORDS = {
 #: More faces are no stone, but a scan or a curved surface in small triangles.
 MOST_FACES = 400
 
+#: Bodies compared with all others at a time.
+AT_A_TIME = 20
+
 #: Change of a block's volume, as a part of it, that is told, far above what planes fitted to drawn faces change; so are
 #: middle planes further apart than this fraction of the size of the drawing.
 NOTED = 1e-3
@@ -421,9 +424,8 @@ def _hidden(
     area = shapely.area(shapes)
     tree = shapely.STRtree(shapes)
     # A few at a time: in a wrong view every body may cover every other, and the first such pair is enough.
-    few = 20
-    for start in range(0, len(shapes), few):
-        one, other = tree.query(shapes[start : start + few], predicate="intersects")
+    for start in range(0, len(shapes), AT_A_TIME):
+        one, other = tree.query(shapes[start : start + AT_A_TIME], predicate="intersects")
         one = one + start
         apart = (one < other) & (np.maximum(low[one], low[other]) >= np.minimum(high[one], high[other]) - LEVEL * size)
         one, other = one[apart], other[apart]
