@@ -396,7 +396,7 @@ def _add_render(verbs: Any) -> None:
     render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")
     render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
-    render.add_argument("--size", default="1280x720", metavar="WxH")
+    render.add_argument("--size", metavar="WxH", help="of stills and film, in pixels (default: film 1280x720)")
     render.add_argument(
         "--cracks", type=int, metavar="N", help="nothing but cracks.png, of increment N (-1: the last equilibrium)"
     )
@@ -1015,7 +1015,7 @@ def _layout(options: argparse.Namespace) -> int:
 
 def _render(options: argparse.Namespace) -> int:
     from .pictures.crack_drawing import draw_cracks
-    from .pictures.render import animate, draw_mechanism, draw_still
+    from .pictures.render import FILM_SIZE, animate, draw_mechanism, draw_still
     from .results.fall_files import known_fall
     from .runs.outputs import draw_curves, write_report_of
     from .runs.progress import DrawingProgress
@@ -1024,7 +1024,7 @@ def _render(options: argparse.Namespace) -> int:
 
     folder = Path(options.results)
     response = open_results(folder)
-    size = _size(options.size)
+    size = None if options.size is None else _size(options.size)
     seen_from = _seen_from(options, folder, response)
     if options.cracks is not None:
         draw_cracks(response, options.cracks, folder / "cracks.png", size=size, **seen_from)
@@ -1047,15 +1047,16 @@ def _render(options: argparse.Namespace) -> int:
     }
     last = response.path[-1] if response.path else response.increments[-1]
     draw_still(response, last, folder / "last.png", size=size, **look, **seen_from)
-    draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **seen_from)
+    draw_mechanism(response, folder / "mechanism.png", size=size, underlay=underlay, **seen_from)
     drawn += ["last.png", "mechanism.png"]
     if response.parameter.is_path:
-        draw_cracks(response, -1, folder / "cracks.png", **seen_from)
+        draw_cracks(response, -1, folder / "cracks.png", size=size, **seen_from)
         drawn.append("cracks.png")
     if options.animation != "none":
         look |= seen_from | {"poster": folder / "poster.png"}
         with DrawingProgress() as progress:
-            animate(response, folder / options.animation, size=size, fall=fall, progress=progress.frame, **look)
+            film = folder / options.animation
+            animate(response, film, size=size or FILM_SIZE, fall=fall, progress=progress.frame, **look)
         drawn += [options.animation, "poster.png"]
     print(f"drawn in {folder}/: {', '.join(drawn)}")
     return 0

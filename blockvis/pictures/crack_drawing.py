@@ -21,8 +21,8 @@ from solver import mechanics
 from . import palette
 from .captions import loss_words, phase_words, state_text
 from .flat_scene import FlatScene
-from .frame import Key, Sheet, along_lines, framed, write_labels
-from .render import STILL_SIZE, numbered, save_picture, seen_from
+from .frame import Key, Sheet, along_lines, framed, still_size, write_labels
+from .render import numbered, save_picture, seen_from
 
 #: Thickness of a crack that only slides and of the widest one, in heights of the picture; the latter in block sizes at
 #: most, or the steps of a fine bond would run into each other.
@@ -34,7 +34,7 @@ def draw_cracks(
     number: int,
     path: str | os.PathLike[str],
     *,
-    size: tuple[int, int] = STILL_SIZE,
+    size: tuple[int, int] | None = None,
     view: str | Mapping[str, float] | Sight | None = None,
     section: str | Mapping[str, Any] | Cut | None = None,
 ) -> Path:
@@ -42,7 +42,7 @@ def draw_cracks(
 
     In the plane each main crack has a colour of its own and its largest width written at its widest point; the others
     are grey. In space lines are the darker and the thicker the more joints are open there, in classes of width; main
-    cracks have their numbers and widths. View and section are as of :func:`blockvis.draw_still`; cracks that the
+    cracks have their numbers and widths. Size, view and section are as of :func:`blockvis.draw_still`; cracks that the
     section cuts away are counted, no more.
 
     Raises ``ValueError`` for a number that no increment in equilibrium has, and for a view of blocks in the plane.
@@ -53,12 +53,11 @@ def draw_cracks(
     joints = initial_joints(assembly)
     cracks = cracks_of(assembly, increment.pose, increment.fallen)
     shown, hidden, cut_at = cracks, 0, list[str]()
-    sheet = Sheet(size)
     if assembly.dimension == 2:
         if view is not None or section is not None:
             raise ValueError("view and section are of blocks in space; these lie in the plane: leave both out")
         thickness = "lines as thick as they are open, the thickest "
-        picture, keys, pixel = _drawn_in_plane(assembly, increment, joints, cracks, sheet)
+        sheet, picture, keys, pixel = _drawn_in_plane(assembly, increment, joints, cracks, size)
         moved = opening_and_slip(assembly, joints, increment.pose, increment.fallen)
         slid = slid_joints(assembly, moved)[:1]
         slip = float(np.abs(moved[slid, 1]).max(initial=0.0))
@@ -69,7 +68,8 @@ def draw_cracks(
         from .cracks_in_space import CracksInSpace
 
         thickness = "the widest "
-        drawing = CracksInSpace(response, increment, joints, sheet, cracks, *seen_from(view, section))
+        drawing = CracksInSpace(response, increment, joints, size, cracks, *seen_from(view, section))
+        sheet = drawing.sheet
         shown = drawing.left_by_section(cracks)
         main = main_cracks(shown)
         picture = drawing.image(main, _numbers(main, cracks))
@@ -103,22 +103,23 @@ def _drawn_in_plane(
     increment: solver.Increment,
     joints: InitialJoints,
     cracks: list[Crack],
-    sheet: Sheet,
-) -> tuple[Image.Image, list[Key], float]:
-    """Draw the cracks of blocks in the plane; returns the picture, its legend and the size of a pixel [m]."""
+    size: tuple[int, int] | None,
+) -> tuple[Sheet, Image.Image, list[Key], float]:
+    """Draw the cracks of blocks in the plane; returns sheet, picture, legend and the size of a pixel [m]."""
     main = main_cracks(cracks)
     openings = np.maximum(carried_faces(assembly, joints, increment.pose).gaps.reshape(-1, 2), 0.0)
     widest = cracks[0].width if cracks else 1.0
     fill = palette.block_colours(assembly.materials, assembly.free)
     fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
     frame = framed(assembly, [solver.Pose.initial(assembly)])
+    sheet = Sheet(size or still_size(frame))
     scene = FlatScene(assembly, frame, sheet.inside_size, fill, outline=palette.PALE_OUTLINE)
     if increment.fallen.any():
         scene.hide(increment.fallen)
         scene.pose(solver.Pose.initial(assembly))
     others = [crack for crack in cracks if id(crack) not in {id(one) for one in main}]
     layers = [*zip(main, palette.SURVEYED, strict=False), *((crack, palette.FAINT) for crack in others)]
-    height = float(scene.frame.size[1])
+    height = scene.usual_height * scene.pixel
     thin, thick = THIN * height, max(min(THICK * height, OF_BLOCK * assembly.block_size), 2.0 * THIN * height)
     # The main ones are drawn last, on top.
     for k, (crack, colour) in list(enumerate(layers))[::-1]:
@@ -135,7 +136,7 @@ def _drawn_in_plane(
     keys = [Key("line", f"crack {number}", colour) for number, colour in named]
     if others:
         keys.append(Key("line", mechanics.counted(len(others), "other"), palette.FAINT))
-    return picture, keys, scene.pixel
+    return sheet, picture, keys, scene.pixel
 
 
 def _numbers(main: list[Crack], cracks: list[Crack]) -> list[int]:

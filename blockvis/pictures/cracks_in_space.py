@@ -17,7 +17,7 @@ from blockvis.text import width_text
 
 from . import palette
 from .drawer import MARGIN, WHOLE
-from .frame import Frame, Key, Sheet, framed, write_labels
+from .frame import Frame, Key, Sheet, framed, still_size, write_labels
 from .paired_scenes import PairedScenes
 from .sight_lines import SightLines
 from .solid_view import AROUND, View, heights_over, hiding_supports, plane_of, section_words, views_of
@@ -43,7 +43,7 @@ class CracksInSpace:
         response: solver.Response,
         increment: solver.Increment,
         joints: InitialJoints,
-        sheet: Sheet,
+        size: tuple[int, int] | None,
         cracks: Sequence[Crack],
         sight: Sight | None = None,
         cut: Cut | None = None,
@@ -71,14 +71,15 @@ class CracksInSpace:
         initial = solver.Pose.initial(assembly)
         frames = [framed(assembly, [initial], MARGIN, 0.3, view.axes[:2], WHOLE, plane) for view in self._views]
         frame = Frame(*(np.concatenate([getattr(one, end) for one in frames]) for end in ("low", "high")))
+        self.sheet = Sheet(size or still_size(frame))
         self._pair = PairedScenes(
-            assembly, self._views, frame, sheet, roles, fine=True, cut=plane, outline=palette.PALE_OUTLINE
+            assembly, self._views, frame, self.sheet, roles, fine=True, cut=plane, outline=palette.PALE_OUTLINE
         )
         self._pair.hide(increment.fallen)
         every = np.ones(assembly.n_blocks, dtype=bool)
         self._pair.pose(initial, palette.pale(roles, every, palette.SURVEY))
         self._draw(limits, colours)
-        self.pixel, self._text = self._pair.pixel, sheet.text
+        self.pixel = self._pair.pixel
         texts = [width_text(limit) for limit in limits]
         words = [*(f"to {text}" for text in texts), f"above {texts[-1]}" if texts else "open joint"]
         self.keys = [Key("line", text, colour) for text, colour in zip(words, colours, strict=True)]
@@ -96,7 +97,7 @@ class CracksInSpace:
         return [crack for crack in cracks if not np.isin(crack.joints, self._seen_joints).any()]
 
     def _draw(self, limits: Sequence[float], colours: Sequence[tuple[int, int, int]]) -> None:
-        height, which = self._pair.size[1], np.searchsorted(limits, self._opened.openings)
+        height, which = self._pair.usual_height, np.searchsorted(limits, self._opened.openings)
         for k, colour in enumerate(colours):
             thick = height * (THIN + k / max(len(colours) - 1, 1) * (THICK - THIN))
             self._pair.lines(f"crack/{k}", self._opened.ends[which == k], colour, thick, 2.0 + k)
@@ -114,7 +115,7 @@ class CracksInSpace:
         slipped: tuple[float, np.ndarray] = 0.0, np.zeros(2)
         dots, seen_joints = [], []
         for scene in self._pair.scenes:
-            offset, thin = np.array([left, 0]), THIN * scene.size[1]
+            offset, thin = np.array([left, 0]), THIN * scene.usual_height
             seen, pixels = ~scene.hides(opened.middles, thin), scene.at_pixel(opened.middles) + offset
             for crack, number in zip(cracks, numbers, strict=True):
                 here = seen & np.isin(opened.joints, crack.joints)
@@ -138,7 +139,7 @@ class CracksInSpace:
             places.append(slipped[1])
             colours.append(palette.SLIDING)
         if labels:
-            write_labels(page, np.array(places), labels, self._text, np.concatenate(dots), colours)
+            write_labels(page, np.array(places), labels, self.sheet.text, np.concatenate(dots), colours)
         return page
 
 

@@ -22,7 +22,7 @@ from . import palette
 from .backfill import fill_bodies
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, fall_text, matters
 from .flat_scene import FlatScene
-from .frame import ColourBar, Frame, Key, Sheet, along_lines, framed, write_labels
+from .frame import STILL_SIZE, ColourBar, Frame, Key, Sheet, along_lines, framed, still_size, write_labels
 from .live_load import LiveLoads
 from .marks import (
     SMALLEST_RESULTANT,
@@ -52,8 +52,8 @@ VISIBLE, MOMENT = 1.0, 0.12
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
 
-#: Arrows end so far off the middle of a hinge, in heights of the picture: its dot would hide their heads.
-DOT = 1.0 / 70.0
+#: Arrows end so far off the middle of a hinge, in heights of the text: its dot would hide their heads.
+DOT = 0.5
 
 #: Blocks in space are so transparent where forces are drawn inside them.
 GLASS = 0.35
@@ -125,9 +125,9 @@ class Drawer:
     """A scene and its sheet, set up for some increments of one response, which share frame, scales and legend.
 
     The curve stands beside the blocks where it is asked for. ``extra`` are poses that the frame has to hold, too, the
-    fall comes after the last equilibrium, and the underlay is a photograph under blocks in the plane. ``still`` is one
-    picture, worth more time than a frame of a film: in space with smooth edges, shaded corners, and of vaults and domes
-    the intrados beside the extrados.
+    fall comes after the last equilibrium, and the underlay is a photograph under blocks in the plane. Without a size
+    the sheet follows what it shows. ``still`` is one picture, worth more time than a frame of a film: in space with
+    smooth edges, shaded corners, and of vaults and domes the intrados beside the extrados.
 
     Raises ``ValueError`` for a view or a section of blocks in the plane.
     """
@@ -136,7 +136,7 @@ class Drawer:
         self,
         response: solver.Response,
         look: Look,
-        size: tuple[int, int],
+        size: tuple[int, int] | None,
         increments: tuple[solver.Increment, ...],
         *,
         curve: bool = False,
@@ -168,7 +168,15 @@ class Drawer:
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
+        self.live = LiveLoads(response, increments, float(frame.size.max()), self._plane)
+        self._arrow = (ARROW if self._flat else ARROW_IN_SPACE) * float(frame.size.max())
+        tied = self.ties.ends([increments[0].pose, increments[-1].pose])
+        heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
+        ends = np.concatenate([heads, *self._arrow_ends(frame, extra), tied])
+        ends = np.concatenate([self.live.tails, ends[heights_over(self._plane, ends) >= 0.0]])
+        frame = frame.holding(self._projected(ends))
         bar = ColourBar(self.largest, fall is not None) if look.colour_by == "displacement" else None
+        size = size or (STILL_SIZE if curve else still_size(frame))
         beside = round(0.36 * size[0]) if curve else 0
         self.sheet = Sheet(size, bar, beside)
         self.panel: CurvePanel | None = None
@@ -177,14 +185,8 @@ class Drawer:
             from .curves import CurvePanel
 
             self.panel = CurvePanel(response, (beside, self.sheet.inside_size[1]), self.sheet.text)
-        self.live = LiveLoads(response, increments, float(frame.size.max()), self._plane)
         whole = frame.fitted(*self.sheet.inside_size) if self._flat else frame
-        self._arrow = (ARROW if self._flat else ARROW_IN_SPACE) * float(frame.size.max())
-        tied = self.ties.ends([increments[0].pose, increments[-1].pose])
-        heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
-        ends = np.concatenate([heads, *self._arrow_ends(frame, extra), tied, self._turned_out(whole)])
-        ends = np.concatenate([self.live.tails, ends[heights_over(self._plane, ends) >= 0.0]])
-        frame = self._with_floor(frame.holding(self._projected(ends)))
+        frame = self._with_floor(frame.holding(self._projected(self._turned_out(whole))))
         # Supports in the plane are hatched, and an outline stays where those that move were.
         self.fill = palette.role_colours(assembly, not self._flat and bool(response.settlements))
         self.frame, self.scene = frame, self._scene(frame)
@@ -277,7 +279,8 @@ class Drawer:
         last = mechanics.moved_vertices(self.assembly, pose)
         places = self._projected(self.assembly.vertices)
         held = ((frame.low < places) & (places < frame.high)).all(axis=1)
-        return last[held & self.assembly.moving[self.assembly.block_of_vertex]]
+        left = heights_over(self._plane, last) >= 0.0
+        return last[held & left & self.assembly.moving[self.assembly.block_of_vertex]]
 
     def _surveyed(self) -> Iterator[solver.Pose]:
         """Yield the poses as shown, and note what must be the same in all pictures.
@@ -351,7 +354,7 @@ class Drawer:
             self._draw_live_load(increment, shown, dots)
             if self.response.loads.fills:
                 self.scene.backfill(fill_bodies(self.response, shown, increment.fallen))
-        self.scene.ties(self.ties.strands(increment, shown, DASH * self.sheet.size[1] / 1080.0 * self.scene.pixel))
+        self.scene.ties(self.ties.strands(increment, shown, DASH * self.scene.usual_height / 1080.0 * self.scene.pixel))
         failed = self.response.stop == solver.Status.SOLVER_FAILED
         head, detail = caption_of(self.response, increment, self.look.magnification)
         picture = self.scene.image()
@@ -644,7 +647,7 @@ class Drawer:
             return
         tails, tips = self.live.arrows(increment, shown)
         if self._flat and len(dots) and len(tips):
-            clear = DOT * self.sheet.size[1] * self.scene.pixel
+            clear = DOT * self.sheet.text * self.scene.pixel
             at_dot = np.linalg.norm(tips[:, None] - dots, axis=2).min(axis=1) < clear
             along = (tips - tails) / np.maximum(np.linalg.norm(tips - tails, axis=1), 1e-300)[:, None]
             back = clear * at_dot[:, None] * along

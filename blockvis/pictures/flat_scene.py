@@ -101,8 +101,8 @@ class FlatScene(Scene):
     def backfill(self, bodies: FillBodies) -> None:
         """Fill and hatch what lies between extrados and surface, behind the blocks."""
         self.polygons("backfill", bodies.columns, palette.FILL)
-        self.lines("backfill/hatch", bodies.hatch(), palette.FILL_HATCH, max(0.8, self.size[1] / 1000.0))
-        self.lines("backfill/rim", bodies.rims(), palette.FILL_RIM, max(1.2, self.size[1] / 500.0))
+        self.lines("backfill/hatch", bodies.hatch(), palette.FILL_HATCH, max(0.8, self.usual_height / 1000.0))
+        self.lines("backfill/rim", bodies.rims(), palette.FILL_RIM, max(1.2, self.usual_height / 500.0))
 
     def polygons(self, layer: str, corners: np.ndarray, colour: Colour) -> None:
         """Fill polygons, (n, k, 2) [m], in one layer, instead of those before."""
@@ -162,11 +162,11 @@ class FlatScene(Scene):
         """Draw bars, and the line of thrust."""
         along = ends[:, 1] - ends[:, 0]
         unit = along / np.hypot(*along.T)[:, None]
-        thick = 0.5 * max(2.0, self.size[1] / 320.0) * self.pixel
+        thick = 0.5 * max(2.0, self.usual_height / 320.0) * self.pixel
         side = np.stack([-unit[:, 1], unit[:, 0]], axis=1) * thick
         bars = [ends[:, 0] - side, ends[:, 1] - side, ends[:, 1] + side, ends[:, 0] + side]
         self.polygons("force", np.stack(bars, axis=1), palette.FORCE)
-        self.lines("force line", line, palette.FORCE, self.size[1] / 500.0)
+        self.lines("force line", line, palette.FORCE, self.usual_height / 500.0)
 
     def ties(self, strands: Sequence[Strands]) -> None:
         """Draw lines with a rim of paper, and dots where they are held."""
@@ -178,14 +178,14 @@ class FlatScene(Scene):
 
     def bearings(self, ends: np.ndarray) -> None:
         """Draw a heavy line where supports carry the structure."""
-        self.lines("ground", ends, palette.INK, max(1.2, self.size[1] / 320.0))
+        self.lines("ground", ends, palette.INK, max(1.2, self.usual_height / 320.0))
 
     def arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: Colour) -> None:
         """Draw arrows with a rim of paper from tails (n, 2) [m] to tips (n, 2) [m]."""
         weight = WEIGHTS[layer]
-        thick = weight * self.size[1] / 110.0 * self.pixel
+        thick = weight * self.usual_height / 110.0 * self.pixel
         for name, grown, fill in (("rim", 1.0, palette.PAPER), ("top", 0.0, colour)):
-            shafts, heads = arrow_shapes(tails, tips, thick, grown * weight * self.size[1] / 360.0 * self.pixel)
+            shafts, heads = arrow_shapes(tails, tips, thick, grown * weight * self.usual_height / 360.0 * self.pixel)
             self.polygons(f"{layer} {name}/shaft", shafts, fill)
             self.polygons(f"{layer} {name}/head", heads, fill)
 
@@ -196,7 +196,7 @@ class FlatScene(Scene):
             # Parts are numbered from the largest on.
             largest = np.where(swing.parts < MOST_OUTLINES, swing.parts, -1)
             outlines = part_outlines(self.assembly, corners, largest)
-            self.lines("motion outline", outlines, palette.SETTLEMENT, self.size[1] / 600.0)
+            self.lines("motion outline", outlines, palette.SETTLEMENT, self.usual_height / 600.0)
         self.arrows("motion", tails, tips, palette.SETTLEMENT)
         return swing.increment.pose
 
@@ -205,18 +205,18 @@ class FlatScene(Scene):
         assembly = self.assembly
         edges = np.stack([assembly.vertices, assembly.vertices[assembly.next_vertex]], axis=1)
         moving = assembly.moving[assembly.block_of_vertex]
-        self.lines("ghost", edges[moving], palette.GHOST, self.size[1] / 800.0)
+        self.lines("ghost", edges[moving], palette.GHOST, self.usual_height / 800.0)
 
     def show_ground(self, height: float) -> None:
         """Draw the ground of a fall over the whole width, hatched below, behind everything."""
-        tick = self.size[1] / 60.0 * self.pixel
+        tick = self.usual_height / 60.0 * self.pixel
         (left, _), (right, _) = self.frame.low, self.frame.high
         ends = np.array([[[left, height], [right, height]]])
-        self.lines("earth", ends, palette.HATCH, max(1.2, self.size[1] / 400.0))
+        self.lines("earth", ends, palette.HATCH, max(1.2, self.usual_height / 400.0))
         x = np.arange(left, right + tick, tick)
         level = np.broadcast_to([height, height - tick], (len(x), 2))
         ticks = np.stack([np.stack([x, x - tick], axis=1), level], axis=2)
-        self.lines("earth/hatch", ticks, palette.HATCH, max(0.7, self.size[1] / 1000.0))
+        self.lines("earth/hatch", ticks, palette.HATCH, max(0.7, self.usual_height / 1000.0))
 
     def clear(self, *layers: str) -> None:
         """Remove layers, parts of them (after a "/") included."""
@@ -259,19 +259,19 @@ class FlatScene(Scene):
 
     def _outline_width(self) -> float:
         """Pixels; thinner where the blocks are small, so that a façade does not turn dark."""
-        return float(np.clip(self.assembly.block_size / self.pixel / 25.0, 0.6, self.size[1] / 540.0))
+        return float(np.clip(self.assembly.block_size / self.pixel / 25.0, 0.6, self.usual_height / 540.0))
 
     def _hatch(self) -> None:
         """Hatch supports as laid out, in the picture and around it."""
         supports = np.flatnonzero(~self.assembly.free)
         outlines = [shapely.Polygon(self.assembly.outline(block)) for block in supports.tolist()]
         around = shapely.box(*(self.frame.low - self.frame.size), *(self.frame.high + self.frame.size))
-        spacing = self.size[1] / 60.0 * self.pixel
+        spacing = self.usual_height / 60.0 * self.pixel
         found = [hatched(shapely.intersection(outline, around), spacing, 1.0) for outline in outlines]
         lines = np.concatenate([np.zeros((0, 2, 2)), *found])
         self._hatched = lines.reshape(-1, 2), np.repeat(supports, [2 * len(of) for of in found])
         if len(lines):
-            self.lines("hatch", lines, palette.HATCH, max(0.7, self.size[1] / 1000.0))
+            self.lines("hatch", lines, palette.HATCH, max(0.7, self.usual_height / 1000.0))
 
 
 class _Layer:

@@ -20,8 +20,14 @@ from solver import mechanics
 from . import palette
 from .surface import left_blocks
 
-#: Height of the text as a fraction of the height of the picture, and its least size in pixels.
-TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 36.0, 12
+#: Height of the text as a fraction of the side of a square as large as the picture, and its least size in pixels.
+TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 48.0, 12
+
+#: Heights of what is above and below the blocks, in those of the text.
+HEADER, FOOTER = 3.6, 3.3
+
+#: Width and height of a still [pixels]; one in other proportions has as many, is no wider, and this at least.
+STILL_SIZE, NARROWEST, LOWEST = (1920, 1080), 1080, 640
 
 #: How far labels lie from their places, in heights of the text: the nearest where there is room.
 LABELS_AWAY = (0.6, 1.8, 3.0)
@@ -69,10 +75,10 @@ class Sheet:
     def __init__(self, size: tuple[int, int], colour_bar: ColourBar | None = None, beside_width: int = 0) -> None:
         self.size = size
         width, height = size
-        self.text = max(SMALLEST_TEXT, round(min(height, width * 0.7) * TEXT_FRACTION))
+        self.text = max(SMALLEST_TEXT, round(np.sqrt(width * height) * TEXT_FRACTION))
         self.pad = max(6, round(0.9 * self.text))
-        self.header = round(3.6 * self.text)
-        self.footer = round(3.3 * self.text)
+        self.header = round(HEADER * self.text)
+        self.footer = round(FOOTER * self.text)
         self.colour_bar = colour_bar
         right = beside_width + (round(7.6 * self.text) if colour_bar else 0)
         #: Left, top, right, bottom of the blocks' picture, in pixels.
@@ -373,6 +379,18 @@ class Frame:
         scale = max(self.size[0] / width, self.size[1] / height)
         half = np.array([width, height]) * scale / 2.0
         return Frame(centre - half, centre + half)
+
+
+def still_size(frame: Frame) -> tuple[int, int]:
+    """Width and height [pixels] of a still in the proportions of what it shows, in each of its views side by side."""
+    width, height = frame.size.reshape(-1, 2).max(axis=0)
+    proportion = height / (width * len(frame.size) / 2.0)
+    pixels = float(np.prod(STILL_SIZE))
+    words = (HEADER + FOOTER) * np.sqrt(pixels) * TEXT_FRACTION
+    # A strip as high as the words, and the blocks' picture.
+    wide = (np.sqrt(words**2 + 4.0 * proportion * pixels) - words) / (2.0 * proportion)
+    wide = float(np.clip(wide, NARROWEST, STILL_SIZE[0]))
+    return round(wide), round(np.clip(proportion * wide + words, LOWEST, pixels / wide))
 
 
 def framed(

@@ -63,7 +63,8 @@ class PairedScenes:
             for view, middle in zip(views, ((frame.low + frame.high) / 2.0).reshape(-1, 2), strict=True)
         ]
         self.size = (size[0] * len(views), height)
-        self.frame, self.pixel = self.scenes[0].frame, self.scenes[0].pixel
+        first = self.scenes[0]
+        self.frame, self.pixel, self.usual_height = first.frame, first.pixel, first.usual_height
 
     pose, hide, backfill, cracks, sliding, hinges, crushing, forces, ties, arrows, clear, lines, close = map(
         _on_each,

@@ -25,7 +25,6 @@ from .swing import MOST_PARTS, shown_increments, swing_of
 from .underlay import Underlay
 from .video import FASTEST_GIF, write_film
 
-STILL_SIZE = (1920, 1080)
 FILM_SIZE = (1280, 720)
 
 
@@ -34,7 +33,7 @@ def draw_still(
     increment: int | solver.Increment,
     path: str | os.PathLike[str],
     *,
-    size: tuple[int, int] = STILL_SIZE,
+    size: tuple[int, int] | None = None,
     magnification: float = 1.0,
     colour_by: str = "material",
     forces: str = "auto",
@@ -53,8 +52,8 @@ def draw_still(
         An increment of the response, or its number; -1 is the last, of what collapses a frame of its fall.
     path : path
         Any format Pillow writes; PNG is meant.
-    size : (int, int)
-        Width and height in pixels.
+    size : (int, int), optional
+        Width and height in pixels; by default as many as of 1920 × 1080, in the proportions of what is shown.
     magnification : float
         Of displacements and rotations; 1 is true scale.
     colour_by : {"material", "mechanism", "displacement"}
@@ -103,7 +102,7 @@ def draw_mechanism(
     response: solver.Response | solver.LimitLoad | solver.Envelope,
     path: str | os.PathLike[str],
     *,
-    size: tuple[int, int] = STILL_SIZE,
+    size: tuple[int, int] | None = None,
     underlay: Underlay | None = None,
     view: str | Mapping[str, float] | Sight | None = None,
     section: str | Mapping[str, Any] | Cut | None = None,
@@ -117,8 +116,8 @@ def draw_mechanism(
     ----------
     response : solver.Response, solver.LimitLoad or solver.Envelope
     path : path
-    size : (int, int)
-        Width and height in pixels.
+    size : (int, int), optional
+        Width and height in pixels; by default as many as of 1920 × 1080, in the proportions of what is shown.
     underlay : Underlay, optional
         A photograph under blocks in the plane.
     view : str or mapping, optional

@@ -16,6 +16,9 @@ OF_STATICS = (
     *("arrow rim", "arrow top", "live rim", "live top"),
 )
 
+#: Pictures lower than this part of their width have lines as thick as if they were so high.
+FLAT = 0.45
+
 
 class Scene:
     """Blocks and their marks in layers, drawn frame after frame; each call replaces what its layers held before.
@@ -27,12 +30,14 @@ class Scene:
         self.assembly, self.size, self.frame = assembly, size, frame.fitted(*size)
         #: Size of a pixel in the world [m].
         self.pixel = float(self.frame.size[0]) / size[0]
+        #: Pixels, by which lines are thick: the height, in upright and in flat pictures what is usual for their width.
+        self.usual_height = min(size[0], max(size[1], FLAT * size[0]))
         self._gone = np.zeros(assembly.n_blocks, dtype=bool)
 
     @property
     def _thin(self) -> float:
         """Pixels; one where the picture is 1080 high."""
-        return self.size[1] / 1080.0
+        return self.usual_height / 1080.0
 
     def hide(self, gone: np.ndarray) -> None:
         """Leave blocks, (n_blocks,) bool array, out from the next pose on."""

@@ -134,7 +134,7 @@ class SolidScene(Scene):
         self._shadow: pv.PolyData | None = None
         # Height of the ground of a fall, and vertices under supports that stand on it.
         self._floor, self._feet = np.inf, np.zeros(0, dtype=int)
-        width = float(np.clip(assembly.block_size / self.pixel / 40.0, 0.6, size[1] / 700.0))
+        width = float(np.clip(assembly.block_size / self.pixel / 40.0, 0.6, self.usual_height / 700.0))
         self._add("edges", self._edges, outline, width=width, forward=1.0)
         if traced.any():
             # What is seen of a block by its edges alone has its colour there.
@@ -269,7 +269,7 @@ class SolidScene(Scene):
 
     def forces(self, ends: np.ndarray, line: np.ndarray) -> None:
         """Draw bars and the line of thrust in front of all: they lie inside the blocks."""
-        width = max(2.5, self.size[1] / 240.0)
+        width = max(2.5, self.usual_height / 240.0)
         self.lines("force", ends, palette.FORCE, width, forward=IN_FRONT_OF_ALL)
         self.lines("force line", line, palette.FORCE, 0.6 * width, forward=IN_FRONT_OF_ALL)
 
@@ -301,7 +301,7 @@ class SolidScene(Scene):
         if swing.n_parts <= MOST_PARTS:
             edges = mechanics.moved_vertices(self.assembly, swing.increment.pose)[self.edges]
             moving = (swing.parts >= 0)[self.assembly.block_of_vertex[self.edges[:, 0]]]
-            self.lines("before", edges[moving], palette.GHOST, self.size[1] / 900.0)
+            self.lines("before", edges[moving], palette.GHOST, self.usual_height / 900.0)
         self.arrows("motion", tails, tips + (LONGER - 1.0) * (tips - tails), palette.SETTLEMENT)
         if swing.n_parts > MOST_PARTS:
             # Of many blocks those behind others would seem to be the ways of what is in front of them.
@@ -338,7 +338,7 @@ class SolidScene(Scene):
             seen = self._hidden_by(tails) < arrows.within
             # One that is hidden still says where a single support goes.
             tails, tips = (tails[seen], tips[seen]) if seen.any() else (tails, tips)
-        thick = self.size[1] / 130.0
+        thick = self.usual_height / 130.0
         for grown, colour in ((0.35 * thick, palette.PAPER), (0.0, arrows.colour)):
             for polygon in chain(*arrow_shapes(self.at_pixel(tails), self.at_pixel(tips), thick, grown)):
                 yield colour, 0.0, 1.0, Path(polygon)

@@ -13,6 +13,7 @@ import matplotlib
 import numpy as np
 from fpdf import FPDF, FontFace
 from fpdf.enums import TableBordersLayout
+from PIL import Image
 
 import solver
 from blockvis.dynamics.fall import Fall
@@ -35,8 +36,8 @@ from .page import certificate_rows, headline_of, range_rows, summary_rows, tie_r
 #: Width of the text, margin and height of a line [mm]; size of the text [points].
 WIDTH, MARGIN, LINE, TEXT = 174.0, 18.0, 5.2, 9.5
 
-#: Height of a picture and its heading [mm].
-PICTURE = 110.0
+#: Largest height of a picture, and height of its heading [mm].
+HIGHEST, HEADING = 150.0, 10.0
 
 #: Cracks and states that the tables list.
 MOST_CRACKS, MOST_STATES = 20, 16
@@ -78,15 +79,13 @@ def write_pdf(
         paper.tabulate("Numbers", ("", ""), rows, (62.0, 112.0))
         if response.path:
             last = response.path[-1]
-            paper.heading("Last equilibrium" if response.parameter.is_path else "Last state", 12.0, PICTURE)
-            paper.picture(draw_still(response, last, Path(folder) / "last.png", underlay=underlay, **eye))
-            paper.heading("Curve", 12.0, PICTURE)
-            paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), 140.0)
+            state = "Last equilibrium" if response.parameter.is_path else "Last state"
+            paper.picture(draw_still(response, last, Path(folder) / "last.png", underlay=underlay, **eye), state)
+            paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), "Curve", 140.0)
             paper.tabulate(*_states(response))
             cracks = cracks_of(response.assembly, last.pose, last.fallen)
             if cracks:
-                paper.heading("Cracks", 12.0, PICTURE)
-                paper.picture(draw_cracks(response, -1, Path(folder) / "cracks.png", **eye))
+                paper.picture(draw_cracks(response, -1, Path(folder) / "cracks.png", **eye), "Cracks")
                 paper.tabulate("Cracks at the last equilibrium", *_crack_table(cracks))
     ties = tie_rows(response)
     if ties:
@@ -197,8 +196,13 @@ class _Paper(FPDF):
         self.ln(2.0)
         self.words(text, size, palette.INK, bold=True, after=1.0)
 
-    def picture(self, path: Path, width: float = WIDTH) -> None:
-        """Place a picture of a width [mm], on the next page where it does not fit."""
+    def picture(self, path: Path, title: str = "", width: float = WIDTH) -> None:
+        """Place a picture of a width [mm] at most under its title, on the next page where both do not fit."""
+        with Image.open(path) as image:
+            proportion = image.height / image.width
+        width = min(width, HIGHEST / proportion)
+        if title:
+            self.heading(title, 12.0, HEADING + proportion * width)
         self.image(path, x=MARGIN + (WIDTH - width) / 2.0, w=width)
         self.ln(2.0)
 

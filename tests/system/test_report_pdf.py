@@ -4,11 +4,13 @@ import json
 import re
 
 import pytest
+from PIL import Image
 from structures import dropped_brick, moved_and_turned, rectangle, vault_response
 
 import blockvis
 import solver
 from blockvis.cli import main
+from blockvis.report.pdf import HIGHEST, MARGIN, WIDTH, _Paper
 
 
 @pytest.mark.slow
@@ -22,6 +24,18 @@ def test_the_report_on_paper_has_pictures_and_pages(arch_results, capsys):
     widths = [int(width) for width in re.findall(rb"/Width (\d+)", pages)]
     assert len(widths) >= 3
     assert min(widths) >= 140 / 25.4 * 200
+
+
+@pytest.mark.slow
+def test_a_picture_on_paper_leaves_room_for_its_heading(tmp_path):
+    paper = _Paper("tower")
+    for size, high in (((1080, 1920), HIGHEST), ((1920, 1080), WIDTH * 1080 / 1920)):
+        Image.new("RGB", size).save(path := tmp_path / f"{size[0]}.png")
+        for _ in range(2):
+            paper.picture(path, "Picture")
+            # Below its heading, on the same page.
+            assert MARGIN + high < paper.get_y() < 297.0 - MARGIN
+    assert paper.page_no() == 3
 
 
 def test_a_report_of_nothing_is_refused(tmp_path, capsys):

@@ -34,7 +34,7 @@ from blockvis.pictures.curves import CurvePanel
 from blockvis.pictures.drawer import Drawer, Look, magnified
 from blockvis.pictures.film import film_of
 from blockvis.pictures.flat_scene import FlatScene
-from blockvis.pictures.frame import Frame, Sheet, framed
+from blockvis.pictures.frame import STILL_SIZE, Frame, Sheet, framed, still_size
 from blockvis.pictures.swing import swing_of
 from solver import mechanics
 
@@ -93,6 +93,31 @@ def test_the_arrows_of_a_support_turn_with_it(tmp_path):
     right = columns > SMALL[0] // 2
     apart = columns[right].mean() - columns[~right].mean()
     assert rows[right].mean() - rows[~right].mean() == pytest.approx(apart * np.tan(0.3), rel=0.1)
+
+
+def test_the_sheet_of_a_still_follows_what_it_shows():
+    def shown(*size):
+        return still_size(Frame(np.zeros(len(size)), np.array(size)))
+
+    assert shown(1.0, 1.0) == shown(1.0, 2.0, 1.0, 2.0)
+    for width, height in (shown(1.0, 1.0), shown(1.8, 1.0), shown(1.0, 1.5)):
+        assert width * height == pytest.approx(np.prod(STILL_SIZE), rel=1e-3)
+    for size in ((1.0, 1.0), (1.8, 1.0), (1.0, 1.5)):
+        width, height = Sheet(shown(*size)).inside_size
+        assert width / height == pytest.approx(size[0] / size[1], rel=0.01)
+    assert shown(1.0, 30.0) == (1080, 1920)
+    assert shown(60.0, 1.0) == (1920, 640)
+
+
+@pytest.mark.slow
+def test_a_still_of_a_tower_is_upright(tmp_path):
+    """One of 1 × 30 m was 27 pixels wide in the middle of a wide sheet."""
+    tower = solver.Structure(generators.column(blocks=30, width=1.0, block_height=1.0), friction_coefficient=0.7)
+    response = tower.settle(solver.Settlement((0.0, -1.0), increment=0.01, limit=0.01))
+    picture = pixels(draw_still(response, -1, tmp_path / "tower.png", forces="none"))
+    assert picture.shape[:2] == (1920, 1080)
+    drawn = (picture[400:1400] < 240).any(axis=(0, 2))
+    assert 50 <= drawn.sum() <= 70
 
 
 @pytest.mark.parametrize("space", [False, True], ids=["of shallow ground", "magnified in space"])
