@@ -365,8 +365,6 @@ class Drawer:
             detail="   ·   ".join([note or detail, *section_words(self._plane)]),
             badge=(badge_of(self.response) if falling else FAILED_BADGE if failed else "") if badge is None else badge,
             keys=self._keys_drawn(increment),
-            # A fall has few keys, and always the same.
-            places=None if falling and self.fall is not None else self.keys(),
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(increment),
         )
@@ -434,9 +432,12 @@ class Drawer:
         return [moves[[k]] for k in first]
 
     def keys(self) -> list[Key]:
-        """Return what is marked in any of the increments, each with its place in the legends of all pictures."""
+        """Return what is marked in any of the increments, what comes and goes first."""
         if self._keys is None:
-            keys = [*self._keys_of_tints(), *self._keys_of_joints(), *self._keys_of_forces(), *self.ties.keys()]
+            keys = self._keys_of_tints()
+            if self._loses and ("lost" in self._seen.marks or self._drawn_at is not None):
+                keys.append(Key("area", LOST, palette.LOST, rim=palette.WARNING if self._flat else None))
+            keys += [*self._keys_of_joints(), *self.ties.keys()]
             if not self._flat and self.response.settlements:
                 kept = [kept_blocks(self._plane, self.assembly, self.increments[k].pose) for k in (0, -1)]
                 moving = self.assembly.moving & (kept[0] | kept[1])
@@ -448,18 +449,14 @@ class Drawer:
                 keys.append(
                     Key(kind, "fill", palette.FILL_HATCH if self._flat else palette.FILL_RIM, 0.0, ("backfill",))
                 )
-            if self._loses and ("lost" in self._seen.marks or self._drawn_at is not None):
-                keys.append(Key("area", LOST, palette.LOST, rim=palette.WARNING if self._flat else None))
             if self.live.largest > 0.0:
                 keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
             if self._drawn_at is not None:
                 layers = ("motion outline", "motion top")
                 what = "motion" if self._flat else "motion, blocks drawn after it"
                 keys.append(Key("line", f"{what} (not to scale)", palette.SETTLEMENT, layers=layers))
-                if self.scene.holds("before"):
-                    keys.append(Key("line", "at equilibrium", palette.GHOST))
-            # In space every picture has the whole legend.
-            self._keys = keys if self._flat else [replace(key, layers=()) for key in keys]
+                keys.append(Key("line", "at equilibrium", palette.GHOST, layers=("before",)))
+            self._keys = [*keys, *self._keys_of_forces()]
         return self._keys
 
     def _keys_of_joints(self) -> list[Key]:
@@ -469,20 +466,20 @@ class Drawer:
         crack = Key(
             "area" if self._flat else "line", f"open joint{up_to}", palette.OPEN, layers=("crack", "crack edge")
         )
-        keys = [crack] * ("cracks" in marks)
+        cracks = [crack] * ("cracks" in marks)
         if self.look.magnification != 1.0:
             told = "are shown at true scale only" if self.look.joints and not self.many else "not shown"
-            return [*keys, Key("", f"hinges, sliding joints and forces {told}", palette.FAINT)]
-        keys += [Key("dot", "crushing", palette.CRUSHING, layers=("crushing top",))] * ("crushing" in marks)
+            return [*cracks, Key("", f"hinges, sliding joints and forces {told}", palette.FAINT)]
+        crushing = [Key("dot", "crushing", palette.CRUSHING, layers=("crushing top",))] * ("crushing" in marks)
         hinge = Key("dot" if self._flat else "line", "hinge", palette.HINGE, layers=("hinge",))
         marked = [Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] * ("sliding" in marks)
         marked += [hinge] * ("hinges" in marks)
         if not self.many:
-            dashed = "hinges" in marks and len(self._views) == 1
-            return keys + marked + [Key("dash", "hidden hinge", palette.HINGE)] * dashed
+            dashed = Key("dash", "hidden hinge", palette.HINGE, layers=("hidden hinge",))
+            return [*crushing, *marked, *[dashed] * ("hinges" in marks and len(self._views) == 1), *cracks]
         # They would hide the cracks: in a wall of many blocks nearly every brick turns or slides a little.
         hidden = " and ".join(f"{key.text}s" for key in marked[::-1])
-        return keys + ([Key("", f"{hidden} not shown", palette.FAINT)] if hidden else [])
+        return [*crushing, *cracks, *([Key("", f"{hidden} not shown", palette.FAINT)] if hidden else [])]
 
     def _keys_of_forces(self) -> list[Key]:
         if self._forces_hidden:
@@ -493,7 +490,8 @@ class Drawer:
         text = joint if self.look.forces == "thrust" else "contact force"
         if not self._flat:
             # Lengths in space are foreshortened: no bar is their scale.
-            return [Key("line", f"{text} up to {force_text(self._seen.largest_force)}", palette.FORCE)]
+            words = f"{text} up to {force_text(self._seen.largest_force)}"
+            return [Key("line", words, palette.FORCE, layers=("force",))]
         length = self.force_shown * self.force_scale / self.scene.pixel
         return [Key("bar", f"{text} {force_text(self.force_shown)}", palette.FORCE, length, ("force",))]
 
@@ -503,11 +501,6 @@ class Drawer:
         untinted = [] if self._acts(increment) else self._keys_of_tints()
         if not (increment.fallen & ~increment.removed).any():
             untinted += [key for key in self.keys() if key.text == LOST]
-        if falling and self.fall is not None and not self._flat:
-            # A fall shows blocks and ties, nothing of statics.
-            ties = self.ties.keys()
-            drawn = [key for key in self.keys() if key.kind == "area" or key.text in {of.text for of in ties}]
-            return [key for key in drawn if key not in untinted]
         return [
             key
             for key in self.keys()

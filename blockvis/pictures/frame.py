@@ -102,17 +102,15 @@ class Sheet:
         detail: str,
         badge: str = "",
         keys: Sequence[Key] = (),
-        places: Sequence[Key] | None = None,
         pixel: float,
         beside: Image.Image | None = None,
     ) -> Image.Image:
         """Put the picture of the blocks, of :attr:`inside_size`, on the sheet, with caption, scale bar and legend.
 
-        Title and detail are the lines of the caption, the badge is a warning at the upper right. ``places`` are all
-        keys of a film, so that each keeps its place where others come and go, else those of the picture. A pixel has a
-        size [m], and the picture ``beside`` that of :attr:`beside`.
+        Title and detail are the lines of the caption, the badge is a warning at the upper right. A pixel has a size
+        [m], and the picture ``beside`` that of :attr:`beside`.
         """
-        shared = tuple(keys), tuple(keys if places is None else places), pixel, detail, badge
+        shared = tuple(keys), pixel, detail, badge
         if shared != self._page_of:
             # One at a time: joints open and slide now and then, and a page at any size is memory.
             self._page, self._page_of = self._around(*shared), shared
@@ -123,12 +121,12 @@ class Sheet:
         self._title(ImageDraw.Draw(page), title, badge)
         return page
 
-    def _around(self, keys: Sequence[Key], places: Sequence[Key], pixel: float, detail: str, badge: str) -> Image.Image:
+    def _around(self, keys: Sequence[Key], pixel: float, detail: str, badge: str) -> Image.Image:
         """Draw what many pictures of a film share: scale bar, legend, colour bar, all of the caption but its title."""
         page = Image.new("RGB", self.size, palette.PAPER)
         draw = ImageDraw.Draw(page)
         end = self._scale_bar(draw, pixel)
-        self._legend(draw, keys, places, end + 2 * self.pad)
+        self._legend(draw, keys, end + 2 * self.pad)
         if self.colour_bar is not None:
             self._colour_bar(page, draw, self.colour_bar)
         font = fitting_font(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
@@ -169,33 +167,32 @@ class Sheet:
         draw.text((x + pixels / 2, y - tick - 0.15 * self.text), label, palette.INK, font, anchor="mb")
         return int(max(x + pixels, x + pixels / 2 + draw.textlength(label, font) / 2))
 
-    def _legend(self, draw: ImageDraw.ImageDraw, keys: Sequence[Key], places: Sequence[Key], left: int) -> None:
-        """Draw those of the keys that are in the picture, each where it stands among all."""
+    def _legend(self, draw: ImageDraw.ImageDraw, keys: Sequence[Key], left: int) -> None:
+        """Draw the legend, from its end on: what comes and goes in a film stands before what stays."""
         room, size = self.size[0] - self.pad - left, round(0.9 * self.text)
-        rows = self._rows(places, size, room)
+        rows = self._rows(keys, size, room)
         # Small letters are harder to read than a second row; only what two rows do not hold is written smaller.
         while len(rows) > 2 and size > 8:
             size -= 1
-            rows = self._rows(places, size, room)
+            rows = self._rows(keys, size, room)
         font, gap = _font(size), LEGEND_GAP * size
-        y = self.size[1] - self.pad - 0.35 * self.text - 1.4 * size * (len(rows) - 1)
+        y = self.size[1] - self.pad - 0.35 * self.text
         for row in rows:
-            widths = [_width(key, size) for key in row]
-            x = self.size[0] - self.pad - sum(widths) - gap * (len(row) - 1)
-            for key, width in zip(row, widths, strict=True):
-                if key in keys:
-                    wide = max(1.7 * size, key.length)
-                    if key.kind:
-                        _swatch(draw, key, x, y, wide, self.text)
-                    draw.text((x + (wide + 0.5 * size) * bool(key.kind), y), key.text, palette.INK, font, anchor="lm")
-                x += width + gap
-            y += 1.4 * size
+            x = float(self.size[0] - self.pad)
+            for key in row:
+                x -= _width(key, size)
+                wide = max(1.7 * size, key.length)
+                if key.kind:
+                    _swatch(draw, key, x, y, wide, self.text)
+                draw.text((x + (wide + 0.5 * size) * bool(key.kind), y), key.text, palette.INK, font, anchor="lm")
+                x -= gap
+            y -= 1.4 * size
 
-    def _rows(self, places: Sequence[Key], size: int, room: float) -> list[list[Key]]:
-        """Break a legend of letters of some size into rows no wider than the room [pixel]."""
+    def _rows(self, keys: Sequence[Key], size: int, room: float) -> list[list[Key]]:
+        """Break a legend of letters of some size, from its end on, into rows no wider than the room [pixel]."""
         rows: list[list[Key]] = []
         used = np.inf
-        for key in places:
+        for key in reversed(keys):
             width = _width(key, size)
             if used + LEGEND_GAP * size + width > room:
                 rows.append([])

@@ -87,8 +87,8 @@ class PairedScenes:
         return swing.displaced
 
     def holds(self, *layers: str) -> bool:
-        """Whether anything is drawn in one of the layers."""
-        return self.scenes[0].holds(*layers)
+        """Whether any of the views shows something of one of the layers."""
+        return any(scene.holds(*layers) for scene in self.scenes)
 
     def image(self) -> Image.Image:
         """Draw the views beside each other, each of several with its words."""

@@ -21,11 +21,11 @@ from solver import mechanics
 
 from . import palette
 from .backfill import FillBodies
-from .frame import Frame, framed, room_in
+from .frame import Frame, along_lines, framed, room_in
 from .marks import Marks, arrow_shapes
 from .painting import painted
 from .scene import Scene
-from .solid_view import ABOVE, AROUND, View, kept_blocks, showing_faces
+from .solid_view import ABOVE, AROUND, View, heights_over, kept_blocks, showing_faces
 from .surface import section_of, sharp_edges, triangles_of
 from .swing import MOST_PARTS, Swing
 from .ties import DASH, Strands, dashed
@@ -50,6 +50,9 @@ SAME_DEPTH = 0.005
 
 #: Layers by how far in front of what lies at the same place they are drawn; what is in front of all hides nothing.
 IN_FRONT_OF_ALL = 1_000_000.0
+
+#: Layers that are drawn in front of all, as ties are by their dashes.
+OVER_BLOCKS = ("force", "crushing", "tie")
 
 #: Radius of the ground of a fall, in larger sides of the picture, the part of it from where on it fades, and the least
 #: sine of the angle of views that decides where its middle is.
@@ -316,8 +319,19 @@ class SolidScene(Scene):
                 self._plotter.remove_actor(self._layers.pop(name), reset_camera=False, render=False)
 
     def holds(self, *layers: str) -> bool:
-        """Whether anything is drawn in one of the layers."""
-        return any(layer in self._layers or layer in self._overlays for layer in layers)
+        """Whether the last picture shows anything of one of the layers; of hidden lines, whether blocks hide any."""
+        if any(True for layer in layers if layer in self._overlays for _ in self._shapes(self._overlays[layer])):
+            return True
+        return any(self._shows(name) for name in self._layers if name.split("/")[0] in layers)
+
+    def _shows(self, layer: str) -> bool:
+        actor = self._layers[layer]
+        points = along_lines(np.asarray(actor.mapper.dataset.points).reshape(-1, 2, 3))
+        points = points[heights_over(self._cut, points) >= 0.0]
+        if layer.startswith(OVER_BLOCKS):
+            return len(points) > 0
+        hidden = self.hides(points, actor.prop.line_width / self._over)
+        return bool(hidden.any() if layer.startswith("hidden") else not hidden.all())
 
     def image(self) -> Image.Image:
         """Draw the picture."""

@@ -7,17 +7,18 @@ from functools import cache
 import numpy as np
 import pytest
 from PIL import Image, ImageDraw
-from structures import arch_response, box, dropped_brick, parted, posed, rectangle, wall
+from structures import arch_response, box, dropped_brick, parted, posed, rectangle, vault_response, wall
 
 import solver
 from blockvis import draw_mechanism, draw_still, generators
 from blockvis.dynamics.fall import fall_of
+from blockvis.layout.sights import read_sight
 from blockvis.pictures import drawer as drawing
 from blockvis.pictures import palette
 from blockvis.pictures.captions import FAILED_BADGE, FALL_BADGE
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of
-from blockvis.pictures.frame import Sheet, write_labels
+from blockvis.pictures.frame import Key, Sheet, write_labels
 from blockvis.studies import pictures
 from blockvis.studies.run_one import _shape
 from solver import mechanics
@@ -196,7 +197,45 @@ def test_the_legend_names_lost_blocks_where_there_are_any(words):
     for increments, increment, named in ((drawn, drawn[0], False), (drawn, lost, True), (drawn[:1], drawn[0], False)):
         Drawer(response, Look(forces="none"), SMALL, increments).picture(increment)
         assert ("lost block" in [key.text for key in words[-1]["keys"]]) is named
-    assert "lost block" not in [key.text for key in words[-1]["places"]], "no room is left for it"
+
+
+def test_a_legend_has_no_gaps_and_what_stays_keeps_its_place():
+    colours = (200, 0, 0), (0, 200, 0), (0, 0, 200)
+    keys = [Key("area", word, colour) for word, colour in zip(("lost", "hinge", "force"), colours, strict=True)]
+    sheet = Sheet((640, 360))
+    page = Image.new("RGB", sheet.inside_size, "white")
+
+    def swatches(*chosen):
+        drawn = np.asarray(sheet.composed(page, title="", detail="", keys=[keys[k] for k in chosen], pixel=0.01))
+        return [np.flatnonzero((drawn == colours[k]).all(axis=2).any(axis=0))[0] for k in chosen]
+
+    lost, hinge, force = swatches(0, 1, 2)
+    assert swatches(1, 2) == [hinge, force]
+    assert swatches(2) == [force]
+    beside, same = swatches(0, 2)
+    assert same == force
+    assert same - beside == pytest.approx(hinge - lost, abs=1), "as near as if nothing had been between"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("view", [None, "top"], ids=["from above and below", "from above"])
+def test_the_legend_names_what_a_view_in_space_shows(view, words, tmp_path):
+    """Every picture had the whole legend: at rest it named open joints, and from above hinges on the intrados."""
+    response = vault_response()
+    sight = None if view is None else read_sight(view)
+    drawer = Drawer(response, Look(sight=sight), SMALL, response.path, still=True)
+    named = []
+    for increment in (response.path[0], response.path[-1]):
+        drawer.picture(increment)
+        named.append({key.text.partition(",")[0] for key in words[-1]["keys"]})
+    assert "open joint" not in named[0]
+    assert "open joint" in named[1]
+    assert "moving support" in named[1]
+    assert ("hidden hinge" in named[1]) is (view is not None)
+    under_the_crown = np.array([[[0.0, -0.1, 0.2], [0.0, 0.1, 0.2]]])
+    drawer.scene.lines("hinge", under_the_crown, palette.HINGE, 3.0)
+    drawer.scene.image()
+    assert drawer.scene.holds("hinge") is (view is None)
 
 
 def test_in_a_fall_the_label_of_a_tie_says_what_its_colour_does(monkeypatch):
