@@ -25,6 +25,7 @@ from .flat_scene import FlatScene
 from .frame import STILL_SIZE, ColourBar, Frame, Key, Sheet, along_lines, framed, still_size, write_labels
 from .live_load import LiveLoads
 from .marks import (
+    END,
     SMALLEST_RESULTANT,
     evenly,
     joint_forces,
@@ -58,7 +59,8 @@ DOT = 0.5
 #: Blocks in space are so transparent where forces are drawn inside them.
 GLASS = 0.35
 
-#: Length of the arrows at the supports, as a part of the larger side of what is drawn, in the plane and in space.
+#: Length of the arrows at the supports, as a part of the larger side of what is drawn, in the plane and in space;
+#: in the plane none is longer than its support.
 ARROW, ARROW_IN_SPACE = 0.055, 0.09
 
 #: Arrows of a mechanism of many parts stand apart by this fraction of the picture, in the plane and in space.
@@ -663,8 +665,13 @@ class Drawer:
         kept = kept_blocks(self._plane, self.assembly, shown)[blocks]
         places, directions = places[kept], directions[kept]
         places = places + into_sight(self._plane, places)
-        half = 0.5 * self._arrow * directions
-        return (places - half, places + half) if self._flat else (places, places + 2.0 * half)
+        if not self._flat:
+            return places, places + self._arrow * directions
+        # Beside a wide structure one as long as usual would cover its support, and of one that turns both would cross.
+        extents = np.array([np.ptp(self.assembly.outline(block), axis=0).max() for block in blocks.tolist()])
+        longest = np.where(np.bincount(blocks)[blocks] > 1, 2.0 * END, 1.0) * extents
+        half = 0.5 * np.minimum(self._arrow, longest)[:, None] * directions
+        return places - half, places + half
 
 
 def _along(tails: np.ndarray, tips: np.ndarray) -> np.ndarray:

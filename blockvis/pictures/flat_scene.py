@@ -30,8 +30,8 @@ ORDER = (
     "earth", "backfill", "ghost", "crack", "fill", "hatch", "outline", "lost", "ground", "crack edge", "sliding",
     "motion outline", "force line", "force",
     "tie rim", "tie ground", "tie slack", "tie elastic", "tie pressed", "tie yielding", "tie broken", "tie end",
-    "hinge", "hinge top", "crushing", "crushing top",
-    "motion rim", "motion top", "live rim", "live top", "arrow rim", "arrow top",
+    "arrow rim", "arrow top", "hinge", "hinge top", "crushing", "crushing top",
+    "motion rim", "motion top", "live rim", "live top",
 )  # fmt: skip
 
 #: Thickness of arrows by their layer, and the least width of a line [pixels].

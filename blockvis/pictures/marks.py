@@ -33,7 +33,7 @@ BESIDE = 2.0
 
 #: Blocks of one part are grown by this fraction of the block size, merged and shrunk back: between faces that touch,
 #: the last digit leaves slivers otherwise.
-SLIVER = 1e-3
+SLIVER = 0.01
 
 #: Joints open by less than this fraction of the block size are drawn half as wide.
 FINE_CRACK = 0.01

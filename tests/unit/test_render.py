@@ -35,6 +35,7 @@ from blockvis.pictures.drawer import Drawer, Look, magnified
 from blockvis.pictures.film import film_of
 from blockvis.pictures.flat_scene import FlatScene
 from blockvis.pictures.frame import STILL_SIZE, Frame, Sheet, framed, still_size
+from blockvis.pictures.marks import part_outlines
 from blockvis.pictures.swing import swing_of
 from solver import mechanics
 
@@ -80,6 +81,30 @@ def test_a_support_that_turns_has_an_arrow_at_both_ends(foot, tmp_path):
     assert not columns[middle]
     assert columns[:middle].sum() == pytest.approx(columns[middle:].sum(), abs=2)
     assert columns[middle:].sum() > 3
+
+
+@pytest.mark.slow
+def test_arrows_of_a_small_support_do_not_cover_it_nor_its_hinge(tmp_path):
+    """Under a tower those of the two ends crossed, longer than the support, and hid where it turns."""
+    tower = solver.Structure(generators.column(blocks=20, width=0.5, block_height=0.5), friction_coefficient=0.7)
+    tilts = solver.Settlement(rotation=-1.0, rotation_centre=(0.0, 0.0), increment=0.02, limit=0.2)
+    response = tower.settle(tilts)
+    last, assembly = swing_of(response).increment, response.assembly
+    drawer = Drawer(response, Look(forces="none"), (900, 1600), (last,))
+    picture = np.asarray(drawer.picture(last)).astype(int)
+    hinges = mechanics.mechanism_of(assembly, last).hinge_points
+    x, y = drawer.scene.at_pixel(last.contacts.points[hinges])[0].round().astype(int) + drawer.sheet.inside[:2]
+    assert alike(picture[y, x], palette.HINGE)
+    arrows = alike(picture[: -drawer.sheet.footer], palette.SETTLEMENT, 30).any(axis=0)
+    assert not arrows[drawer.scene.at_pixel(last.pose.positions[assembly.moving])[0, 0].round().astype(int)]
+    width = np.ptp(assembly.outline(int(np.flatnonzero(assembly.moving)[0]))[:, 0])
+    assert np.ptp(np.flatnonzero(arrows)) < 1.3 * width / drawer.scene.pixel
+
+
+def test_joints_that_give_leave_no_lines_in_the_outline_of_a_part():
+    stones = [rectangle(0.0, 0.0, 1.0, 0.5), rectangle(1.004, 0.0, 2.0, 0.5)]
+    wall_of_two = solver.Assembly.from_outlines([rectangle(-1, -0.5, 3, 0), *stones], roles=["fixed", "free", "free"])
+    assert len(part_outlines(wall_of_two, wall_of_two.vertices, np.array([-1, 0, 0]))) == 4
 
 
 def test_the_arrows_of_a_support_turn_with_it(tmp_path):
