@@ -60,7 +60,7 @@ DOT = 0.5
 GLASS = 0.35
 
 #: Length of the arrows at the supports, as a part of the larger side of what is drawn, in the plane and in space;
-#: in the plane none is longer than its support.
+#: in the plane none is longer than its support, to a third.
 ARROW, ARROW_IN_SPACE = 0.055, 0.09
 
 #: Arrows of a mechanism of many parts stand apart by this fraction of the picture, in the plane and in space.
@@ -670,7 +670,7 @@ class Drawer:
         # Beside a wide structure one as long as usual would cover its support, and of one that turns both would cross.
         extents = np.array([np.ptp(self.assembly.outline(block), axis=0).max() for block in blocks.tolist()])
         longest = np.where(np.bincount(blocks)[blocks] > 1, 2.0 * END, 1.0) * extents
-        half = 0.5 * np.minimum(self._arrow, longest)[:, None] * directions
+        half = 0.5 * np.clip(longest, self._arrow / 3.0, self._arrow)[:, None] * directions
         return places - half, places + half
 
 

@@ -406,7 +406,8 @@ def arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float
     """Shafts (n, 4, 2) and heads (n, 3, 2) of arrows, a margin ``grown`` larger all around [m]."""
     along = tips - tails
     length = np.hypot(*along.T)
-    kept = length > 1.2 * thick
+    # Seen from their end, shorter ones would be blobs.
+    kept = length > 2.0 * thick
     tails, tips, along, length = tails[kept], tips[kept], along[kept], length[kept]
     unit = along / length[:, None]
     side = np.stack([-unit[:, 1], unit[:, 0]], axis=1)

@@ -636,3 +636,9 @@ def test_of_many_supports_each_side_has_arrows_of_its_own():
     blocks, _, directions = marks.settlement_arrows(piers, settlement, solver.Pose.initial(piers))
     assert blocks.tolist() == [0, 2, 3, 5]
     assert directions[:, 1].tolist() == [-1.0, -1.0, 1.0, 1.0]
+
+
+def test_arrows_that_are_seen_from_their_end_are_left_out():
+    """They were blobs without a direction."""
+    tips = np.array([[1.8, 0.0], [2.2, 0.0]])
+    assert [len(shapes) for shapes in marks.arrow_shapes(np.zeros((2, 2)), tips, 1.0, 0.0)] == [1, 1]
