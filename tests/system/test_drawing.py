@@ -120,7 +120,7 @@ def test_film_and_pictures_may_be_left_out(case, tmp_path):
     assert {"report.html", "curve.png", "mechanism.png", "cracks.png"} <= there
     assert "collapse.mp4" not in there
     last = (run.folder / "cracks.png").read_bytes()
-    assert main(["render", str(run.folder), "--cracks", "-1", "--size", "1920x1080"]) == 0
+    assert main(["render", str(run.folder), "--cracks", "-1"]) == 0
     assert (run.folder / "cracks.png").read_bytes() == last
     assert main(["render", str(run.folder), "--cracks", "0", "--size", "1920x1080"]) == 0
     assert (run.folder / "cracks.png").read_bytes() != last

@@ -9,8 +9,8 @@ from structures import dropped_brick, moved_and_turned, rectangle, vault_respons
 
 import blockvis
 import solver
+from blockvis import generators
 from blockvis.cli import main
-from blockvis.report.pdf import HIGHEST, MARGIN, WIDTH, _Paper
 
 
 @pytest.mark.slow
@@ -27,15 +27,22 @@ def test_the_report_on_paper_has_pictures_and_pages(arch_results, capsys):
 
 
 @pytest.mark.slow
-def test_a_picture_on_paper_leaves_room_for_its_heading(tmp_path):
-    paper = _Paper("tower")
-    for size, high in (((1080, 1920), HIGHEST), ((1920, 1080), WIDTH * 1080 / 1920)):
-        Image.new("RGB", size).save(path := tmp_path / f"{size[0]}.png")
-        for _ in range(2):
-            paper.picture(path, "Picture")
-            # Below its heading, on the same page.
-            assert MARGIN + high < paper.get_y() < 297.0 - MARGIN
-    assert paper.page_no() == 3
+def test_upright_pictures_on_paper_fit_on_the_page_of_their_heading(tmp_path, monkeypatch):
+    placed = []
+
+    def noted(paper, path, x, w):
+        with Image.open(path) as image:
+            placed.append((paper.get_y(), w * image.height / image.width, x, w))
+
+    monkeypatch.setattr("blockvis.report.pdf._Paper.image", noted)
+    tower = solver.Structure(generators.column(blocks=30, width=1.0, block_height=1.0), friction_coefficient=0.7)
+    sinks = solver.Settlement((0.0, -1.0), increment=0.01, limit=0.01)
+    blockvis.write(tower.settle(sinks), tmp_path / "out")
+    assert main(["report", str(tmp_path / "out"), "--pdf"]) == 0
+    assert [round(height) for _, height, _, _ in placed[:2]] == [150, 150]
+    for top, height, left, width in placed:
+        assert top + height < 297.0 - 18.0
+        assert left + width / 2.0 == pytest.approx(105.0)
 
 
 def test_a_report_of_nothing_is_refused(tmp_path, capsys):

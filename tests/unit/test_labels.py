@@ -12,13 +12,12 @@ from structures import arch_response, box, dropped_brick, parted, posed, rectang
 import solver
 from blockvis import draw_mechanism, draw_still, generators
 from blockvis.dynamics.fall import fall_of
-from blockvis.layout.sights import read_sight
 from blockvis.pictures import drawer as drawing
 from blockvis.pictures import palette
 from blockvis.pictures.captions import FAILED_BADGE, FALL_BADGE
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of
-from blockvis.pictures.frame import Key, Sheet, write_labels
+from blockvis.pictures.frame import Sheet, write_labels
 from blockvis.studies import pictures
 from blockvis.studies.run_one import _shape
 from solver import mechanics
@@ -201,7 +200,7 @@ def test_the_legend_names_lost_blocks_where_there_are_any(words):
 
 def test_a_legend_has_no_gaps_and_what_stays_keeps_its_place():
     colours = (200, 0, 0), (0, 200, 0), (0, 0, 200)
-    keys = [Key("area", word, colour) for word, colour in zip(("lost", "hinge", "force"), colours, strict=True)]
+    keys = [drawing.Key("area", word, colour) for word, colour in zip(("lost", "hinge", "force"), colours, strict=True)]
     sheet = Sheet((640, 360))
     page = Image.new("RGB", sheet.inside_size, "white")
 
@@ -222,7 +221,7 @@ def test_a_legend_has_no_gaps_and_what_stays_keeps_its_place():
 def test_the_legend_names_what_a_view_in_space_shows(view, words, tmp_path):
     """Every picture had the whole legend: at rest it named open joints, and from above hinges on the intrados."""
     response = vault_response()
-    sight = None if view is None else read_sight(view)
+    sight = None if view is None else drawing.Sight(-90.0, 90.0)
     drawer = Drawer(response, Look(sight=sight), SMALL, response.path, still=True)
     named = []
     for increment in (response.path[0], response.path[-1]):

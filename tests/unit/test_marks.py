@@ -642,3 +642,9 @@ def test_arrows_that_are_seen_from_their_end_are_left_out():
     """They were blobs without a direction."""
     tips = np.array([[1.8, 0.0], [2.2, 0.0]])
     assert [len(shapes) for shapes in marks.arrow_shapes(np.zeros((2, 2)), tips, 1.0, 0.0)] == [1, 1]
+
+
+def test_joints_that_give_leave_no_lines_in_the_outline_of_a_part():
+    stones = [rectangle(0.0, 0.0, 1.0, 0.5), rectangle(1.004, 0.0, 2.0, 0.5)]
+    wall_of_two = solver.Assembly.from_outlines([rectangle(-1, -0.5, 3, 0), *stones], roles=["fixed", "free", "free"])
+    assert len(marks.part_outlines(wall_of_two, wall_of_two.vertices, np.array([-1, 0, 0]))) == 4
