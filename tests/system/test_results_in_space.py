@@ -666,11 +666,12 @@ def test_one_command_from_case_to_pictures_and_again(tmp_path, monkeypatch, caps
     assert len(widest["at"]) == len(widest["to"]) == 3
     assert widest["widest_joint"] in (out / "report.html").read_text(encoding="utf-8")
     capsys.readouterr()
-    assert main(["render", "out", "--animation", "none", "--colour-by", "displacement", "--forces", "thrust"]) == 0
+    again = ["render", "out", "--animation", "none", "--size", "960x540"]
+    assert main([*again, "--colour-by", "displacement", "--forces", "thrust"]) == 0
     assert (out / "last.png").stat().st_size > 1000
     # A picture from another side; the case says from which where the command line does not.
     before = pixels(out / "mechanism.png")
-    assert main(["render", "out", "--animation", "none", "--view", "30,-20", "--section", "y = 0.1"]) == 0
+    assert main([*again, "--view", "30,-20", "--section", "y = 0.1"]) == 0
     assert (pixels(out / "mechanism.png") != before).any(axis=2).mean() > 0.05
     # A run that was stopped goes on to the same end.
     (out / "summary.json").unlink()
