@@ -50,7 +50,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "collapse_phase": None if phase is None else phase + 1,
         "collapse_bracket": list(collapse.bracket) if collapse else None,
         "settlement_unit": unit_in(response, in_phase),
-        "initial_reaction": _initial_reaction(response),
+        "initial_reaction": initial_reaction(response),
         "reaction_at_rest": finite(path[0].reaction) if path else None,
         "collapse_lost": collapse.lost if collapse else None,
         "collapse_reaction": collapse.reaction if collapse else None,
@@ -80,7 +80,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
     }
 
 
-def _initial_reaction(response: solver.Response) -> float | None:
+def initial_reaction(response: solver.Response) -> float | None:
     """Find the least reaction before anything has moved; bounds of a pushover are not of its reaction."""
     if not response.path:
         return None
