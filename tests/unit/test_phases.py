@@ -6,6 +6,7 @@ import dataclasses
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ import blockvis
 import solver
 from blockvis.cli import main
 from blockvis.generators import build
+from blockvis.results.tables import change_words
+from blockvis.results.ties import tie_force_curves
 from solver import mechanics
 
 DOWN = solver.Settlement([0.0, -1.0], increment=1e-3, limit=1e-3)
@@ -71,6 +74,24 @@ def test_what_changes_before_a_settlement_is_told_where_the_structure_falls_of_i
     page = report_of(response)
     assert "before settlement 2" in page
     assert "taken away, dead load changed" in page
+
+
+def test_many_changes_are_told_in_a_few_words_and_forces_of_rounding_have_no_curve() -> None:
+    structure = beam_on_a_prop()
+    ties = [solver.Tie(f"t{k}", (0, 4), ((0.0, 0.5), (0.0, 1.1)), 1e5, phase=2) for k in range(6)]
+    gone = [taken_away(structure, 2, name, ties=tuple(tie.name for tie in ties)) for name in ("prop", "load")]
+    rounding, states = np.full(6, 1e-5), np.full(6, mechanics.ELASTIC)
+    at_rest = SimpleNamespace(ties=mechanics.TieForces(forces=rounding, states=states))
+    response: Any = SimpleNamespace(
+        assembly=structure.assembly, ties=ties, changes=gone, path=[at_rest] * 2, total_weight=1e4
+    )
+    assert change_words(response, 1) == ["'t0', 't1', 't2', 't3' and 2 more installed"]
+    blocks, members = change_words(response, 2)
+    assert blocks.startswith("blocks 'prop', 'load' taken away, ")
+    assert members == "'t0', 't1', 't2', 't3' and 2 more taken away"
+    assert tie_force_curves(response) is None
+    rounding += 1.0
+    assert tie_force_curves(response) is not None
 
 
 def test_what_has_been_taken_away_stays_where_it_was() -> None:
