@@ -25,10 +25,11 @@ from .toml_table import Table, is_number, shortened
 #: Pieces of a support narrower than this fraction of the block size are not cut off.
 NARROWEST = 0.02
 
-#: Upright part of the normal of a joint from which on a block stands on a support, and of a face that bears a fill.
+#: Upright part of the normal of a joint from which on a block stands on a support.
 UPRIGHT = 1e-3
 
-#: A profile that leaves the chord over a support by less than this fraction of its largest value tilts it as it is.
+#: A profile that leaves the chord over a support by less than this fraction of its largest value tilts it as it is; so
+#: straight, in its length, is the line of a tie, and a trough that moves all feet so much alike is none.
 STRAIGHT = 1e-3
 
 

@@ -20,7 +20,7 @@ from .joints.close import WAYS
 from .layout import Layout
 from .notes import REPORTED, kind_of
 from .outlines import ring_width
-from .repair import DRAWN_GAP, overlaps, refuse_overlaps, repaired
+from .repair import DRAWN_GAP, nothing_closed, overlaps, refuse_overlaps, repaired
 from .roles import checked_role, roles_of, told_apart, twins_note
 from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
@@ -106,7 +106,8 @@ def assemble(
         facing = faced(layout.solids, layout.names, tolerance, anchored)
         assembly = solver.Assembly.from_solids(facing.solids, **of_blocks)
         accepted = tolerance if overlap_tolerance is None else overlap_tolerance
-        for note in (facing.note, _left_overlaps(assembly, accepted), _crossings(assembly)):
+        said = facing.note or (nothing_closed(float(joint_thickness)) if joint_thickness else "")
+        for note in (said, _left_overlaps(assembly, accepted), _crossings(assembly)):
             if note:
                 warnings.warn(f"{where}: {note}", stacklevel=2)
         return assembly

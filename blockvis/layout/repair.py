@@ -97,7 +97,7 @@ def repaired(
     tolerance = DEFAULT_OVERLAP * width if overlap_tolerance is None else float(overlap_tolerance)
     found = [(i, j, d) for i, j, d in overlaps(assembly, ROUNDING * width) if not (anchored[i] and anchored[j])]
     refuse_overlaps(assembly, found, tolerance)
-    measured = [outlines[i] for i in np.flatnonzero(free)]
+    measured, asked = [outlines[i] for i in np.flatnonzero(free)], closing
     thickness, closing, notes = _thickness(joint_thickness, closing, measured, laid[free])
     if not found and thickness == 0:
         return outlines, notes
@@ -114,7 +114,7 @@ def repaired(
         ) from None
     pairs = zip(*overlapping(closed.outlines, ROUNDING * width), strict=True)
     left = [(int(i), int(j), float(d)) for i, j, d in pairs if not (anchored[i] and anchored[j])]
-    notes += _notes(closed, thickness, found, left, assembly, bool(mortar))
+    notes += _notes(closed, thickness, found, left, assembly, bool(mortar), asked)
     return list(closed.outlines), notes
 
 
@@ -137,6 +137,7 @@ def _notes(
     left: list[tuple[int, int, float]],
     assembly: solver.Assembly,
     drawn: bool,
+    asked: str,
 ) -> list[str]:
     notes = []
     still = {pair[:2] for pair in left}
@@ -149,18 +150,24 @@ def _notes(
                 f"'{assembly.names[i]}' and '{assembly.names[j]}'; redraw them, or lower "
                 "overlap_tolerance to have them refused"
             )
-    if thickness and closing.method == "voronoi":
+    if thickness and not closing.largest_gap and not drawn:
+        notes.append(nothing_closed(thickness))
+    elif thickness and closing.method == "voronoi":
+        why = "" if asked == "voronoi" else ": faces are not straight, or corners blunt"
+        corners = sum(map(len, closing.outlines)) / len(closing.outlines)
         notes.append(
             f"joints of up to {thickness:g} m{', and the mortar as drawn,' if drawn else ''} were closed by giving the "
-            "mortar to the nearest stone: faces are not straight, or corners blunt; "
-            f"{sum(map(len, closing.outlines)) / len(closing.outlines):.3g} corners a block"
+            f"mortar to the nearest stone{why}; {corners:.3g} corners a block"
         )
-    elif thickness and not closing.n_joints:
-        notes.append(f"no gaps of up to joint_thickness {thickness:g} m lie between facing edges: nothing was closed")
     elif thickness:
         notes.append(
             f"{counted(closing.n_joints, 'stretch', 'stretches')} of joints of up to "
-            f"{max(closing.largest_gap, 0.0):.3g} m closed to the midline, {closing.n_cut} of them by cutting one side "
+            f"{closing.largest_gap:.3g} m closed to the midline, {closing.n_cut} of them by cutting one side "
             "along the other"
         )
     return notes
+
+
+def nothing_closed(thickness: float) -> str:
+    """Say that a joint thickness [m] closes nothing."""
+    return f"no gaps of up to joint_thickness {thickness:g} m lie between blocks: nothing was closed"

@@ -256,8 +256,8 @@ class _Plot:
             self.axes.axvline(place, color=RED, linewidth=1.0, linestyle=(0, (1, 2)), zorder=2)
             if (row, place, number) in words:
                 low, high = self.axes.get_ylim()
-                near = self.values[row - 1 : row + 1].mean()
-                above = near < (low + high) / 2.0
+                # They stand before the line.
+                above = self.values[row - 1] < (low + high) / 2.0
                 # Clear of the words of a collapse.
                 places = collapse_places(self.response)
                 room = COLLAPSE_LINES * self.text * (places is not None and self._above(places[1]) == above)

@@ -502,7 +502,7 @@ def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tu
     swing = swing_of(response) if path else None
     if swing is not None and swing.moves:
         fails = response.collapse is not None or response.swings
-        counted = counts_text(mechanics.mechanism_of(assembly, swing.increment))
+        counted = counts_text(mechanics.mechanism_of(assembly, swing.increment)) or "of supports alone"
         rows.append(("mechanism" if fails else "motion that would follow", counted))
     follows = f", {apart} {'of pseudo-motion' if response.swings else 'falling'}" if apart and fall is None else ""
     rows += [

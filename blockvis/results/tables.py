@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.text import force_text
+from blockvis.text import force_text, listed
 from solver import mechanics
 
 from .about import collapse_mechanism, collapse_phase, least_reaction, loss_of, mechanism_text, unit_in
@@ -50,7 +50,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "collapse_phase": None if phase is None else phase + 1,
         "collapse_bracket": list(collapse.bracket) if collapse else None,
         "settlement_unit": unit_in(response, in_phase),
-        "initial_reaction": _initial_reaction(response),
+        "initial_reaction": initial_reaction(response),
         "reaction_at_rest": finite(path[0].reaction) if path else None,
         "collapse_lost": collapse.lost if collapse else None,
         "collapse_reaction": collapse.reaction if collapse else None,
@@ -80,7 +80,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
     }
 
 
-def _initial_reaction(response: solver.Response) -> float | None:
+def initial_reaction(response: solver.Response) -> float | None:
     """Find the least reaction before anything has moved; bounds of a pushover are not of its reaction."""
     if not response.path:
         return None
@@ -125,16 +125,18 @@ def removals(response: solver.Response) -> list[dict[str, Any]]:
 
 def change_words(response: solver.Response, phase: int) -> list[str]:
     """Say what changes before a settlement, its number from 0: blocks and ties that go, dead loads, new ties."""
-    words, names = [], response.assembly.names
-    for one in removals(response):
-        if one["phase"] == phase + 1 and one["blocks"]:
-            listed = response.assembly.listed(np.flatnonzero(np.isin(names, one["blocks"])), 4)
-            many = "s" * (len(one["blocks"]) > 1)
-            words.append(f"block{many} {listed} taken away, {force_text(one['weight'])}")
-        if one["phase"] == phase + 1:
-            words += [f"'{name}' taken away" for name in one["ties"]]
+    here = [one for one in removals(response) if one["phase"] == phase + 1]
+    blocks, gone = ([name for one in here for name in one[what]] for what in ("blocks", "ties"))
+    new = [tie.name for tie in response.ties if phase and tie.phase == phase + 1]
+    many, weight = "s" * (len(blocks) > 1), force_text(sum(one["weight"] for one in here))
+    words = [f"block{many} {_quoted(blocks)} taken away, {weight}"] * bool(blocks)
+    words += [f"{_quoted(gone)} taken away"] * bool(gone)
     words += ["dead load changed"] * any(of.phase == phase and of.dead is not None for of in response.changes)
-    return words + [f"'{tie.name}' installed" for tie in response.ties if phase and tie.phase == phase + 1]
+    return words + [f"{_quoted(new)} installed"] * bool(new)
+
+
+def _quoted(names: Sequence[str]) -> str:
+    return listed([f"'{name}'" for name in names], 4)
 
 
 def changes_told(response: solver.Response) -> list[tuple[str, str]]:

@@ -177,7 +177,7 @@ def tie_force_curves(response: solver.Response) -> TieForceCurves | None:
     forces = np.where(np.isin(states, (mechanics.ELASTIC, mechanics.YIELDING)), forces, 0.0)
     forces[states == mechanics.ABSENT] = np.nan
     largest = np.nan_to_num(np.abs(forces)).max(axis=0)
-    told = (largest > EXACT * largest.max()) | (states == mechanics.BROKEN).any(axis=0)
+    told = (largest > EXACT * response.total_weight) | (states == mechanics.BROKEN).any(axis=0)
     chosen = [k for k in np.argsort(-largest, kind="stable").tolist() if told[k]][:MOST_CURVES]
     if not chosen:
         return None

@@ -21,9 +21,10 @@ from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.frame import Frame
 from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
-from blockvis.results.about import collapse_phase, governing_limit, least_reaction, loss_in
+from blockvis.results.about import collapse_phase, governing_limit, loss_in
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.results.swinging import SWING, swing_factors
+from blockvis.results.tables import initial_reaction
 from blockvis.runs.plan import planned
 from solver import mechanics
 
@@ -122,7 +123,7 @@ def _outcome(run: AnalysisRun, number: int, seconds: float | None) -> tuple[dict
 def _numbers(response: solver.Response) -> dict[str, Any]:
     """Give what the table says of how a run ended; settlements count from the start of the first phase."""
     before = [0.0, *np.cumsum([s.limit for s in response.settlements])]
-    path, collapse, assembly = response.path, response.collapse, response.assembly
+    path, collapse, assembly, governing = response.path, response.collapse, response.assembly, response.governing
     told = KINDS[response.analysis].capacity
     by_load, never_stood = told == response.measured, response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
     found: dict[str, Any] = {
@@ -132,16 +133,16 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
         "last_settlement": float(path[-1].settlement + before[path[-1].phase])
         if path and response.parameter.is_path
         else 0.0,
-        "initial_reaction": least_reaction(path[0]) if path else None,
+        "initial_reaction": initial_reaction(response),
         "collapse_reaction": None,
         "load_multiplier": None,
         "total_weight": response.total_weight,
     }
-    if path:
+    if governing is not None:
         joints = initial_joints(assembly)
         opening = opening_and_slip(assembly, joints, path[-1].pose)[:, 0]
         left = path[-1].fallen[joints.block_a] | path[-1].fallen[joints.block_b]
-        found |= {"last_reaction": float(path[-1].reaction), "largest_opening": float(opening[~left].max(initial=0.0))}
+        found |= {"last_reaction": float(governing.reaction), "largest_opening": float(opening[~left].max(initial=0.0))}
         weights = assembly.masses * assembly.free
         found["lost_share"] = float(weights[path[-1].fallen & ~path[-1].removed].sum() / weights.sum())
     if collapse is not None and path:
@@ -153,15 +154,12 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
         # It collapses before any settlement.
         found |= {"collapse_displacement": 0.0, "bracket_low": 0.0, "bracket_high": 0.0}
     if by_load:
-        # What a settlement or its own weight brings down carries no live load.
+        # What a settlement or its own weight brings down carries no live load, what has no result who knows which.
         limit = governing_limit(response) if collapse is None and not never_stood else None
         low, high = (0.0, 0.0) if limit is None else limit.bounds
-        known = limit is None or limit.status is not solver.LimitStatus.NOT_CONVERGED
-        found["load_multiplier"] = (0.0 if limit is None else limit.multiplier) if known else None
-        if np.isfinite(high):
-            found |= {"bracket_low": low, "bracket_high": high}
-        if response.governing is not None:
-            found["last_reaction"] = float(response.governing.reaction)
+        if never_stood or response.stop in (solver.Status.COLLAPSED, solver.Status.LIMIT_REACHED):
+            found["load_multiplier"] = 0.0 if limit is None else limit.multiplier
+            found |= {"bracket_low": low, "bracket_high": high} if np.isfinite(high) else {}
     elif response.control is not None and path:
         found["load_multiplier"] = float(path[0].load_multiplier)
     return found

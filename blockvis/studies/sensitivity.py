@@ -54,12 +54,13 @@ def capacity(table: pd.DataFrame) -> pd.Series:
 def outcome(table: pd.DataFrame) -> np.ndarray:
     """(n_rows,) array [m, rad or a number]: where a run collapsed, or how far one that did not was followed.
 
-    The latter is a lower bound: 0 where nothing is known, the largest multiplier of all where none brings it down. It
-    is nan of what was not built.
+    The latter is a lower bound: 0 where nothing is known, as of load multipliers, the largest of all where none brings
+    it down. It is nan of what was not built.
     """
     found = capacity(table).to_numpy(dtype=float)
     most = float(found[np.isfinite(found)].max(initial=0.0))
-    least = table["last_settlement"].fillna(0.0).where(table["status"] != NOT_BUILT).to_numpy(dtype=float)
+    followed = table["last_settlement"].where(table["unit"] != "", 0.0).fillna(0.0)
+    least = followed.where(table["status"] != NOT_BUILT).to_numpy(dtype=float)
     return np.where(np.isnan(found), least, np.minimum(found, most))
 
 

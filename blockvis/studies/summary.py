@@ -14,7 +14,7 @@ from blockvis.text import rounded_text
 from solver.mechanics import counted
 
 from .fragility import fragility_of
-from .sensitivity import capacity, first_order, independent_rows, swings, unit_of, without_collapse
+from .sensitivity import capacity, first_order, independent_rows, outcome, swings, unit_of, without_collapse
 from .study_file import Study
 from .study_folder import NO_RESULT, NOT_BUILT
 
@@ -57,7 +57,7 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     """Summarise a study by its table, for its summary.json; lengths in m, angles in rad."""
     curve = fragility_of(independent_rows(study, table))
     without_result = table[table["status"].isin(NO_RESULT)]
-    broken_off = without_result.loc[without_result["status"] != NOT_BUILT, "last_settlement"].fillna(0.0)
+    broken_off = outcome(without_result[without_result["status"] != NOT_BUILT])
     reached = {str(p): curve.quantile(p) for p in (0.05, 0.5, 0.95)}
     at_the_end = [float(of[-1]) if len(of) else 0.0 for of in (curve.probability, curve.at_most)]
     return {

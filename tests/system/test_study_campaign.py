@@ -77,11 +77,11 @@ def arches(tmp_path):
     return path
 
 
-def _made_here(study, folder, runs):
+def _made_here(study, folder, runs, seconds=None):
     """Some runs of a study, without any cluster."""
     records = StudyFolder(folder, study)
     for run in runs:
-        records.add([run_once(study.values, str(study.case_source), study.order(run), study.n_seeded)])
+        records.add([run_once(study.values, str(study.case_source), study.order(run), study.n_seeded, seconds)])
     records.close()
     return records
 
@@ -125,6 +125,23 @@ def test_where_no_load_brings_it_down_a_run_stands_beyond_all_others(tmp_path):
 
 
 @pytest.mark.slow
+def test_a_run_that_took_too_long_before_its_limit_load_carries_who_knows_what(tmp_path):
+    settling = {"direction": [1.0, 0.0], "increment": 0.1, "limit": 0.2}
+    case = PUSHED | {"settlement": settling}
+    given = {"study": {"case": case, "method": "grid"}, "parameters": {"material.friction_coefficient": [0.2, 0.4]}}
+    study = read_study(given)
+    table = _made_here(study, tmp_path, range(2), seconds=0.0).table()
+    assert table["status"].tolist() == ["interrupted"] * 2
+    # That at the start of the settlement is another one.
+    assert table["load_multiplier"].isna().all()
+    assert table["bracket_low"].isna().all()
+    assert fragility_of(table).probability.tolist() == [0.0]
+    # How far it settled is no multiplier.
+    table["last_settlement"] = 0.1
+    assert summary_of(study, table)["broken_off_at"] == [0.0, 0.0]
+
+
+@pytest.mark.slow
 def test_a_study_of_pushovers_tells_where_the_capacity_is_lost(tmp_path):
     pushed = PUSHED | {
         "analysis": {"kind": "pushover"},
@@ -135,6 +152,7 @@ def test_a_study_of_pushovers_tells_where_the_capacity_is_lost(tmp_path):
     # Its weight stands over its corner where its centroid has moved by half of its width.
     np.testing.assert_allclose(table["collapse_displacement"], 0.25, rtol=1e-2)
     np.testing.assert_allclose(table["load_multiplier"], 0.5, rtol=1e-3)
+    np.testing.assert_allclose(table["initial_reaction"], 0.5 * table["total_weight"], rtol=1e-3)
     assert table["unit"].tolist() == ["m", "m"]
 
 

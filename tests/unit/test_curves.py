@@ -303,3 +303,18 @@ def test_words_of_losses_stand_clear_of_those_of_the_collapse(tmp_path, monkeypa
     told = next(where for words, where in said.items() if words.startswith("collapse at"))
     assert place[1] == same[1] == told[0][1], "all stand below the curve"
     assert (alone, beside > 40.0) == (0.0, True)
+
+
+@pytest.mark.slow
+def test_words_of_a_loss_leave_the_curve_free_that_leads_there(tmp_path, monkeypatch):
+    """Half-way down from there to nothing they covered the last dot before it."""
+    stands, said = dropped_brick(0.05), {}
+    monkeypatch.setattr(
+        "blockvis.pictures.curves._word", lambda _, words, place, *__, **___: said.update({words: place})
+    )
+    lost = [increment.fallen.any() for increment in stands.increments]
+    measured = [0.0 if gone else 1.0 for gone in lost]
+    falling = tuple(replace(of, measured=size) for of, size in zip(stands.increments, measured, strict=True))
+    draw_curve(replace(stands, increments=falling), tmp_path / "curve.png")
+    assert lost[-1]
+    assert said["1 block lost"][1] < 0.5

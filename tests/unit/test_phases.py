@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import html
 import json
 import re
 from pathlib import Path
@@ -71,6 +72,26 @@ def test_what_changes_before_a_settlement_is_told_where_the_structure_falls_of_i
     page = report_of(response)
     assert "before settlement 2" in page
     assert "taken away, dead load changed" in page
+
+
+@pytest.mark.slow
+def test_many_changes_are_told_in_a_few_words_and_forces_of_rounding_have_no_curve(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    structure = beam_on_a_prop()
+    ties = [solver.Tie(f"t{k}", (0, 4), ((0.0, 0.5), (0.0, 1.1)), 1e5, phase=2) for k in range(6)]
+    gone = [taken_away(structure, 2, name, ties=tuple(tie.name for tie in ties)) for name in ("prop", "load")]
+    response = dataclasses.replace(structure, ties=ties).settle([DOWN] * 3, changes=gone)
+    page = html.unescape(report_of(response))
+    assert "'t0', 't1', 't2', 't3' and 2 more installed" in page
+    away = r"blocks 'prop', 'load' taken away, [\d.]+ k?N, 't0', 't1', 't2', 't3' and 2 more taken away"
+    assert re.search(away, page)
+    curve = []
+    for size in (1e-9, 1e-3):
+        carried = mechanics.TieForces(np.full(6, size * response.total_weight), states=np.full(6, mechanics.ELASTIC))
+        monkeypatch.setattr(solver.Increment, "ties", carried)
+        curve.append(blockvis.draw_curve(response, tmp_path / "curve.svg").read_text("utf-8"))
+    assert ["force of ties" in text for text in curve] == [False, True]
 
 
 def test_what_has_been_taken_away_stays_where_it_was() -> None:

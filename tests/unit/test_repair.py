@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from structures import drawn, rectangle
 
-from blockvis import inspect, read
+import blockvis
+from blockvis import generators, inspect, read
 
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
 
@@ -80,6 +81,21 @@ def test_a_plate_that_overlaps_would_fold_is_refused(tmp_path):
 
 
 def test_a_joint_thickness_that_closes_nothing_says_so(tmp_path):
-    path = drawn(tmp_path / "a.json", [rectangle(0.0, 0.0, 1.0, 1.0), rectangle(1.0, 0.0, 2.0, 1.0)])
-    with pytest.warns(UserWarning, match=r"no gaps of up to joint_thickness 0\.01 m .*: nothing was closed"):
-        read(path, joint_thickness=0.01)
+    # Another overlap than none: a millimetre that is cut away.
+    for number, over in enumerate((0.0, 1e-3)):
+        path = drawn(tmp_path / f"{number}.json", [rectangle(0.0, 0.0, 1.0 + over, 1.0), rectangle(1.0, 0.0, 2.0, 1.0)])
+        for closing in ("auto", "voronoi"):
+            with pytest.warns(UserWarning, match="nothing was closed|was cut away") as told:
+                read(path, joint_thickness=0.01, closing=closing)
+            assert str(told[-1].message).endswith(
+                "no gaps of up to joint_thickness 0.01 m lie between blocks: nothing was closed"
+            )
+    blockvis.save_layout(generators.barrel_vault(voussoirs=3, stones=1), tmp_path / "vault.json")
+    with pytest.warns(UserWarning, match="nothing was closed"):
+        read(tmp_path / "vault.json", joint_thickness=0.01)
+
+
+def test_mortar_that_is_asked_to_go_to_the_nearest_stone_goes_there_for_no_other_reason(tmp_path):
+    path = drawn(tmp_path / "a.json", [rectangle(0.0, 0.0, 1.0, 1.0), rectangle(1.01, 0.0, 2.0, 1.0)])
+    with pytest.warns(UserWarning, match=r"to the nearest stone; [\d.]+ corners a block"):
+        read(path, joint_thickness=0.02, closing="voronoi")

@@ -51,6 +51,7 @@ def test_a_loss_is_in_every_output_and_told_apart(tmp_path):
     page = report_of(response)
     assert "the structure stands without" in page
     assert "<td>limit reached, 1 block lost</td>" in page
+    assert "<td>motion that would follow</td><td>of supports alone</td>" in page
     assert re.search(
         r"<h1>Part has fallen: 1 block at a settlement of 0\.15\d+ m; the rest stands at the end</h1>", page
     )

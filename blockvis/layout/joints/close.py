@@ -173,7 +173,8 @@ def _to_nearest_stone(
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
     n_open = int((np.abs(found.gaps).max(axis=1) > CLOSED * scale).sum())
     closed = share_out(outlines, thickness, anchored, mortar)
-    return Closing(tuple(closed), n_open, 0, float(found.gaps.max(initial=0.0)), "voronoi")
+    largest = float(found.gaps.max(initial=0.0, where=found.gaps > CLOSED * scale))
+    return Closing(tuple(closed), n_open, 0, largest, "voronoi")
 
 
 def _between_faces(
@@ -199,7 +200,7 @@ def _between_faces(
         outlines=tuple(outlines[i] if anchored[i] else ring + origin for i, ring in enumerate(final)),
         n_joints=n_open,
         n_cut=len(uncommon),
-        largest_gap=float(found.gaps.max(initial=0.0)),
+        largest_gap=float(found.gaps.max(initial=0.0, where=found.gaps > closed)),
     )
 
 
