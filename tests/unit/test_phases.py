@@ -16,6 +16,8 @@ import blockvis
 import solver
 from blockvis.cli import main
 from blockvis.generators import build
+from blockvis.results.tables import removals
+from blockvis.results.ties import tie_courses, tie_texts
 from solver import mechanics
 
 DOWN = solver.Settlement([0.0, -1.0], increment=1e-3, limit=1e-3)
@@ -462,6 +464,23 @@ def run_told(folder: Path, case: str, capsys: pytest.CaptureFixture[str]) -> tup
     capsys.readouterr()
     assert main(["run", str(folder / "case.toml"), "-o", str(folder / "out"), "--no-check-steps"], outputs=()) == 0
     return capsys.readouterr().out, json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.slow
+def test_a_tie_without_which_a_structure_falls_is_told_as_taken_away() -> None:
+    """A beam overhangs and is tied down behind the edge; before a settlement that is not reached a wire goes."""
+    outlines = [rectangle(0.5, 0.0, 1.0, 1.0), rectangle(0.4, 1.0, 2.4, 1.4)]
+    assembly = solver.Assembly.from_outlines(outlines, names=["pier", "beam"], roles=["moving", "free"])
+    ends = (1, None), ((0.4, 1.2), (0.4, -1.0))
+    ties = [solver.Tie("hold", *ends, 1e6, prestress=12e3), solver.Tie("wire", *ends, 1e7, strength=100.0)]
+    up = solver.Settlement([0.0, 1.0], increment=5e-4, limit=1e-3)
+    changes = [solver.PhaseChange(1, ties=("hold",)), solver.PhaseChange(2, ties=("wire",))]
+    structure = solver.Structure(assembly, friction_coefficient=0.6, ties=ties)
+    response = structure.settle([up] * 3, changes=changes, controls=solver.Controls(falling_frames=0))
+    assert [(one["phase"], one["ties"]) for one in removals(response)] == [(2, ["hold"])]
+    told = [tie_texts(course, response) for course in tie_courses(response)]
+    assert told[0][1:] == ("13 kN tension at 0.001 m in phase 1", "taken away before settlement 2")
+    assert told[1][1:] == ("100 N tension at 0.0005 m in phase 1", "yields at 0.0005 m in phase 1 or before")
 
 
 @pytest.mark.slow
