@@ -467,7 +467,7 @@ def run_told(folder: Path, case: str, capsys: pytest.CaptureFixture[str]) -> tup
 
 
 @pytest.mark.slow
-def test_a_tie_without_which_a_structure_falls_is_told_as_taken_away() -> None:
+def test_a_tie_without_which_a_structure_falls_is_told_as_taken_away(tmp_path: Path) -> None:
     """A beam overhangs and is tied down behind the edge; before a settlement that is not reached a wire goes."""
     outlines = [rectangle(0.5, 0.0, 1.0, 1.0), rectangle(0.4, 1.0, 2.4, 1.4)]
     assembly = solver.Assembly.from_outlines(outlines, names=["pier", "beam"], roles=["moving", "free"])
@@ -481,6 +481,8 @@ def test_a_tie_without_which_a_structure_falls_is_told_as_taken_away() -> None:
     told = [tie_texts(course, response) for course in tie_courses(response)]
     assert told[0][1:] == ("13 kN tension at 0.001 m in phase 1", "taken away before settlement 2")
     assert told[1][1:] == ("100 N tension at 0.0005 m in phase 1", "yields at 0.0005 m in phase 1 or before")
+    curve = blockvis.draw_curve(response, tmp_path / "curve.svg")
+    assert "phase 2 from 1 mm: 'hold' taken away" in curve.read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
