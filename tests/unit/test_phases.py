@@ -16,8 +16,6 @@ import blockvis
 import solver
 from blockvis.cli import main
 from blockvis.generators import build
-from blockvis.results.tables import removals
-from blockvis.results.ties import tie_courses, tie_texts
 from solver import mechanics
 
 DOWN = solver.Settlement([0.0, -1.0], increment=1e-3, limit=1e-3)
@@ -477,10 +475,13 @@ def test_a_tie_without_which_a_structure_falls_is_told_as_taken_away(tmp_path: P
     changes = [solver.PhaseChange(1, ties=("hold",)), solver.PhaseChange(2, ties=("wire",))]
     structure = solver.Structure(assembly, friction_coefficient=0.6, ties=ties)
     response = structure.settle([up] * 3, changes=changes, controls=solver.Controls(falling_frames=0))
-    assert [(one["phase"], one["ties"]) for one in removals(response)] == [(2, ["hold"])]
-    told = [tie_texts(course, response) for course in tie_courses(response)]
-    assert told[0][1:] == ("13 kN tension at 0.001 m in phase 1", "taken away before settlement 2")
-    assert told[1][1:] == ("100 N tension at 0.0005 m in phase 1", "yields at 0.0005 m in phase 1 or before")
+    blockvis.write(response, tmp_path / "out")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert [(one["phase"], one["ties"]) for one in summary["removed"]] == [(2, ["hold"])]
+    page = blockvis.write_report(response, tmp_path / "report.html").read_text(encoding="utf-8")
+    held = "13 kN tension at 0.001 m in phase 1", "taken away before settlement 2"
+    for told in (*held, "100 N tension at 0.0005 m in phase 1", "yields at 0.0005 m in phase 1 or before"):
+        assert told in page
     curve = blockvis.draw_curve(response, tmp_path / "curve.svg")
     assert "phase 2 from 1 mm: 'hold' taken away" in curve.read_text(encoding="utf-8")
 
