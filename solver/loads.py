@@ -271,9 +271,7 @@ class Settlement:
                 raise ValueError(f"settlement profile_depth is {self.profile_depth:g}; it must be a positive number")
             largest = self.profile_depth
             object.__setattr__(self, "profile_depth", 1.0)
-        # What is scaled already, as when it is read from a summary, keeps its last digits.
-        largest = 1.0 if abs(largest - 1.0) < 1e-12 else largest
-        scaled = {name: tuple((motion / largest).tolist()) for name, motion in motions.items()}
+        scaled = {name: tuple((motion / _scale(largest)).tolist()) for name, motion in motions.items()}
         object.__setattr__(self, "profile", scaled)
         arms = {name: numbers_of(arm, f"profile_arms of '{name}'") for name, arm in (self.profile_arms or {}).items()}
         for name, arm in arms.items():
@@ -372,6 +370,11 @@ def check_steps(path: Any, what: str) -> None:
         raise ValueError(f"{what} tolerance is {path.tolerance:g}, {part}; give at least {1.1 * least:.2g}")
 
 
+def _scale(length: float) -> float:
+    """Give 1 for what is scaled already, as when it is read from a summary: it keeps its last digits."""
+    return 1.0 if abs(length - 1.0) < 1e-12 else length
+
+
 def set_vectors(owner: Any, what: str, counts: Mapping[str, tuple[int, ...]], units: Mapping[str, str]) -> None:
     """Make tuples of numbers of the vectors of a dataclass, by how many they may be, and unit vectors of directions."""
     for name, count in counts.items():
@@ -387,7 +390,7 @@ def set_vectors(owner: Any, what: str, counts: Mapping[str, tuple[int, ...]], un
             length = float(np.hypot(*vector)) if len(vector) == 2 else float(np.linalg.norm(vector))
             if length == 0.0:
                 raise ValueError(f"{what} {name} is {[0] * len(vector)}; give the {units[name]}")
-            vector = vector / length
+            vector = vector / _scale(length)
         object.__setattr__(owner, name, tuple(vector.tolist()))
 
 

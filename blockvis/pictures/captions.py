@@ -25,9 +25,6 @@ FAILED_BADGE = "SOLVER FAILED"
 #: without limit.
 MOST_OVER_LOWEST = 8.0
 
-#: What of a settlement is no motion but how far it goes, and in which steps.
-STEPS = ("increment", "limit", "tolerance", "stops")
-
 #: Drop of the reaction from that at rest, as a part of the largest, that is seen in a curve.
 NOTABLE = 0.05
 
@@ -63,11 +60,8 @@ def new_motions(response: solver.Response) -> list[int]:
 
     A multiplier is that of the live load, however supports move.
     """
-    # Not by a settlement made anew, whose direction would be divided by its length once more.
-    motions = [
-        {name: value for name, value in vars(settlement).items() if name not in STEPS}
-        for settlement in response.settlements * response.measured.is_force
-    ]
+    settlements = response.settlements * response.measured.is_force
+    motions = [replace(given, increment=1.0, limit=1.0, tolerance=None, stops=()) for given in settlements]
     phases = [increment.phase for increment in response.path]
     return [k for k in range(1, len(phases) if motions else 0) if motions[phases[k - 1]] != motions[phases[k]]]
 

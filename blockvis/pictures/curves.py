@@ -397,18 +397,20 @@ def _mark_phases(axes: Axes, response: solver.Response, letters: int) -> float:
 
     The list leaves the plot to the curve, of whose phases the shortest may be narrower than a word.
     """
-    path, lines = response.path, list[str]()
+    phases, lines = [increment.phase for increment in response.path], list[str]()
     (per_length, unit), others, height = parameter_unit(response), new_motions(response), 0.85 * TEXT
     total = response.parameters * per_length
     style: dict[str, Any] = {"va": "bottom", "fontsize": height, "color": GREY}
-    for k in range(1, len(path)):
-        if path[k].phase == path[k - 1].phase:
+    # What falls as a phase begins has no row in it.
+    phases += [collapse_phase(response) or phase for phase in phases[-1:]]
+    for k in range(1, len(phases)):
+        if phases[k] == phases[k - 1]:
             continue
         words = ["reaction along another motion"] * (k in others)
-        words += change_words(response, path[k].phase)
+        words += change_words(response, phases[k])
         axes.axvline(total[k - 1], color=GREY, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1)
-        _word(axes, str(path[k].phase + 1), (total[k - 1], 1.0), (0, 2), AT, ha="center", **style)
-        where = f"phase {path[k].phase + 1} from {total[k - 1]:.4g} {unit}"
+        _word(axes, str(phases[k] + 1), (total[k - 1], 1.0), (0, 2), AT, ha="center", **style)
+        where = f"phase {phases[k] + 1} from {total[k - 1]:.4g} {unit}"
         lines += wrap(f"{where}: {', '.join(words)}" if words else where, letters, subsequent_indent="    ")
     if not lines:
         return 0.0

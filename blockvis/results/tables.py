@@ -103,10 +103,11 @@ def finite(value: float) -> float | None:
 
 
 def removals(response: solver.Response) -> list[dict[str, Any]]:
-    """Blocks and ties that are taken away before each settlement, its number from 1, and the blocks' weight."""
+    """Blocks and ties that were taken away before each settlement, its number from 1, and the blocks' weight."""
     names, weights = response.assembly.names, response.assembly.masses * solver.GRAVITY
     there, removed, ties = np.ones(len(names), dtype=bool), list[dict[str, Any]](), list(response.ties)
-    for change in sorted(response.changes, key=lambda change: change.phase):
+    made = (change for change in response.changes if change.phase <= _last_phase(response))
+    for change in sorted(made, key=lambda change: change.phase):
         taken = np.flatnonzero(there & (False if change.removed is None else change.removed))
         there[taken] = False
         gone = [tie for tie in ties if tie.name in change.ties or set(tie.blocks) & set(taken.tolist())]
@@ -121,6 +122,11 @@ def removals(response: solver.Response) -> list[dict[str, Any]]:
                 }
             )
     return removed
+
+
+def _last_phase(response: solver.Response) -> int:
+    """Find the number, from 0, of the last settlement that a path comes to."""
+    return max([collapse_phase(response) or 0, *(i.phase for i in response.path[-1:])])
 
 
 def change_words(response: solver.Response, phase: int) -> list[str]:
@@ -141,8 +147,7 @@ def _quoted(names: Sequence[str]) -> str:
 
 def changes_told(response: solver.Response) -> list[tuple[str, str]]:
     """Say before which settlement what changes, of those that the path comes to."""
-    last = max([collapse_phase(response) or 0, *(i.phase for i in response.path[-1:])])
-    told = ((phase, ", ".join(change_words(response, phase))) for phase in range(last + 1))
+    told = ((phase, ", ".join(change_words(response, phase))) for phase in range(_last_phase(response) + 1))
     return [(f"before settlement {phase + 1}", words) for phase, words in told if words]
 
 

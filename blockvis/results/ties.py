@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from solver import mechanics
 
 from .about import EXACT, certified, unit_and_phase
 from .npz import packed, read_stored
-from .tables import place_in_table
+from .tables import place_in_table, removals
 
 #: File of the ties of a results folder, which is there where it has any.
 TIES = "ties.npz"
@@ -131,10 +132,12 @@ def _after(
     if state == mechanics.BROKEN and before.breaks_at is None:
         # It has carried its strength since the last increment.
         force = -tie.strength if tie.kind == mechanics.PROP else tie.strength
+    elif state == mechanics.YIELDING:
+        # Forces of an equilibrium may be a little below it.
+        force = math.copysign(tie.strength, force)
     elif abs(force) < least:
         force = 0.0
     found: dict[str, Any] = {}
-    # A tie that yields has carried the same, up to rounding, since it began to.
     if larger := abs(force) - abs(before.largest_force) > least:
         found["largest_force"] = float(force)
     begins = before.last_state == STATE_WORDS[mechanics.ABSENT] and state != mechanics.ABSENT
@@ -216,7 +219,10 @@ def tie_texts(course: TieCourse, response: solver.Response) -> tuple[str, str, s
         fate.insert(0, f"the blocks leave {left} of its prestress of {force_text(prestress)}")
     # What yields and breaks was told.
     said = {"yielding": course.yields_at, "broken": course.breaks_at}.get(course.last_state)
-    if said is None:
+    # What falls as soon as it is taken away carried it at the last equilibrium.
+    if taken := [one["phase"] for one in removals(response) if course.name in one["ties"]]:
+        fate.append(f"taken away before settlement {taken[0]}")
+    elif said is None:
         fate.append(
             f"{course.last_state} at the end, {force_text(abs(course.last_force))}"
             if course.last_force

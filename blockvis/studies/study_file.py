@@ -223,7 +223,7 @@ def _check(study: Study, where: str) -> None:
     drawn = next((p for p in study.parameters if p.points and study.method != "grid"), None)
     if drawn is not None:
         raise ValueError(f'{where}[parameters] "{drawn.path}": points belong to a grid; give [study] runs')
-    _check_paths(study, where)
+    _check_paths(study, where, 0)
     _check_runs(study, where)
 
 
@@ -239,16 +239,18 @@ def _check_grid(study: Study, where: str) -> None:
         raise ValueError(f"{where}[study] repeats is {study.repeats}, but without [[imperfections]] they are all alike")
 
 
-def _check_paths(study: Study, where: str) -> None:
-    """Put each parameter alone into the base case, so that a message names the wrong path, not a run."""
-    first = study.order(0)
+def _check_paths(study: Study, where: str, run: int) -> None:
+    """Put each parameter of a run alone into the base case, so that a message names the wrong path, not the run."""
+    order = study.order(run)
     for p in study.parameters:
         for path in (p.path, *p.also):
-            alone = {**first, "paths": {path: first["paths"][path]}}
+            alone = {**order, "paths": {path: order["paths"][path]}}
             try:
                 case_of(run_values(study.values, alone, study.n_seeded), study.case_source)
             except ValueError as error:
-                raise ValueError(f'{where}[parameters] "{path}": {error}') from None
+                limit = "" if p.distribution is None else "lower" if order["paths"][path] < p.value(0.5) else "upper"
+                remedy = f": its distribution goes beyond, limit it by {limit}" if limit else ""
+                raise ValueError(f'{where}[parameters] "{path}": {error}{remedy}') from None
 
 
 def _spread(study: Study, most: int) -> list[int]:
@@ -274,6 +276,7 @@ def _check_runs(study: Study, where: str) -> None:
         try:
             case = case_of(study.values_of(run), study.case_source)
         except ValueError as error:
+            _check_paths(study, where, run)
             raise ValueError(f"{where}{shown} is no case: {error}") from None
         capacity = KINDS[case.analysis].capacity
         units = [driver.unit for driver in KINDS[case.analysis].course(case).drivers] if capacity.unit else [""]

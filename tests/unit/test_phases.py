@@ -486,6 +486,28 @@ def run_told(folder: Path, case: str, capsys: pytest.CaptureFixture[str]) -> tup
 
 
 @pytest.mark.slow
+def test_a_tie_without_which_a_structure_falls_is_told_as_taken_away(tmp_path: Path) -> None:
+    """A beam overhangs and is tied down behind the edge; before a settlement that is not reached a wire goes."""
+    outlines = [rectangle(0.5, 0.0, 1.0, 1.0), rectangle(0.4, 1.0, 2.4, 1.4)]
+    assembly = solver.Assembly.from_outlines(outlines, names=["pier", "beam"], roles=["moving", "free"])
+    ends = (1, None), ((0.4, 1.2), (0.4, -1.0))
+    ties = [solver.Tie("hold", *ends, 1e6, prestress=12e3), solver.Tie("wire", *ends, 1e7, strength=100.0)]
+    up = solver.Settlement([0.0, 1.0], increment=5e-4, limit=1e-3)
+    changes = [solver.PhaseChange(1, ties=("hold",)), solver.PhaseChange(2, ties=("wire",))]
+    structure = solver.Structure(assembly, friction_coefficient=0.6, ties=ties)
+    response = structure.settle([up] * 3, changes=changes, controls=solver.Controls(falling_frames=0))
+    blockvis.write(response, tmp_path / "out")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert [(one["phase"], one["ties"]) for one in summary["removed"]] == [(2, ["hold"])]
+    page = blockvis.write_report(response, tmp_path / "report.html").read_text(encoding="utf-8")
+    held = "13 kN tension at 0.001 m in phase 1", "taken away before settlement 2"
+    for told in (*held, "100 N tension at 0.0005 m in phase 1", "yields at 0.0005 m in phase 1 or before"):
+        assert told in page
+    curve = blockvis.draw_curve(response, tmp_path / "curve.svg")
+    assert "phase 2 from 1 mm: 'hold' taken away" in curve.read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
 def test_a_tie_that_is_named_twice_is_taken_away_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     iron = '[[ties]]\nname = "iron"\nfrom = { block = "left springer", point = [-1, 0] }\n'
     iron += 'to = { block = "right springer", point = [1, 0] }\nstiffness = 1e5\n'

@@ -1,5 +1,6 @@
 """The increment loop: how it starts, what it follows, how it ends, and how its results prove themselves."""
 
+from dataclasses import replace
 from functools import cache
 from itertools import combinations, pairwise
 
@@ -282,6 +283,12 @@ def test_a_speck_that_tumbles_between_large_stones_makes_no_step_short():
     # Rounding decides where it comes to lie between the lintels.
     assert with_it.reaction[-1] == pytest.approx(without.reaction[-1], rel=0.02)
     assert sum(increment.programs for increment in with_it.increments) < 1500, "13,012 by its rotation times their size"
+
+
+def test_a_settlement_made_anew_keeps_its_last_digits():
+    for direction, axis in np.random.default_rng(0).normal(size=(20, 2, 3)):
+        settlement = solver.Settlement(direction, rotation_centre=(0, 0, 0), rotation=0.3, rotation_axis=axis)
+        assert replace(settlement) == settlement
 
 
 def test_rotation_about_a_point_moves_the_support_on_the_arc():

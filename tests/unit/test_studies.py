@@ -207,7 +207,12 @@ BAD = [
     ("material.friction_coefficient", "material friction", ("is not a path",)),
     ("lower = 0.4", "lower = 0.9", ("lower is 0.9 and upper is 0.8",)),
     ('"uniform"', '"unifrom"', ("did you mean 'uniform'",)),
-    ("lower = 0.4", "lower = -0.2", ("run ", "is no case", "friction_coefficient is -", "at least 0")),
+    ("lower = 0.4", "lower = -0.2", ("friction_coefficient is -", "at least 0: its distribution", "limit it by lower")),
+    (
+        '"uniform", lower = 0.4, upper = 0.8',
+        '"normal", mean = 0.2, deviation = 0.2',
+        ('[parameters] "material.friction_coefficient": ', "friction_coefficient is -", "limit it by lower"),
+    ),
     ('"latin hypercube"', '"latin cube"', ("did you mean 'latin hypercube'",)),
     ("runs = 8", "runs = 0", ("runs is 0", "at least 1")),
     ("runs = 8", "rums = 8", ("did you mean 'runs'",)),
