@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from .broad_phase import expand_ranges
+from .solids import unit
 
 #: Faces that cover each other on a strip may touch if its gap is at most this part of its width; others slide past.
 STEEPEST_LANDING = 0.25
@@ -55,6 +56,14 @@ class Contacts:
     def pair_keys(self) -> np.ndarray:
         """(n,) int array: a number for each pair of blocks, that of the lower one first."""
         return np.minimum(self.block_a, self.block_b).astype(np.int64) << 32 | np.maximum(self.block_a, self.block_b)
+
+
+def frames_of(normals: np.ndarray) -> np.ndarray:
+    """(n, d, d) array: frames with these unit normals (n, d); in space the tangents are any two."""
+    if normals.shape[1] == 2:
+        return np.stack([normals, np.stack([-normals[:, 1], normals[:, 0]], axis=1)], axis=1)
+    first = unit(np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)]))
+    return np.stack([normals, first, np.cross(normals, first)], axis=1)
 
 
 def joined_contacts(groups: Sequence[Contacts]) -> Contacts:

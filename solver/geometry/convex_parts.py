@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from solver.tolerances import CORNER_TOLERANCE, DRAWN_GAP
 from solver.words import Kept, kept
 
+from .contacts import frames_of
 from .flat_faces import ONE_WAY, merged_faces
 from .portions import alike
 from .solids import Faces, Solids, cross, dot, unit
@@ -243,8 +244,7 @@ class _Piece:
     def separated(self, normal: np.ndarray, origin: np.ndarray) -> list[_Piece]:
         """Cut along a plane, and tell apart the bodies in which that leaves the piece."""
         # Corners in the plane are so to the last digit; cuts run beside it, or faces there would stay with both sides.
-        first = unit(np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())]))
-        frame = np.stack([normal, first, np.cross(normal, first)])
+        frame = frames_of(normal[None])[0]
         level = (self.points - origin) @ frame.T
         level[np.abs(level[:, 0]) <= ON_PLANE, 0] = 0.0
         body, found, cut = _body(level, self.triangles), [], int(self.face.max()) + 1
@@ -303,9 +303,8 @@ def _whole(points: np.ndarray, faces: list[list[int]], normals: np.ndarray) -> _
     from manifold3d import triangulate
 
     triangles, face = [], []
-    for k, (loop, normal) in enumerate(zip(faces, normals, strict=True)):
-        first = unit(np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())]))
-        flat = points[loop] @ np.stack([first, np.cross(normal, first)], axis=1)
+    for k, (loop, frame) in enumerate(zip(faces, frames_of(normals), strict=True)):
+        flat = points[loop] @ frame[1:].T
         # The fast way through convex outlines leaves triangles without an area, which manifold3d clears with corners.
         triangles.append(np.array(loop)[triangulate([flat], allow_convex=False)])
         face.append(np.full(len(triangles[-1]), k))
