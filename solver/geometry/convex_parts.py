@@ -18,7 +18,7 @@ from solver.words import Kept, kept
 from .contacts import frames_of
 from .flat_faces import ONE_WAY, merged_faces
 from .portions import alike
-from .solids import Faces, Solids, cross, dot, unit
+from .solids import ROUNDING, Faces, Solids, cross, dot, unit
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -43,9 +43,6 @@ BESIDE_PLANE = 1e-13
 
 #: How much an edge that a cut runs through, and makes a corner of, outweighs of the edges along which it runs.
 THROUGH_EDGE = 1e-3
-
-#: Difference of volumes, as a fraction of them, up to which they are equal: corners of hulls are welded at 1e-7.
-SAME_VOLUME = 1e-6
 
 #: A part with less than this fraction of the cube over the diagonal of its block is what rounding has left at a cut.
 SMALLEST_PART = 1e-10
@@ -457,7 +454,7 @@ def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray
             third = np.roll(level, 1, axis=1).ravel()
             split = convex & (np.maximum(np.abs(level), np.abs(beyond)) <= ON_PLANE)
             along -= widths[split & (third * third[piece.twins] < -(ON_PLANE**2)).reshape(-1, 3)].sum() / 4.0
-            equal = abs(size - smallest) <= SAME_VOLUME * smallest
+            equal = abs(size - smallest) <= ROUNDING * smallest
             if size < np.inf and (along > most + ON_PLANE if equal else size < smallest):
                 best, smallest, most = (normal, edge[0]), size, along
     return best
