@@ -51,7 +51,7 @@ from solver.kinematics import Pose, motion_size, moved, moved_vertices, put_toge
 from solver.loads import Loads, Settlement
 from solver.path.controls import Ending
 from solver.path.drivers import SupportMotion
-from solver.path.reports import no_equilibrium
+from solver.path.reports import no_equilibrium, wedged
 from solver.path.state import PathState, Place
 from solver.program.model import Model
 from solver.programs.problem import LinearProgram, SolveError, Unbounded
@@ -60,7 +60,6 @@ from solver.results.certificate import Certificate, carrying_gap, friction_exces
 from solver.results.increment import Increment, State, Status, carries, used_up
 from solver.results.mechanism import mechanism_of, with_motion
 from solver.results.response import Collapse
-from solver.words import counted
 
 #: Programs that close the joints after a step.
 LINEARISATIONS = 10
@@ -135,10 +134,7 @@ def solve_program(
         solution = solve_lp(program)
     except Unbounded as ray:
         carrying = carries((rays @ ray.x[:n]).reshape(-1, 2), tolerances.CARRYING_FRACTION)
-        blocks = np.unique(np.concatenate([contacts.block_a[carrying], contacts.block_b[carrying]]))
-        blocks = blocks[free[blocks]]
-        wedged = counted(len(blocks), "block is", "blocks are")
-        raise SupportsLocked(f"the supports cannot move on: {wedged} wedged ({assembly.listed(blocks, 4)})") from None
+        raise SupportsLocked(wedged(assembly, contacts[carrying])) from None
     forces = rays @ solution.x[:n]
     resultant = (wrench @ forces).reshape(-1, 3)
     displacements = np.zeros_like(supports)

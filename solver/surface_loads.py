@@ -86,9 +86,9 @@ def surface_forces(
     push, pressure = push / size, plain(pressure, "float", "pressure")
     across = np.array([-push[1], push[0]])
     chosen = assembly.free if blocks is None else chosen_blocks(assembly, blocks)
-    strips, depth, block = _first_met(assembly, push, across, removed)
-    centre = (strips[:-1] + strips[1:]) / 2.0
-    loaded = (block >= 0) & chosen[block]
+    strips, depth, edge = _first_met(assembly, push, across, removed)
+    centre, block = (strips[:-1] + strips[1:]) / 2.0, assembly.block_of_vertex[edge]
+    loaded = (edge >= 0) & chosen[block]
     points, owner = centre[loaded, None] * across + depth[loaded, None] * push, block[loaded]
     forces = (pressure * np.diff(strips)[loaded] * assembly.thickness[owner])[:, None] * push
     return PointForces(owner, forces, points)
@@ -119,22 +119,18 @@ def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.
 def force_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.0)) -> PointForces:
     """Put a force on the topmost surface at a place, which goes with its block; as :func:`load_on_top`."""
     x = plain(x, "float", "x")
-    strips, _, block = _first_met(assembly, np.array([0.0, -1.0]), np.array([1.0, 0.0]))
-    k = int(np.clip(np.searchsorted(strips, x) - 1, 0, len(block) - 1))
-    if not strips[0] <= x <= strips[-1] or block[k] < 0:
+    strips, _, edges = _first_met(assembly, np.array([0.0, -1.0]), np.array([1.0, 0.0]))
+    edge = int(edges[np.clip(np.searchsorted(strips, x) - 1, 0, len(edges) - 1)])
+    if not strips[0] <= x <= strips[-1] or edge < 0:
         raise ValueError(
             f"nothing is below a load at x = {x:g} m; the structure reaches from {strips[0]:g} to {strips[-1]:g} m"
         )
-    owner = int(block[k])
+    owner = int(assembly.block_of_vertex[edge])
     if not assembly.free[owner]:
         raise ValueError(f"the load at x = {x:g} m stands on the support '{assembly.names[owner]}'")
-    ring = assembly.outline(owner)
-    following = np.roll(ring, -1, axis=0)
-    low, high = np.minimum(ring[:, 0], following[:, 0]), np.maximum(ring[:, 0], following[:, 0])
-    edges = np.flatnonzero((low <= x) & (x <= high) & (high > low))
-    part = (x - ring[edges, 0]) / (following[edges, 0] - ring[edges, 0])
-    top = float((ring[edges, 1] + part * (following[edges, 1] - ring[edges, 1])).max())
-    return PointForces.at(owner, force, (x, top))
+    start, stop = assembly.vertices[[edge, assembly.next_vertex[edge]]]
+    top = start[1] + (x - start[0]) / (stop[0] - start[0]) * (stop[1] - start[1])
+    return PointForces.at(owner, force, (x, float(top)))
 
 
 def _first_met(
@@ -143,7 +139,7 @@ def _first_met(
     """Divide the structure into strips along a direction, between all corners, and find what each meets first.
 
     Gives the ends of the strips, (n + 1,) [m] across, the depth in the middle of each, infinite where there is no
-    block, and the number of the block, -1 where there is none.
+    block, and the edge there, by the vertex it starts at, -1 where there is none.
     """
     start, stop = assembly.vertices, assembly.vertices[assembly.next_vertex]
     a, b = start @ across, stop @ across
@@ -152,7 +148,7 @@ def _first_met(
     strips = strips[np.append(True, np.diff(strips) > 1e-12 * (strips[-1] - strips[0]))]
     centre = (strips[:-1] + strips[1:]) / 2.0
     low, high = np.minimum(a, b), np.maximum(a, b)
-    depth, block = np.full(len(centre), np.inf), np.full(len(centre), -1)
+    depth, met = np.full(len(centre), np.inf), np.full(len(centre), -1)
     first, last = np.searchsorted(centre, low), np.searchsorted(centre, high)
     there = True if removed is None else ~removed[assembly.block_of_vertex]
     for edge in np.flatnonzero((last > first) & there).tolist():
@@ -161,5 +157,5 @@ def _first_met(
         at = start[edge] @ push + part * float((stop[edge] - start[edge]) @ push)
         nearer = at < depth[under]
         depth[under] = np.where(nearer, at, depth[under])
-        block[under] = np.where(nearer, assembly.block_of_vertex[edge], block[under])
-    return strips, depth, block
+        met[under] = np.where(nearer, edge, met[under])
+    return strips, depth, met

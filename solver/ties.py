@@ -10,7 +10,7 @@ import numpy as np
 from solver.words import counted, make_plain, numbers_of
 
 from .assembly import Assembly
-from .geometry.contacts import Contacts
+from .geometry.contacts import Contacts, frames_of
 from .kinematics import Pose, carried
 from .tolerances import SMALLEST_FORCE
 
@@ -190,7 +190,7 @@ def member_contacts(
         block_a=blocks[:, 0],
         block_b=blocks[:, 1],
         points=ends[:, 0],
-        frames=_frames(along),
+        frames=frames_of(along),
         gaps=-sense * (length - rest[number]),
         slip=np.zeros((len(features), assembly.dimension - 1)),
         areas=np.zeros(len(features)),
@@ -233,13 +233,3 @@ def member_states(size: np.ndarray, strength: np.ndarray, largest: float) -> np.
 def _blocks(ties: Sequence[Tie]) -> np.ndarray:
     """(n_ties, 2) int array: blocks of the ends, -1 for the ground."""
     return np.array([[-1 if b is None else b for b in tie.blocks] for tie in ties], dtype=np.int64).reshape(-1, 2)
-
-
-def _frames(normals: np.ndarray) -> np.ndarray:
-    """(n, d, d) array: frames of contact points with these normals."""
-    if normals.shape[1] == 2:
-        return np.stack([normals, np.stack([-normals[:, 1], normals[:, 0]], axis=1)], axis=1)
-    other = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    first = np.cross(normals, other)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([normals, first, np.cross(normals, first)], axis=1)

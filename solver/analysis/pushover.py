@@ -19,7 +19,7 @@ from solver.path.path import Path
 from solver.path.state import PathState
 from solver.results.increment import Bonds
 from solver.ties import Tie, TieForces, check_ties
-from solver.words import checked, counted
+from solver.words import checked
 
 from .increments import Increments
 from .limit_load import checked_live, remaining
@@ -63,11 +63,8 @@ def pushover_increments(
     if not left.free[assembly.index(control.block)]:
         what = "has left the structure" if assembly.free[assembly.index(control.block)] else "is a support"
         raise ValueError(f"control block '{control.block}' {what}; name a free block")
-    if resume is not None and len(resume.place.pose.rotations) != assembly.n_blocks:
-        raise ValueError(
-            f"the checkpoint has {counted(len(resume.place.pose.rotations), 'block')}, the assembly "
-            f"{assembly.n_blocks}: it belongs to another run"
-        )
+    if resume is not None:
+        resume.refuse_other(assembly.n_blocks, 1)
     check_ties(ties, assembly, 0 if ties_at is None else np.inf)
     origin = at_origin(assembly)
     near, loads, ties = without_origin(origin, assembly, loads, ties)

@@ -22,7 +22,7 @@ from solver.phases import PhaseChange, loads_in, removed_before
 from solver.program.model import Model, mean_load
 from solver.results.increment import Increment, Status
 from solver.ties import Tie, check_ties
-from solver.words import checked, counted
+from solver.words import checked
 
 from .increments import Increments
 
@@ -59,12 +59,8 @@ def settlement_increments(
     if by_program:
         _refuse_by_program(assembly, interfaces, loads, ties, changes)
     check_ties(ties, assembly, len(phases))
-    if resume is not None and (resume.phase >= len(phases) or len(resume.start.rotations) != assembly.n_blocks):
-        raise ValueError(
-            f"the checkpoint is of phase {resume.phase + 1} with {counted(len(resume.start.rotations), 'block')}; "
-            f"there are {counted(len(phases), 'phase')} and {counted(assembly.n_blocks, 'block')}: "
-            "it belongs to another run"
-        )
+    if resume is not None:
+        resume.refuse_other(assembly.n_blocks, len(phases))
     origin = at_origin(assembly)
     near, loads, near_ties = without_origin(origin, assembly, loads, ties)
     local = tuple(nearer(phase, origin) for phase in phases) if origin.any() else tuple(phases)

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .cones import ITERATIONS, Scaling, longest_step, product, quotient
+from .cones import CONVERGED, ITERATIONS, Scaling, longest_step, product, quotient
 from .factors import NotSolved
 from .stiffness import ContactRows
 
-#: Force out of balance, and mean product of forces and multipliers, in block weights, at which it has converged.
-BALANCED, CONVERGED = 1e-11, 1e-12
+#: Force out of balance, in block weights, at which it has converged.
+BALANCED = 1e-11
 
 #: Force out of balance, in block weights, that is accepted of an iterate that no further one improves: the programs of
 #: bounds leave as much, and where one multiplier is in equilibrium the force that makes it the largest.

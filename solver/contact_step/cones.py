@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-#: Iterations of the interior methods.
-ITERATIONS = 60
+#: Iterations of the interior methods; mean product of forces, in block weights, and distances at which they have
+#: converged: small beside the compliance, which decides forces that equilibrium leaves open.
+ITERATIONS, CONVERGED = 60, 1e-12
 
 
 def inner(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -17,13 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .cones import ITERATIONS, Scaling, inner, longest_step, product, quotient
+from .cones import CONVERGED, ITERATIONS, Scaling, inner, longest_step, product, quotient
 from .problem import ContactProblem, NotSolved, StepSolution
 
-#: Mean product, small beside the compliance, which decides forces that equilibrium leaves open, however far the blocks
-#: move; residual of the geometry, as a part of the movement; and force out of balance, in block weights, at which the
-#: method has converged. The last is accepted of each, of the first as a part of the movement, where it goes no further.
-CONVERGED, FITS, BALANCED, ACCEPTED = 1e-12, 1e-8, 1e-9, 1e-6
+#: Residual of the geometry, as a part of the movement, and force out of balance, in block weights, at which the method
+#: has converged. The last is accepted of each, and of the mean product over the movement, where it goes no further.
+FITS, BALANCED, ACCEPTED = 1e-8, 1e-9, 1e-6
 
 
 class _Point(NamedTuple):

@@ -9,9 +9,9 @@ import numpy as np
 from solver.tolerances import CORNER_TOLERANCE
 
 from .convex_parts import A_LITTLE, ENDS, GOES_ON, PlacedParts
+from .facing import SMALLEST_SINE
 from .outlines import next_vertices
 from .portions import alike
-from .separations import SMALLEST_SINE
 from .solids import cross, dot, unit
 from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of
 

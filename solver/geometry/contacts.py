@@ -9,16 +9,14 @@ from typing import Protocol
 import numpy as np
 
 from .broad_phase import expand_ranges
+from .solids import ROUNDING, unit
 
 #: Faces that cover each other on a strip may touch if its gap is at most this part of its width; others slide past.
 STEEPEST_LANDING = 0.25
 
 #: Distance, in block sizes, up to which a point takes over from one that has vanished, twice the longest step, and for
-#: which a normal turned by 1 counts beside it; and difference of distances up to which points are equally near.
-FAR_SUCCESSOR, SAME_PLACE = 0.1, 1e-6
-
-#: Cosine from which on two normals are the same.
-SAME_NORMAL = 1.0 - 1e-6
+#: which a normal turned by 1 counts beside it.
+FAR_SUCCESSOR = 0.1
 
 
 @dataclass(frozen=True)
@@ -57,6 +55,14 @@ class Contacts:
         return np.minimum(self.block_a, self.block_b).astype(np.int64) << 32 | np.maximum(self.block_a, self.block_b)
 
 
+def frames_of(normals: np.ndarray) -> np.ndarray:
+    """(n, d, d) array: frames with these unit normals (n, d); in space the tangents are any two."""
+    if normals.shape[1] == 2:
+        return np.stack([normals, np.stack([-normals[:, 1], normals[:, 0]], axis=1)], axis=1)
+    first = unit(np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)]))
+    return np.stack([normals, first, np.cross(normals, first)], axis=1)
+
+
 def joined_contacts(groups: Sequence[Contacts]) -> Contacts:
     """Put groups of contact points, at least one, into one."""
     return Contacts(*(np.concatenate([getattr(g, field.name) for g in groups]) for field in fields(Contacts)))
@@ -86,7 +92,7 @@ def are_known(contacts: Contacts, known: Contacts) -> np.ndarray:
     """(n,) bool array: whether contact points are among those known, by their names and normals."""
     number, same = matched_contacts(contacts, known)
     k = np.flatnonzero(same)
-    same[k] = np.einsum("ni,ni->n", contacts.frames[k, 0], known.frames[number[k], 0]) > SAME_NORMAL
+    same[k] = np.einsum("ni,ni->n", contacts.frames[k, 0], known.frames[number[k], 0]) > 1.0 - ROUNDING
     return same
 
 
@@ -110,6 +116,6 @@ def successors(
     near, least = apart < FAR_SUCCESSOR * size, np.full(len(vanished), np.inf)
     measure = apart + FAR_SUCCESSOR * size * turned
     np.minimum.at(least, row[near], measure[near])
-    chosen = (measure <= least[row] + SAME_PLACE * size) & near
+    chosen = (measure <= least[row] + ROUNDING * size) & near
     row = row[chosen]
     return vanished[row], successor[chosen], 1.0 / np.bincount(row)[row]

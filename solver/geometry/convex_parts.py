@@ -15,9 +15,10 @@ from scipy.sparse.csgraph import connected_components
 from solver.tolerances import CORNER_TOLERANCE, DRAWN_GAP
 from solver.words import Kept, kept
 
+from .contacts import frames_of
 from .flat_faces import ONE_WAY, merged_faces
 from .portions import alike
-from .solids import Faces, Solids, cross, dot, unit
+from .solids import ROUNDING, Faces, Solids, cross, dot, unit
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -42,9 +43,6 @@ BESIDE_PLANE = 1e-13
 
 #: How much an edge that a cut runs through, and makes a corner of, outweighs of the edges along which it runs.
 THROUGH_EDGE = 1e-3
-
-#: Difference of volumes, as a fraction of them, up to which they are equal: corners of hulls are welded at 1e-7.
-SAME_VOLUME = 1e-6
 
 #: A part with less than this fraction of the cube over the diagonal of its block is what rounding has left at a cut.
 SMALLEST_PART = 1e-10
@@ -243,8 +241,7 @@ class _Piece:
     def separated(self, normal: np.ndarray, origin: np.ndarray) -> list[_Piece]:
         """Cut along a plane, and tell apart the bodies in which that leaves the piece."""
         # Corners in the plane are so to the last digit; cuts run beside it, or faces there would stay with both sides.
-        first = unit(np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())]))
-        frame = np.stack([normal, first, np.cross(normal, first)])
+        frame = frames_of(normal[None])[0]
         level = (self.points - origin) @ frame.T
         level[np.abs(level[:, 0]) <= ON_PLANE, 0] = 0.0
         body, found, cut = _body(level, self.triangles), [], int(self.face.max()) + 1
@@ -303,9 +300,8 @@ def _whole(points: np.ndarray, faces: list[list[int]], normals: np.ndarray) -> _
     from manifold3d import triangulate
 
     triangles, face = [], []
-    for k, (loop, normal) in enumerate(zip(faces, normals, strict=True)):
-        first = unit(np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())]))
-        flat = points[loop] @ np.stack([first, np.cross(normal, first)], axis=1)
+    for k, (loop, frame) in enumerate(zip(faces, frames_of(normals), strict=True)):
+        flat = points[loop] @ frame[1:].T
         # The fast way through convex outlines leaves triangles without an area, which manifold3d clears with corners.
         triangles.append(np.array(loop)[triangulate([flat], allow_convex=False)])
         face.append(np.full(len(triangles[-1]), k))
@@ -458,7 +454,7 @@ def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray
             third = np.roll(level, 1, axis=1).ravel()
             split = convex & (np.maximum(np.abs(level), np.abs(beyond)) <= ON_PLANE)
             along -= widths[split & (third * third[piece.twins] < -(ON_PLANE**2)).reshape(-1, 3)].sum() / 4.0
-            equal = abs(size - smallest) <= SAME_VOLUME * smallest
+            equal = abs(size - smallest) <= ROUNDING * smallest
             if size < np.inf and (along > most + ON_PLANE if equal else size < smallest):
                 best, smallest, most = (normal, edge[0]), size, along
     return best

@@ -9,16 +9,10 @@ import numpy as np
 from .broad_phase import expand_ranges
 from .convex_parts import PlacedParts
 from .portions import alike
-from .solids import cross, dot, unit
+from .solids import ROUNDING, cross, dot, unit
 
 #: How much an overlap before the movement, along an axis, counts against one after it.
 BEFORE = 10.0
-
-#: Edges nearer to parallel than this sine have no common normal, by rounding.
-PARALLEL = 1e-6
-
-#: An edge is foremost along a normal where no corner is farther by more than this part of its length.
-FOREMOST = 1e-6
 
 #: With the corner that is farthest behind a plane those that are so far by this part of it: about one it would turn.
 AS_DEEP = 0.5
@@ -87,7 +81,7 @@ def across(placed: PlacedParts, own: np.ndarray, other: np.ndarray) -> np.ndarra
     normal = cross(along, along_other)
     size, lengths = np.sqrt(dot(normal, normal)), np.sqrt(dot(along, along) * dot(along_other, along_other))
     sense = np.sign(dot(normal, placed.outward(other)))
-    return normal * (np.where(size > PARALLEL * lengths, sense, 0.0) / np.maximum(size, 1e-300))[..., None]
+    return normal * (np.where(size > ROUNDING * lengths, sense, 0.0) / np.maximum(size, 1e-300))[..., None]
 
 
 def _score(before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -157,5 +151,5 @@ def _gaps(
     low = (normals @ (placed.vertices[corners[0]] - origin).transpose(0, 2, 1)).min(axis=2)
     high = (normals @ (placed.vertices[corners[1]] - origin).transpose(0, 2, 1)).max(axis=2)
     is_normal = dot(normals, normals) > 0.5
-    foremost = is_normal & (np.maximum(at_own - low, high - at_other) <= FOREMOST * np.sqrt(dot(along, along)))
+    foremost = is_normal & (np.maximum(at_own - low, high - at_other) <= ROUNDING * np.sqrt(dot(along, along)))
     return np.where(is_normal, low - high, -np.inf), foremost

@@ -14,13 +14,12 @@ from solver.words import kept
 
 from .broad_phase import box_pairs, expand_ranges
 from .clipping import clipped_faces
-from .contacts import SAME_NORMAL, STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
+from .contacts import STEEPEST_LANDING, Contacts, are_known, joined_contacts, matched_contacts
 from .convex_parts import ENDS, ConvexParts, PlacedParts, convex_parts
 from .cut_points import without_points_of_cuts
-from .entering import PARALLEL, Movement, across, entered
-from .facing import FacingParts, facing_parts, near_parts
-from .separations import edge_separations, face_separations
-from .solids import Solids, cross, dot, unit
+from .entering import Movement, across, entered
+from .facing import FacingParts, edge_separations, face_separations, facing_parts, near_parts
+from .solids import ROUNDING, Solids, cross, dot, unit
 from .spatial_features import ACROSS, BEFORE_EDGE, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
 
 #: Difference of separations, in widths, that is more than rounding.
@@ -145,7 +144,7 @@ class Polyhedra(Solids):
         apart = np.maximum(apart, face_separations(placed, j, i, none)[0])
         deep = np.flatnonzero(apart < -tolerance)
         i, j, apart = i[deep], j[deep], apart[deep]
-        apart = np.maximum(apart, edge_separations(placed, i, j, PARALLEL)[0])
+        apart = np.maximum(apart, edge_separations(placed, i, j, ROUNDING)[0])
         deep = apart < -tolerance
         blocks = np.sort(np.stack([block_of_part[i[deep]], block_of_part[j[deep]]], axis=1), axis=1)
         pairs, pair_of = np.unique(blocks, axis=0, return_inverse=True)
@@ -268,7 +267,7 @@ def _without_duplicates(contacts: Contacts, near: float) -> Contacts:
     pairs = contacts.pair_keys()
     sense = np.where(contacts.block_a[first] == contacts.block_a[second], 1.0, -1.0)
     same = pairs[first] == pairs[second]
-    same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > SAME_NORMAL
+    same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > 1.0 - ROUNDING
     n = len(contacts)
     links = coo_array((np.ones(np.count_nonzero(same)), (first[same], second[same])), shape=(n, n))
     count, group = connected_components(links, directed=False)

@@ -13,6 +13,9 @@ from solver.words import kept
 from .broad_phase import expand_ranges
 from .outlines import Bodies, next_vertices
 
+#: Part of lengths, volumes and directions up to which two are equal: corners of hulls are welded at a tenth of it.
+ROUNDING = 1e-6
+
 
 def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """(..., 3) array: cross products, a coordinate at a time, which is faster than ``np.cross``."""

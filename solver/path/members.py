@@ -23,11 +23,9 @@ from solver.ties import (
     tie_ends,
     tie_lengths,
 )
+from solver.tolerances import AT_LIMIT
 
 from .state import Place
-
-#: Part of its strength from which on a member yields or breaks.
-AT_STRENGTH = 1.0 - 1e-9
 
 #: Error of the length of a member, as a part of the gap of contact points that carry: that of the geometry.
 GIVE = 1e-2
@@ -121,7 +119,7 @@ class Members:
     def _at_strength(self, contacts: Contacts, forces: np.ndarray) -> np.ndarray:
         """Numbers of the contact points of members whose forces are at their strength."""
         members = np.flatnonzero(is_member(contacts))
-        return members[forces[members, 0] >= AT_STRENGTH * self.strength[contacts.features[members, 1]]]
+        return members[forces[members, 0] >= (1.0 - AT_LIMIT) * self.strength[contacts.features[members, 1]]]
 
     def told(self, contacts: Contacts, forces: np.ndarray, pose: Pose, lengths: np.ndarray) -> TieForces:
         """What the members do at a place, from forces in units of the program."""

@@ -39,15 +39,12 @@ TURN_PER_ERROR = 2.0
 #: Steps tried for an increment before an analysis ends.
 MOST_STEPS = 3000
 
-#: Penetration, in block sizes, at which blocks may be wedged.
-WEDGED = 1e-5
-
 #: Error of a step, in errors aimed for, at which it is refused.
 REFUSED = 4.0
 
-#: Speed of a block, in speeds of the supports, and movements in a step, in block sizes: equilibrium is checked from the
-#: first on where blocks are fast, and from the second on in any case. Open joints that close move blocks by less.
-FAST, NEAR, FAR = 3.0, 1e-3, 0.05
+#: Speed of a block, in speeds of the supports, from which on equilibrium is checked where joints that close move blocks
+#: by less; in any case it is where they have moved as far as supports do in the longest step.
+FAST = 3.0
 
 #: Viscosity where a collapse is enclosed, as a part of the model's.
 REFINED = 1e-3
@@ -388,9 +385,9 @@ class Path:
             new, motion, error = self.stepper.step(place, length, viscosity=viscosity, exact=exact)
         except NotSolved as failure:
             return self._shorten(state, length, str(failure))
-        if error.penetration > WEDGED and length > FIRST_STEP * unit:
+        if error.penetration > CLOSING_GAP and length > FIRST_STEP * unit:
             return replace(state, step=length / 3.0), None
-        presses = error.penetration > WEDGED or new.forces[:, 0].max(initial=0.0) > 100.0 * self.model.total_load
+        presses = error.penetration > CLOSING_GAP or new.forces[:, 0].max(initial=0.0) > 100.0 * self.model.total_load
         if presses and self._supports_locked(place):
             return state, self.reports.locked(new)
         works = self._works(place, new, motion)
@@ -448,11 +445,11 @@ class Path:
         """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""
         if self.model.has_live and new.multiplier <= 0.0 and new.s > self._onset():
             return False
-        fast = error.moved > min(max(FAST * length / self.stepper.unit, NEAR), FAR)
+        fast = error.moved > min(max(FAST * length / self.stepper.unit, MECHANISM), LONGEST_STEP)
         if not (fast or refining):
             return True
         # What jumps is followed in time, however little viscosity there is.
-        if refining and error.moved > FAR:
+        if refining and error.moved > LONGEST_STEP:
             return False
         # Of a live load that has viscosity in it more than a step may err by.
         if self.checks.in_equilibrium(new, self.closed_gap, 1.0 / (1.0 + REFUSED * self.tolerance)):

@@ -126,14 +126,9 @@ class Reports:
 
     def locked(self, place: Place) -> Ending:
         """The ending that names the wedged blocks."""
-        assembly, contacts, normal = self.model.assembly, place.contacts, place.forces[:, 0]
-        assert contacts is not None
-        pressed = normal > 0.1 * normal.max()
-        blocks = np.unique(np.concatenate([contacts.block_a[pressed], contacts.block_b[pressed]]))
-        # The ground at an end of a member is -1.
-        blocks = blocks[(blocks >= 0) & assembly.free[blocks]]
-        wedged = counted(len(blocks), "block is", "blocks are")
-        return Ending(Status.LOCKED, f"the supports cannot move on: {wedged} wedged ({self._named(blocks)})")
+        normal = place.forces[:, 0]
+        assert place.contacts is not None
+        return Ending(Status.LOCKED, wedged(self.model.assembly, place.contacts[normal > 0.1 * normal.max()]))
 
     def no_step(self, s: float, reason: str) -> Ending:
         """The ending at a step that was not solved, from a parameter s [m or rad]."""
@@ -195,6 +190,15 @@ def falling_blocks(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
     """Numbers of the free blocks that move a tenth as fast as the fastest, or more, (n_blocks, n_dof) array."""
     size = np.abs(motion[:, : assembly.dimension]).max(axis=1)
     return np.flatnonzero(assembly.free & (size >= 0.1 * size.max()))
+
+
+def wedged(assembly: Assembly, pressed: Contacts) -> str:
+    """Message that names the blocks that are wedged, from the contact points between which they are."""
+    blocks = np.unique(np.concatenate([pressed.block_a, pressed.block_b]))
+    # The ground at an end of a member is -1.
+    blocks = blocks[(blocks >= 0) & assembly.free[blocks]]
+    are = counted(len(blocks), "block is", "blocks are")
+    return f"the supports cannot move on: {are} wedged ({assembly.listed(blocks, 4)})"
 
 
 def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:

@@ -10,6 +10,7 @@ from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.program.static_program import EquilibriumBounds
 from solver.results.increment import Bonds
+from solver.words import counted
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,12 @@ class PathState:
     reported: float = -np.inf  #: [m or rad], parameter of the last increment
     peak: float = 0.0  #: multiplier above which a peak is reported
     fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))  #: (n_blocks,), as in :class:`State`
+
+    def refuse_other(self, n_blocks: int, n_phases: int) -> None:
+        """Raise ``ValueError`` where an analysis has another number of blocks, or no such phase."""
+        if (own := len(self.start.rotations)) != n_blocks or self.phase >= n_phases:
+            found = f"is of phase {self.phase + 1} of {n_phases} and has {counted(own, 'block')}"
+            raise ValueError(f"the checkpoint {found}, the assembly {n_blocks}: it belongs to another run")
 
 
 @dataclass(frozen=True)
