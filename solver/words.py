@@ -15,7 +15,7 @@ T = TypeVar("T")
 #: What to look for where blocks do not stand as drawn.
 REMEDY = (
     "look for gaps between blocks (joint_thickness), a missing support, too little friction, or blocks that overhang "
-    "and tip, which need a tie, a prop or a support"
+    "and tip, which need a tie that is stiff or has prestress, a prop or a support"
 )
 
 

@@ -89,5 +89,6 @@ def _cause(case: Case, assembly: solver.Assembly, falling: Sequence[int]) -> str
     who = f"{len(still)} of them ({assembly.listed(still, 6)})" if some else "they"
     return (
         f"{who} tip or drop whatever the friction is: look for gaps below them, a missing stone or a missing support; "
-        "what overhangs needs a tie, a prop or a support" + "; the others slide, or fall with these" * some
+        "what overhangs needs a tie that is stiff or has prestress, a prop or a support"
+        + "; the others slide, or fall with these" * some
     )

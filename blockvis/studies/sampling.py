@@ -10,7 +10,7 @@ import numpy as np
 
 from blockvis.case_files.case_keys import MOST_STEPS
 
-#: Methods of sampling; "saltelli" is for Sobol' indices of first order and total.
+#: Methods of sampling; "saltelli" is for Sobol' indices of first order.
 METHODS = ("grid", "latin hypercube", "sobol", "random", "saltelli")
 
 
