@@ -90,5 +90,6 @@ def _cause(case: Case, assembly: solver.Assembly, falling: Sequence[int]) -> str
     return (
         f"{who} tip or drop whatever the friction is: look for gaps below them, a missing stone or a missing support; "
         "what overhangs needs a tie that is stiff or has prestress, a prop or a support"
-        + "; the others slide, or fall with these" * some
+        + "; the others slide, or fall with these"
+        * some
     )
