@@ -470,14 +470,14 @@ falling_frames = 0
 [[loads]]
 kind = "live"
 force = [0.0, -1000.0]
-point = [1.0, 1.9]
-blocks = "voussoir 7"
+point = [-1.0, 1.9]
+blocks = "voussoir 3"
 [settlement]
 direction = [1.0, 0.0]
 increment = 0.1
 limit = 0.1
 [control]
-block = "voussoir 7"
+block = "voussoir 3"
 direction = [0.0, -1.0]
 limit = 0.4
 step_tolerance = 0.001
