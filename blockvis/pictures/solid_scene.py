@@ -320,7 +320,7 @@ class SolidScene(Scene):
 
     def holds(self, *layers: str) -> bool:
         """Whether the last picture shows anything of one of the layers; of hidden lines, whether blocks hide any."""
-        if any(True for layer in layers if layer in self._overlays for _ in self._shapes(self._overlays[layer])):
+        if any(next(self._shapes(self._overlays[layer]), None) for layer in layers if layer in self._overlays):
             return True
         return any(self._shows(name) for name in self._layers if name.split("/")[0] in layers)
 
