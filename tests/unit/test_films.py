@@ -241,7 +241,7 @@ def test_a_section_shows_the_loads_of_blocks_that_it_leaves(monkeypatch, tmp_pat
     """An arrow was drawn where it began in what is left: beside a stone that is cut away, or not at one that stays."""
     drawn = []
     monkeypatch.setattr("blockvis.pictures.solid_scene._Arrows", lambda *arrows: drawn.append(arrows))
-    monkeypatch.setattr("blockvis.pictures.solid_scene.SolidScene._shapes", lambda self, arrows: [])
+    monkeypatch.setattr("blockvis.pictures.solid_scene.SolidScene._shapes", lambda self, arrows: iter(()))
     limit = row_of(6, 3, np.ones(6))
     blockvis.draw_still(limit.response, 0, tmp_path / "cut.png", section=f"x = {cut}", view=view, size=SIZE)
     ((_, ends, *_),) = drawn
