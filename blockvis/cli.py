@@ -396,7 +396,7 @@ def _add_render(verbs: Any) -> None:
     render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")
     render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
-    render.add_argument("--size", metavar="WxH", help="of stills and film, in pixels (default: film 1280x720)")
+    render.add_argument("--size", metavar="WxH", help="of stills and film, in pixels (default: as what they show)")
     render.add_argument(
         "--cracks", type=int, metavar="N", help="nothing but cracks.png, of increment N (-1: the last equilibrium)"
     )
@@ -1015,7 +1015,7 @@ def _layout(options: argparse.Namespace) -> int:
 
 def _render(options: argparse.Namespace) -> int:
     from .pictures.crack_drawing import draw_cracks
-    from .pictures.render import FILM_SIZE, animate, draw_mechanism, draw_still
+    from .pictures.render import animate, draw_mechanism, draw_still
     from .results.fall_files import known_fall
     from .runs.outputs import draw_curves, write_report_of
     from .runs.progress import DrawingProgress
@@ -1056,7 +1056,7 @@ def _render(options: argparse.Namespace) -> int:
         look |= seen_from | {"poster": folder / "poster.png"}
         with DrawingProgress() as progress:
             film = folder / options.animation
-            animate(response, film, size=size or FILM_SIZE, fall=fall, progress=progress.frame, **look)
+            animate(response, film, size=size, fall=fall, progress=progress.frame, **look)
         drawn += [options.animation, "poster.png"]
     print(f"drawn in {folder}/: {', '.join(drawn)}")
     return 0

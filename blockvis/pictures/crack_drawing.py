@@ -21,7 +21,7 @@ from solver import mechanics
 from . import palette
 from .captions import loss_words, phase_words, state_text
 from .flat_scene import FlatScene
-from .frame import Key, Sheet, along_lines, framed, still_size, write_labels
+from .frame import Key, Sheet, along_lines, framed, sheet_size, write_labels
 from .render import numbered, save_picture, seen_from
 
 #: Thickness of a crack that only slides and of the widest one, in heights of the picture; the latter in block sizes at
@@ -112,7 +112,7 @@ def _drawn_in_plane(
     fill = palette.block_colours(assembly.materials, assembly.free)
     fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
     frame = framed(assembly, [solver.Pose.initial(assembly)])
-    sheet = Sheet(size or still_size(frame))
+    sheet = Sheet(size or sheet_size(frame))
     scene = FlatScene(assembly, frame, sheet.inside_size, fill, outline=palette.PALE_OUTLINE)
     if increment.fallen.any():
         scene.hide(increment.fallen)

@@ -17,7 +17,7 @@ from blockvis.text import width_text
 
 from . import palette
 from .drawer import MARGIN, WHOLE
-from .frame import Frame, Key, Sheet, framed, still_size, write_labels
+from .frame import Frame, Key, Sheet, framed, sheet_size, write_labels
 from .paired_scenes import PairedScenes
 from .sight_lines import SightLines
 from .solid_view import AROUND, View, heights_over, hiding_supports, plane_of, section_words, views_of
@@ -71,7 +71,7 @@ class CracksInSpace:
         initial = solver.Pose.initial(assembly)
         frames = [framed(assembly, [initial], MARGIN, 0.3, view.axes[:2], WHOLE, plane) for view in self._views]
         frame = Frame(*(np.concatenate([getattr(one, end) for one in frames]) for end in ("low", "high")))
-        self.sheet = Sheet(size or still_size(frame))
+        self.sheet = Sheet(size or sheet_size(frame))
         self._pair = PairedScenes(
             assembly, self._views, frame, self.sheet, roles, fine=True, cut=plane, outline=palette.PALE_OUTLINE
         )

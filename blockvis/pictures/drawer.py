@@ -22,7 +22,20 @@ from . import palette
 from .backfill import fill_bodies
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, fall_text, matters
 from .flat_scene import FlatScene
-from .frame import STILL_SIZE, ColourBar, Frame, Key, Sheet, along_lines, framed, still_size, write_labels
+from .frame import (
+    BAR,
+    CURVE,
+    SEPARATOR,
+    STILL_SIZE,
+    ColourBar,
+    Frame,
+    Key,
+    Sheet,
+    along_lines,
+    framed,
+    sheet_size,
+    write_labels,
+)
 from .live_load import LiveLoads
 from .marks import (
     END,
@@ -36,7 +49,7 @@ from .marks import (
 )
 from .scene import OF_STATICS
 from .solid_view import View, heights_over, hiding_supports, into_sight, kept_blocks, plane_of, section_words, views_of
-from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
+from .swing import FASTEST, MOST_PARTS, Swing, mechanism_colours, swing_of
 from .ties import DASH, DrawnTies
 from .underlay import Underlay
 
@@ -128,8 +141,9 @@ class Drawer:
 
     The curve stands beside the blocks where it is asked for. ``extra`` are poses that the frame has to hold, too, the
     fall comes after the last equilibrium, and the underlay is a photograph under blocks in the plane. Without a size
-    the sheet follows what it shows. ``still`` is one picture, worth more time than a frame of a film: in space with
-    smooth edges, shaded corners, and of vaults and domes the intrados beside the extrados.
+    the sheet follows what it shows, with as many pixels as is ``usual``. ``still`` is one picture, worth more time than
+    a frame of a film: in space with smooth edges, shaded corners, and of vaults and domes the intrados beside the
+    extrados.
 
     Raises ``ValueError`` for a view or a section of blocks in the plane.
     """
@@ -146,6 +160,7 @@ class Drawer:
         fall: Fall | None = None,
         underlay: Underlay | None = None,
         still: bool = False,
+        usual: tuple[int, int] = STILL_SIZE,
     ) -> None:
         assembly = self.assembly = response.assembly
         self._flat = assembly.dimension == 2
@@ -176,19 +191,19 @@ class Drawer:
         heads = fill_bodies(response, solver.Pose.initial(assembly)).heads.reshape(-1, assembly.dimension)
         ends = np.concatenate([heads, *self._arrow_ends(frame, extra), tied])
         ends = np.concatenate([self.live.tails, ends[heights_over(self._plane, ends) >= 0.0]])
-        frame = frame.holding(self._projected(ends))
+        frame = self._with_floor(frame.holding(self._projected(ends)))
         bar = ColourBar(self.largest, fall is not None) if look.colour_by == "displacement" else None
-        size = size or (STILL_SIZE if curve else still_size(frame))
-        beside = round(0.36 * size[0]) if curve else 0
-        self.sheet = Sheet(size, bar, beside)
+        size = size or sheet_size(frame, usual, CURVE * curve + BAR * (bar is not None))
+        self.sheet = Sheet(size, bar, curve)
         self.panel: CurvePanel | None = None
         if curve:
             # Figures and axes of matplotlib are loaded where a curve is drawn only.
             from .curves import CurvePanel
 
-            self.panel = CurvePanel(response, (beside, self.sheet.inside_size[1]), self.sheet.text)
+            left, top, right, bottom = self.sheet.beside
+            self.panel = CurvePanel(response, (right - left, bottom - top), self.sheet.text)
         whole = frame.fitted(*self.sheet.inside_size) if self._flat else frame
-        frame = self._with_floor(frame.holding(self._projected(self._turned_out(whole))))
+        frame = frame.holding(self._projected(self._turned_out(whole)))
         # Supports in the plane are hatched, and an outline stays where those that move were.
         self.fill = palette.role_colours(assembly, not self._flat and bool(response.settlements))
         self.frame, self.scene = frame, self._scene(frame)
@@ -364,7 +379,7 @@ class Drawer:
         return self.sheet.composed(
             picture,
             title=title or head,
-            detail="   ·   ".join([note or detail, *section_words(self._plane)]),
+            detail=SEPARATOR.join([note or detail, *section_words(self._plane)]),
             badge=(badge_of(self.response) if falling else FAILED_BADGE if failed else "") if badge is None else badge,
             keys=self._keys_drawn(increment),
             pixel=self.scene.pixel,
@@ -412,7 +427,7 @@ class Drawer:
         shown = lengths >= min(SPECK * float(self.scene.frame.size.max()), lengths.max(initial=0.0))
         tails, tips = tails[shown], tips[shown]
         self._along_arrows["motion"] = _along(tails, tips)
-        self.tints = mechanism_colours(self.assembly, self.fill, swing)
+        self._swing, self.tints = swing, mechanism_colours(self.assembly, self.fill, swing)
         self._drawn_at = self.scene.show_motion(swing, tails, tips)
 
     def _blocks_with_arrows(self, swing: Swing) -> list[np.ndarray]:
@@ -441,11 +456,8 @@ class Drawer:
                 keys.append(Key("area", LOST, palette.LOST, rim=palette.WARNING if self._flat else None))
             keys += [*self._keys_of_joints(), *self.ties.keys()]
             if not self._flat and self.response.settlements:
-                kept = [kept_blocks(self._plane, self.assembly, self.increments[k].pose) for k in (0, -1)]
-                moving = self.assembly.moving & (kept[0] | kept[1])
-                solid = moving & ~hiding_supports(self.assembly, self._views[0])
-                if moving.any():
-                    keys.append(Key("area" if solid.any() else "line", "moving support", palette.MOVING))
+                traced = hiding_supports(self.assembly, self._views[0])[self.assembly.moving].all()
+                keys.append(Key("line" if traced else "area", "moving support", palette.MOVING, layers=("moving",)))
             if self.response.loads.fills:
                 kind = "area" if self._flat else "line"
                 keys.append(
@@ -513,9 +525,11 @@ class Drawer:
         """Return what the legend says of the colours of the blocks."""
         if self._swing is None or self.tints is None:
             return []
-        together = self._swing.n_parts <= MOST_PARTS
-        colour = palette.rgb(palette.PARTS[0] if together else palette.RAMP[5])
-        return [Key("area", "parts of the last mechanism" if together else "faster in the last mechanism", colour)]
+        words, shades = "parts of", [self.tints[self._swing.parts == part][0] for part in range(self._swing.n_parts)]
+        if self._swing.n_parts > MOST_PARTS:
+            words, shades = "faster in", [*palette.displacement_colours(FASTEST * np.linspace(0.25, 1.0, 4))]
+        shown = tuple(map(palette.rgb, shades))
+        return [Key("area", f"{words} the last mechanism", shown[0], shades=shown)]
 
     @property
     def many(self) -> bool:

@@ -23,11 +23,17 @@ from .surface import left_blocks
 #: Height of the text as a fraction of the side of a square as large as the picture, and its least size in pixels.
 TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 48.0, 12
 
-#: Heights of what is above and below the blocks, in those of the text.
-HEADER, FOOTER = 3.6, 3.3
+#: Heights of what is above and below the blocks, in those of the text, and rows of the caption below its title.
+HEADER, FOOTER, ROWS = 4.8, 3.3, 2
 
-#: Width and height of a still [pixels]; one in other proportions has as many, is no wider, and this at least.
-STILL_SIZE, NARROWEST, LOWEST = (1920, 1080), 1080, 640
+#: Widths of curve and colour bar beside the blocks, and the largest height of the curve, in heights of the text.
+CURVE, BAR, HIGHEST_CURVE = 23.0, 7.6, 29.0
+
+#: Width and height of a still and of a film [pixels]; one in other proportions has as many, and is no wider.
+STILL_SIZE, FILM_SIZE = (1920, 1080), (1280, 720)
+
+#: Between the parts of a caption.
+SEPARATOR = "   ·   "
 
 #: How far labels lie from their places, in heights of the text: the nearest where there is room.
 LABELS_AWAY = (0.6, 1.8, 3.0)
@@ -55,6 +61,7 @@ class Key:
     length: float = 0.0  #: Pixels, of a bar drawn to scale.
     layers: tuple[str, ...] = ()  #: Of the scene that it explains; none of what is in every picture.
     rim: tuple[int, int, int] | None = None  #: Colour of the edge of an area.
+    shades: tuple[tuple[int, int, int], ...] = ()  #: Of an area in several colours, from left to right.
 
 
 @dataclass(frozen=True)
@@ -68,11 +75,10 @@ class ColourBar:
 class Sheet:
     """Where the picture of the blocks goes, and the words around it.
 
-    Its size is in pixels; to the right of the blocks is room for a picture as high as theirs, ``beside_width`` pixels
-    wide.
+    Its size is in pixels; to the right of the blocks is room for the ``curve`` where it is asked for.
     """
 
-    def __init__(self, size: tuple[int, int], colour_bar: ColourBar | None = None, beside_width: int = 0) -> None:
+    def __init__(self, size: tuple[int, int], colour_bar: ColourBar | None = None, curve: bool = False) -> None:
         self.size = size
         width, height = size
         self.text = max(SMALLEST_TEXT, round(np.sqrt(width * height) * TEXT_FRACTION))
@@ -80,12 +86,15 @@ class Sheet:
         self.header = round(HEADER * self.text)
         self.footer = round(FOOTER * self.text)
         self.colour_bar = colour_bar
-        right = beside_width + (round(7.6 * self.text) if colour_bar else 0)
+        beside = curve * min(round(CURVE * self.text), width // 2)
+        right = beside + (round(BAR * self.text) if colour_bar else 0)
         #: Left, top, right, bottom of the blocks' picture, in pixels.
         self.inside = (0, self.header, width - right, height - self.footer)
         if min(self.inside_size) < 1:
             raise ValueError(f"size is {width} × {height} pixels, which leave the blocks none; give more")
-        self.beside = (width - beside_width, self.header, width, height - self.footer)
+        aside = max((self.inside_size[1] - round(HIGHEST_CURVE * self.text)) // 2, 0)
+        #: The same of the curve.
+        self.beside = (width - beside, self.header + aside, width, height - self.footer - aside)
         self._page, self._page_of = Image.new("RGB", size), tuple[object, ...]()
 
     @property
@@ -129,8 +138,9 @@ class Sheet:
         self._legend(draw, keys, end + 2 * self.pad)
         if self.colour_bar is not None:
             self._colour_bar(page, draw, self.colour_bar)
-        font = fitting_font(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
-        draw.text((self.pad, self.pad + 2.15 * self.text), detail, palette.FAINT, font, anchor="lm")
+        rows, font = fitting_rows(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
+        for row, words in enumerate(rows):
+            draw.text((self.pad, self.pad + (2.15 + 1.2 * row) * self.text), words, palette.FAINT, font, anchor="lm")
         if badge:
             self._badge(draw, badge)
         return page
@@ -249,7 +259,8 @@ def write_labels(
         lows = place + beside * (size / 2.0 + away[:, None]) - size / 2.0
         nearest = np.clip(place, lows, lows + size)
         leaders = np.linspace(np.broadcast_to(place, nearest.shape), nearest, 12)[1:]
-        free = (lows >= 0.0).all(axis=1) & (lows + size <= picture.size).all(axis=1)
+        # A rim on the edge of the picture would be cut off.
+        free = (lows >= rim).all(axis=1) & (lows + size <= picture.size - np.array(rim)).all(axis=1)
         cost = _inside(dots[:, None], lows - rim, lows + size + rim).sum(axis=0) + away / text
         for other in written:
             free &= ~((lows < other.high) & (other.low < lows + size)).all(axis=1)
@@ -318,6 +329,9 @@ def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float
     if key.kind == "area":
         box, width = (x, y - 0.38 * text, x + wide, y + 0.38 * text), max(1, round(text / 12))
         draw.rectangle(box, fill=key.colour, outline=key.rim, width=width if key.rim else 0)
+        for k, shade in enumerate(key.shades):
+            sides = (x + wide * end / len(key.shades) for end in (k, k + 1))
+            draw.rectangle((next(sides), box[1], next(sides), box[3]), fill=shade)
     elif key.kind == "dash":
         for k in range(3):
             left = x + (k + 0.15) * wide / 3.0
@@ -338,6 +352,18 @@ def fitting_font(text: str, size: int, room: float, bold: bool = False) -> Image
         size -= 1
         font = _font(size, bold)
     return font
+
+
+def fitting_rows(text: str, size: int, room: float) -> tuple[list[str], ImageFont.FreeTypeFont]:
+    """Break a text between its parts into ``ROWS`` rows at most; returns them and the largest font that fits."""
+    while True:
+        font, rows = _font(size), list[str]()
+        for part in text.split(SEPARATOR):
+            longer = f"{rows[-1]}{SEPARATOR}{part}" if rows else part
+            rows = [*rows[:-1], longer] if font.getlength(longer) <= room else [*rows, part]
+        if size <= 7 or (len(rows) <= ROWS and max(map(font.getlength, rows)) <= room):
+            return [*rows[: ROWS - 1], SEPARATOR.join(rows[ROWS - 1 :])], font
+        size -= 1
 
 
 @cache
@@ -378,16 +404,21 @@ class Frame:
         return Frame(centre - half, centre + half)
 
 
-def still_size(frame: Frame) -> tuple[int, int]:
-    """Width and height [pixels] of a still in the proportions of what it shows, in each of its views side by side."""
+def sheet_size(frame: Frame, usual: tuple[int, int] = STILL_SIZE, beside: float = 0.0) -> tuple[int, int]:
+    """Width and height [pixels], both even, of a sheet in the proportions of what it shows, in views side by side.
+
+    It has as many pixels as the usual one, and ``beside`` the blocks goes something so wide, in heights of the text.
+    """
     width, height = frame.size.reshape(-1, 2).max(axis=0)
     proportion = height / (width * len(frame.size) / 2.0)
-    pixels = float(np.prod(STILL_SIZE))
-    words = (HEADER + FOOTER) * np.sqrt(pixels) * TEXT_FRACTION
+    pixels = float(np.prod(usual))
+    text = np.sqrt(pixels) * TEXT_FRACTION
     # A strip as high as the words, and the blocks' picture.
+    words = (HEADER + FOOTER - proportion * beside) * text
     wide = (np.sqrt(words**2 + 4.0 * proportion * pixels) - words) / (2.0 * proportion)
-    wide = float(np.clip(wide, NARROWEST, STILL_SIZE[0]))
-    return round(wide), round(np.clip(proportion * wide + words, LOWEST, pixels / wide))
+    wide = float(np.clip(wide, usual[1], usual[0]))
+    high = float(np.clip(proportion * wide + words, usual[0] / 3.0, pixels / wide))
+    return 2 * round(wide / 2.0), 2 * round(high / 2.0)
 
 
 def framed(

@@ -21,11 +21,10 @@ from solver import mechanics
 from .captions import MECHANISM_BADGE, in_one_unit, loss_words, parameter_unit, phase_words
 from .drawer import Drawer, Look
 from .film import film_of, poster_of
+from .frame import FILM_SIZE, STILL_SIZE
 from .swing import MOST_PARTS, shown_increments, swing_of
 from .underlay import Underlay
 from .video import FASTEST_GIF, write_film
-
-FILM_SIZE = (1280, 720)
 
 
 def draw_still(
@@ -125,25 +124,38 @@ def draw_mechanism(
     section : str or mapping, optional
         As of :func:`draw_still`.
     """
+    return save_picture(mechanism_picture(response, size, underlay=underlay, view=view, section=section), path)
+
+
+def mechanism_picture(
+    response: solver.Response | solver.LimitLoad | solver.Envelope,
+    size: tuple[int, int] | None = None,
+    *,
+    usual: tuple[int, int] = STILL_SIZE,
+    underlay: Underlay | None = None,
+    view: str | Mapping[str, float] | Sight | None = None,
+    section: str | Mapping[str, Any] | Cut | None = None,
+) -> Image.Image:
+    """Make the picture of :func:`draw_mechanism`; without a size it has as many pixels as is ``usual``."""
     response = response if isinstance(response, solver.Response) else response.response
     check_increments(response)
     swing = swing_of(response)
     sight, cut = seen_from(view, section)
     look, extra = Look(forces="none", sight=sight, cut=cut), (swing.displaced,)
-    drawer = Drawer(response, look, size, (swing.increment,), extra=extra, underlay=underlay, still=True)
+    drawer = Drawer(response, look, size, (swing.increment,), extra=extra, underlay=underlay, still=True, usual=usual)
     if swing.moves:
         drawer.show_motion(swing)
     note = "   ·   ".join([_mechanism_note(response, swing.n_parts), *phase_words(response, swing.increment)])
     moved_on = swing.moves and response.assembly.dimension == 3 and response.stop != solver.Status.SOLVER_FAILED
     badge = MECHANISM_BADGE if moved_on else None
-    return save_picture(drawer.picture(swing.increment, note=note, badge=badge, widths=True), path)
+    return drawer.picture(swing.increment, note=note, badge=badge, widths=True)
 
 
 def animate(
     response: solver.Response,
     path: str | os.PathLike[str],
     *,
-    size: tuple[int, int] = FILM_SIZE,
+    size: tuple[int, int] | None = None,
     fps: float = 25.0,
     seconds: float = 5.0,
     magnification: float = 1.0,
@@ -169,8 +181,8 @@ def animate(
     response : solver.Response
     path : path
         Ending in .mp4, .gif or .webp; a name without an ending is a folder of pictures.
-    size : (int, int)
-        Width and height in pixels, both even.
+    size : (int, int), optional
+        Width and height in pixels, both even; by default as many as of 1280 × 720, in the proportions of what is shown.
     fps : float
         Frames per second; a .gif has 50 at most.
     seconds : float [s]
@@ -195,9 +207,9 @@ def animate(
     elif fall is None:
         fall = fall_of(response)
     shown = shown_increments(response) if fall is None else response.path
-    drawer = Drawer(response, look, size, shown, curve=curve, fall=fall, underlay=underlay)
+    drawer = Drawer(response, look, size, shown, curve=curve, fall=fall, underlay=underlay, usual=FILM_SIZE)
     fps = min(fps, FASTEST_GIF) if Path(path).suffix.lower() == ".gif" else fps
-    film = write_film(film_of(drawer, fps, seconds, progress), path, size=size, fps=fps)
+    film = write_film(film_of(drawer, fps, seconds, progress), path, size=drawer.sheet.size, fps=fps)
     if poster is not None:
         save_picture(poster_of(drawer), poster)
     return film

@@ -64,6 +64,9 @@ EDGE = 0.028
 #: Faces look down or up where their normals do by this much.
 LEVEL = 0.5
 
+#: Points of a triangle that are looked for, as parts (n, 3) of its corners: of what is nearly hidden a corner is seen.
+_INSIDE = np.array([(i, j, 8 - i - j) for i in range(9) for j in range(9 - i)]) / 8.0 * 0.94 + 0.02
+
 #: The arrows of a mechanism are longer than the way it is drawn by, to be seen on the blocks.
 LONGER = 1.6
 
@@ -117,6 +120,8 @@ class SolidScene(Scene):
         self._overlays: dict[str, _Arrows] = {}
         self._look_at()
         self._cut = cut
+        #: Cut faces (n, 3) [m], and the block of each.
+        self._sections: list[tuple[np.ndarray, int]] = []
         self._outlined = np.zeros(assembly.n_blocks, dtype=bool) if outlined is None else outlined
         self._triangles, self._block = triangles_of(assembly.polyhedra)
         solid = ~self._outlined[self._block]
@@ -180,6 +185,7 @@ class SolidScene(Scene):
             shades = (CUT_SHADE * self._fill[owners]).astype(np.uint8)
             colours = np.repeat(shades, [len(face) for face in faces], axis=0)
             self.polygons("section", faces, colours, forward=1.0)
+            self._sections = list(zip(faces, owners.tolist(), strict=True))
 
     def backfill(self, bodies: FillBodies) -> None:
         """Draw the edges of the bodies of fill."""
@@ -319,10 +325,24 @@ class SolidScene(Scene):
                 self._plotter.remove_actor(self._layers.pop(name), reset_camera=False, render=False)
 
     def holds(self, *layers: str) -> bool:
-        """Whether the last picture shows anything of one of the layers; of hidden lines, whether blocks hide any."""
+        """Whether the last picture shows anything of one of the layers; of hidden lines, whether blocks hide any.
+
+        Supports that move are the layer "moving".
+        """
         if any(next(self._shapes(self._overlays[layer]), None) for layer in layers if layer in self._overlays):
             return True
+        if "moving" in layers and self._shows_blocks(self.assembly.moving & ~self._gone):
+            return True
         return any(self._shows(name) for name in self._layers if name.split("/")[0] in layers)
+
+    def _shows_blocks(self, blocks: np.ndarray) -> bool:
+        """Whether the last picture shows anything of blocks, (n_blocks,) bool array."""
+        corners, traced = np.asarray(self._surface.points), blocks & self._outlined
+        lines = along_lines(corners[self.edges[traced[self.assembly.block_of_vertex[self.edges[:, 0]]]]])
+        faces = corners[self._triangles[(blocks & ~self._outlined)[self._block]]]
+        sections = [0.98 * face + 0.02 * face.mean(axis=0) for face, block in self._sections if blocks[block]]
+        points, lines = (of[heights_over(self._cut, of) >= 0.0] for of in ((_INSIDE @ faces).reshape(-1, 3), lines))
+        return bool(self.sees(np.concatenate([points, *sections])).any() or not self.hides(lines, 1.0).all())
 
     def _shows(self, layer: str) -> bool:
         actor = self._layers[layer]

@@ -25,6 +25,9 @@ REACH, TEAR = 0.05, 0.002
 #: Up to this many parts of a mechanism are tinted one by one: each has a colour of its own.
 MOST_PARTS = len(palette.PARTS)
 
+#: Of more, the fastest block has the colour of this part of the scale of displacements.
+FASTEST = 0.75
+
 
 @dataclass(frozen=True)
 class Swing:
@@ -94,7 +97,7 @@ def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing)
         still = palette.pale(fill, assembly.free & (swing.parts < 0), palette.STILL)
         return palette.part_colours(still, swing.parts)
     travel = np.linalg.norm(swing.displaced.positions - swing.increment.pose.positions, axis=1)
-    tints = palette.displacement_colours(0.75 * travel / travel[assembly.free].max())
+    tints = palette.displacement_colours(FASTEST * travel / travel[assembly.free].max())
     return np.where(assembly.free[:, None], tints, fill)
 
 

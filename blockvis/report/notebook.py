@@ -11,19 +11,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 import solver
 from blockvis.pictures import palette
 from blockvis.pictures.curves import draw_curve
-from blockvis.pictures.render import draw_mechanism
+from blockvis.pictures.frame import FILM_SIZE
+from blockvis.pictures.render import mechanism_picture, save_picture
 from blockvis.results.fall_files import known_fall
 from blockvis.text import force_text
 from solver import mechanics
 
 from .page import html_rows, report_html, summary_rows
 
-#: Pixels of the picture of a response, and inches of its curve; both are shown at half their width.
-PICTURE, CURVE = (1280, 720), (6.4, 3.6)
+#: Inches of the curve of a response; it and the picture are shown at half their width.
+CURVE = (6.4, 3.6)
 
 #: Pixels of the width and largest height of the picture of an assembly.
 WIDE, HIGH = 560, 420
@@ -60,10 +62,11 @@ def response_html(response: solver.Response) -> str:
     pictures = []
     with tempfile.TemporaryDirectory() as folder:
         if response.increments:
-            pictures.append(draw_mechanism(response, Path(folder) / "mechanism.png", size=PICTURE))
+            picture = mechanism_picture(response, usual=FILM_SIZE)
+            pictures.append(save_picture(picture, Path(folder) / "mechanism.png"))
         if response.path:
             pictures.append(draw_curve(response, Path(folder) / "curve.png", size=CURVE))
-        images = [_image(path.stem, PICTURE[0] // 2, path.read_bytes()) for path in pictures]
+        images = [_image(path.stem, Image.open(path).width // 2, path.read_bytes()) for path in pictures]
     return f"<div>{''.join(images)}{_table(summary_rows(response))}</div>"
 
 

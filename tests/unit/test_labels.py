@@ -237,6 +237,50 @@ def test_the_legend_names_what_a_view_in_space_shows(view, words, tmp_path):
     assert drawer.scene.holds("hinge") is (view is None)
 
 
+@pytest.mark.slow
+def test_the_legend_names_a_moving_support_where_it_is_seen(words):
+    """From above its block hides it, and a section leaves it out; of what is cut the face in the plane is seen."""
+    solids = [box((-0.4, -0.4, -0.4), (0.4, 0.4, 0)), box((-0.6, -0.6, 0), (0.6, 0.6, 1)), box((2, -1, 0), (3, 1, 1))]
+    assembly = solver.Assembly.from_solids(solids, roles=["moving", "free", "fixed"])
+    sinks = solver.Settlement((0, 0, -1), increment=0.01, limit=0.01)
+    response = solver.Structure(assembly, friction_coefficient=0.7).settle(sinks)
+    named = []
+    for around, above, cut in (
+        *((-90.0, 90.0, None), (-60.0, 24.0, None), (180.0, 0.0, drawing.Cut((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)))),
+        (180.0, 0.0, drawing.Cut((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))),
+    ):
+        look = Look(sight=drawing.Sight(around, above), cut=cut)
+        Drawer(response, look, SMALL, response.path).picture(response.path[-1])
+        named.append("moving support" in [key.text for key in words[-1]["keys"]])
+    assert named == [False, True, False, True]
+
+
+def test_the_legend_has_the_colours_of_the_parts_that_move(words, tmp_path):
+    """Of an arch of four parts it had the first, another than blocks have; that of the mechanism had none."""
+    response = arch_response()
+    picture = np.asarray(Image.open(draw_mechanism(response, tmp_path / "mechanism.png", size=LARGE)))
+    key = next(key for key in words[-1]["keys"] if key.text == "parts of the last mechanism")
+    assert len(set(key.shades)) == 4
+    for shade in key.shades:
+        rows = np.flatnonzero((picture == shade).all(axis=2).any(axis=1))
+        assert rows[0] < 0.8 * LARGE[1] < 0.9 * LARGE[1] < rows[-1], "on blocks, and in the legend"
+
+
+def test_a_long_caption_is_broken_between_its_parts_and_keeps_its_size():
+    """On upright sheets it was a third smaller than its title asked for."""
+    sheet = Sheet((720, 1280))
+    page, parts = Image.new("RGB", sheet.inside_size, "white"), ["limit reached: the motion that would follow"] * 2
+
+    def drawn(*told):
+        picture = sheet.composed(page, title="", detail="   ·   ".join(told), pixel=0.01)
+        return np.asarray(picture)[: sheet.header].astype(int)
+
+    both, one = drawn(*parts), drawn(parts[0])
+    row = round(1.2 * sheet.text)
+    assert (np.minimum(one, np.roll(one, row, axis=0)) == both).all()
+    assert (drawn(*parts)[-2:] == 255).all(), "above the blocks"
+
+
 def test_in_a_fall_the_label_of_a_tie_says_what_its_colour_does(monkeypatch):
     assembly = solver.Assembly.from_outlines([rectangle(0, -1, 1, 0), rectangle(0, 0, 1, 1)], roles=["moving", "free"])
     iron = solver.Tie("iron", (1, None), ((0.5, 0.9), (0.5, 2.0)), stiffness=1e6)
@@ -415,6 +459,19 @@ def test_the_mechanism_of_what_falls_as_a_stone_is_taken_away_names_stone_and_ph
         in said["detail"]
     )
     assert said["detail"].endswith("50 % of the weight fall   ·   phase 2 of 2")
+
+
+def test_labels_keep_their_rim_off_the_edges_of_the_picture():
+    """The rim of one that just had room was cut off."""
+    labels = 0
+    for k in range(60):
+        picture = Image.new("RGB", (200, 60), "white")
+        write_labels(picture, np.array([[70.0 + k, 30.0]]), ["110 mm"], 20, np.zeros((0, 2)))
+        page = np.asarray(picture).copy()
+        labels += bool((page < 255).any())
+        page[2:-2, 2:-2] = 255
+        assert (page == 255).all(), k
+    assert 20 < labels < 60
 
 
 @pytest.mark.parametrize(("pixel", "said"), [(1e-3, "0.1 m"), (1e-4, "10 mm"), (1e-2, "1 m")])

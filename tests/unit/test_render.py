@@ -133,6 +133,25 @@ def test_the_sheet_of_a_still_follows_what_it_shows(size, sheet, tmp_path):
     assert max(extents[0] / width, extents[1] / (height - 400)) > 0.85
 
 
+@pytest.mark.parametrize(
+    ("width", "curve", "size"),
+    [
+        (40, True, (1280, 426)),
+        pytest.param(1, False, (720, 1280), marks=pytest.mark.slow),
+        pytest.param(1, True, None, marks=pytest.mark.slow),
+    ],
+)
+def test_the_sheet_of_a_film_follows_what_it_shows(width, curve, size, tmp_path):
+    """Films, and stills with a curve, were 16 by 9 whatever they show."""
+    stones = [rectangle(0, -1, width, 0), rectangle(0, 0, width, 5)]
+    block = solver.Assembly.from_outlines(stones, roles=["moving", "free"])
+    sinks = solver.Settlement((0.0, -1.0), increment=0.01, limit=0.01)
+    response = solver.Structure(block, friction_coefficient=0.7).settle(sinks)
+    film = animate(response, tmp_path / "frames", fps=2, seconds=1, curve=curve, joints=False, forces="none")
+    drawn = pixels(film / "frame_00000.png").shape[1::-1]
+    assert drawn == size if size else drawn[0] < drawn[1] and not any(np.mod(drawn, 2)), drawn
+
+
 @pytest.mark.parametrize("space", [False, True], ids=["of shallow ground", "magnified in space"])
 @pytest.mark.slow
 def test_arrows_of_supports_are_drawn_whole(space, tmp_path):
