@@ -341,8 +341,16 @@ class SolidScene(Scene):
         lines = along_lines(corners[self.edges[traced[self.assembly.block_of_vertex[self.edges[:, 0]]]]])
         faces = corners[self._triangles[(blocks & ~self._outlined)[self._block]]]
         sections = [0.98 * face + 0.02 * face.mean(axis=0) for face, block in self._sections if blocks[block]]
-        points, lines = (of[heights_over(self._cut, of) >= 0.0] for of in ((_INSIDE @ faces).reshape(-1, 3), lines))
-        return bool(self.sees(np.concatenate([points, *sections])).any() or not self.hides(lines, 1.0).all())
+        points, lines = map(self._in_picture, (np.concatenate([(_INSIDE @ faces).reshape(-1, 3), *sections]), lines))
+        # Not all that is seen: blocks of glass have no depth.
+        in_front = self._hidden_by(points) >= SAME_DEPTH * self.frame.size.max()
+        return not (in_front.all() and self.hides(lines, 1.0).all())
+
+    def _in_picture(self, points: np.ndarray) -> np.ndarray:
+        """Choose those of points (n, 3) [m] that the section leaves and that lie in the picture, hidden or not."""
+        places = self.at_pixel(points)
+        inside = ((places >= 0.0) & (places < self.size)).all(axis=1)
+        return points[inside & (heights_over(self._cut, points) >= -SAME_DEPTH * self.frame.size.max())]
 
     def _shows(self, layer: str) -> bool:
         actor = self._layers[layer]

@@ -253,6 +253,9 @@ def test_the_legend_names_a_moving_support_where_it_is_seen(words):
         Drawer(response, look, SMALL, response.path).picture(response.path[-1])
         named.append("moving support" in [key.text for key in words[-1]["keys"]])
     assert named == [False, True, False, True]
+    glass = Look(forces="thrust", sight=drawing.Sight(-90.0, 0.0))
+    Drawer(response, glass, SMALL, response.path).picture(response.path[-1])
+    assert "moving support" in [key.text for key in words[-1]["keys"]]
 
 
 def test_the_legend_has_the_colours_of_the_parts_that_move(words, tmp_path):
