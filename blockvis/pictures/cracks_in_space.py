@@ -67,7 +67,8 @@ class CracksInSpace:
         self._seen_joints = np.zeros(0, dtype=int)
         limits = class_limits(float(self._opened.openings.max(initial=0.0)))
         colours = [palette.rgb(colour) for colour in palette.crack_colours(len(limits) + 1)]
-        roles = palette.role_colours(assembly, bool(response.settlements))
+        self._tells_moving = bool(response.settlements)
+        roles = palette.role_colours(assembly, self._tells_moving)
         initial = solver.Pose.initial(assembly)
         frames = [framed(assembly, [initial], MARGIN, 0.3, view.axes[:2], WHOLE, plane) for view in self._views]
         frame = Frame(*(np.concatenate([getattr(one, end) for one in frames]) for end in ("low", "high")))
@@ -129,6 +130,9 @@ class CracksInSpace:
             dots += [pixels[seen], along[slides]]
             seen_joints.append(opened.joints[seen])
             left += scene.size[0]
+        if self._tells_moving and self._pair.holds("moving"):
+            pale = palette.pale(np.array([palette.MOVING]), np.array([True]), palette.SURVEY)
+            self.keys.append(Key("area", "moving support", palette.rgb(pale[0])))
         self._pair.close()
         self._seen_joints = np.concatenate(seen_joints)
         labelled = [(crack, n) for crack, n in zip(cracks, numbers, strict=True) if n in found]
