@@ -23,8 +23,12 @@ from .surface import left_blocks
 #: Height of the text as a fraction of the side of a square as large as the picture, and its least size in pixels.
 TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 48.0, 12
 
-#: Heights of what is above and below the blocks, in those of the text, and rows of the caption below its title.
-HEADER, FOOTER, ROWS = 4.8, 3.3, 2
+#: Sheets narrower than this, in heights of the text, have warnings below the title, and one more row in the legend.
+NARROW = 48.0
+
+#: Heights of what is above and below the blocks, in those of the text, of usual and of narrow sheets, and rows of the
+#: caption below its title.
+HEADER, FOOTER, ROWS = (4.7, 5.1), (3.3, 4.6), 2
 
 #: Widths of curve and colour bar beside the blocks, and the largest height of the curve, in heights of the text.
 CURVE, BAR, HIGHEST_CURVE = 23.0, 7.6, 29.0
@@ -83,8 +87,9 @@ class Sheet:
         width, height = size
         self.text = max(SMALLEST_TEXT, round(np.sqrt(width * height) * TEXT_FRACTION))
         self.pad = max(6, round(0.9 * self.text))
-        self.header = round(HEADER * self.text)
-        self.footer = round(FOOTER * self.text)
+        self._narrow = width < NARROW * self.text
+        self.header = round(HEADER[self._narrow] * self.text)
+        self.footer = round(FOOTER[self._narrow] * self.text)
         self.colour_bar = colour_bar
         beside = curve * min(round(CURVE * self.text), width // 2)
         right = beside + (round(BAR * self.text) if colour_bar else 0)
@@ -138,29 +143,33 @@ class Sheet:
         self._legend(draw, keys, end + 2 * self.pad)
         if self.colour_bar is not None:
             self._colour_bar(page, draw, self.colour_bar)
-        rows, font = fitting_rows(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
+        room = [self.size[0] - 2.0 * self.pad] * ROWS
+        if badge and self._narrow:
+            room[-1] = self._badge_box(badge)[0] - 2.0 * self.pad
+        rows, font = fitting_rows(detail, round(0.9 * self.text), room)
         for row, words in enumerate(rows):
-            draw.text((self.pad, self.pad + (2.15 + 1.2 * row) * self.text), words, palette.FAINT, font, anchor="lm")
+            draw.text((self.pad, self.pad + (2.0 + 1.2 * row) * self.text), words, palette.FAINT, font, anchor="lm")
         if badge:
             self._badge(draw, badge)
         return page
 
     def _title(self, draw: ImageDraw.ImageDraw, title: str, badge: str) -> None:
-        room = (self._badge_box(badge)[0] if badge else self.size[0]) - 2 * self.pad
+        room = (self._badge_box(badge)[0] if badge and not self._narrow else self.size[0]) - 2 * self.pad
         font = fitting_font(title, round(1.15 * self.text), room, bold=True)
         draw.text((self.pad, self.pad + 0.72 * self.text), title, palette.INK, font, anchor="lm")
 
     def _badge(self, draw: ImageDraw.ImageDraw, badge: str) -> None:
         box, half = self._badge_box(badge), 0.75 * self.text
         draw.rounded_rectangle(box, radius=half * 0.5, fill=palette.WARNING)
-        place = box[0] + 0.6 * self.text, self.pad + half
+        place = box[0] + 0.6 * self.text, box[1] + half
         draw.text(place, badge, palette.PAPER, _font(round(0.9 * self.text), bold=True), anchor="lm")
 
     def _badge_box(self, badge: str) -> tuple[float, float, float, float]:
         """Left, top, right and bottom of a warning, in pixels."""
         right = self.size[0] - self.pad
         width = _font(round(0.9 * self.text), bold=True).getlength(badge)
-        return right - width - 1.2 * self.text, self.pad, right, self.pad + 1.5 * self.text
+        top = self.pad + 2.55 * self.text * self._narrow
+        return right - width - 1.2 * self.text, top, right, top + 1.5 * self.text
 
     def _scale_bar(self, draw: ImageDraw.ImageDraw, pixel: float) -> int:
         """Draw the scale bar; returns its right end in pixels."""
@@ -181,8 +190,8 @@ class Sheet:
         """Draw the legend, from its end on: what comes and goes in a film stands before what stays."""
         room, size = self.size[0] - self.pad - left, round(0.9 * self.text)
         rows = self._rows(keys, size, room)
-        # Small letters are harder to read than a second row; only what two rows do not hold is written smaller.
-        while len(rows) > 2 and size > 8:
+        # Small letters are harder to read than a second row; only what there is no room for is written smaller.
+        while len(rows) > 2 + self._narrow and size > 8:
             size -= 1
             rows = self._rows(keys, size, room)
         font, gap = _font(size), LEGEND_GAP * size
@@ -354,15 +363,17 @@ def fitting_font(text: str, size: int, room: float, bold: bool = False) -> Image
     return font
 
 
-def fitting_rows(text: str, size: int, room: float) -> tuple[list[str], ImageFont.FreeTypeFont]:
-    """Break a text between its parts into ``ROWS`` rows at most; returns them and the largest font that fits."""
+def fitting_rows(text: str, size: int, room: Sequence[float]) -> tuple[list[str], ImageFont.FreeTypeFont]:
+    """Break a text between its parts into rows with so much room each, in the largest font up to ``size`` that fits."""
     while True:
-        font, rows = _font(size), list[str]()
-        for part in text.split(SEPARATOR):
-            longer = f"{rows[-1]}{SEPARATOR}{part}" if rows else part
-            rows = [*rows[:-1], longer] if font.getlength(longer) <= room else [*rows, part]
-        if size <= 7 or (len(rows) <= ROWS and max(map(font.getlength, rows)) <= room):
-            return [*rows[: ROWS - 1], SEPARATOR.join(rows[ROWS - 1 :])], font
+        font, parts, rows = _font(size), text.split(SEPARATOR), list[str]()
+        for wide in room:
+            count = sum(font.getlength(SEPARATOR.join(parts[:n])) <= wide for n in range(1, len(parts) + 1))
+            rows.append(SEPARATOR.join(parts[:count]))
+            parts = parts[count:]
+        if not parts or size <= 7:
+            rows[-1] = SEPARATOR.join(filter(None, [rows[-1], *parts]))
+            return rows, font
         size -= 1
 
 
@@ -413,10 +424,13 @@ def sheet_size(frame: Frame, usual: tuple[int, int] = STILL_SIZE, beside: float 
     proportion = height / (width * len(frame.size) / 2.0)
     pixels = float(np.prod(usual))
     text = np.sqrt(pixels) * TEXT_FRACTION
-    # A strip as high as the words, and the blocks' picture.
-    words = (HEADER + FOOTER - proportion * beside) * text
-    wide = (np.sqrt(words**2 + 4.0 * proportion * pixels) - words) / (2.0 * proportion)
-    wide = float(np.clip(wide, usual[1], usual[0]))
+    for header, footer in zip(HEADER, FOOTER, strict=True):
+        # A strip as high as the words, and the blocks' picture.
+        words = (header + footer - proportion * beside) * text
+        wide = (np.sqrt(words**2 + 4.0 * proportion * pixels) - words) / (2.0 * proportion)
+        wide = float(np.clip(wide, usual[1], usual[0]))
+        if wide >= NARROW * text:
+            break
     high = float(np.clip(proportion * wide + words, usual[0] / 3.0, pixels / wide))
     return 2 * round(wide / 2.0), 2 * round(high / 2.0)
 

@@ -301,8 +301,8 @@ def test_a_poster_is_where_the_fall_is_fastest(tmp_path):
     frames = animate(
         arch_response(), tmp_path / "frames", size=SIZE, fps=25, seconds=0.1, poster=tmp_path / "poster.png"
     )
-    pictures, poster = [pixels(frame)[45:140] for frame in sorted(frames.iterdir())], pixels(tmp_path / "poster.png")
-    chosen = [k for k, picture in enumerate(pictures) if (picture == poster[45:140]).all()]
+    pictures, poster = [pixels(frame)[61:125] for frame in sorted(frames.iterdir())], pixels(tmp_path / "poster.png")
+    chosen = [k for k, picture in enumerate(pictures) if (picture == poster[61:125]).all()]
     # What is drawn anew, of a fall that takes a second or two behind half a second of rest.
     changes = [np.abs(after - before).sum() for before, after in pairwise(pictures)]
     assert len(chosen) == 1

@@ -288,6 +288,27 @@ def test_a_long_caption_is_broken_between_its_parts_and_keeps_its_size():
     assert (drawn(*parts)[-2:] == 255).all(), "above the blocks"
 
 
+def test_a_warning_leaves_the_title_of_an_upright_sheet_its_size():
+    """As a film began to fall, its title was made a third smaller."""
+    sheet = Sheet((720, 1280))
+    page = Image.new("RGB", sheet.inside_size, "white")
+
+    def drawn(badge):
+        said = {
+            "title": "Settlement 0.1000 m   ·   Reaction 11.48 kN",
+            "detail": "fall   ·   true scale",
+            "pixel": 0.01,
+        }
+        return np.asarray(sheet.composed(page, badge=badge, **said))[: sheet.header].astype(int)
+
+    calm, falling = drawn(""), drawn(FALL_BADGE)
+    below = sheet.pad + 2 * sheet.text
+    assert (calm[:below] == falling[:below]).all()
+    red = (falling == palette.WARNING).all(axis=2).any(axis=1)
+    assert red.any()
+    assert not red[-1], "it is not cut off"
+
+
 def test_in_a_fall_the_label_of_a_tie_says_what_its_colour_does(monkeypatch):
     assembly = solver.Assembly.from_outlines([rectangle(0, -1, 1, 0), rectangle(0, 0, 1, 1)], roles=["moving", "free"])
     iron = solver.Tie("iron", (1, None), ((0.5, 0.9), (0.5, 2.0)), stiffness=1e6)
