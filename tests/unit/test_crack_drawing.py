@@ -197,6 +197,19 @@ def test_a_step_between_blocks_in_space_is_drawn_though_no_joint_is_open(tmp_pat
     assert said[1:] == ["1 crack   ·   the widest 3000 mm   ·   drawn on the layout"]
 
 
+@pytest.mark.slow
+def test_the_legend_of_cracks_in_space_names_a_moving_support_that_is_seen(tmp_path):
+    """It is pale green, and nothing said why."""
+    solids = [box((-0.4, -0.4, -0.4), (0.4, 0.4, 0)), box((-0.6, -0.6, 0), (0.6, 0.6, 1))]
+    assembly = solver.Assembly.from_solids(solids, roles=["moving", "free"])
+    sinks = solver.Settlement((0, 0, -1), increment=0.01, limit=0.01)
+    response = solver.Structure(assembly, friction_coefficient=0.7).settle(sinks)
+    named = palette.pale(np.array([palette.MOVING]), np.array([True]), palette.SURVEY)
+    for view in ("top", "front"):
+        picture = pixels(draw_cracks(response, -1, tmp_path / "cracks.png", view=view, size=SIZE))
+        assert (picture[320:] == named).all(axis=2).any() == (view == "front")
+
+
 def test_a_step_in_the_plane_is_said(tmp_path, monkeypatch):
     """A joint that slides and belongs to no crack; through those that do a stepped crack runs."""
     rings = [rectangle(x, 0.0, x + 1.0, 1.0) for x in (0.0, 1.0, 2.0)]
