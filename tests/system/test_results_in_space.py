@@ -519,12 +519,13 @@ def test_mechanism_is_tinted_and_shows_where_it_goes(tmp_path):
     parts = int(swing_of(response).parts.max()) + 1
     assert parts >= 3
     assert (np.abs(picture - palette.SETTLEMENT).max(axis=2) <= 8).sum() > 60
-    tints = palette.PARTS[:parts]
+    tints = palette.part_colours(np.repeat(palette.STONES[:1], parts, axis=0), np.arange(parts))
+    blocks = picture[60:300]
     for tint in tints:
         # A tint in any of the lights that its faces are seen in.
-        hue = picture / np.maximum(picture.sum(axis=2, keepdims=True), 1)
-        near = np.abs(hue - tint / tint.sum()).max(axis=2) < 0.025
-        assert near.sum() > 120
+        hue = blocks / np.maximum(blocks.sum(axis=2, keepdims=True), 1)
+        near = np.abs(hue - tint / tint.sum()).max(axis=2) < 0.012
+        assert near.sum() > 2000
 
 
 def torn(assembly, swing):
