@@ -279,7 +279,7 @@ def drawn_vault(tmp_path, **seen_from):
     """Pixels of the picture of the vault's last equilibrium."""
     response = vault_response()
     path = draw_still(response, -1, tmp_path / "still.png", size=SMALL, **seen_from)
-    return pixels(path)[45:310]
+    return pixels(path)[57:320]
 
 
 def ink_in(picture):
