@@ -186,17 +186,16 @@ class _Problem:
         contacts, gaps = contacts[number], gaps[number]
         crushing = np.where(is_open | (gaps <= closed_gap), crushing[number], 0.0)
         cohesion, tension = (np.where(is_open, 0.0, of[number]) for of in (joints.cohesion, joints.tension))
-        friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-        friction = np.where(is_member(contacts), 0.0, friction)
+        friction = np.where(is_member(contacts), 0.0, interfaces.friction(assembly, contacts.block_a, contacts.block_b))
         faces = Faces.of(contacts, model.length, friction) if torsion == UNIFORM and len(contacts) else None
         if faces is not None:
             faces.refuse_not_convex(contacts, assembly)
         limits = ForceLimits(-tension, crushing, np.maximum(cohesion - friction * tension, 0.0))
         price = np.zeros(len(contacts))
         if displacement > 0.0:
-            # What a unit of normal force costs in multipliers of the scaled live load.
+            # In multipliers of the scaled live load; of forces their points count, not what they turn about centroids.
             live, _ = model.scaled_live(pose)
-            total = float(np.linalg.norm(live[:, :d], axis=1).sum() + np.linalg.norm(live[:, d:], axis=1).sum())
+            total = np.linalg.norm(live[:, :d], axis=1).sum() or np.linalg.norm(live[:, d:], axis=1).sum()
             price = np.where(is_open, gaps, 0.0) / displacement / total
         self.gaps, self.ties_at = gaps, ties_at
         self.program = StaticProgram(
