@@ -126,8 +126,10 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
     path, collapse, assembly, governing = response.path, response.collapse, response.assembly, response.governing
     told = KINDS[response.analysis].capacity
     by_load, never_stood = told == response.measured, response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
+    # A settlement that ends before the load acts says nothing of what the structure carries.
+    unknown = by_load and response.stop is solver.Status.LOCKED
     found: dict[str, Any] = {
-        "status": str(response.stop),
+        "status": FAILED if unknown else str(response.stop),
         "message": response.message if collapse is None else "",
         "unit": told.unit and response.parameter.unit,
         "last_settlement": float(path[-1].settlement + before[path[-1].phase])
