@@ -103,8 +103,7 @@ def find_limit_load(
         if not 0.0 <= value < np.inf:
             raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
     gone = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else np.asarray(fallen)
-    told = ties_as_drawn(ties, assembly, pose) if ties_at is None else ties_at
-    told = told.held(ties, gone)
+    told = (ties_as_drawn(ties, assembly, pose) if ties_at is None else ties_at).held(ties, gone)
     force = mean_load(left, loads) or float(np.abs(loads.live[left.free]).max())
     model = Model(left, interfaces, loads, left.block_size, force, gone, has_live=True, ties=tuple(ties))
     model = model.without(gone) if gone.any() else model
