@@ -308,9 +308,8 @@ class Structure(Shown):
         positions = numbers_of(positions, "positions")
         if positions.ndim != 1 or len(positions) == 0:
             raise ValueError(f"positions have shape {positions.shape}; give at least one number")
-        given: Any = {"pose": pose, "flow": flow, "torsion": torsion}
-        given |= {"ties_at": ties_at, "bonds_at": bonds_at, "fallen": fallen}
-        limits = (self.with_live(live(float(x))).limit_load(**given) for x in positions)
+        given: Any = {"pose": pose, "ties_at": ties_at, "bonds_at": bonds_at, "fallen": fallen, "flow": flow}
+        limits = (self.with_live(live(float(x))).limit_load(torsion=torsion, **given) for x in positions)
         return Envelope(positions, tuple(limits))
 
     def _standing(

@@ -36,11 +36,11 @@ WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4
 POINT_UNCERTAINTY = 1e-3
 
 #: A place farther than this from its joint or block, in block sizes, is a mistake in its coordinates or their unit, and
-#: so is an uncertainty of more than this, in largest widths or displacements; blocks of a drawing that are paired by
-#: their shapes have moved by less, in block sizes, or are others.
+#: so is an uncertainty of more than this, in largest widths or displacements.
 FARTHEST = 2.0
 
-#: A width of more than this, in block sizes, is a mistake in its unit.
+#: A width of more than this, in block sizes, is a mistake in its unit; blocks of a drawing that are paired by their
+#: shapes have moved by less, or are others.
 WIDEST = 1.0
 
 #: A point that is displaced by more than this fraction of the structure is a mistake in its unit.
@@ -482,7 +482,9 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
         missing = counted(
             len(lost), "block of the case is not in it and says", "blocks of the case are not in it and say"
         )
-        warnings.warn(f"{path}: {missing} nothing ({_first(lost)})", stacklevel=4)
+        others = [f"'{name}'" for k, name in enumerate(layout.names) if k not in partner.values()]
+        other = f"; {len(others)} of its blocks fit none, or lie too far away ({_first(others)})" * bool(others)
+        warnings.warn(f"{path}: {missing} nothing ({_first(lost)}){other}", stacklevel=4)
     joints = initial_joints(assembly)
     opening = opening_and_slip(assembly, joints, pose)[:, 0]
     # Joints that are closed but for the rounding of the drawing's numbers would be told and drawn as cracks.
@@ -551,7 +553,7 @@ def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: so
     # Two blocks of unlike size are not the same stone, however near they lie.
     cost = apart + np.abs(np.log(assembly.areas[:, None] / areas[None]))
     rows, columns = linear_sum_assignment(cost)
-    return {int(i): int(k) for i, k in zip(rows, columns, strict=True) if cost[i, k] < FARTHEST}
+    return {int(i): int(k) for i, k in zip(rows, columns, strict=True) if cost[i, k] < WIDEST}
 
 
 def _moved(assembly: solver.Assembly, block: int, ring: np.ndarray) -> tuple[np.ndarray, float]:

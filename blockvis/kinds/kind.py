@@ -16,6 +16,7 @@ from blockvis.cases.build import case_interfaces
 from blockvis.cases.contents import Case
 from blockvis.cases.key import Key, Section, read_keys
 from blockvis.cases.toml_table import Table
+from blockvis.results.about import phases_of
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -29,13 +30,13 @@ class Course:
 
     parameter: mechanics.Quantity
     measured: mechanics.Quantity
-    settlements: tuple[solver.Settlement, ...] = ()  #: Whose phases the parameter belongs to.
+    settlements: tuple[solver.Settlement, ...] = ()  #: Along which they run, or after which they begin.
     control: mechanics.Control | None = None  #: What drives the parameter where no settlement does.
 
     @property
     def drivers(self) -> tuple[mechanics.Control, ...]:
         """How far the parameter goes in each phase; empty where no limit is known."""
-        return self.settlements if self.control is None else (self.control,)
+        return phases_of(self) if self.control is None else (self.control,)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,14 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
-from blockvis.results.about import collapse_phase, governing_limit, in_phase, unit_and_phase
+from blockvis.results.about import (
+    after_settlements,
+    collapse_phase,
+    governing_limit,
+    in_phase,
+    phases_of,
+    unit_and_phase,
+)
 from blockvis.results.other_mechanisms import has_others
 from blockvis.results.swinging import SWING, swing_factors, swung_increment
 from blockvis.results.tables import csv_text, finite
@@ -44,8 +51,8 @@ TORSIONS = ("points", "uniform")
 #: structure.
 SWINGING_FRAMES = 30
 
-#: Displacement within which joints that a settlement has opened may close, in block sizes. It changes nothing for an
-#: arch whose hinges have opened; without it the capacity of a wall of many bricks is that of its loosest brick.
+#: Displacement within which joints that a settlement has opened may close, in mean heights of the free blocks, which do
+#: not depend on how deep these are. Without it the capacity of a wall of many bricks is that of its loosest brick.
 CLOSING = 1e-3
 
 #: Part of a multiplier by which that of joints that stay open has to differ to be told.
@@ -103,7 +110,7 @@ class LimitLoadKind(AnalysisKind):
         Key("capacity_at", NUMBERS, "Settlements at which limit loads are wanted, in each [[settlement]] that reaches "
             "them; of a rotation in rad", [0.0, 0.02], "m", otherwise="every increment"),
         Key("displacement", NOT_NEGATIVE, "Within which joints that a settlement has opened may close", 0.001, "m",
-            otherwise=f"{CLOSING:g} block sizes"),
+            otherwise=f"{CLOSING:g} mean heights of the blocks"),
     )  # fmt: skip
 
     def read(self, top: Table, analysis: Table) -> LimitLoadSettings:
@@ -161,7 +168,7 @@ class LimitLoadKind(AnalysisKind):
     def course(self, case: Case) -> Course:
         """Run over the positions of a load that moves, else over the settlements of a case."""
         if any(load.positions for load in case.loads) or not case.settlements:
-            return Course(self.parameter, self.measured)
+            return Course(self.parameter, self.measured, case.settlements)
         return replace(settlement_course(case.settlements), measured=self.measured)
 
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
@@ -213,9 +220,9 @@ class LimitLoadKind(AnalysisKind):
         """Complete the response by the settlements and limit loads of the summary."""
         response = super().restored(response, summary)
         settlements = stored_settlements(summary)
-        if settlements:
-            parameter = settlement_course(settlements).parameter
-            response = replace(response, settlements=settlements, parameter=parameter)
+        response = replace(response, settlements=settlements)
+        if summary.get("parameter") == mechanics.SETTLEMENT.name:
+            response = replace(response, parameter=settlement_course(settlements).parameter)
         return replace(response, limits=_stored_limits(summary, response.increments))
 
     def tables(self, response: solver.Response) -> dict[str, str]:
@@ -271,11 +278,12 @@ class LimitLoadKind(AnalysisKind):
             lines.append(f"note: {said['limit_load_caveat']}")
         if not response.parameter.is_path and len(path) > 1:
             lines.append(f"the lowest of {len(path)} positions: load at x = {state.parameter:.6g} m")
-        elif response.settlements:
+        elif phases_of(response):
             before = _before(response)
             drawn = "" if before is None else f"   before it {before:.6g}"
             place = unit_and_phase(response, state.phase)
             lines.append(f"after a settlement of{state.parameter:12.6g} {place}{drawn}")
+        lines += filter(None, [after_settlements(response)])
         lines += [f"note: {note}" for note in _notes_on_places(response)]
         if response.collapse is not None:
             lines.append(response.message)
@@ -297,7 +305,8 @@ class LimitLoadKind(AnalysisKind):
         if len(response.path) > 1:
             place = unit_and_phase(response, state.phase)
             where = f" at {response.parameter.name} {state.parameter:.5g} {place}"
-        return f"Limit load: α = {state.load_multiplier:.5g}{where}"
+        told = f"Limit load: α = {state.load_multiplier:.5g}{where}"
+        return " ".join(filter(None, (told, after_settlements(response))))
 
     def rows(self, response: solver.Response) -> list[tuple[str, str]]:
         """Describe the limit load that governs: its values, and where it is."""
@@ -324,11 +333,12 @@ class LimitLoadKind(AnalysisKind):
                 rows.append(("live load at α = 1", force_text(limit.live_force)))
         if not response.parameter.is_path and len(path) > 1:
             rows.append(("lowest of", f"{len(path)} positions, at x = {state.parameter:.5g} m"))
-        elif response.settlements:
+        elif phases_of(response):
             rows.append(("after a settlement of", f"{state.parameter:.6g} {unit_and_phase(response, state.phase)}"))
             before = _before(response)
             if before is not None:
                 rows.append(("before it", f"{before:.6g}"))
+        rows += [("the structure", f"stands {after}")] if (after := after_settlements(response)) else []
         rows += [("note", note) for note in _notes_on_places(response)]
         return rows
 
@@ -624,9 +634,11 @@ def _limit(run: AnalysisRun, loads: solver.Loads, at: Standing, displacement: fl
 
 def _displacement(case: Case, assembly: solver.Assembly) -> float:
     """Within which joints that a settlement has opened may close [m]."""
-    if not case.settlements:
-        return 0.0
-    return CLOSING * assembly.block_size if case.settings.displacement is None else case.settings.displacement
+    if not case.settlements or case.settings.displacement is not None:
+        return case.settings.displacement or 0.0
+    upward = assembly.vertices[:, -1]
+    high, low = (end.reduceat(upward, assembly.shapes.offsets[:-1]) for end in (np.maximum, np.minimum))
+    return CLOSING * float((high - low)[assembly.free].mean())
 
 
 def _limit_ending(limit: solver.LimitLoad) -> mechanics.Ending:

@@ -8,7 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.dynamics.fall import CAPTION
-from blockvis.results.about import collapse_phase, least_reaction, loss_of, told_reaction
+from blockvis.results.about import after_settlements, collapse_phase, least_reaction, loss_of, phases_of, told_reaction
 from blockvis.text import force_text, padded_text
 from solver import mechanics
 
@@ -60,7 +60,7 @@ def new_motions(response: solver.Response) -> list[int]:
 
     A multiplier is that of the live load, however supports move.
     """
-    settlements = response.settlements * response.measured.is_force
+    settlements = phases_of(response) * response.measured.is_force
     motions = [replace(given, increment=1.0, limit=1.0, tolerance=None, stops=()) for given in settlements]
     phases = [increment.phase for increment in response.path]
     return [k for k in range(1, len(phases) if motions else 0) if motions[phases[k - 1]] != motions[phases[k]]]
@@ -87,7 +87,7 @@ def in_one_unit(response: solver.Response, phase: int | None = None) -> solver.R
 
     That is the last phase with an increment by default.
     """
-    units = [settlement.unit for settlement in response.settlements]
+    units = [settlement.unit for settlement in phases_of(response)]
     if len(set(units)) < 2 or not response.increments:
         return response
     phase = min(response.increments[-1].phase if phase is None else phase, len(units) - 1)
@@ -273,9 +273,10 @@ def loss_words(increment: solver.Increment) -> list[str]:
 
 
 def phase_words(response: solver.Response, increment: solver.Increment) -> list[str]:
-    """Say to which of several settlements an increment belongs: its parameter counts from their beginning."""
-    several = len(response.settlements) > 1
-    return [f"phase {increment.phase + 1} of {len(response.settlements)}"] if several else []
+    """Say in which of several settlements an increment is, whose parameter counts from there, or after which it is."""
+    number = len(phases_of(response))
+    words = f"phase {increment.phase + 1} of {number}" if number > 1 else after_settlements(response)
+    return [words] if words else []
 
 
 def _swings_out(response: solver.Response, increment: solver.Increment) -> bool:

@@ -16,7 +16,15 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image, ImageDraw
 
 import solver
-from blockvis.results.about import about, collapse_phase, counts_text, in_phase, losing
+from blockvis.results.about import (
+    about,
+    after_settlements,
+    collapse_phase,
+    counts_text,
+    in_phase,
+    losing,
+    phases_of,
+)
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.results.tables import change_words
 from blockvis.results.ties import TieForceCurves, tie_force_curves
@@ -95,10 +103,10 @@ def draw_curve(
         Of the reaction, drawn behind it.
     """
     response = response if isinstance(response, solver.Response) else response.response
-    path, name = Path(path), about(response).name
+    path, name = Path(path), "   ·   ".join(filter(None, (about(response).name, after_settlements(response))))
     if in_one_unit(response) is not response:
         response = in_one_unit(response)
-        name += f"   ·   phase {response.path[-1].phase + 1} of {len(response.settlements)}" if response.path else ""
+        name += f"   ·   phase {response.path[-1].phase + 1} of {len(phases_of(response))}" if response.path else ""
     if path.suffix.lower() not in CURVE_SUFFIXES:
         raise ValueError(f"'{path.name}' is no curve that blockvis draws; end its name in {', '.join(CURVE_SUFFIXES)}")
     ties = tie_force_curves(response) if response.parameter.is_path else None
@@ -113,7 +121,7 @@ def draw_curve(
         _draw_ties(below, response, ties)
         axes.set_xlabel("")
     name += "" if band is None else f"   ·   band: range of {mechanics.counted(band.runs.max(initial=0), 'run')}"
-    above = _mark_phases(axes, response, int(LETTERS * size[0])) if response.settlements else 0.0
+    above = _mark_phases(axes, response, int(LETTERS * size[0])) if phases_of(response) else 0.0
     axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK), pad=6.0 + above)
     return saved(figure, path, 200)
 
@@ -146,10 +154,10 @@ class CurvePanel:
         """Return the curve with the dot at an increment; at the end of the curve during the fall."""
         picture = self._picture.copy()
         # Phases in another unit are not on the curve.
-        if len(self._total) == 0 or (self._response.settlements and increment.phase not in self._offsets):
+        if len(self._total) == 0 or increment.phase not in self._offsets:
             return picture
         falling = increment.status == solver.Status.FALLING
-        at = self._offsets.get(increment.phase, 0.0) + increment.parameter
+        at = self._offsets[increment.phase] + increment.parameter
         if falling and not self._response.swings:
             at = self._total[-1]
         x, y = (float(np.interp(at, self._total, self._places[:, k])) for k in (0, 1))

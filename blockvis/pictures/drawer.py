@@ -13,6 +13,7 @@ from PIL import Image
 import solver
 from blockvis.dynamics.fall import Fall, falling_increment
 from blockvis.layout.sights import Cut, Sight
+from blockvis.results.about import phases_of
 from blockvis.results.cracks import cracks_of, main_areas
 from blockvis.results.joint_faces import initial_joints
 from blockvis.text import force_text, rounded_length, width_text
@@ -363,9 +364,7 @@ class Drawer:
             self._draw_forces(increment, shown)
             self._draw_bearings(shown)
             # In the mechanism of a live load supports stand still.
-            if self.response.settlements and not (
-                increment.load_multiplier and (falling or self._drawn_at is not None)
-            ):
+            if phases_of(self.response) and not (increment.load_multiplier and (falling or self._drawn_at is not None)):
                 seen = self.scene.frame if self._flat else None
                 self._draw_arrows("arrow", *self._settlement_arrows(increment, shown, seen), palette.SETTLEMENT)
             self._draw_live_load(increment, shown, dots)
@@ -671,7 +670,7 @@ class Drawer:
         self, increment: solver.Increment, shown: solver.Pose, seen: Frame | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Tails and tips (n, d) [m] of the arrows at supports: in the plane on them, in space out of them."""
-        phases = self.response.settlements
+        phases = phases_of(self.response)
         if not phases:
             return np.zeros((0, self.assembly.dimension)), np.zeros((0, self.assembly.dimension))
         phase = phases[min(increment.phase, len(phases) - 1)]

@@ -18,6 +18,7 @@ from blockvis.pictures.marks import (
     settlement_arrows,
     sliding_lines,
 )
+from blockvis.results.about import phases_of
 from blockvis.results.joint_faces import InitialJoints
 from blockvis.results.joints import carried_faces, joint_states
 from blockvis.text import force_text, rounded_length
@@ -118,7 +119,7 @@ def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list
             [int(block), *np.round(place - origin, 5).tolist(), *np.round(direction, 5).tolist()]
             for block, place, direction in zip(*settlement_arrows(assembly, settlement, initial, seen), strict=True)
         ]
-        for settlement in response.settlements
+        for settlement in phases_of(response)
     ]
 
 

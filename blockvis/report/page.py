@@ -35,6 +35,7 @@ from blockvis.pictures.captions import (
     new_motions,
     parameter_label,
     parameter_unit,
+    phase_words,
     shown_range,
     state_text,
     unit_for,
@@ -45,7 +46,7 @@ from blockvis.pictures.marks import STEEPEST, WIDEST
 from blockvis.pictures.render import check_increments
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.pictures.ties import DrawnTies
-from blockvis.results.about import about, certified, counts_text, governing_limit, loss_of
+from blockvis.results.about import about, certified, counts_text, governing_limit, loss_of, phases_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
@@ -377,11 +378,9 @@ def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, An
         if frame.time is not None:
             caption = f"{fall_text(response)}   ·   {frame.time:.2f} s"
         else:
-            caption = state_text(increment, response)
-            if len(response.settlements) > 1:
-                caption += f"  ·  phase {increment.phase + 1}"
-            caption = "  ·  ".join([caption, *loss_words(increment)])
-        phase = min(increment.phase, max(len(response.settlements) - 1, 0))
+            words = *phase_words(response, increment), *loss_words(increment)
+            caption = "  ·  ".join([state_text(increment, response), *words])
+        phase = min(increment.phase, max(len(phases_of(response)) - 1, 0))
         caption = caption.replace("   ·   ", "  ·  ")
         told = {"caption": caption, "falling": frame.falling, "curve": frame.curve, "phase": phase}
         fell_at = increment.state.fell_at
@@ -428,7 +427,7 @@ def _curve(response: solver.Response, band: ReactionRange | None) -> dict[str, A
 
     return {
         # Frames before this one are of phases in another unit.
-        "first": before - len(response.path) if len(response.settlements) > 1 else 0,
+        "first": before - len(response.path) if len(phases_of(response)) > 1 else 0,
         "settlement": [float(f"{v:.7g}") for v in x],
         "reaction": [float(f"{v:.7g}") if np.isfinite(v) else None for v in y],
         # The reaction leaves that at rest at once: the way to the next one is dotted.

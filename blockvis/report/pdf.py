@@ -24,7 +24,7 @@ from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.marks import evenly
 from blockvis.pictures.render import check_increments, draw_mechanism, draw_still
 from blockvis.pictures.underlay import Underlay
-from blockvis.results.about import about
+from blockvis.results.about import about, phases_of
 from blockvis.results.cracks import Crack, cracks_of
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.system.atomic_files import write_atomic
@@ -134,7 +134,7 @@ def _states(response: solver.Response) -> tuple[str, Sequence[str], list[tuple[s
         value = force_text(increment.measured, moment) if measured.is_force else f"{increment.measured:.5g}"
         share = f"{increment.measured / weight:.4f}" if measured.is_force and not moment else ""
         place = parameter_text(increment.parameter, here)
-        several = len(response.settlements) > 1
+        several = len(phases_of(response)) > 1
         rows.append((f"{place}, phase {increment.phase + 1}" if several else place, value, share))
     # Moments and multipliers are no parts of the weight.
     columns = 3 if any(share for _, _, share in rows) else 2

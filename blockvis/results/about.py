@@ -11,7 +11,7 @@ from typing import Protocol
 
 import solver
 from blockvis.dynamics.fall import with_mechanism
-from blockvis.text import force_text
+from blockvis.text import force_text, listed
 from solver import mechanics
 
 from .increments import folder_of
@@ -74,7 +74,7 @@ def least_reaction(first: solver.Increment) -> float:
 
 def in_phase(response: solver.Response, phase: int) -> str:
     """Say in which of several settlements, by its number from 0, a place is; empty where there is but one."""
-    return f" in phase {phase + 1}" if len(response.settlements) > 1 else ""
+    return f" in phase {phase + 1}" if len(phases_of(response)) > 1 else ""
 
 
 def unit_and_phase(response: solver.Response, phase: int) -> str:
@@ -105,13 +105,25 @@ class Measured(Protocol):
 
     @property
     def settlements(self) -> tuple[solver.Settlement, ...]:
-        """Whose phases the parameter belongs to."""
+        """Along which it runs, or after which it begins."""
+
+
+def phases_of(course: Measured) -> tuple[solver.Settlement, ...]:
+    """Give the settlements whose phases the parameter belongs to; none where it begins after them."""
+    return course.settlements if course.parameter.name == mechanics.SETTLEMENT.name else ()
+
+
+def after_settlements(response: solver.Response) -> str:
+    """Say after which settlements a path over another parameter stands; empty where there are none, or no such path."""
+    before = () if phases_of(response) or not response.path else response.settlements
+    told = listed([f"{settlement.limit:.6g} {settlement.unit}" for settlement in before])
+    return told and f"after {'settlements' if len(before) > 1 else 'a settlement'} of {told}"
 
 
 def unit_in(course: Measured, phase: int) -> str:
     """Give the unit of the parameter in a phase, by its number from 0: "m" or "rad" of a settlement."""
-    settlements = course.settlements
-    return settlements[min(phase, len(settlements) - 1)].unit if settlements else course.parameter.unit
+    phases = phases_of(course)
+    return phases[min(phase, len(phases) - 1)].unit if phases else course.parameter.unit
 
 
 @dataclass(frozen=True)
@@ -135,7 +147,7 @@ def quantities_in(course: Measured, phase: int) -> Quantities:
 
 def quantities_of(course: Measured) -> tuple[Quantities, ...]:
     """Give the quantities of each phase; of what has no settlement those of the whole."""
-    return tuple(quantities_in(course, phase) for phase in range(max(len(course.settlements), 1)))
+    return tuple(quantities_in(course, phase) for phase in range(max(len(phases_of(course)), 1)))
 
 
 def collapse_phase(response: solver.Response) -> int | None:

@@ -18,6 +18,7 @@ from blockvis.system.atomic_files import PARTIAL, WINDOWS, flush, make_folder, r
 from blockvis.text import resume_command
 from solver import mechanics
 
+from .about import phases_of
 from .cracks import MOST_LISTED, cracks_of
 from .fall_files import remove_fall
 from .given import GIVEN, write_given
@@ -221,7 +222,7 @@ class ResultsFolder:
                 write_atomic(self._files.file(len(response.path) - 1), packed_increment(last))
         self._write_table(durable=True)
         write_lists(self.path, self.increments, durable=True)
-        write_atomic(self.path / "joints.csv", self._movements.table(response.settlements))
+        write_atomic(self.path / "joints.csv", self._movements.table(phases_of(response)))
         for name, text in (tables or {}).items():
             write_atomic(self.path / name, text)
         cracks = []

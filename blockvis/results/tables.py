@@ -42,6 +42,9 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
     path, collapse, phase = response.path, response.collapse, collapse_phase(response)
     in_phase = phase if phase is not None else path[-1].phase if path else 0
     worst = mechanics.worst_of(i.certificate for i in path)
+    # States that stand by themselves stand after the last of the settlements, or as drawn.
+    before = None if response.parameter.is_path else next(reversed(response.settlements), None)
+    last = path[-1].parameter if path and response.parameter.is_path else before.limit if before else 0.0
     return {
         "status": str(response.stop),
         "message": response.message,
@@ -49,7 +52,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "collapse_displacement": collapse.displacement if collapse else None,
         "collapse_phase": None if phase is None else phase + 1,
         "collapse_bracket": list(collapse.bracket) if collapse else None,
-        "settlement_unit": unit_in(response, in_phase),
+        "settlement_unit": before.unit if before else unit_in(response, in_phase),
         "initial_reaction": initial_reaction(response),
         "reaction_at_rest": finite(path[0].reaction) if path else None,
         "collapse_lost": collapse.lost if collapse else None,
@@ -62,7 +65,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "analysis": response.analysis,
         "parameter": response.parameter.name,
         **own,
-        "last_settlement": path[-1].parameter if path else None,
+        "last_settlement": last if path else None,
         "last_reaction": finite(path[-1].reaction) if path else None,
         "total_weight": response.total_weight,
         "fill_weight": sum(fill.weight(response.assembly) for fill in response.loads.fills),

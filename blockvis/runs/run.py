@@ -18,6 +18,7 @@ from blockvis.cases.contents import Case
 from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kind import AnalysisRun
 from blockvis.kinds.kinds import KINDS
+from blockvis.results.about import phases_of
 from blockvis.results.folder import RESULTS, ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_json, read_record, versions
 from blockvis.results.viewer_files import restore_grids, write_end
@@ -265,7 +266,7 @@ def _followed(
             with clock.counting("write"):
                 results.add(increment)
             run.recorded(results.increments)
-            phase = f"phase {increment.phase + 1}, " if len(run.course.settlements) > 1 else ""
+            phase = f"phase {increment.phase + 1}, " if len(phases_of(run.course)) > 1 else ""
             for note in increment.notes:
                 warnings.warn(f"{phase}{note}", stacklevel=2)
             progress.increment(increment)

@@ -12,7 +12,7 @@ import numpy as np
 
 import solver
 from blockvis.cases.contents import Case
-from blockvis.results.about import unit_in
+from blockvis.results.about import phases_of, unit_in
 from blockvis.results.folder import STEP_CHECK, add_to_summary
 from blockvis.results.record import read_json, write_json
 from blockvis.system.worker import LOOK
@@ -225,5 +225,5 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
         position=float(moved.max(initial=0.0 if len(mine) else np.nan)),
         stop=stops[0],
         stop_of_check=stops[1],
-        phase=phase + 1 if len(response.settlements) > 1 else None,
+        phase=phase + 1 if len(phases_of(response)) > 1 else None,
     )

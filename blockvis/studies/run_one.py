@@ -21,7 +21,7 @@ from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.frame import Frame
 from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
-from blockvis.results.about import collapse_phase, governing_limit, loss_in
+from blockvis.results.about import collapse_phase, governing_limit, loss_in, phases_of
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.results.swinging import SWING, swing_factors
 from blockvis.results.tables import initial_reaction
@@ -122,12 +122,14 @@ def _outcome(run: AnalysisRun, number: int, seconds: float | None) -> tuple[dict
 
 def _numbers(response: solver.Response) -> dict[str, Any]:
     """Give what the table says of how a run ended; settlements count from the start of the first phase."""
-    before = [0.0, *np.cumsum([s.limit for s in response.settlements])]
+    before = [0.0, *np.cumsum([s.limit for s in phases_of(response)])]
     path, collapse, assembly, governing = response.path, response.collapse, response.assembly, response.governing
     told = KINDS[response.analysis].capacity
     by_load, never_stood = told == response.measured, response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
+    # A settlement that ends before the load acts says nothing of what the structure carries.
+    unknown = by_load and response.stop is solver.Status.LOCKED
     found: dict[str, Any] = {
-        "status": str(response.stop),
+        "status": FAILED if unknown else str(response.stop),
         "message": response.message if collapse is None else "",
         "unit": told.unit and response.parameter.unit,
         "last_settlement": float(path[-1].settlement + before[path[-1].phase])

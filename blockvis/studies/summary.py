@@ -79,7 +79,7 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
         "quantile_bounds": {p: list(ends) for p, ends in reached.items()},
         "probability_at_the_end": at_the_end[0],
         "probability_at_the_end_at_most": at_the_end[1],
-        "furthest_settlement": curve.furthest,
+        _furthest(study.capacity.name): curve.furthest,
         "first_order_indices": {} if is_single(study) else {k: list(v) for k, v in first_order(study, table).items()},
         "swings": [
             {
@@ -94,6 +94,11 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
         "line": _line(study.parameters[0].name, table) if is_single(study) else [],
         "run_seconds": float(np.nansum(table["seconds"].to_numpy(dtype=float))),
     }
+
+
+def _furthest(capacity: str) -> str:
+    """Name the key of how far runs were followed, by what they collapse at."""
+    return f"furthest_{capacity.replace(' ', '_')}"
 
 
 def ends_counted(table: pd.DataFrame) -> dict[str, int]:
@@ -174,7 +179,7 @@ def _curve_lines(summary: dict[str, Any]) -> list[str]:
         return []
     if not summary["unit"]:
         return ["no load multiplier brings any run down: let a live load push what can move"]
-    far = _with_unit(summary["furthest_settlement"], summary)
+    far = _with_unit(summary[_furthest(summary["capacity"])], summary)
     # [settlement] and [control] are called as what they drive begins.
     driver = summary["capacity"].split()[0]
     return [

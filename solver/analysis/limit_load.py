@@ -103,8 +103,7 @@ def find_limit_load(
         if not 0.0 <= value < np.inf:
             raise ValueError(f"{name} is {value:g} m; it must be a finite number of at least 0")
     gone = np.zeros(assembly.n_blocks, dtype=bool) if fallen is None else np.asarray(fallen)
-    told = ties_as_drawn(ties, assembly, pose) if ties_at is None else ties_at
-    told = told.held(ties, gone)
+    told = (ties_as_drawn(ties, assembly, pose) if ties_at is None else ties_at).held(ties, gone)
     force = mean_load(left, loads) or float(np.abs(loads.live[left.free]).max())
     model = Model(left, interfaces, loads, left.block_size, force, gone, has_live=True, ties=tuple(ties))
     model = model.without(gone) if gone.any() else model
@@ -186,17 +185,16 @@ class _Problem:
         contacts, gaps = contacts[number], gaps[number]
         crushing = np.where(is_open | (gaps <= closed_gap), crushing[number], 0.0)
         cohesion, tension = (np.where(is_open, 0.0, of[number]) for of in (joints.cohesion, joints.tension))
-        friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-        friction = np.where(is_member(contacts), 0.0, friction)
+        friction = np.where(is_member(contacts), 0.0, interfaces.friction(assembly, contacts.block_a, contacts.block_b))
         faces = Faces.of(contacts, model.length, friction) if torsion == UNIFORM and len(contacts) else None
         if faces is not None:
             faces.refuse_not_convex(contacts, assembly)
         limits = ForceLimits(-tension, crushing, np.maximum(cohesion - friction * tension, 0.0))
         price = np.zeros(len(contacts))
         if displacement > 0.0:
-            # What a unit of normal force costs in multipliers of the scaled live load.
+            # In multipliers of the scaled live load; of forces their points count, not what they turn about centroids.
             live, _ = model.scaled_live(pose)
-            total = float(np.linalg.norm(live[:, :d], axis=1).sum() + np.linalg.norm(live[:, d:], axis=1).sum())
+            total = np.linalg.norm(live[:, :d], axis=1).sum() or np.linalg.norm(live[:, d:], axis=1).sum()
             price = np.where(is_open, gaps, 0.0) / displacement / total
         self.gaps, self.ties_at = gaps, ties_at
         self.program = StaticProgram(

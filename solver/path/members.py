@@ -23,7 +23,7 @@ from solver.ties import (
     tie_ends,
     tie_lengths,
 )
-from solver.tolerances import AT_LIMIT
+from solver.tolerances import AT_LIMIT, COMPUTED_GAP
 
 from .state import Place
 
@@ -51,9 +51,8 @@ class Members:
         lengths = place.tie_lengths if len(place.tie_lengths) else np.full((len(self.ties), 2), np.nan)
         new = np.array([tie.phase == phase + 1 for tie in self.ties])
         length = tie_lengths(tie_ends(self.ties, self.model.assembly, place.pose))
-        give = [tie.prestress / tie.stiffness * (-1.0 if tie.kind == PROP else 1.0) for tie in self.ties]
-        now = np.stack([length, length - np.array(give)], axis=1)
-        return replace(place, tie_lengths=np.where(new[:, None], now, lengths))
+        give = np.array([tie.prestress / tie.stiffness * (-1.0 if tie.kind == PROP else 1.0) for tie in self.ties])
+        return replace(place, tie_lengths=np.where(new[:, None], np.stack([length, length - give], axis=1), lengths))
 
     def beside(self, contacts: Contacts, pose: Pose, lengths: np.ndarray) -> Contacts:
         """The contact points of blocks, then those of the members that are there."""
@@ -128,7 +127,10 @@ class Members:
         force, ends = member_forces(contacts, forces, len(self.ties)), tie_ends(self.ties, self.model.assembly, pose)
         # Those that break do not yield before.
         strength, lengths = np.where(self.brittle, np.inf, self.strength), np.where(self.held[:, None], lengths, np.nan)
-        state = member_states(np.abs(force), strength, float(np.abs(forces).max(initial=0.0)))
-        state = np.where(np.isnan(lengths[:, 1]), BROKEN, state)
-        state = np.where(np.isnan(lengths[:, 0]), ABSENT, state)
-        return TieForces(force * self.model.force, tie_lengths(ends) - lengths[:, 0], lengths[:, 1], state, ends)
+        elongations, stretched = (tie_lengths(ends)[:, None] - lengths).T
+        # What is as long as it yields may carry less in an equilibrium, by what :meth:`force_range` leaves open.
+        most = np.sign(force) * stretched / (self.compliance * self.model.length)
+        size = np.fmax(np.abs(force), np.minimum(most, np.abs(force) + GIVE * COMPUTED_GAP / self.compliance))
+        state = member_states(size, strength, float(np.abs(forces).max(initial=0.0)))
+        state = np.select(list(np.isnan(lengths.T)), [ABSENT, BROKEN], state)
+        return TieForces(force * self.model.force, elongations, lengths[:, 1], state, ends)

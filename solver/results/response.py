@@ -111,6 +111,7 @@ class Response(Shown):
     ----------
     assembly : Assembly
     settlements : tuple of Settlement
+        Along which the increments run or, where they run over something else, after which they begin.
     interfaces : Interfaces
     loads : Loads
     increments : tuple of Increment

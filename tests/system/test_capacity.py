@@ -112,6 +112,7 @@ def test_envelope_after_a_settlement_has_the_mortar_that_is_left(tmp_path):
     settled = '[roles]\n"right springer" = "moving"\n[settlement]\ndirection = [1.0, 0.0]\nincrement = 0.005\n'
     text = ARCH.replace("coefficient = 2.0", "coefficient = 2.0\ncohesion = 2e4\ntensile_strength = 1e4") + settled
     text = text.replace("-0.8, 0.8, 5", "-0.4, 0.4, 2") + "limit = 0.01\n"
+    text = text.replace('"limit load"', '"limit load"\ndisplacement = 0.0002')
     response, _ = solved(text, tmp_path)
     path = solver.settle(
         response.assembly,
@@ -125,8 +126,7 @@ def test_envelope_after_a_settlement_has_the_mortar_that_is_left(tmp_path):
     for limit, x in zip(response.limits, (-0.4, 0.4), strict=True):
         live = solver.force_on_top(response.assembly, x, (0.0, -1000.0))
         whole = solver.Structure(response.assembly, response.interfaces, path.loads).with_live(live)
-        close = 1e-3 * response.assembly.block_size
-        expected = whole.limit_load(pose=last.pose, bonds_at=last.bonds, displacement=close)
+        expected = whole.limit_load(pose=last.pose, bonds_at=last.bonds, displacement=2e-4)
         assert limit.multiplier == pytest.approx(expected.multiplier, rel=1e-9)
         dry = whole.limit_load(pose=last.pose, bonds_at=replace(last.bonds, left=0.0 * last.bonds.left))
         assert limit.multiplier > 2.0 * dry.multiplier
@@ -179,6 +179,7 @@ depth = 0.7
 friction_coefficient = 0.7
 [analysis]
 kind = "limit load"
+displacement = 0.0005
 [[ties]]
 name = "iron"
 from = { block = "left pier 4", point = [-1.4, 1.4] }
@@ -217,7 +218,7 @@ def tied(tmp_path_factory):
 def test_a_load_that_moves_is_told_with_joints_that_stay_open(tied):
     rows = table(tied.folder / "envelope.csv")
     case = tied.folder.parent / "apart.toml"
-    case.write_text(TIED.replace('kind = "limit load"', 'kind = "limit load"\ndisplacement = 0.0'), encoding="utf-8")
+    case.write_text(TIED.replace("displacement = 0.0005", "displacement = 0.0"), encoding="utf-8")
     apart = blockvis.run_case(case, tied.folder.parent / "apart", outputs=())
     without = [limit.multiplier for limit in apart.response.limits]
     assert [float(row["staying_open"]) for row in rows] == pytest.approx(without, rel=1e-6)
@@ -334,13 +335,14 @@ capacity_at = [0.004]
     assert note in said.err
     closing, apart = (
         ran(text.replace("[0.004]", f"[0.004]\ndisplacement = {within}") + SIDEWAYS, tmp_path, "--force")[1]
-        for within in (0.00015, 0.0)
+        for within in (0.0001, 0.0)
     )
     with_it, without = (f"{one['limit_load_multiplier']:.6g}" for one in (closing, apart))
     assert note.startswith(
         f"at a settlement of 0.004 m α = {with_it}, {without} without: joints that are open may close"
     )
-    assert "by up to 0.00015 m" in note
+    # Bricks are 0.1 m high.
+    assert "by up to 0.0001 m" in note
     assert apart["notes"] == []
 
 

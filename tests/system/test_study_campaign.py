@@ -15,9 +15,10 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
-from structures import started_cluster
+from structures import rectangle, started_cluster
 
 import blockvis
+import solver
 from blockvis.cli import main
 from blockvis.studies import campaign
 from blockvis.studies.fragility import fragility_of
@@ -110,6 +111,24 @@ def test_a_study_of_limit_loads_tells_load_multipliers(tmp_path):
     words = "collapse by material.friction_coefficient, 0.2: 0.2; 0.4: 0.4; 0.8: 0.5"
     assert words in in_words(summary)
     assert "load multiplier at collapse" in draw_scatter(study, table, tmp_path / "scatter.svg").read_text("utf-8")
+
+
+@pytest.mark.slow
+def test_a_settlement_that_locks_before_the_load_acts_leaves_its_run_without_result(tmp_path):
+    sides = [(-1.0, -1.0, 4.0, 0.0), (0.0, 0.0, 1.0, 0.5), (1.005, 0.0, 2.005, 0.5), (2.01, 0.0, 3.0, 0.5)]
+    outlines = [rectangle(*ends) for ends in sides]
+    jaws = solver.Assembly.from_outlines(outlines, roles=["fixed", "fixed", "free", "moving"])
+    blockvis.save_layout(jaws, tmp_path / "jaws.json")
+    case = PUSHED | {"geometry": {"file": str(tmp_path / "jaws.json")}}
+    case |= {"settlement": {"direction": [-1.0, 0.0], "increment": 0.004}}
+    limits = {"settlement.limit": [0.004, 0.02]}
+    study = read_study({"study": {"case": case, "method": "grid"}, "parameters": limits})
+    table = _made_here(study, tmp_path / "study", range(2)).table()
+    assert table["status"].tolist() == ["collapsed", "failed"]
+    summary = summary_of(study, table)
+    assert (summary["n_stood"], summary["n_without_result"], summary["broken_off_at"]) == (0, 1, [0.0, 0.0])
+    assert summary["furthest_load_multiplier"] == pytest.approx(0.6)
+    assert "without result, 1 time: during the settlement: the supports cannot move on" in in_words(summary)
 
 
 def test_where_no_load_brings_it_down_a_run_stands_beyond_all_others(tmp_path):

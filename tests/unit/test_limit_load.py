@@ -144,6 +144,10 @@ def test_a_joint_that_is_open_by_less_than_the_displacement_counts_by_its_gap(fl
     # N of the stop costs N · g / (δ · brick); up to 2 μ brick of it gains N / brick: worth it once δ exceeds the gap.
     short = limit_load(assembly, displacement=0.5 * gap, flow=flow, **options)
     assert short.multiplier == pytest.approx(mu, rel=1e-6)
+    # A force moves by what its point does, however it turns the block.
+    low = pushed(assembly, solver.point_load(assembly, 0, (brick, 0.0), point=(0.5, 0.1)))
+    short = limit_load(assembly, displacement=0.75 * gap, flow=flow, **options | {"loads": low})
+    assert short.multiplier == pytest.approx(mu, rel=1e-6)
     long = limit_load(assembly, displacement=2.0 * gap, flow=flow, **options)
     assert long.multiplier == pytest.approx(3.0 * mu, rel=1e-6)
     if flow == "associative":

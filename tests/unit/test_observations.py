@@ -260,6 +260,18 @@ def test_a_drawing_of_small_stones_that_have_moved_far_is_taken(tmp_path):
     assert np.linalg.norm(found.displacements, axis=1).max() == pytest.approx(away)
 
 
+def test_a_stone_that_has_fallen_in_a_drawing_without_names_is_paired_with_none(tmp_path):
+    """Both joints beside it would have opened by more than a block is wide."""
+    pose = lifted()
+    pose.positions[ARCH.index("voussoir 3")] -= [0.0, 1.5 * ARCH.block_size]
+    corners = corners_of(pose)
+    path = drawn(tmp_path / "damaged.json", corners, [f"stone {k}" for k in range(len(corners))])
+    with pytest.warns(UserWarning, match=r"1 block of the case is not in it .*'voussoir 3'.*; 1 of .*'stone 2'"):
+        found = read_observations(path, ARCH)
+    assert "voussoir 3" not in found.blocks
+    assert found.largest < 0.1 * ARCH.block_size
+
+
 def test_a_drawing_of_something_else_is_refused(tmp_path):
     save_layout(generators.wall(bricks=2, courses=2, brick_length=0.05, brick_height=0.02), tmp_path / "other.json")
     with pytest.raises(ValueError, match=r"of its . blocks? none is one of the case"):
