@@ -195,6 +195,11 @@ def _courses(
     middles, sizes, normals = joints.ends[chosen].mean(axis=1), joints.sizes[chosen], joints.normals[chosen]
     opening, slip = np.maximum(moved[:, 0], 0.0), moved[:, 1]
     parted = opening[:, None] * normals + slip[:, None] * np.stack([-normals[:, 1], normals[:, 0]], axis=1)
+    # Along each joint with block a on the left.
+    ways = joints.ends[chosen]
+    run = ways[:, 1] - ways[:, 0]
+    backwards = run[:, 0] * normals[:, 1] < run[:, 1] * normals[:, 0]
+    ways = np.where(backwards[:, None, None], ways[:, ::-1], ways)
     angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     across = np.stack([-np.sin(angles), np.cos(angles)])
     # What opens across the line, times the length along it; a joint along the line that only slides parts nothing.
@@ -218,7 +223,7 @@ def _courses(
             if most[direction, line] < largest - margin:
                 break
             strip = members[inside[:, direction, line]]
-            tried, gain = _course_through(widest, strip, meeting, apart, gained[:, direction])
+            tried, gain = _course_through(widest, strip, meeting, parted, gained[:, direction], ways)
             shorter = sizes[tried].sum() < (1.0 - EXACT) * sizes[course].sum()
             if gain > largest + margin or (gain >= largest - margin and shorter):
                 course, largest = tried, gain
@@ -230,30 +235,37 @@ def _courses(
 
 
 def _course_through(
-    start: int, members: np.ndarray, meeting: np.ndarray, apart: np.ndarray, gains: np.ndarray
+    start: int, members: np.ndarray, meeting: np.ndarray, parted: np.ndarray, gains: np.ndarray, ways: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Order the joints of the course through a start that gains most, and sum its gains.
 
-    It is a path of the tree that joins the members by those whose blocks have moved most apart.
+    It is a path of the tree that joins the members by those whose blocks have moved most apart. What is to its left
+    moves from what is to its right as it does at the start; ``parted`` (n, 2) [m] is that along the ``ways`` (n, 2, 2).
     """
     n = len(members)
     # minimum_spanning_tree of scipy 1.15 takes no longer integers.
-    place = np.full(len(apart), -1, dtype=np.int32)
+    place = np.full(len(parted), -1, dtype=np.int32)
     place[members] = np.arange(n, dtype=np.int32)
     one, other = place[meeting]
     pairs = (one >= 0) & (other >= 0) & (one < other)
     one, other = one[pairs], other[pairs]
-    own, gained = apart[members], gains[members]
+    own, gained = np.linalg.norm(parted[members], axis=1), gains[members]
     # Of three joints that meet the widest lies between the others.
     joined = np.minimum(own[one], own[other]) + EXACT * np.maximum(own[one], own[other])
     narrow = 2.0 * own.max() - joined
     tree = minimum_spanning_tree(sp.coo_array((narrow, (one, other)), shape=(n, n)))
     order, before = breadth_first_order(tree, place[start], directed=False)
     root, total, arm = int(order[0]), np.full(n, -np.inf), np.arange(n)
+    middles = ways[members].mean(axis=1)
+    entered = np.linalg.norm(ways[members] - middles[np.maximum(before, 0)][:, None], axis=2).argmin(axis=1)
+    left = np.linalg.norm(ways[start] - middles[:, None], axis=2).argmin(axis=1)
+    alike, margin = parted[members] @ parted[start], EXACT * own * own[root]
     total[root] = gained[root]
     for k in order[1:]:
-        total[k] = total[before[k]] + gained[k]
         arm[k] = k if before[k] == root else arm[before[k]]
+        # Two cracks with a row of blocks between them are none that turns back.
+        goes_on = (alike[k] if entered[k] != left[arm[k]] else -alike[k]) >= -margin[k]
+        total[k] = total[before[k]] + gained[k] if goes_on else -np.inf
 
     def back(k: int) -> list[int]:
         found = []
@@ -264,7 +276,7 @@ def _course_through(
 
     first = back(int(total.argmax()))
     if first:
-        total[arm == arm[first[0]]] = -np.inf
+        total[(left[arm] == left[arm[first[0]]]) & (arm != root)] = -np.inf
     course = [*first, root, *back(int(total.argmax()))[::-1]]
     return members[course], float(gained[course].sum())
 

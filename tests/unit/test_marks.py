@@ -591,6 +591,15 @@ def test_diagonals_through_a_bond_are_one_crack_each(side, apart):
     assert np.tan(np.radians(flat.inclination)) == pytest.approx(side * 0.1 / 0.125, rel=0.15)
 
 
+def test_two_level_cracks_above_each_other_are_none_that_turns_back():
+    """The right of two courses lifts, the upper one by twice as much: a joint that slides leads from bed to bed."""
+    wall = squares(*((0.25 * x, 0.1 * y) for y in range(3) for x in range(8)), size=(0.25, 0.1))
+    lifted = {f"block_{8 * y + x}": (0.0, 0.02 * y, 0.0) for y in (1, 2) for x in range(2, 8)}
+    cracks = cracks_of(wall, moved(wall, **lifted))
+    assert [(round(crack.width, 6), round(crack.inclination, 6)) for crack in cracks] == [(0.02, 0.0), (0.02, 0.0)]
+    assert all(crack.places[1] == "the right edge" for crack in cracks)
+
+
 def test_a_crack_ends_where_its_joints_do_not_at_one_beside_their_way():
     """The upper left corner of a bond goes, and most of what is on its right lifts from the course below."""
     bricks = [(0, 0, 1), (1, 0, 3), (3, 0, 5), (0, 1, 2), (2, 1, 5), (0, 2, 1), (1, 2, 3), (3, 2, 5)]
