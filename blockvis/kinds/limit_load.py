@@ -32,7 +32,7 @@ from .kind import (
     needs_no_crushing,
     without_increments,
 )
-from .settlement import not_reached, settlement_course, settlement_steps, stored_settlements
+from .settlement import left_by, not_reached, settlement_course, settlement_steps, stored_settlements
 
 #: Flow rules of the sliding joints of a limit load.
 FLOWS = ("associative", "non-associative")
@@ -527,8 +527,9 @@ def _over_places(
             if (stays := _staying_open(run, loads, standing)) is not None:
                 run.limits[-1] = replace(run.limits[-1], staying_open=stays.multiplier)
                 state = replace(state, programs=state.programs + stays.increment.programs)
-            if number == 0 and (words := _closing_words(run)):
-                state = replace(state, notes=(*state.notes, words))
+            if number == 0:
+                words = filter(None, [*left_by(run.given.case.settlements), _closing_words(run)])
+                state = replace(state, notes=(*state.notes, *words))
             programs = 0
         if shown is None or mechanics.lowest([shown.load_multiplier, state.load_multiplier]):
             chosen, shown = number, state

@@ -510,6 +510,17 @@ def test_pushover_after_a_tilt_starts_at_what_is_left(tmp_path):
     assert "nothing is left to push over" in summary["message"]
 
 
+@pytest.mark.parametrize("kind", ["pushover", "positions"])
+def test_a_live_load_over_its_own_parameter_says_which_settlement_it_comes_after(kind, tmp_path):
+    """Neither its curve nor its table tells that the capacity is not that of the drawing."""
+    tilt = '[roles]\n"ground" = "moving"\n[settlement]\nrotation_centre = [0.0, 0.0]\nrotation = -1.0\nlimit = 0.01\n'
+    over = LIMIT + MOVING.format("[-0.05, 0.05, 2]") if kind == "positions" else PUSHED + "limit = 0.001\n"
+    response, _ = solved(over + tilt, tmp_path)
+    assert [note for note in response.notes if "settlement" in note] == [
+        "the live load comes after a settlement of 0.01 rad"
+    ]
+
+
 @pytest.mark.slow
 def test_pressure_on_the_top_and_on_an_edge(tmp_path):
     """Pressure p on the flank of b × h overturns it at p h²/2 = W b/2; pressure on the top holds it."""
