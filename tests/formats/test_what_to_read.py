@@ -1,6 +1,7 @@
 """What of a drawing is read: repaired, left out, and chosen by window, kind and colour."""
 
 import ezdxf
+import numpy as np
 import pytest
 
 import blockvis
@@ -37,6 +38,19 @@ def test_an_outline_that_crosses_itself_keeps_its_largest_piece_or_is_left_out(t
     assert "repaired: 1 outline crosses or touches itself, 'block 30' at" in said
     assert "sum 2.49755 m²" in said
     assert "left out: 1 outline that crosses itself on layer '0', 'block 31' at (2.5, 0.25)" in said
+
+
+@pytest.mark.parametrize("width", [1e-13, -1e-13])
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_a_spike_of_rounding_is_dropped(tmp_path, capsys, turn, width):
+    """As shapes cut from one another leave them; a block above would stand on it, and not on what is below."""
+    spur = np.array([(0, 0), (3, 0), (1, width), (1, 0.5), (0, 0.5)])
+    spur = spur @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    drawn(tmp_path / "wall.dxf", spur.tolist(), brick(5, 5))
+    said = info(capsys, tmp_path / "wall.dxf")
+    x, y = 3.0 * np.cos(turn), 3.0 * np.sin(turn)
+    assert f"repaired: 1 outline crosses or touches itself, 'block 2F' at ({x:.6g}, {y:.6g})" in said
+    assert "corners         8" in said
 
 
 def test_a_background_alone_is_no_block(tmp_path, capsys):
