@@ -70,6 +70,15 @@ def test_only_gaps_that_are_joints_are_proposed_as_such(tmp_path, capsys, gap, s
     assert len(blockvis.inspect(tmp_path / "wall.dxf").joints) == (3 if gap > 1e-3 else 0)
 
 
+def test_edges_beside_a_corner_of_stones_that_touch_are_no_joint(tmp_path, capsys):
+    """A stone under the haunch of an arch, which is not drawn, and the head of the pier below it."""
+    haunch = [(3.5, 2.0), (3.56, 2.342), (3.594, 2.4), (3.15, 2.4), (3.15, 2.0)]
+    stones = [brick(1.35, 2.0, 0.9, 0.4), brick(2.25, 2.0, 0.9, 0.4), brick(3.6, 1.6, 0.3, 0.4)]
+    drawn(tmp_path / "wall.dxf", *stones, haunch)
+    assert "mortar joints   none: no gaps between facing edges\n" in info(capsys, tmp_path / "wall.dxf")
+    assert len(blockvis.inspect(tmp_path / "wall.dxf").joints) == 0
+
+
 def test_a_window_reads_what_lies_within_it_and_tells_what_it_cuts(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     drawn("wall.dxf", *(brick(x, y) for x in (0, 1, 2) for y in (0, 0.5)), brick(10, 0), brick(12, 0))
