@@ -619,6 +619,13 @@ def test_places_are_told_by_openings():
     assert below.places[1] == "the lower right corner of the opening"
 
 
+def test_a_crack_through_a_low_beam_ends_at_its_underside():
+    """It is lower than what is near: the joint between its halves ended at the top twice."""
+    halves = squares((0, 0), (1, 0), size=(1, 0.4))
+    (crack,) = cracks_of(halves, moved(halves, block_1=(0.02, 0.0, 0.0)))
+    assert crack.places == ("the underside", "the top")
+
+
 def test_a_crack_that_ends_a_course_above_the_foot_ends_inside():
     """Courses are lower than bricks are long: the joint below it is shut."""
     wall = squares(*((0.25 * x, 0.1 * y) for y in range(4) for x in range(4)), size=(0.25, 0.1))
