@@ -196,10 +196,8 @@ def _courses(
     opening, slip = np.maximum(moved[:, 0], 0.0), moved[:, 1]
     parted = opening[:, None] * normals + slip[:, None] * np.stack([-normals[:, 1], normals[:, 0]], axis=1)
     # Along each joint with block a on the left.
-    ways = joints.ends[chosen]
-    run = ways[:, 1] - ways[:, 0]
-    backwards = run[:, 0] * normals[:, 1] < run[:, 1] * normals[:, 0]
-    ways = np.where(backwards[:, None, None], ways[:, ::-1], ways)
+    runs = joints.ends[chosen, 1] - joints.ends[chosen, 0]
+    runs *= np.where(runs[:, 0] * normals[:, 1] < runs[:, 1] * normals[:, 0], -1.0, 1.0)[:, None]
     angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     across = np.stack([-np.sin(angles), np.cos(angles)])
     # What opens across the line, times the length along it; a joint along the line that only slides parts nothing.
@@ -223,7 +221,7 @@ def _courses(
             if most[direction, line] < largest - margin:
                 break
             strip = members[inside[:, direction, line]]
-            tried, gain = _course_through(widest, strip, meeting, parted, gained[:, direction], ways)
+            tried, gain = _course_through(widest, strip, meeting, parted, gained[:, direction], middles, runs)
             shorter = sizes[tried].sum() < (1.0 - EXACT) * sizes[course].sum()
             if gain > largest + margin or (gain >= largest - margin and shorter):
                 course, largest = tried, gain
@@ -235,12 +233,18 @@ def _courses(
 
 
 def _course_through(
-    start: int, members: np.ndarray, meeting: np.ndarray, parted: np.ndarray, gains: np.ndarray, ways: np.ndarray
+    start: int,
+    members: np.ndarray,
+    meeting: np.ndarray,
+    parted: np.ndarray,
+    gains: np.ndarray,
+    middles: np.ndarray,
+    runs: np.ndarray,
 ) -> tuple[np.ndarray, float]:
     """Order the joints of the course through a start that gains most, and sum its gains.
 
     It is a path of the tree that joins the members by those whose blocks have moved most apart. What is to its left
-    moves from what is to its right as it does at the start; ``parted`` (n, 2) [m] is that along the ``ways`` (n, 2, 2).
+    moves from what is to its right as it does at the start; ``parted`` (n, 2) [m] is that along the ``runs`` (n, 2).
     """
     n = len(members)
     # minimum_spanning_tree of scipy 1.15 takes no longer integers.
@@ -256,15 +260,17 @@ def _course_through(
     tree = minimum_spanning_tree(sp.coo_array((narrow, (one, other)), shape=(n, n)))
     order, before = breadth_first_order(tree, place[start], directed=False)
     root, total, arm = int(order[0]), np.full(n, -np.inf), np.arange(n)
-    middles = ways[members].mean(axis=1)
-    entered = np.linalg.norm(ways[members] - middles[np.maximum(before, 0)][:, None], axis=2).argmin(axis=1)
-    left = np.linalg.norm(ways[start] - middles[:, None], axis=2).argmin(axis=1)
-    alike, margin = parted[members] @ parted[start], EXACT * own * own[root]
+    own_middles, own_runs = middles[members], runs[members]
+    on = ((own_middles - own_middles[np.maximum(before, 0)]) * own_runs).sum(axis=1) > 0.0
+    ahead = (own_middles - own_middles[root]) @ runs[start] > 0.0
+    # Beyond the start, and with the other sign behind it.
+    alike = np.where(on, 1.0, -1.0) * (parted[members] @ parted[start])
+    margin = EXACT * own * own[root]
     total[root] = gained[root]
     for k in order[1:]:
         arm[k] = k if before[k] == root else arm[before[k]]
         # Two cracks with a row of blocks between them are none that turns back.
-        goes_on = (alike[k] if entered[k] != left[arm[k]] else -alike[k]) >= -margin[k]
+        goes_on = (alike[k] if ahead[arm[k]] else -alike[k]) >= -margin[k]
         total[k] = total[before[k]] + gained[k] if goes_on else -np.inf
 
     def back(k: int) -> list[int]:
@@ -276,7 +282,7 @@ def _course_through(
 
     first = back(int(total.argmax()))
     if first:
-        total[(left[arm] == left[arm[first[0]]]) & (arm != root)] = -np.inf
+        total[(ahead[arm] == ahead[arm[first[0]]]) & (arm != root)] = -np.inf
     course = [*first, root, *back(int(total.argmax()))[::-1]]
     return members[course], float(gained[course].sum())
 
