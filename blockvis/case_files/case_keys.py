@@ -409,7 +409,8 @@ LOADS = Section(
     (
         Key("kind", one_of(("dead", "live")), "Dead loads act from the start; live loads are scaled by the multiplier",
             "live", default="dead"),
-        Key("blocks", TEXT, "Name of the free blocks on which it acts, or a pattern", "brick 10-*", default="*"),
+        Key("blocks", TEXT, "Name of the free blocks on which it acts, or a pattern, or material, of drawings a layer",
+            "brick 10-*", default="*"),
         Key("weight_fraction", VECTOR, "Force as a fraction of the weight of each block and of the fill over it: a "
             "horizontal acceleration",
             [1.0, 0.0], otherwise="none"),

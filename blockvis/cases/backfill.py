@@ -10,10 +10,10 @@ import numpy as np
 import shapely
 
 import solver
-from blockvis.layout.left_out import matches
+from blockvis.layout.names import blocks_matching
 from blockvis.layout.outlines import ring_of
 from blockvis.layout.triangulation import triangles_of_ring
-from blockvis.text import listed, nearest
+from blockvis.text import listed
 
 from .block_at import ON_EDGE
 from .key import NOT_NEGATIVE, NUMBER, POSITIVE, TEXTS, Key, Section
@@ -140,19 +140,9 @@ def lay_backfill(
 
 def _chosen(over: Sequence[str], assembly: solver.Assembly, where: str) -> np.ndarray:
     """(n_blocks,) bool array: the free blocks of these names or materials."""
-    names, chosen = assembly.names, np.zeros(assembly.n_blocks, dtype=bool)
+    chosen = np.zeros(assembly.n_blocks, dtype=bool)
     for pattern in over:
-        meant = [
-            matches(filter(None, labels), [pattern])
-            for labels in zip(names, assembly.drawn_names, assembly.materials, strict=True)
-        ]
-        if not any(meant):
-            known = [*names, *sorted(set(assembly.materials) - {""})]
-            raise ValueError(
-                f"{where} over: no block and no material is named '{pattern}'{nearest(pattern, known)}; the blocks "
-                f"are {listed(names, 12)}"
-            )
-        chosen |= meant
+        chosen[blocks_matching(pattern, assembly, f"{where} over")] = True
     if not (chosen & assembly.free).any():
         raise ValueError(f"{where} over: '{listed(over)}' are supports only; fill loads free blocks: name one")
     return chosen & assembly.free

@@ -11,7 +11,7 @@ import numpy as np
 
 import solver
 from blockvis.layout.names import blocks_matching
-from blockvis.text import force_text, listed, nearest
+from blockvis.text import force_text
 
 from .block_at import ON_EDGE, block_at, note_outside
 
@@ -179,16 +179,10 @@ def _loaded(load: LoadCase, named: np.ndarray, gone: np.ndarray, assembly: solve
 
 
 def _named(load: LoadCase, assembly: solver.Assembly, gone: np.ndarray, where: str) -> np.ndarray:
-    named = blocks_matching(load.blocks, assembly)
+    named = blocks_matching(load.blocks, assembly, where)
     chosen = [i for i in named if assembly.free[i]]
-    if not chosen and named:
-        raise ValueError(f"{where} '{load.blocks}' matches supports only; loads act on free blocks: name one")
     if not chosen:
-        names = [name for name, free in zip(assembly.names, assembly.free, strict=True) if free]
-        raise ValueError(
-            f"{where} '{load.blocks}' matches no free block{nearest(load.blocks, names)}; "
-            f"the layout has {listed(names, 12)}"
-        )
+        raise ValueError(f"{where} '{load.blocks}' matches supports only; loads act on free blocks: name one")
     if gone[chosen].all():
         raise ValueError(
             f"{where} '{load.blocks}' matches only what [[remove]] has taken away before settlement {load.phase}, from "

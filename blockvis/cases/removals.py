@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +20,8 @@ REMOVE = Section(
     (
         Key("phase", whole(1), "Number of the [[settlement]] before which they are taken away", 2, required=True,
             remedy="give the number of the [[settlement]] before which they are taken away, from 1"),
-        Key("blocks", TEXTS, "Names of the blocks, or patterns of them", ["prop", "brick 4-*"], otherwise="none",
-            default=()),
+        Key("blocks", TEXTS, "Names of the blocks, or patterns of them, or materials, of drawings layers",
+            ["prop", "brick 4-*"], otherwise="none", default=()),
         Key("ties", TEXTS, "Names of the ties, or patterns of them", ["tie 1"], otherwise="none", default=()),
     ),
     several=True,
@@ -48,8 +48,10 @@ def read_removal(table: Table) -> Removal:
 
 def removed_blocks(removal: Removal, assembly: solver.Assembly) -> np.ndarray:
     """(n_blocks,) bool array: blocks that a table takes away; ValueError for a name that no block has."""
-    found = {pattern: blocks_matching(pattern, assembly) for pattern in removal.blocks}
-    return np.isin(assembly.names, _matching(found, assembly.names, f"{removal.where} blocks", "block"))
+    gone = np.zeros(assembly.n_blocks, dtype=bool)
+    for pattern in removal.blocks:
+        gone[blocks_matching(pattern, assembly, f"{removal.where} blocks")] = True
+    return gone
 
 
 def gone_in(removals: Sequence[Removal], assembly: solver.Assembly, phase: int) -> np.ndarray:
@@ -63,9 +65,13 @@ def removed_ties(removal: Removal, ties: Sequence[solver.Tie]) -> tuple[str, ...
 
     ValueError for a name that no tie has, and a tie that is installed later.
     """
-    names = [tie.name for tie in ties]
-    found = {pattern: named_like(pattern, names) for pattern in removal.ties}
-    chosen = _matching(found, names, f"{removal.where} ties", "tie")
+    names, chosen = [tie.name for tie in ties], list[str]()
+    for pattern in removal.ties:
+        numbers = named_like(pattern, names)
+        if not numbers:
+            known = f"the ties are {listed(names, 12)}" if names else "the case has no ties"
+            raise ValueError(f"{removal.where} ties: no tie is named '{pattern}'{nearest(pattern, names)}; {known}")
+        chosen += [names[i] for i in numbers]
     late = next((tie for tie in ties if tie.name in chosen and tie.phase >= removal.phase), None)
     if late is not None:
         raise ValueError(
@@ -73,14 +79,3 @@ def removed_ties(removal: Removal, ties: Sequence[solver.Tie]) -> tuple[str, ...
             f"settlement {removal.phase}; give phase = {late.phase + 1} or later, or leave it out"
         )
     return tuple(chosen)
-
-
-def _matching(found: Mapping[str, list[int]], names: Sequence[str], where: str, what: str) -> list[str]:
-    """Names that match patterns, each at least one; ``found`` are their numbers by the pattern."""
-    chosen = []
-    for pattern, numbers in found.items():
-        if not numbers:
-            known = f"the {what}s are {listed(names, 12)}" if names else f"the case has no {what}s"
-            raise ValueError(f"{where}: no {what} is named '{pattern}'{nearest(pattern, names)}; {known}")
-        chosen += [names[i] for i in numbers]
-    return chosen

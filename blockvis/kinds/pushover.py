@@ -29,7 +29,7 @@ from .kind import (
     needs_no_crushing,
     without_increments,
 )
-from .settlement import not_reached, settlement_steps
+from .settlement import left_by, not_reached, settlement_steps
 
 CONTROL = Section(
     "control",
@@ -225,7 +225,9 @@ def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechani
             resume=resume,
             on_step=given.step,
         )
-        yield from pushed
+        for number, increment in enumerate(pushed):
+            words = left_by(case.settlements) if number == 0 and resume is None else []
+            yield replace(increment, notes=(*increment.notes, *words))
     except ValueError as error:
         raise ValueError(f"{case.source}: {error}") from None
     return pushed.ending

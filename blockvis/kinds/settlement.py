@@ -310,6 +310,12 @@ def settlement_steps(
         raise ValueError(f"{case.source}: {error}") from None
 
 
+def left_by(settlements: Sequence[solver.Settlement]) -> list[str]:
+    """Say which settlements come before a live load that has a parameter of its own; nothing where there are none."""
+    told = ", then ".join(f"{settlement.limit:.6g} {settlement.unit}" for settlement in settlements)
+    return [f"the live load comes after a settlement of {told}"] if told else []
+
+
 def not_reached(before: mechanics.Ending, what: str) -> mechanics.Ending:
     """Say how an analysis ends whose settlement did not reach its limit; ``what`` says what that means for it."""
     if before.stop is solver.Status.COLLAPSED:

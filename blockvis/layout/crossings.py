@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +12,7 @@ import shapely
 from .layout import Layout
 from .left_out import LeftOut
 from .notes import CHANGED, Note
-from .outlines import ROUNDING, around_hole, pieces_of, ring_of, without_collinear
+from .outlines import ROUNDING, around_hole, pieces_of, ring_area, ring_of, without_collinear
 from .surfaces import same_points
 
 #: The largest piece of an outline that crosses itself is the block if it holds at least this share of its area.
@@ -24,9 +25,16 @@ def uncrossed(layout: Layout) -> Layout:
     An outline without area stays: it is no crossing.
     """
     rings = [ring if len(ring) > 2 else np.zeros((3, 2)) for ring in layout.outlines]
-    shapes = np.array([shapely.Polygon(ring) for ring in rings])
     reasons: dict[int, LeftOut] = {}
     reduced: dict[int, np.ndarray] = {}
+    places: dict[int, np.ndarray] = {}
+    for i, corners in _turning_back(rings).items():
+        places[i] = rings[i][corners[0]]
+        while len(corners) and len(rings[i]) > 3:
+            rings[i] = np.delete(rings[i], corners, axis=0)
+            corners = _turning_back(rings[i : i + 1]).get(0, np.zeros(0, dtype=int))
+        reduced[i] = rings[i] = without_collinear(rings[i])
+    shapes = np.array([shapely.Polygon(ring) for ring in rings])
     lost = 0.0
     for i in np.flatnonzero(~shapely.is_valid(shapes)).tolist():
         pieces = pieces_of(shapely.make_valid(shapes[i]))
@@ -43,7 +51,7 @@ def uncrossed(layout: Layout) -> Layout:
         lost = max(lost, 1.0 - share)
     if reduced:
         first = next(iter(reduced))
-        x, y = _crossing(layout.outlines[first])
+        x, y = places[first] if first in places else _crossing(layout.outlines[first])
         words, the = "1 outline crosses or touches itself, ", ""
         if len(reduced) > 1:
             words, the = f"{len(reduced)} outlines cross or touch themselves, ", "the first "
@@ -52,6 +60,27 @@ def uncrossed(layout: Layout) -> Layout:
         blocks = tuple(reduced.get(i, ring) for i, ring in enumerate(layout.outlines))
         layout = replace(layout, blocks=blocks, notes=(*layout.notes, Note(CHANGED, said)))
     return layout.leaving_out(reasons)
+
+
+def _turning_back(rings: Sequence[np.ndarray]) -> dict[int, np.ndarray]:
+    """Numbers of the corners of each (n, 2) ring with an area at which its line comes back on itself, where it does.
+
+    Such a spike has no width but that of rounding, so that the outline need not touch itself.
+    """
+    points, counts = np.concatenate([np.zeros((0, 2)), *rings]), np.array([len(ring) for ring in rings], dtype=int)
+    ends = np.cumsum(counts)
+    of, last, first = np.repeat(np.arange(len(rings)), counts), ends - 1, ends - counts
+    following, before = np.arange(len(points)) + 1, np.arange(len(points)) - 1
+    following[last], before[first] = first, last
+    back, on = points[before] - points, points[following] - points
+    extents = np.array([np.ptp(ring, axis=0).max() for ring in rings])
+    areas = np.array([abs(ring_area(ring)) for ring in rings])
+    across = np.abs(back[:, 0] * on[:, 1] - back[:, 1] * on[:, 0])
+    shorter, longer = np.sort([np.hypot(*back.T), np.hypot(*on.T)], axis=0)
+    near = ROUNDING * extents[of]
+    turns = ((back * on).sum(axis=1) > 0.0) & (across <= near * longer) & (shorter > near)
+    turns &= (areas > ROUNDING * extents**2)[of]
+    return {int(i): np.flatnonzero(turns[first[i] : ends[i]]) for i in np.unique(of[turns])}
 
 
 def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:

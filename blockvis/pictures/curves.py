@@ -339,8 +339,8 @@ class _Plot:
         if self.words:
             where = f"{response.parameter.symbol} = {place[0]:.4g} {response.parameter.unit}"
             told = f"lowest {response.measured.symbol} = {place[1]:.5g} at {where}"
-            style = {"ha": "center", "va": "top", "fontsize": self.text, "color": RED}
-            _word(self.axes, told, (0.5, 0.96), (0, 0), "axes fraction", **style)
+            # Of an envelope every place below may be on the curve.
+            self.axes.set_title(told, loc="right", fontsize=self.text, color=RED)
 
     def _collapse(self, collapse: solver.Collapse) -> None:
         axes, total = self.axes, self.total

@@ -195,6 +195,9 @@ def _courses(
     middles, sizes, normals = joints.ends[chosen].mean(axis=1), joints.sizes[chosen], joints.normals[chosen]
     opening, slip = np.maximum(moved[:, 0], 0.0), moved[:, 1]
     parted = opening[:, None] * normals + slip[:, None] * np.stack([-normals[:, 1], normals[:, 0]], axis=1)
+    # Along each joint with block a on the left.
+    runs = joints.ends[chosen, 1] - joints.ends[chosen, 0]
+    runs *= np.where(runs[:, 0] * normals[:, 1] < runs[:, 1] * normals[:, 0], -1.0, 1.0)[:, None]
     angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     across = np.stack([-np.sin(angles), np.cos(angles)])
     # What opens across the line, times the length along it; a joint along the line that only slides parts nothing.
@@ -218,7 +221,7 @@ def _courses(
             if most[direction, line] < largest - margin:
                 break
             strip = members[inside[:, direction, line]]
-            tried, gain = _course_through(widest, strip, meeting, apart, gained[:, direction])
+            tried, gain = _course_through(widest, strip, meeting, parted, gained[:, direction], middles, runs)
             shorter = sizes[tried].sum() < (1.0 - EXACT) * sizes[course].sum()
             if gain > largest + margin or (gain >= largest - margin and shorter):
                 course, largest = tried, gain
@@ -230,30 +233,45 @@ def _courses(
 
 
 def _course_through(
-    start: int, members: np.ndarray, meeting: np.ndarray, apart: np.ndarray, gains: np.ndarray
+    start: int,
+    members: np.ndarray,
+    meeting: np.ndarray,
+    parted: np.ndarray,
+    gains: np.ndarray,
+    middles: np.ndarray,
+    runs: np.ndarray,
 ) -> tuple[np.ndarray, float]:
     """Order the joints of the course through a start that gains most, and sum its gains.
 
-    It is a path of the tree that joins the members by those whose blocks have moved most apart.
+    It is a path of the tree that joins the members by those whose blocks have moved most apart. What is to its left
+    moves from what is to its right as it does at the start; ``parted`` (n, 2) [m] is that along the ``runs`` (n, 2).
     """
     n = len(members)
     # minimum_spanning_tree of scipy 1.15 takes no longer integers.
-    place = np.full(len(apart), -1, dtype=np.int32)
+    place = np.full(len(parted), -1, dtype=np.int32)
     place[members] = np.arange(n, dtype=np.int32)
     one, other = place[meeting]
     pairs = (one >= 0) & (other >= 0) & (one < other)
     one, other = one[pairs], other[pairs]
-    own, gained = apart[members], gains[members]
+    own, gained = np.linalg.norm(parted[members], axis=1), gains[members]
     # Of three joints that meet the widest lies between the others.
     joined = np.minimum(own[one], own[other]) + EXACT * np.maximum(own[one], own[other])
     narrow = 2.0 * own.max() - joined
     tree = minimum_spanning_tree(sp.coo_array((narrow, (one, other)), shape=(n, n)))
     order, before = breadth_first_order(tree, place[start], directed=False)
     root, total, arm = int(order[0]), np.full(n, -np.inf), np.arange(n)
+    own_middles, own_runs = middles[members], runs[members]
+    on = ((own_middles - own_middles[np.maximum(before, 0)]) * own_runs).sum(axis=1) > 0.0
+    ahead = (own_middles - own_middles[root]) @ runs[start] > 0.0
+    # Beyond the start, and with the other sign behind it.
+    alike = np.where(on, 1.0, -1.0) * (parted[members] @ parted[start])
+    margin = EXACT * own * own[root]
     total[root] = gained[root]
     for k in order[1:]:
-        total[k] = total[before[k]] + gained[k]
         arm[k] = k if before[k] == root else arm[before[k]]
+        # Two cracks with a row of blocks between them are none that turns back.
+        goes_on = (alike[k] if ahead[arm[k]] else -alike[k]) >= -margin[k]
+        total[k] = total[before[k]] + gained[k] if goes_on else -np.inf
 
     def back(k: int) -> list[int]:
         found = []
@@ -264,7 +282,7 @@ def _course_through(
 
     first = back(int(total.argmax()))
     if first:
-        total[arm == arm[first[0]]] = -np.inf
+        total[(ahead[arm] == ahead[arm[first[0]]]) & (arm != root)] = -np.inf
     course = [*first, root, *back(int(total.argmax()))[::-1]]
     return members[course], float(gained[course].sum())
 

@@ -52,8 +52,8 @@ class Places:
     def name(self, point: np.ndarray) -> str:
         """Say where a point (2,) [m] is."""
         place = shapely.Point(point)
-        left, _, right, top = self._box
-        edges = [(float(top - point[1]), "the top")]
+        left, low, right, top = self._box
+        edges = [(float(top - point[1]), "the top"), (float(point[1] - low), "the underside")]
         if self._edges:
             edges += [(float(point[0] - left), "the left edge"), (float(right - point[0]), "the right edge")]
         off, edge = min(edges)

@@ -1,6 +1,7 @@
 """What of a drawing is read: repaired, left out, and chosen by window, kind and colour."""
 
 import ezdxf
+import numpy as np
 import pytest
 
 import blockvis
@@ -39,6 +40,19 @@ def test_an_outline_that_crosses_itself_keeps_its_largest_piece_or_is_left_out(t
     assert "left out: 1 outline that crosses itself on layer '0', 'block 31' at (2.5, 0.25)" in said
 
 
+@pytest.mark.parametrize("width", [1e-13, -1e-13])
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_a_spike_of_rounding_is_dropped(tmp_path, capsys, turn, width):
+    """As shapes cut from one another leave them; a block above would stand on it, and not on what is below."""
+    spur = np.array([(0, 0), (3, 0), (1, width), (1, 0.5), (0, 0.5)])
+    spur = spur @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    drawn(tmp_path / "wall.dxf", spur.tolist(), brick(5, 5))
+    said = info(capsys, tmp_path / "wall.dxf")
+    x, y = 3.0 * np.cos(turn), 3.0 * np.sin(turn)
+    assert f"repaired: 1 outline crosses or touches itself, 'block 2F' at ({x:.6g}, {y:.6g})" in said
+    assert "corners         8" in said
+
+
 def test_a_background_alone_is_no_block(tmp_path, capsys):
     stones = "".join(f"M{x} 40h80v60h-80z" for x in (40, 140, 240))
     (tmp_path / "pile.svg").write_text(
@@ -54,6 +68,15 @@ def test_only_gaps_that_are_joints_are_proposed_as_such(tmp_path, capsys, gap, s
     assert says in info(capsys, tmp_path / "wall.dxf")
     # What is no joint has no mark and no colour bar in the picture.
     assert len(blockvis.inspect(tmp_path / "wall.dxf").joints) == (3 if gap > 1e-3 else 0)
+
+
+def test_edges_beside_a_corner_of_stones_that_touch_are_no_joint(tmp_path, capsys):
+    """A stone under the haunch of an arch, which is not drawn, and the head of the pier below it."""
+    haunch = [(3.5, 2.0), (3.56, 2.342), (3.594, 2.4), (3.15, 2.4), (3.15, 2.0)]
+    stones = [brick(1.35, 2.0, 0.9, 0.4), brick(2.25, 2.0, 0.9, 0.4), brick(3.6, 1.6, 0.3, 0.4)]
+    drawn(tmp_path / "wall.dxf", *stones, haunch)
+    assert "mortar joints   none: no gaps between facing edges\n" in info(capsys, tmp_path / "wall.dxf")
+    assert len(blockvis.inspect(tmp_path / "wall.dxf").joints) == 0
 
 
 def test_a_window_reads_what_lies_within_it_and_tells_what_it_cuts(tmp_path, capsys, monkeypatch):

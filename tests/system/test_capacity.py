@@ -512,6 +512,14 @@ def test_pushover_after_a_tilt_starts_at_what_is_left(tmp_path):
     assert "nothing is left to push over" in summary["message"]
 
 
+def test_a_pushover_says_which_settlement_it_comes_after(tmp_path):
+    """Neither its curve nor its table tells that the capacity is not that of the drawing."""
+    tilt = '[roles]\n"ground" = "moving"\n[settlement]\nrotation_centre = [0.0, 0.0]\nrotation = -1.0\nlimit = 0.01\n'
+    response, _ = solved(PUSHED + "limit = 0.001\n" + tilt, tmp_path)
+    told = [note for note in response.notes if "settlement" in note]
+    assert told == ["the live load comes after a settlement of 0.01 rad"]
+
+
 @pytest.mark.slow
 def test_pressure_on_the_top_and_on_an_edge(tmp_path):
     """Pressure p on the flank of b × h overturns it at p h²/2 = W b/2; pressure on the top holds it."""

@@ -591,6 +591,15 @@ def test_diagonals_through_a_bond_are_one_crack_each(side, apart):
     assert np.tan(np.radians(flat.inclination)) == pytest.approx(side * 0.1 / 0.125, rel=0.15)
 
 
+def test_two_level_cracks_above_each_other_are_none_that_turns_back():
+    """The right of two courses lifts, the upper one by twice as much: a joint that slides leads from bed to bed."""
+    wall = squares(*((0.25 * x, 0.1 * y) for y in range(3) for x in range(8)), size=(0.25, 0.1))
+    lifted = {f"block_{8 * y + x}": (0.0, 0.02 * y, 0.0) for y in (1, 2) for x in range(2, 8)}
+    cracks = cracks_of(wall, moved(wall, **lifted))
+    assert [(round(crack.width, 6), round(crack.inclination, 6)) for crack in cracks] == [(0.02, 0.0), (0.02, 0.0)]
+    assert all(crack.places[1] == "the right edge" for crack in cracks)
+
+
 def test_a_crack_ends_where_its_joints_do_not_at_one_beside_their_way():
     """The upper left corner of a bond goes, and most of what is on its right lifts from the course below."""
     bricks = [(0, 0, 1), (1, 0, 3), (3, 0, 5), (0, 1, 2), (2, 1, 5), (0, 2, 1), (1, 2, 3), (3, 2, 5)]
@@ -608,6 +617,13 @@ def test_places_are_told_by_openings():
     above, below = sorted(cracks_of(wall, moved(wall, **column)), key=lambda crack: -crack.at[1])
     assert above.places == ("the upper right corner of the opening", "the top")
     assert below.places[1] == "the lower right corner of the opening"
+
+
+def test_a_crack_through_a_low_beam_ends_at_its_underside():
+    """It is lower than what is near: the joint between its halves ended at the top twice."""
+    halves = squares((0, 0), (1, 0), size=(1, 0.4))
+    (crack,) = cracks_of(halves, moved(halves, block_1=(0.02, 0.0, 0.0)))
+    assert crack.places == ("the underside", "the top")
 
 
 def test_a_crack_that_ends_a_course_above_the_foot_ends_inside():

@@ -340,7 +340,7 @@ def test_a_path_goes_on_across_a_removal_bit_for_bit() -> None:
     ("more", "words"),
     [
         (REMOVED.replace("2", "3", 1), r"\[remove\] phase is 3; the case has 2 \[\[settlement\]\]"),
-        (REMOVED.replace("brick", "brik"), r"\[remove\] blocks: no block is named 'brik 3-3'"),
+        (REMOVED.replace("brick", "brik"), r"\[remove\] blocks: no block and no material is named 'brik 3-3'"),
         ("[[remove]]\nphase = 2\n", r"\[remove\] blocks is missing"),
         ('[[remove]]\nphase = 2\nties = "tie"\n', r"\[remove\] ties: no tie is named 'tie'; the case has no ties"),
         (

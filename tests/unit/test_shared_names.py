@@ -23,8 +23,8 @@ def response(tmp_path):
     """A function that runs a beam on three piers, under two stones; two names are there twice."""
     role = ["moving"] * 3 + ["free"] * 3
 
-    def run(text, names=NAMES):
-        drawn(tmp_path / "names.json", BLOCKS, names, role=role)
+    def run(text, names=NAMES, **told):
+        drawn(tmp_path / "names.json", BLOCKS, names, role=role, **told)
         (tmp_path / "case.toml").write_text(f'[geometry]\nfile = "names.json"\n{text}', encoding="utf-8")
         return blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", overwrite=True, outputs=()).response
 
@@ -62,6 +62,28 @@ def test_loads_and_removals_are_of_all_blocks_with_their_name(response):
     more = found.loads.dead - solver.self_weight(found.assembly).dead
     np.testing.assert_allclose(more[3:, :2], [[0.0, 0.0], [5.0, 0.0], [5.0, 1.0]], atol=1e-9)
     assert found.path[-1].removed.tolist() == [False] * 4 + [True] * 2
+
+
+def test_loads_and_removals_are_of_all_blocks_of_a_material(response):
+    """Of a drawing in CAD, whose blocks have no names, that is a layer; a name that is there comes first."""
+    stones = {"material": ["mid"] * 4 + ["CAPS"] * 2}
+    with pytest.warns(UserWarning, match="acts on each of 2 blocks"):
+        found = response(
+            f'{SETTLES}{SETTLES}[[loads]]\nblocks = "CAP?"\nforce = [5, 0]\n[[remove]]\nphase = 2\nblocks = ["CAPS"]\n',
+            **stones,
+        )
+    more = found.loads.dead - solver.self_weight(found.assembly).dead
+    np.testing.assert_allclose(more[3:, 0], [0.0, 5.0, 5.0], atol=1e-9)
+    assert found.path[-1].removed.tolist() == [False] * 4 + [True] * 2
+    for table, where in (
+        ('[[loads]]\nblocks = "CUPS"\nforce = [5, 0]', "loads 1"),
+        ('[[remove]]\nphase = 1\nblocks = ["CUPS"]', "remove"),
+    ):
+        said = rf"\[{where}\] blocks: no block and no material is named 'CUPS' \(did you mean 'CAPS'\?\)"
+        with pytest.raises(ValueError, match=f"{said}; the blocks are pier, mid.*the materials are mid, CAPS"):
+            response(f"{SETTLES}{table}\n", **stones)
+    with pytest.raises(ValueError, match="'mid' matches supports only"):
+        response(f'{SETTLES}[[loads]]\nblocks = "mid"\nforce = [5, 0]\n', **stones)
 
 
 def test_one_block_is_the_one_that_holds_the_point(response):

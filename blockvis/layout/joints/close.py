@@ -80,7 +80,7 @@ def proposed(outlines: Sequence[np.ndarray], method: str = "auto", laid: np.ndar
         return Proposal(thickness, method, search_reach(outlines), found)
     drawn = [ring for k, ring in enumerate(outlines) if laid is None or not laid[k]]
     gap, reach = proposed_gap(drawn) if drawn else (0.0, 0.0)
-    return Proposal(rounded_up(gap) if gap else 0.0, method, reach, found)
+    return Proposal(rounded_up(gap), method, reach, found) if gap else Proposal(0.0, method, reach, Facing.none())
 
 
 def chosen_method(outlines: Sequence[np.ndarray], found: Facing) -> str:
