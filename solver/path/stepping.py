@@ -65,8 +65,8 @@ STANDSTILL, SHORT, STANDING, STANDSTILLS = 1e3, 1e-3, 1e-7, 300
 #: Lean [rad] from which blocks come back on joints and ground that carry them.
 LEAN = 1e-5
 
-#: Part of the viscosity at the start of a settlement; it grows as the memory of velocities fills.
-STARTING = 0.1
+#: Movement of the supports, in block sizes, in which their joints have given at the start of a settlement.
+GIVEN = 1e-4
 
 #: Damping of steps in time, in units of mass · √(g / block size): critical for a block that rocks.
 DAMPING = 2.0
@@ -296,7 +296,8 @@ class Stepper:
         start = self.contacts_at(place) if candidates is None else candidates
         place = self.mortar.renamed(place, start)
         # A larger share alternates where the normal force falls as the bound grows.
-        share = 0.9 if in_time else min(0.5, size / (size + min(tolerances.FRICTION_MEMORY, s / self.unit)))
+        memory = min(tolerances.FRICTION_MEMORY, max(s / self.unit, size))
+        share = 0.9 if in_time else min(0.5, size / (size + memory))
         points = self._points(place, start, share)
         joints, loads = points.joints, 0.0 if in_time else viscosity
         resisting, before = self._resistance(place, length, in_time, viscosity)
@@ -310,7 +311,8 @@ class Stepper:
         motion = np.where(free[:, None], self._of_blocks(motion_so_far), place.pose.movement_to(new.pose))
         velocity = motion / length if in_time else self._velocity(place, motion, length)
         new = self._arrived(place, replace(new, velocity=velocity), points, left, share)
-        work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size)
+        memory = tolerances.FRICTION_MEMORY if model.has_live else memory
+        work = self._work_in_error(points, new, joints.cohesion - left.cohesion, size, memory)
         work += self.members.work_beyond(place.tie_lengths, new.tie_lengths)
         # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * self._largest((motion_so_far - before) * self._shares)
@@ -458,7 +460,7 @@ class Stepper:
         bonds = self.mortar.bonds(place, points.start, left.left)
         return replace(new, followed=after, tie_lengths=lengths, bonds=bonds)
 
-    def _work_in_error(self, points: _StepPoints, new: Place, lost: np.ndarray, size: float) -> float:
+    def _work_in_error(self, points: _StepPoints, new: Place, lost: np.ndarray, size: float, memory: float) -> float:
         """Work of friction bounds that are not what was expected, and of lost cohesion (n,)."""
         assert new.contacts is not None
         # What slips faster than the supports move does so however short the step is.
@@ -467,9 +469,10 @@ class Stepper:
         # What the points of one joint hand to each other does not change its friction.
         works = np.bincount(new.contacts.joints()[1], change * np.minimum(slip, size))
         # Differences of friction grow while bounds follow, by e in a step as long as the memory; longer ones miss that.
-        growth = (1.0 + size / tolerances.FRICTION_MEMORY) ** 3
-        # Half of it, as bounds depart from what was expected in the course of the step, and joints err to either side.
-        return 0.25 * growth * float(np.abs(works).sum())
+        # What errs to one side counts whole, but for friction of the limit load that pushovers begin with and lose at
+        # once; of the rest, half, as bounds depart in the course of the step, and half of that cancels.
+        one_sided = 0.0 if self.model.has_live else abs(float(works.sum()))
+        return (1.0 + size / memory) ** 3 * max(0.25 * float(np.abs(works).sum()), one_sided)
 
     def _penetration(self, points: _StepPoints, new: Place) -> float:
         """Deepest penetration where blocks carry, in block sizes, from gaps without the give that stays."""
@@ -519,11 +522,8 @@ class Stepper:
     ) -> tuple[np.ndarray, np.ndarray]:
         """(n_dof,) arrays: force per movement by viscosity or inertia, and the movement that has none of it."""
         weights, kept = self.weights[self.free].ravel(), 1.0
-        # It is beyond the velocity that blocks had: at the start they have none, and all of it would choose the hinges.
-        # A pushover begins with the mechanism of its limit load.
-        memory = tolerances.VELOCITY_MEMORY * self.unit
-        found = 1.0 if self.model.has_live else min(max(place.s / memory, STARTING), 1.0)
-        resisting = tolerances.VISCOSITY * found * viscosity * self.unit / length * weights
+        # It is beyond the velocity that blocks had.
+        resisting = tolerances.VISCOSITY * viscosity * self.unit / length * weights
         if in_time:
             resisting, kept = (1.0 / length**2 + DAMPING / length) * weights, 1.0 / (1.0 + DAMPING * length)
         if place.velocity is None:
@@ -533,7 +533,11 @@ class Stepper:
     def _velocity(self, place: Place, motion: np.ndarray, length: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity after a step, averaged with those before."""
         before = np.zeros_like(motion) if place.velocity is None else place.velocity
-        return before + (motion - length * before) / (length + tolerances.VELOCITY_MEMORY * self.unit)
+        memory = tolerances.VELOCITY_MEMORY * self.unit
+        # What joints give at first is no velocity, and a pushover begins with the mechanism of its limit load.
+        if place.s >= GIVEN * self.unit and not self.model.has_live:
+            memory = min(memory, place.s)
+        return before + (motion - length * before) / (length + memory)
 
     def _with_missed(self, stepped: Contacts, before: Place, pose: Pose, movement_size: float) -> Contacts:
         """Contact points of a step with those that it has missed, where they were: at its end a corner is in a block.
