@@ -434,12 +434,11 @@ class Path:
         return ahead if ahead <= 1.000001 * step else min(step, ahead / 2.0)
 
     def _next_step(self, step: float, length: float, measure: float) -> float:
-        unit = self.stepper.unit
         grow = min(2.0, max(0.5, 1.0 / max(measure, 1e-300)))
         if grow <= 1.0:
-            return max(grow * length, min(length, FIRST_STEP * unit))
+            return max(grow * length, min(length, FIRST_STEP * self.stepper.unit))
         # A step that was cut at its target does not shorten the next.
-        return min(LONGEST_STEP * unit, max(step if length < 0.99 * step else 0.0, grow * length))
+        return min(LONGEST_STEP * self.stepper.unit, max(step if length < 0.99 * step else 0.0, grow * length))
 
     def _is_on_path(self, new: Place, error: StepError, length: float, refining: bool) -> bool:
         """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""

@@ -246,16 +246,14 @@ class Stepper:
         followed = np.where(same, place.followed[number], 0.0)
         trial = np.where(same[:, None], place.trial[number], -np.eye(d)[0])
         _, kept = matched_contacts(before, contacts)
-        carried = ~is_member(before) & ((place.forces[:, 0] != 0.0) | (place.followed > 0.0))
-        vanished = np.flatnonzero(~kept & carried)
+        vanished = np.flatnonzero(~kept & ~is_member(before) & ((place.forces[:, 0] != 0.0) | (place.followed > 0.0)))
         is_new = ~same
         if len(vanished):
             vanished, successor, part = successors(before, vanished, contacts, self.model.length)
             sense = np.where(before.block_a[vanished] == contacts.block_a[successor], 1.0, -1.0)
             vectors = np.einsum("nji,nj->ni", before.frames[vanished], place.forces[vanished]) * sense[:, None]
             passed = np.einsum("nij,nj->ni", contacts.frames[successor], vectors)
-            least = np.minimum(place.forces[vanished, 0], 0.0) if self.mortar.present else 0.0
-            passed[:, 0] = np.maximum(passed[:, 0], least)
+            passed[:, 0] = np.maximum(passed[:, 0], np.minimum(place.forces[vanished, 0], 0.0) * self.mortar.present)
             np.add.at(forces, successor, part[:, None] * passed)
             trial[successor] = forces[successor]
             np.add.at(followed, successor, part * place.followed[vanished])
@@ -533,10 +531,9 @@ class Stepper:
     def _velocity(self, place: Place, motion: np.ndarray, length: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity after a step, averaged with those before."""
         before = np.zeros_like(motion) if place.velocity is None else place.velocity
-        memory = tolerances.VELOCITY_MEMORY * self.unit
         # What joints give at first is no velocity, and a pushover begins with the mechanism of its limit load.
-        if place.s >= GIVEN * self.unit and not self.model.has_live:
-            memory = min(memory, place.s)
+        begun = place.s >= GIVEN * self.unit and not self.model.has_live
+        memory = min(tolerances.VELOCITY_MEMORY * self.unit, place.s if begun else np.inf)
         return before + (motion - length * before) / (length + memory)
 
     def _with_missed(self, stepped: Contacts, before: Place, pose: Pose, movement_size: float) -> Contacts:
