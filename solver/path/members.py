@@ -23,7 +23,7 @@ from solver.ties import (
     tie_ends,
     tie_lengths,
 )
-from solver.tolerances import AT_LIMIT, COMPUTED_GAP
+from solver.tolerances import AT_LIMIT
 
 from .state import Place
 
@@ -127,10 +127,6 @@ class Members:
         force, ends = member_forces(contacts, forces, len(self.ties)), tie_ends(self.ties, self.model.assembly, pose)
         # Those that break do not yield before.
         strength, lengths = np.where(self.brittle, np.inf, self.strength), np.where(self.held[:, None], lengths, np.nan)
-        elongations, stretched = (tie_lengths(ends)[:, None] - lengths).T
-        # What is as long as it yields may carry less in an equilibrium, by what :meth:`force_range` leaves open.
-        most = np.sign(force) * stretched / (self.compliance * self.model.length)
-        size = np.fmax(np.abs(force), np.minimum(most, np.abs(force) + GIVE * COMPUTED_GAP / self.compliance))
-        state = member_states(size, strength, float(np.abs(forces).max(initial=0.0)))
+        state = member_states(np.abs(force), strength, float(np.abs(forces).max(initial=0.0)))
         state = np.select(list(np.isnan(lengths.T)), [ABSENT, BROKEN], state)
-        return TieForces(force * self.model.force, elongations, lengths[:, 1], state, ends)
+        return TieForces(force * self.model.force, tie_lengths(ends) - lengths[:, 0], lengths[:, 1], state, ends)
