@@ -58,10 +58,9 @@ class ContactProblem:
 
     def stiffness(self, trial: np.ndarray) -> np.ndarray:
         """(n, d, d) array: derivative of the allowed forces by movements, times -1; symmetric and positive."""
-        size = np.linalg.norm(trial[:, 1:], axis=1)
-        part = np.minimum(1.0, self.bound / np.maximum(size, 1e-300))
-        along = trial[:, 1:] / np.maximum(size, 1e-300)[:, None]
-        d = trial.shape[1]
+        # Squares of smaller shear forces lose their digits, and their direction would be longer than 1.
+        size, d = np.maximum(np.linalg.norm(trial[:, 1:], axis=1), 1e-150), trial.shape[1]
+        part, along = np.minimum(1.0, self.bound / size), trial[:, 1:] / size[:, None]
         out = np.zeros((len(trial), d, d))
         out[:, 0, 0] = ((trial[:, 0] > 0.0) & (trial[:, 0] < self.most)) / self.compliance[:, 0]
         k = part / self.compliance[:, 1]

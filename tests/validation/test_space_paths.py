@@ -180,6 +180,27 @@ def test_supports_turn_about_an_axis_in_space():
     assert pose.positions[1] == pytest.approx([x, 0.5, z], abs=1e-6)
 
 
+def test_a_joint_that_slides_with_next_to_no_friction_has_a_stiffness():
+    """Friction of a joint that opens halves step by step to 1e-306: the corner of walls had no way on at 0.162 m."""
+    sizes = 10.0 ** -np.arange(1.0, 308.0)
+    trial = np.column_stack([np.ones_like(sizes), sizes, 0.24 * sizes])
+    none = np.zeros(len(sizes))
+    problem = import_module("solver.contact_step.problem").ContactProblem(
+        rows=None,
+        gap=none,
+        slip=none,
+        forces=none,
+        bound=0.1 * sizes,
+        compliance=np.ones((len(sizes), 3)),
+        most=np.full(len(sizes), np.inf),
+        load=none,
+        viscosity=none,
+        motion_so_far=none,
+        size=1.0,
+    )
+    assert np.linalg.eigvalsh(problem.stiffness(trial)).min() > -1e-15
+
+
 @pytest.mark.slow
 def test_programs_of_sliding_stones_take_few_factorisations(monkeypatch):
     minimise, rows, taken, factors = import_module("solver.contact_step.minimise"), mechanics.ContactRows, [], []
