@@ -522,7 +522,8 @@ class Drawer:
 
     def _keys_of_tints(self) -> list[Key]:
         """Return what the legend says of the colours of the blocks."""
-        if self._swing is None or self.tints is None:
+        # Where nothing that stands moves there are no parts.
+        if self._swing is None or self.tints is None or self._swing.n_parts == 0:
             return []
         words, shades = "parts of", [self.tints[self._swing.parts == part][0] for part in range(self._swing.n_parts)]
         if self._swing.n_parts > MOST_PARTS:
