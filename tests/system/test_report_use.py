@@ -301,7 +301,8 @@ def test_every_face_of_two_blocks_is_told_its_own_forces_however_small(tmp_path)
     states = joint_states(assembly, joints, response.path[-1])
     written = np.array([row.split(",")[3:] for row in found["text"].splitlines()[1:]], dtype=float)
     exact = np.stack([states.normal_force, states.shear_force], axis=1)[: len(joints)]
-    assert written == pytest.approx(exact, rel=2e-4, abs=1e-6 * exact.max())
+    # The page has four digits.
+    assert written == pytest.approx(exact, rel=5e-4, abs=1e-6 * exact.max())
     pebble = 9.81 * assembly.masses[3]
     assert written[states.block_b[: len(joints)] == 3, 0] == pytest.approx([pebble], rel=2e-3)
     assert all("N 0 N" not in line for line in found["tip"].splitlines())
