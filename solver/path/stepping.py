@@ -59,8 +59,9 @@ CARRIES = 1e-3
 OPEN = 1e-6
 
 #: Times, in units of √(block size / g), in which what viscosity retards comes to rest at once, and in which what falls
-#: hardly moves; movement, in block sizes, in which it has come to rest; and steps after which it does not.
-STANDSTILL, SHORT, STANDING, STANDSTILLS = 1e3, 1e-3, 1e-7, 300
+#: hardly moves; movement, in block sizes, in which it has come to rest, and part by which one that creeps changes at
+#: most; and steps after which it does not.
+STANDSTILL, SHORT, STANDING, STEADY, STANDSTILLS = 1e3, 1e-3, 1e-7, 1e-4, 300
 
 #: Lean [rad] from which blocks come back on joints and ground that carry them.
 LEAN = 1e-5
@@ -325,7 +326,7 @@ class Stepper:
         """The place once the supports have stood still, as joints of given stiffness give; None where it moves away."""
         if not self.gives(place):
             return place
-        still, time, so_far = place, STANDSTILL, 0.0
+        still, time, so_far, before = place, STANDSTILL, 0.0, 0.0
         for _ in range(STANDSTILLS):
             try:
                 still, _, error = self.step(replace(still, velocity=None), time, in_time=True, exact=True)
@@ -336,8 +337,11 @@ class Stepper:
                 continue
             # What leans on them moves by a part of the movement before in each step, or by more, and falls.
             so_far += error.moved
-            if time == STANDSTILL and error.moved < STANDING:
+            # What creeps by as much each time is out of balance by what programs are solved to.
+            creeps = error.moved < tolerances.CLOSING_GAP and abs(error.moved - before) < STEADY * before
+            if time == STANDSTILL and (error.moved < STANDING or creeps):
                 return replace(still, velocity=place.velocity, works=place.works)
+            before = error.moved
             if so_far > tolerances.FARTHEST_FALL:
                 break
             time = min(10.0 * time, STANDSTILL)
