@@ -61,6 +61,7 @@ def test_joints_without_friction_have_nothing_to_stick_by():
     assert finding.outcome == "limit reached"
 
 
+@pytest.mark.slow
 def test_tiny_blocks_stand_like_others():
     """Here blocks of a tenth of a millimetre fell for being cheaper out of balance than the reaction."""
     finding = tried("courses", 30098)

@@ -224,6 +224,7 @@ def test_edges_between_faces_in_one_plane_are_not_drawn():
     assert not across.any()
 
 
+@pytest.mark.slow
 def test_the_view_shows_the_motion_across_it():
     response = vault_response()
     n = response.assembly.n_blocks

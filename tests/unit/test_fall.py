@@ -205,6 +205,7 @@ def test_blocks_come_to_rest_on_something(structure):
     np.testing.assert_allclose(fall.positions[0][assembly.free], last.positions[assembly.free], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_first_push_is_that_of_the_mechanism():
     response, fall = shipped_arch(), fallen(shipped_arch)
     moved = (fall.positions[1] - fall.positions[0])[response.assembly.free]

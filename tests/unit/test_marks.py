@@ -174,6 +174,7 @@ def test_joints_that_hardly_slide_are_not_marked():
         assert (len(marks.marks_of(response.assembly, joints, sliding, last.pose).sliding) > 0) is drawn
 
 
+@pytest.mark.slow
 def test_resultants_balance_every_voussoir():
     response = arch_response()
     increment, assembly = response.path[-1], response.assembly

@@ -153,6 +153,7 @@ def test_a_ground_of_one_block_is_cut_under_the_joints_of_the_first_course():
     assert assembly.areas[pieces].sum() == pytest.approx(whole.areas[whole.index("ground")])
 
 
+@pytest.mark.slow
 def test_how_deep_the_ground_is_drawn_counts_for_nothing(tmp_path):
     found = []
     cli.main(["layout", "wall", "bricks=3", "courses=2", "-o", str(tmp_path / "wall.json")])

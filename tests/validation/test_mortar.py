@@ -610,6 +610,7 @@ def test_a_tower_on_soft_ground_stands_as_long_as_it_is_stable(factor, status, n
     assert ("no stable equilibrium" in response.message) is (factor < 1.0)
 
 
+@pytest.mark.slow
 def test_walls_and_what_is_left_of_a_tower_stand_on_soft_ground():
     """A lean lets friction go, so that bricks shift by more than it; what was taken away leans, and goes nowhere."""
     law = solver.InterfaceLaw(0.6)
