@@ -13,6 +13,10 @@ from solver.interfaces import Interfaces
 from solver.kinematics import Pose, unit_lengths
 from solver.loads import Loads
 from solver.ties import Tie
+from solver.tolerances import NOTICEABLE
+
+#: Forces that are named in words; the others are counted.
+NAMED = 4
 
 
 def mean_load(assembly: Assembly, loads: Loads) -> float:
@@ -80,6 +84,20 @@ class Model:
             return np.zeros((len(free), self.n_dof)), 0.0
         size = float(np.abs(np.where(free, self.live / units, 0.0)).max(initial=0.0))
         return np.where(free, self.loads.live_at(self.assembly, pose) / units, 0.0) / (size or 1.0), size
+
+    def held_by(self, missing: np.ndarray) -> str:
+        """Words that go on with the forces which balance what falls, (n_blocks, n_dof) in units of the program."""
+        d, newtons = self.dimension, missing * self.force * unit_lengths(self.n_dof, self.length)
+        ways = [f"N along {x}" for x in "xyz"[:d]] + [f"N·m about {x}" for x in "xyz"[d - self.n_dof :]]
+        size = np.abs(missing)
+        largest = np.flatnonzero(size > NOTICEABLE * size.max())
+        told = np.sort(largest[np.argsort(-size.ravel()[largest], kind="stable")][:NAMED])
+        words = [
+            f"{newtons[block, way]:.4g} {ways[way]} at '{self.assembly.names[block]}'"
+            for block, way in zip(*np.unravel_index(told, size.shape), strict=True)
+        ]
+        others = f" and {len(largest) - NAMED} more" if len(largest) > NAMED else ""
+        return f", and would stand with {', '.join(words)}{others}"
 
     @cached_property
     def total_load(self) -> float:
