@@ -13,10 +13,6 @@ from solver.interfaces import Interfaces
 from solver.kinematics import Pose, unit_lengths
 from solver.loads import Loads
 from solver.ties import Tie
-from solver.tolerances import NOTICEABLE
-
-#: Forces that are named in words; the others are counted.
-NAMED = 4
 
 
 def mean_load(assembly: Assembly, loads: Loads) -> float:
@@ -87,17 +83,12 @@ class Model:
 
     def held_by(self, missing: np.ndarray) -> str:
         """Words that go on with the forces which balance what falls, (n_blocks, n_dof) in units of the program."""
-        d, newtons = self.dimension, missing * self.force * unit_lengths(self.n_dof, self.length)
+        d, size = self.dimension, np.abs(missing)
+        newtons = missing * self.force * unit_lengths(self.n_dof, self.length)
         ways = [f"N along {x}" for x in "xyz"[:d]] + [f"N·m about {x}" for x in "xyz"[d - self.n_dof :]]
-        size = np.abs(missing)
-        largest = np.flatnonzero(size > NOTICEABLE * size.max())
-        told = np.sort(largest[np.argsort(-size.ravel()[largest], kind="stable")][:NAMED])
-        words = [
-            f"{newtons[block, way]:.4g} {ways[way]} at '{self.assembly.names[block]}'"
-            for block, way in zip(*np.unravel_index(told, size.shape), strict=True)
-        ]
-        others = f" and {len(largest) - NAMED} more" if len(largest) > NAMED else ""
-        return f", and would stand with {', '.join(words)}{others}"
+        told = np.argwhere(size > 0.1 * size.max()).tolist()
+        words = [f"{newtons[k, way]:.4g} {ways[way]} at '{self.assembly.names[k]}'" for k, way in told[:4]]
+        return f", and would stand with {', '.join(words)}" + " and others" * (len(told) > 4)
 
     @cached_property
     def total_load(self) -> float:
