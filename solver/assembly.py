@@ -115,7 +115,7 @@ class Assembly(Kept, Shown):
         for k in drawn.spikes.tolist():
             (x, y), i = drawn.vertices[k], drawn.block_of_vertex[k]
             raise ValueError(
-                f"block {i} ('{names[i]}') has a spike without width at ({x:.9g}, {y:.9g}): drop this corner"
+                f"block {i} ('{names[i]}') has a spike of rounding at ({x:.9g}, {y:.9g}): drop that corner"
             )
         return cls(
             shapes=Polygons(vertices, offsets, _positive(thickness, "thickness", "m", names)),
