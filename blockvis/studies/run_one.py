@@ -101,7 +101,8 @@ def _outcome(run: AnalysisRun, number: int, seconds: float | None) -> tuple[dict
                 told = f"took longer than {seconds:g} s: let [study] seconds be longer, with --retry-failed"
                 ending = mechanics.Ending(solver.Status.INTERRUPTED, told)
                 break
-    except Exception as error:  # noqa: BLE001 - what raises half-way has come as far as its last increment
+    except Exception as error:
+        # What raises half-way has come as far as its last increment.
         if not n_path:
             raise
         ending = mechanics.Ending(solver.Status.SOLVER_FAILED, _reason(error))
