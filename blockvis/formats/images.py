@@ -1,4 +1,4 @@
-"""Pictures of stones, .png, .tif and .jpg: masks of stones against joints, and label images with a value per stone."""
+"""Pictures of stones: masks of stones against joints, and label images with a value per stone."""
 
 from __future__ import annotations
 
