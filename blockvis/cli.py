@@ -42,6 +42,9 @@ BAD_INPUT, SOLVER_FAILED, NO_PICTURES, NO_EQUILIBRIUM, INTERRUPTED = 2, 3, 4, 5,
 #: What errors of the standard output have for the name of a file.
 OUTPUT = "standard output"
 
+#: What libraries say, and Python of threads, where there is no memory for them.
+NO_MEMORY = ("failed to map segment", "can't start new thread")
+
 #: What the exit codes mean, for ``--help``.
 EXIT_CODES = f"""exit codes:
   0    done, also when the structure collapses
@@ -96,13 +99,13 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Drawing] |
             raise
         print(f"blockvis: {_in_plain_words(error)}", file=sys.stderr)
         return BAD_INPUT
-    except MemoryError:
-        print("blockvis: there is not enough memory for what the input asks for", file=sys.stderr)
-        return BAD_INPUT
     except KeyboardInterrupt as stop:
         print(f"blockvis: {stop}" if str(stop) else "blockvis: interrupted", file=sys.stderr)
         return INTERRUPTED
     except Exception as error:
+        if isinstance(error, MemoryError) or any(words in str(error) for words in NO_MEMORY):
+            print(f"blockvis: there is not enough memory for what is asked for: {error}".rstrip(": "), file=sys.stderr)
+            return BAD_INPUT
         # Not in the clause, where the end of a help would load the mechanics to look whether it is one.
         if not isinstance(error, solver.SolveError):
             raise

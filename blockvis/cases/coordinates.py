@@ -41,10 +41,15 @@ def _of_settlements(case: Case, d: int) -> Iterator[tuple[str, str, Any]]:
     """Table, key and numbers of the directions and points of settlements of d dimensions."""
     for k, settlement in enumerate(case.settlements, start=1):
         table = f"settlement {k}" if len(case.settlements) > 1 else "settlement"
-        if d == 3 and (settlement.profile is not None or any(case.profiles[k - 1 : k])):
+        motions = list((settlement.profile or {}).values())
+        if (d == 3 and any(case.profiles[k - 1 : k])) or (motions and len(motions[0]) != 3 * (d - 1)):
             raise ValueError(
-                f"{case.source}: [{table}] profile belongs to blocks in the plane; in space give a direction of three "
-                "numbers, or in Python solver.Settlement(profile=...) of six numbers for each support"
+                f"{case.source}: [{table}] profile belongs to blocks {_where(5 - d)}; "
+                + (
+                    "in space give a direction, or the motion of each of its supports, [dx, dy, dz, rx, ry, rz]"
+                    if d == 3
+                    else "in the plane the motion of a support is [dx, dy, rotation]"
+                )
             )
         for key in ("rotation_axis", "radial_from"):
             if d == 2 and getattr(settlement, key) is not None:

@@ -19,7 +19,7 @@ from blockvis.text import listed, nearest
 from solver import mechanics
 from solver.mechanics import counted
 
-from .key import NUMBER, PAIR, POSITIVE, VECTOR, Forms, Key, Section, ValueKind, list_of, one_of
+from .key import NUMBER, PAIR, POSITIVE, Forms, Key, Section, ValueKind, list_of, one_of
 from .toml_table import Table, is_number, shortened
 
 #: Pieces of a support narrower than this fraction of the block size are not cut off.
@@ -135,29 +135,29 @@ def _points(table: Table, key: Key) -> tuple[tuple[float, float], ...] | None:
     return points
 
 
-def _motions(table: Table, key: Key) -> dict[str, tuple[float, float, float]] | None:
+def _motions(table: Table, key: Key) -> dict[str, tuple[float, ...]] | None:
     given = table.take(key.name)
     if given is None:
         return None
     if not isinstance(given, dict) or not given:
         raise table.error(key.name, f'is {shortened(given)}; give {{ "name" = [dx, dy, rotation], ... }}')
     supports = table.table(key.name)
-    motions = {name: supports.vector(name, words="[dx, dy] or [dx, dy, rotation]") for name in given}
-    padded = {str(name): (*motion, 0.0) for name, motion in motions.items()}
-    return {name: (dx, dy, rotation) for name, (dx, dy, rotation, *_) in padded.items()}
+    words = "[dx, dy] or [dx, dy, rotation], or in space [dx, dy, dz, rx, ry, rz]"
+    motions = {str(name): supports.vector(name, (2, 3, 6), words) for name in given}
+    return {name: motion if len(motion) > 2 else (*motion, 0.0) for name, motion in motions.items()}
 
 
 _DEPTH = ValueKind("1 or -1", {"enum": [1, -1]}, _depth)
 _POINTS = ValueKind("list of at least two pairs", list_of(PAIR.schema, 2), _points)
 _MOTIONS = ValueKind(
-    "table of two or three numbers by the name of a support",
-    {"type": "object", "additionalProperties": VECTOR.schema, "minProperties": 1},
+    "table of two or three numbers, in space six, by the name of a support",
+    {"type": "object", "additionalProperties": list_of({"type": "number"}, 2, 6), "minProperties": 1},
     _motions,
 )
 
 PROFILE = Section(
     "settlement.profile",
-    "How far each support goes, in proportion, by one of three kinds of profile, in the plane",
+    "How far each support goes, in proportion, by one of three kinds of profile; in space by the motion of each",
     (
         Key("kind", one_of(("gaussian", "points", "supports")), "A Gaussian trough or heave along x, points of a "
             "table, or the motion of each support", "gaussian", otherwise="the kind whose keys are there"),
@@ -169,8 +169,9 @@ PROFILE = Section(
         Key("depth", _DEPTH, "Of a Gaussian trough, 1, or -1 for a heave: the settlement scales it", -1.0, default=1.0),
         Key("points", _POINTS, "Places x [m] and how far the ground goes there, straight between them and level beyond",
             [[0.0, 0.0], [2.0, 1.0]], otherwise="required for points"),
-        Key("supports", _MOTIONS, "Displacement [m] of each support and its rotation [rad], in proportion",
-            {"pier": [0.2, -0.5, 0.01]}, otherwise="required for supports"),
+        Key("supports", _MOTIONS, "Displacement [m] of each support and its rotation [rad], in proportion; in "
+            "space six numbers [dx, dy, dz, rx, ry, rz]", {"pier": [0.2, -0.5, 0.01]},
+            otherwise="required for supports"),
     ),
     forms=Forms(
         "kind",
@@ -180,7 +181,7 @@ PROFILE = Section(
 )  # fmt: skip
 
 
-def read_profile(table: Table, key: Key) -> Profile | dict[str, tuple[float, float, float]] | None:
+def read_profile(table: Table, key: Key) -> Profile | dict[str, tuple[float, ...]] | None:
     """Read the profile of a settlement; the motions of supports where it gives these."""
     given = table.take(key.name)
     if given is None:
@@ -192,7 +193,7 @@ def read_profile(table: Table, key: Key) -> Profile | dict[str, tuple[float, flo
             '{ points = [[x, s], ...] } or { supports = { "name" = [dx, dy, rotation] } }',
         )
     values = PROFILE.read(table.table(key.name))
-    motions: dict[str, tuple[float, float, float]] | None = values.pop("supports", None)
+    motions: dict[str, tuple[float, ...]] | None = values.pop("supports", None)
     if motions is not None:
         return motions
     return Profile(**values | {"kind": "points" if "points" in values else "gaussian"})

@@ -46,7 +46,7 @@ FORMATS = {
     **dict.fromkeys((".off", ".dae"), Format("solids")),
     **dict.fromkeys((".3ddat", ".3dec", ".dat"), Format("threedec")),
     **dict.fromkeys((".geo", ".geo_unrolled", ".step", ".stp", ".brep"), Format("gmsh_cad")),
-    **dict.fromkeys((".png", ".tif", ".tiff", ".jpg", ".jpeg"), Format("images", alone=True)),
+    **dict.fromkeys((".png", ".tif", ".tiff", ".jpg", ".jpeg", ".webp", ".bmp"), Format("images", alone=True)),
     **dict.fromkeys((
         ".inp", ".bdf", ".fem", ".nas", ".med", ".mesh", ".meshb", ".su2", ".ugrid", ".vol", ".xdmf", ".xmf",
         ".mdpa", ".avs", ".cgns", ".exo", ".f3grid", ".tec", ".wkt", ".h5m", ".xml", ".post", ".dato", ".hmf",

@@ -1,4 +1,4 @@
-"""Pictures of stones, .png, .tif and .jpg: masks of stones against joints, and label images with a value per stone."""
+"""Pictures of stones: masks of stones against joints, and label images with a value per stone."""
 
 from __future__ import annotations
 
@@ -67,14 +67,16 @@ def opened(path: Path) -> tuple[Image.Image, Mapping[int, Any]]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             # Of files by name Pillow maps TIFFs into memory, and shears those that lie on their side.
-            image = Image.open(BytesIO(path.read_bytes()))
+            content = path.read_bytes()
+            image = Image.open(BytesIO(content))
         width, height = image.size
         if width * height > MOST_PIXELS:
             raise ValueError(
                 f"'{path}' has {width} × {height} pixels, more than {MOST_PIXELS}; scale it down, or cut it"
             )
         tags = dict(getattr(image, "tag_v2", {}))
-        form = image.format
+        # A lossy WebP blurs colours as a JPEG does.
+        form = "JPEG" if image.format == "WEBP" and b"VP8L" not in content else image.format
         image.load()
         upright = ImageOps.exif_transpose(image)
     except (UnidentifiedImageError, Image.DecompressionBombError):

@@ -19,7 +19,7 @@ from .crossings import uncrossed
 from .layout import Layout
 from .left_out import LeftOut, in_words, matches
 from .linked import linked
-from .notes import LEFT_OUT, SPECK, UNIT, Note
+from .notes import CHANGED, LEFT_OUT, SPECK, UNIT, Note
 from .outlines import ring_area, ring_width
 from .unfilled import walls_to_fill
 from .units import doubt
@@ -53,9 +53,12 @@ INNER = 3
 #: Layers that by their name hold what explains a drawing.
 ANNOTATIONS = re.compile(
     r"(dims?|dimensions?|bema[sß]+ung|cotes?|titles?|title[ _-]?block|schriftfeld|guides?|rulers?|guide[ _-]?rulers?"
-    r"|backgrounds?|hintergrund|annotations?|viewports?|defpoints)",
+    r"|backgrounds?|hintergrund|annotations?|viewports?|defpoints|north([ _-]?arrows?)?|nordpfeil)",
     re.IGNORECASE,
 )
+
+#: Labels of what is no stone, but a place without any.
+VOIDS = re.compile(r"(openings?|windows?|doors?|voids?|holes?)", re.IGNORECASE)
 
 #: Names of mortar.
 MORTAR = re.compile(r"\b(mortar|mörtel|moertel|malta|mortier|mortero|argamassa)\b", re.IGNORECASE)
@@ -105,6 +108,9 @@ def noted(layout: Layout) -> Layout:
     doubted = "" if layout.unit_by == "user" else doubt(layout.unit, size, page=layout.unit_by == "page")
     found = [Note(UNIT, words) for words in (doubted, _thickness_doubt(layout, size)) if words]
     found += [Note(SPECK, words) for words in (_specks(layout, size),) if words]
+    for label in sorted({group for group in (*layout.groups, *layout.materials) if VOIDS.fullmatch(group)}):
+        words = f"what is called '{label}' counts as a stone; of an opening leave it out: ignore = [\"{label}\"]"
+        found.append(Note(CHANGED, words))
     walls = [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]
     return replace(layout, notes=(*layout.notes, *walls, *in_words(layout.left_out), *found))
 

@@ -157,7 +157,7 @@ def _joints_in_plane(assembly: solver.Assembly, contacts: mechanics.Contacts, to
     lean = np.abs(across[:, 1] - across[:, 0]) / assembly.edge_lengths[a]
     low = np.maximum(0.0, along.min(axis=1))
     high = np.minimum(length, along.max(axis=1))
-    keep = (high - low > 10.0 * tolerance) | (high - low > 0.5 * np.minimum(length, assembly.edge_lengths[a]))
+    keep = (high - low > 2.0 * tolerance) | (high - low > 0.5 * np.minimum(length, assembly.edge_lengths[a]))
     keep &= (lean < PARALLEL) & (across.min(axis=1) <= 2.0 * tolerance) & (along[:, 0] > along[:, 1])
     ends = np.stack([start + low[:, None] * tangent, start + high[:, None] * tangent], axis=1)
     owner = assembly.block_of_vertex

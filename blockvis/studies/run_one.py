@@ -88,18 +88,24 @@ def _outcome(run: AnalysisRun, number: int, seconds: float | None) -> tuple[dict
     # Only the ends of the path are kept.
     kept: list[solver.Increment] = []
     n_path = n_programs = 0
-    for increment in run.steps:
-        falling = increment.status is solver.Status.FALLING
-        if not falling:
-            # Each limit load belongs to an increment.
-            kept = kept if run.limits else kept[:1]
-            n_path, n_programs = n_path + 1, n_programs + increment.programs
-        kept.append(increment)
-        # Of what falls the collapse is found already.
-        if seconds is not None and not falling and time.perf_counter() - started > seconds:
-            told = f"took longer than {seconds:g} s: let [study] seconds be longer, with --retry-failed"
-            ending = mechanics.Ending(solver.Status.INTERRUPTED, told)
-            break
+    try:
+        for increment in run.steps:
+            falling = increment.status is solver.Status.FALLING
+            if not falling:
+                # Each limit load belongs to an increment.
+                kept = kept if run.limits else kept[:1]
+                n_path, n_programs = n_path + 1, n_programs + increment.programs
+            kept.append(increment)
+            # Of what falls the collapse is found already.
+            if seconds is not None and not falling and time.perf_counter() - started > seconds:
+                told = f"took longer than {seconds:g} s: let [study] seconds be longer, with --retry-failed"
+                ending = mechanics.Ending(solver.Status.INTERRUPTED, told)
+                break
+    except Exception as error:
+        # What raises half-way has come as far as its last increment.
+        if not n_path:
+            raise
+        ending = mechanics.Ending(solver.Status.SOLVER_FAILED, _reason(error))
     response = run.response(kept, ending or run.steps.ending)
     found = _numbers(response) | {"increments": n_path, "programs": n_programs}
     state = with_mechanism(response) or (response.governing if response.limits else None)

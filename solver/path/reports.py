@@ -36,10 +36,6 @@ class Reports:
     def increment(self, check: EquilibriumCheck, velocity: np.ndarray, works: tuple[float, ...]) -> Increment:
         """The increment of an equilibrium and the movement that follows, with the notes since the last one."""
         model, place, contacts, bounds = self.model, check.place, check.contacts, check.bounds
-        resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
-        live, live_size = model.scaled_live(place.pose)
-        multiplier = check.measured * live_size if model.has_live else 0.0
-        balance = (resultant + model.scaled_load_at(place.pose) + multiplier * live)[model.assembly.free]
         support_forces = on_supports(model, contacts, place.pose, check.forces)
         state = self._state(place, contacts, check.forces, check.friction, velocity, support_forces)
         gaps, least, cohesion = self.stepper.joint_limits(place, contacts, check.forces)
@@ -49,7 +45,7 @@ class Reports:
         in_place = replace(state.contacts, gaps=gaps[between])
         excess = friction_excess(beyond[between], state.friction, cohesion[between])
         certificate = Certificate(
-            equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
+            equilibrium_residual=float(np.abs(self._unbalanced(check)).max(initial=0.0)) / model.total_load,
             friction_excess=excess / model.total_load,
             carrying_gap=carrying_gap(in_place, check.forces[between]),
             largest_penetration=max(largest_penetration(in_place), self._overlap(place)),
@@ -61,6 +57,18 @@ class Reports:
         state = self.stepper.mortar.told(state, place)
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
         return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
+
+    def _unbalanced(self, check: EquilibriumCheck) -> np.ndarray:
+        """(n_blocks, n_dof) array: what is out of balance on free blocks, in units of the program."""
+        model, pose = self.model, check.place.pose
+        resultant = (wrench_matrix(check.contacts, pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
+        live, live_size = model.scaled_live(pose)
+        multiplier = check.measured * live_size if model.has_live else 0.0
+        return np.where(model.assembly.free[:, None], resultant + model.scaled_load_at(pose) + multiplier * live, 0.0)
+
+    def no_equilibrium(self, check: EquilibriumCheck, motion: np.ndarray) -> str:
+        """Message that names the blocks that fall before any settlement, and the forces that would hold them."""
+        return no_equilibrium(self.model.assembly, motion, self.model.held_by(-self._unbalanced(check)))
 
     def _overlap(self, place: Place) -> float:
         """Deepest overlap [m] of blocks that no contact point keeps apart; told of each two once."""
@@ -201,10 +209,10 @@ def wedged(assembly: Assembly, pressed: Contacts) -> str:
     return f"the supports cannot move on: {are} wedged ({assembly.listed(blocks, 4)})"
 
 
-def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
+def no_equilibrium(assembly: Assembly, motion: np.ndarray, held: str = "") -> str:
     """Message that names the blocks that fall before any settlement, by their motion, (n_blocks, n_dof) array."""
     falling = falling_blocks(assembly, motion)
     return (
         f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
-        f"({assembly.listed(falling, 8)}); {REMEDY}"
+        f"({assembly.listed(falling, 8)}){held}; {REMEDY}"
     )

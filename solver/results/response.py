@@ -365,6 +365,8 @@ class LimitLoad(HasState, Shown):
         Whose limit load it is.
     staying_open : float, optional
         Multiplier where joints that are open may not close for the live load; None where it has not been asked for.
+    held_by : str
+        Where there is no equilibrium, words of the forces with which there would be one.
     """
 
     multiplier: float
@@ -378,6 +380,7 @@ class LimitLoad(HasState, Shown):
     torsion: str = "points"
     analysed: Analysed | None = field(default=None, repr=False, compare=False)
     staying_open: float | None = None
+    held_by: str = field(default="", repr=False, compare=False)
 
     @property
     def mechanism(self) -> np.ndarray:
@@ -441,7 +444,7 @@ class LimitLoad(HasState, Shown):
                 free, gone = assembly.free, self.fallen
                 depth = depths[(free[i] | free[j]) & ~gone[i] & ~gone[j]].max(initial=0.0)
                 inside = f"; blocks overlap by up to {depth:.3g} m at this pose" if depth > 0.0 else ""
-            return f"no equilibrium under the dead load: {falling}{inside}; {REMEDY}"
+            return f"no equilibrium under the dead load: {falling}{self.held_by}{inside}; {REMEDY}"
         if self.status is LimitStatus.UNBOUNDED:
             return "unbounded: no live load of this pattern brings the structure down"
         law = "" if self.torsion == "points" else f", {self.torsion} torsion"

@@ -2,6 +2,8 @@
 
 import pickle
 import shutil
+import subprocess
+import sys
 import weakref
 from dataclasses import replace
 
@@ -204,3 +206,14 @@ def test_limit_loads_of_a_run_have_the_arrays_of_their_increments(tmp_path):
         assert np.array_equal(limit.forces, state.forces)
         assert limit.increment.pose.positions.shape == state.pose.positions.shape
         assert str(limit).startswith("load multiplier")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no limit of the addresses of a process")
+def test_where_memory_is_limited_a_run_says_so_and_ends(tmp_path):
+    """With 0.5 GB a library of HiGHS would ask for its memory for ever."""
+    case_from(ARCH + SPREAD, tmp_path)
+    run = f"ulimit -v 500000; exec {sys.executable} -m blockvis run case.toml"
+    ended = subprocess.run(["sh", "-c", run], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert ended.stderr.startswith("blockvis: there is not enough memory for what is asked for: ")

@@ -27,6 +27,7 @@ from blockvis.studies.run_one import run_once
 from blockvis.studies.study_file import read_study
 from blockvis.studies.study_folder import StudyFolder, finished_runs
 from blockvis.studies.summary import in_words, summary_of
+from solver.path import path
 
 #: A block 0.5 × 1 on a ground that tilts: it overturns at atan(0.5) or slides at atan(μ), whichever is first.
 TILT = {
@@ -218,7 +219,7 @@ def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path,
 
 
 @pytest.mark.slow
-def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
+def test_failed_runs_are_rows_with_their_reason(tmp_path, monkeypatch):
     """On a grid, in one process: a column of no block, and a time too short for any run, which says how far it came."""
     given = {
         "study": {"case": TILT, "method": "grid"},
@@ -240,6 +241,17 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
     assert (row["last_settlement"], row["increments"]) == (0.0, 1)
     assert row["last_reaction"] == pytest.approx(0.0)
     assert shape == b""
+    advance = path.Path.advance
+
+    def fail_at_the_third(of, state, target):
+        if state.reported > 0.0:
+            raise MemoryError("no room")
+        return advance(of, state, target)
+
+    monkeypatch.setattr(path.Path, "advance", fail_at_the_third)
+    row, _ = run_once(plan.values, "case", plan.order(0), 0)
+    assert (row["status"], row["message"]) == ("solver failed", "MemoryError: no room")
+    assert (row["last_settlement"], row["increments"]) == (pytest.approx(0.05), 2)
 
 
 @pytest.mark.slow

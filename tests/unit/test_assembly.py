@@ -116,6 +116,11 @@ REFUSED = {
         {},
         r"doubles back: .* \(0, 0\) and \(1, 0\)",
     ),
+    "a spike of rounding": (
+        [SQUARE, [[0, 0], [3, 0], [1, 1e-7], [1, 1], [0, 1]]],
+        {},
+        r"block 1 \('block 1'\) has a spike of rounding at \(3, 0\): drop that corner",
+    ),
     "an edge to and fro": ([[[0, 0], [2, 0], [1, 0], [3, 0], [3, 1], [0, 1]]], {}, "doubles back"),
     "a corner on an edge": ([[[0, 0], [2, 0], [2, 1], [1, 0], [0, 1]]], {}, "crosses itself"),
     "ragged": (

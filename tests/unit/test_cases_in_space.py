@@ -104,14 +104,26 @@ def test_rotations_and_loads_have_three_numbers(tmp_path):
          r"case\.toml: \[\[supports\]\] .* 'levels', which no support in the plane has; leave it out, "
          r"or give \[geometry\] dimension = 3 if the blocks are in space"),
         (DOME + "[settlement]\nprofile = { points = [[0, 0], [4, 1]] }", r"\[settlement\] profile belongs to blocks in "
-         r"the plane; in space give a direction of three numbers, or in Python solver\.Settlement"),
+         r"the plane; in space give a direction, or the motion of each of its supports, \[dx, dy, dz, rx, ry, rz\]"),
         (DOME + "[settlement]\nprofile = { supports = { g = [0, -1] } }", r"profile belongs to blocks in the plane"),
+        (ARCH + '[settlement]\nprofile = { supports = { "right springer" = [0, 0, -1, 0, 0, 0] } }',
+         r"profile belongs to blocks in space; in the plane the motion of a support is \[dx, dy, rotation\]"),
         (DOME + DOWN + '[roles]\n"sprinter 1" = "fixed"\n', r"roles: 'sprinter 1' matches no block"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_named(text, reason, tmp_path):
     with pytest.raises(ValueError, match=reason):
         assembly_of(case(text, tmp_path))
+
+
+def test_a_support_in_space_moves_as_its_six_numbers_say(tmp_path):
+    text = (
+        DOME + '[settlement]\nincrement = 1e-3\nlimit = 1e-3\nprofile.supports."springer 1" = [0, 2, -2, 0, 0, 0.5]\n'
+    )
+    run = blockvis.run_case(case(text, tmp_path), tmp_path / "out", outputs=())
+    moved = run.response.path[-1].pose.displacements(run.response.assembly)[run.response.assembly.index("springer 1")]
+    root = 0.5**0.5
+    np.testing.assert_allclose(moved, 1e-3 * np.array([0, root, -root, 0, 0, root / 4]), atol=1e-12)
 
 
 @pytest.mark.parametrize(("key", "end"), [("from", "[0, 5]"), ("to", "{ fixed = [2.0, 0.3] }")])

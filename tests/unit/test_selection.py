@@ -58,6 +58,10 @@ def hatch_with_hole(space):
             "left out: 1 frame or background around other blocks on layer",
         ),
         (outline(brick(0, 900, 500, 60), "Title"), "left out: 1 outline on a layer of annotations on layer 'Title'"),
+        (
+            outline(brick(0, 900, 50, 90), "North arrow"),
+            "left out: 1 outline on a layer of annotations on layer 'North",
+        ),
     ],
 )
 def test_what_is_no_block_is_left_out_with_a_note(tmp_path, extra, note):
