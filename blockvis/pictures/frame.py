@@ -20,8 +20,12 @@ from solver import mechanics
 from . import palette
 from .surface import left_blocks
 
-#: Height of the text as a fraction of the side of a square as large as the picture, and its least size in pixels.
-TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 48.0, 12
+#: Height of the text as a fraction of the side of a square as large as the picture, and of the width: as wide as the text
+#: of an A4 page, 174 mm, the smallest letters then have 7 points. Its least size in pixels.
+TEXT_FRACTION, OF_WIDTH, SMALLEST_TEXT = 1.0 / 48.0, 1.0 / 62.0, 12
+
+#: The smallest letters, in heights of the text.
+SMALL = 0.9
 
 #: Sheets narrower than this, in heights of the text, have warnings below the title, and one more row in the legend.
 NARROW = 48.0
@@ -85,7 +89,7 @@ class Sheet:
     def __init__(self, size: tuple[int, int], colour_bar: ColourBar | None = None, curve: bool = False) -> None:
         self.size = size
         width, height = size
-        self.text = max(SMALLEST_TEXT, round(np.sqrt(width * height) * TEXT_FRACTION))
+        self.text = max(SMALLEST_TEXT, round(text_height(width, height)))
         self.pad = max(6, round(0.9 * self.text))
         self._narrow = width < NARROW * self.text
         self.header = round(HEADER[self._narrow] * self.text)
@@ -146,7 +150,7 @@ class Sheet:
         room = [self.size[0] - 2.0 * self.pad] * ROWS
         if badge and self._narrow:
             room[-1] = self._badge_box(badge)[0] - 2.0 * self.pad
-        rows, font = fitting_rows(detail, round(0.9 * self.text), room)
+        rows, font = fitting_rows(detail, round(SMALL * self.text), room)
         for row, words in enumerate(rows):
             draw.text((self.pad, self.pad + (2.0 + 1.2 * row) * self.text), words, palette.FAINT, font, anchor="lm")
         if badge:
@@ -162,12 +166,12 @@ class Sheet:
         box, half = self._badge_box(badge), 0.75 * self.text
         draw.rounded_rectangle(box, radius=half * 0.5, fill=palette.WARNING)
         place = box[0] + 0.6 * self.text, box[1] + half
-        draw.text(place, badge, palette.PAPER, _font(round(0.9 * self.text), bold=True), anchor="lm")
+        draw.text(place, badge, palette.PAPER, _font(round(SMALL * self.text), bold=True), anchor="lm")
 
     def _badge_box(self, badge: str) -> tuple[float, float, float, float]:
         """Left, top, right and bottom of a warning, in pixels."""
         right = self.size[0] - self.pad
-        width = _font(round(0.9 * self.text), bold=True).getlength(badge)
+        width = _font(round(SMALL * self.text), bold=True).getlength(badge)
         top = self.pad + 2.55 * self.text * self._narrow
         return right - width - 1.2 * self.text, top, right, top + 1.5 * self.text
 
@@ -181,14 +185,14 @@ class Sheet:
         draw.rectangle((x, y - thick // 2, x + pixels, y - thick // 2 + thick - 1), fill=palette.INK)
         for end in (x, x + pixels - thick + 1):
             draw.rectangle((end, y - tick, end + thick - 1, y + tick), fill=palette.INK)
-        font = _font(round(0.9 * self.text))
+        font = _font(round(SMALL * self.text))
         label = bar_text(length)
         draw.text((x + pixels / 2, y - tick - 0.15 * self.text), label, palette.INK, font, anchor="mb")
         return int(max(x + pixels, x + pixels / 2 + draw.textlength(label, font) / 2))
 
     def _legend(self, draw: ImageDraw.ImageDraw, keys: Sequence[Key], left: int) -> None:
         """Draw the legend, from its end on: what comes and goes in a film stands before what stays."""
-        room, size = self.size[0] - self.pad - left, round(0.9 * self.text)
+        room, size = self.size[0] - self.pad - left, round(SMALL * self.text)
         rows = self._rows(keys, size, room)
         # Small letters are harder to read than a second row; only what there is no room for is written smaller.
         while len(rows) > 2 + self._narrow and size > 8:
@@ -228,7 +232,7 @@ class Sheet:
         strip = np.repeat(ramp[:, None, :], round(0.9 * self.text), axis=1)
         page.paste(Image.fromarray(strip), (left, top))
         draw.rectangle((left, top, left + strip.shape[1] - 1, top + height - 1), outline=palette.OUTLINE)
-        font = _font(round(0.85 * self.text))
+        font = _font(round(SMALL * self.text))
         unit, factor = ("mm", 1e3) if bar.largest < 1.0 else ("m", 1.0)
         step = rounded_length(bar.largest * factor / 4.0)
         value, largest = 0.0, bar.largest * factor
@@ -255,7 +259,7 @@ def write_labels(
     They leave dots (n, 2) free where there is room beside them, and each has a leader to its place. All lengths are in
     pixels; the rims have the colour of open joints by default.
     """
-    draw, font = ImageDraw.Draw(picture), _font(round(0.85 * text))
+    draw, font = ImageDraw.Draw(picture), _font(round(SMALL * text))
     rim, written = 0.4 * text, list[_Label]()
     # A label over the place of another would seem to be its.
     dots = np.concatenate([dots, np.repeat(places, CROSSED, axis=0)])
@@ -313,7 +317,7 @@ def _inside(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
 
 def write_words(picture: Image.Image, place: tuple[float, float], words: str, text: int) -> None:
     """Write faint words, their middle at a place of a picture [pixel]."""
-    ImageDraw.Draw(picture).text(place, words, palette.FAINT, _font(round(0.85 * text)), anchor="mm")
+    ImageDraw.Draw(picture).text(place, words, palette.FAINT, _font(round(SMALL * text)), anchor="mm")
 
 
 def place_in(shape: shapely.Geometry) -> np.ndarray:
@@ -415,6 +419,11 @@ class Frame:
         return Frame(centre - half, centre + half)
 
 
+def text_height(width: int, height: int) -> float:
+    """Height [pixels] of the text of a sheet of so many pixels."""
+    return max(float(np.sqrt(width * height)) * TEXT_FRACTION, width * OF_WIDTH)
+
+
 def sheet_size(frame: Frame, usual: tuple[int, int] = STILL_SIZE, beside: float = 0.0) -> tuple[int, int]:
     """Width and height [pixels], both even, of a sheet in the proportions of what it shows, in views side by side.
 
@@ -423,7 +432,7 @@ def sheet_size(frame: Frame, usual: tuple[int, int] = STILL_SIZE, beside: float 
     width, height = frame.size.reshape(-1, 2).max(axis=0)
     proportion = height / (width * len(frame.size) / 2.0)
     pixels = float(np.prod(usual))
-    text = np.sqrt(pixels) * TEXT_FRACTION
+    text = text_height(*usual)
     for header, footer in zip(HEADER, FOOTER, strict=True):
         # A strip as high as the words, and the blocks' picture.
         words = (header + footer - proportion * beside) * text
