@@ -25,6 +25,7 @@ from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, fall_text,
 from .flat_scene import FlatScene
 from .frame import (
     BAR,
+    CROSSED,
     CURVE,
     SEPARATOR,
     STILL_SIZE,
@@ -689,8 +690,8 @@ class Drawer:
 
 
 def _along(tails: np.ndarray, tips: np.ndarray) -> np.ndarray:
-    """(3 n, d) array [m]: both ends and the middle of arrows."""
-    return np.concatenate([tails, (tails + tips) / 2.0, tips])
+    """(n, d) array [m]: points along arrows, so many that a label over one is as bad as over its own place."""
+    return np.repeat(along_lines(np.stack([tails, tips], axis=1)), CROSSED, axis=0)
 
 
 def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:
