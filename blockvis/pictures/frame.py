@@ -83,13 +83,16 @@ class ColourBar:
 class Sheet:
     """Where the picture of the blocks goes, and the words around it.
 
-    Its size is in pixels; to the right of the blocks is room for the ``curve`` where it is asked for.
+    Its size is in pixels; to the right of the blocks is room for the ``curve`` where it is asked for, and so many
+    sheets stand side by side ``across`` a page.
     """
 
-    def __init__(self, size: tuple[int, int], colour_bar: ColourBar | None = None, curve: bool = False) -> None:
+    def __init__(
+        self, size: tuple[int, int], colour_bar: ColourBar | None = None, curve: bool = False, across: int = 1
+    ) -> None:
         self.size = size
         width, height = size
-        self.text = max(SMALLEST_TEXT, round(text_height(width, height)))
+        self.text = max(SMALLEST_TEXT, round(text_height(across * width, height)))
         self.pad = max(6, round(0.9 * self.text))
         self._narrow = width < NARROW * self.text
         self.header = round(HEADER[self._narrow] * self.text)
@@ -424,15 +427,18 @@ def text_height(width: int, height: int) -> float:
     return max(float(np.sqrt(width * height)) * TEXT_FRACTION, width * OF_WIDTH)
 
 
-def sheet_size(frame: Frame, usual: tuple[int, int] = STILL_SIZE, beside: float = 0.0) -> tuple[int, int]:
+def sheet_size(
+    frame: Frame, usual: tuple[int, int] = STILL_SIZE, beside: float = 0.0, across: int = 1
+) -> tuple[int, int]:
     """Width and height [pixels], both even, of a sheet in the proportions of what it shows, in views side by side.
 
-    It has as many pixels as the usual one, and ``beside`` the blocks goes something so wide, in heights of the text.
+    It has as many pixels as the usual one, and ``beside`` the blocks goes something so wide, in heights of the text,
+    which are those of so many sheets ``across`` a page.
     """
     width, height = frame.size.reshape(-1, 2).max(axis=0)
     proportion = height / (width * len(frame.size) / 2.0)
     pixels = float(np.prod(usual))
-    text = text_height(*usual)
+    text = text_height(across * usual[0], usual[1])
     for header, footer in zip(HEADER, FOOTER, strict=True):
         # A strip as high as the words, and the blocks' picture.
         words = (header + footer - proportion * beside) * text
