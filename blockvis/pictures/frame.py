@@ -27,12 +27,12 @@ TEXT_FRACTION, OF_WIDTH, SMALLEST_TEXT = 1.0 / 48.0, 1.0 / 62.0, 12
 #: The smallest letters, in heights of the text.
 SMALL = 0.9
 
-#: Sheets narrower than this, in heights of the text, have warnings below the title, and one more row in the legend.
+#: Sheets narrower than this, in heights of the text, have one more row in the legend.
 NARROW = 48.0
 
-#: Heights of what is above and below the blocks, in those of the text, of usual and of narrow sheets, and rows of the
-#: caption below its title.
-HEADER, FOOTER, ROWS = (4.7, 5.1), (3.3, 4.6), 2
+#: Heights of what is above and below the blocks, in those of the text, this of usual and of narrow sheets, and rows of
+#: the caption below its title.
+HEADER, FOOTER, ROWS = 5.1, (3.3, 4.6), 2
 
 #: Widths of curve and colour bar beside the blocks, and the largest height of the curve, in heights of the text.
 CURVE, BAR, HIGHEST_CURVE = 23.0, 7.6, 29.0
@@ -95,7 +95,7 @@ class Sheet:
         self.text = max(SMALLEST_TEXT, round(text_height(across * width, height)))
         self.pad = max(6, round(0.9 * self.text))
         self._narrow = width < NARROW * self.text
-        self.header = round(HEADER[self._narrow] * self.text)
+        self.header = round(HEADER * self.text)
         self.footer = round(FOOTER[self._narrow] * self.text)
         self.colour_bar = colour_bar
         beside = curve * min(round(CURVE * self.text), width // 2)
@@ -131,7 +131,8 @@ class Sheet:
         Title and detail are the lines of the caption, the badge is a warning at the upper right. A pixel has a size
         [m], and the picture ``beside`` that of :attr:`beside`.
         """
-        shared = tuple(keys), pixel, detail, badge
+        beside_title = self._room(badge) >= _font(round(1.15 * self.text), bold=True).getlength(title)
+        shared = tuple(keys), pixel, detail, badge, beside_title
         if shared != self._page_of:
             # One at a time: joints open and slide now and then, and a page at any size is memory.
             self._page, self._page_of = self._around(*shared), shared
@@ -139,10 +140,12 @@ class Sheet:
         page.paste(picture, self.inside[:2])
         if beside is not None:
             page.paste(beside, self.beside[:2])
-        self._title(ImageDraw.Draw(page), title, badge)
+        self._title(ImageDraw.Draw(page), title, badge if beside_title else "")
         return page
 
-    def _around(self, keys: Sequence[Key], pixel: float, detail: str, badge: str) -> Image.Image:
+    def _around(
+        self, keys: Sequence[Key], pixel: float, detail: str, badge: str, beside_title: bool
+    ) -> Image.Image:
         """Draw what many pictures of a film share: scale bar, legend, colour bar, all of the caption but its title."""
         page = Image.new("RGB", self.size, palette.PAPER)
         draw = ImageDraw.Draw(page)
@@ -150,33 +153,32 @@ class Sheet:
         self._legend(draw, keys, end + 2 * self.pad)
         if self.colour_bar is not None:
             self._colour_bar(page, draw, self.colour_bar)
-        room = [self.size[0] - 2.0 * self.pad] * ROWS
-        if badge and self._narrow:
-            room[-1] = self._badge_box(badge)[0] - 2.0 * self.pad
+        room = [self._room("")] * ROWS
+        if not beside_title:
+            room[-1] = self._room(badge)
         rows, font = fitting_rows(detail, round(SMALL * self.text), room)
         for row, words in enumerate(rows):
             draw.text((self.pad, self.pad + (2.0 + 1.2 * row) * self.text), words, palette.FAINT, font, anchor="lm")
         if badge:
-            self._badge(draw, badge)
+            # Beside a long title it would make that small.
+            self._badge(draw, badge, self.pad + 2.55 * self.text * (not beside_title))
         return page
 
     def _title(self, draw: ImageDraw.ImageDraw, title: str, badge: str) -> None:
-        room = (self._badge_box(badge)[0] if badge and not self._narrow else self.size[0]) - 2 * self.pad
-        font = fitting_font(title, round(1.15 * self.text), room, bold=True)
+        font = fitting_font(title, round(1.15 * self.text), self._room(badge), bold=True)
         draw.text((self.pad, self.pad + 0.72 * self.text), title, palette.INK, font, anchor="lm")
 
-    def _badge(self, draw: ImageDraw.ImageDraw, badge: str) -> None:
-        box, half = self._badge_box(badge), 0.75 * self.text
+    def _badge(self, draw: ImageDraw.ImageDraw, badge: str, top: float) -> None:
+        left, half = self._room(badge) + 2 * self.pad, 0.75 * self.text
+        box = left, top, self.size[0] - self.pad, top + 2 * half
         draw.rounded_rectangle(box, radius=half * 0.5, fill=palette.WARNING)
-        place = box[0] + 0.6 * self.text, box[1] + half
+        place = left + 0.6 * self.text, top + half
         draw.text(place, badge, palette.PAPER, _font(round(SMALL * self.text), bold=True), anchor="lm")
 
-    def _badge_box(self, badge: str) -> tuple[float, float, float, float]:
-        """Left, top, right and bottom of a warning, in pixels."""
-        right = self.size[0] - self.pad
-        width = _font(round(SMALL * self.text), bold=True).getlength(badge)
-        top = self.pad + 2.55 * self.text * self._narrow
-        return right - width - 1.2 * self.text, top, right, top + 1.5 * self.text
+    def _room(self, badge: str) -> float:
+        """Width of a line beside a warning, or of one without, in pixels."""
+        beside = _font(round(SMALL * self.text), bold=True).getlength(badge) + 1.2 * self.text + self.pad
+        return self.size[0] - 2 * self.pad - beside * bool(badge)
 
     def _scale_bar(self, draw: ImageDraw.ImageDraw, pixel: float) -> int:
         """Draw the scale bar; returns its right end in pixels."""
@@ -439,9 +441,9 @@ def sheet_size(
     proportion = height / (width * len(frame.size) / 2.0)
     pixels = float(np.prod(usual))
     text = text_height(across * usual[0], usual[1])
-    for header, footer in zip(HEADER, FOOTER, strict=True):
+    for footer in FOOTER:
         # A strip as high as the words, and the blocks' picture.
-        words = (header + footer - proportion * beside) * text
+        words = (HEADER + footer - proportion * beside) * text
         wide = (np.sqrt(words**2 + 4.0 * proportion * pixels) - words) / (2.0 * proportion)
         wide = float(np.clip(wide, usual[1], usual[0]))
         if wide >= NARROW * text:
