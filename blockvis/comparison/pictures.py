@@ -36,7 +36,7 @@ from .compared import Comparison, Side
 #: Colours and lines of the two curves, told apart without colour, too.
 COLOURS, LINES = (palette.FORCE, palette.OPEN), ("-", "--")
 
-#: Usual width and height of the picture of one run [pixels], beside each other or, of wide structures, below each other.
+#: Usual width and height of the picture of one run [pixels], beside that of the other or, of wide structures, below it.
 TALL_PANEL, WIDE_PANEL = (800, 620), (1280, 480)
 
 #: Structures wider than this for their height stand below each other.

@@ -40,10 +40,10 @@ def draw_cracks(
 ) -> Path:
     """Draw the cracks of an increment in equilibrium, by its number, alone, on the layout.
 
-    In the plane each main crack has a colour of its own, and its number and largest width at its widest point; the
-    others are grey. In space lines are the darker and the thicker the more joints are open there, in classes of width; main
-    cracks have their numbers and widths. Size, view and section are as of :func:`blockvis.draw_still`; cracks that the
-    section cuts away are counted, no more.
+    In the plane each main crack has a colour of its own, its number and its largest width where it is; the others are
+    grey. In space lines are the darker and the thicker the more joints are open there, in classes of width; main cracks
+    have their numbers and widths. Size, view and section are as of :func:`blockvis.draw_still`; cracks that the section
+    cuts away are counted, no more.
 
     Raises ``ValueError`` for a number that no increment in equilibrium has, and for a view of blocks in the plane.
     """

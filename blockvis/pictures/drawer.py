@@ -143,9 +143,9 @@ class Drawer:
 
     The curve stands beside the blocks where it is asked for. ``extra`` are poses that the frame has to hold, too, the
     fall comes after the last equilibrium, and the underlay is a photograph under blocks in the plane. Without a size
-    the sheet follows what it shows, with as many pixels as is ``usual``; so many go ``across`` a page. ``still`` is one picture, worth more time than
-    a frame of a film: in space with smooth edges, shaded corners, and of vaults and domes the intrados beside the
-    extrados.
+    the sheet follows what it shows, with as many pixels as is ``usual``; so many go ``across`` a page. ``still`` is one
+    picture, worth more time than a frame of a film: in space with smooth edges, shaded corners, and of vaults and domes
+    the intrados beside the extrados.
 
     Raises ``ValueError`` for a view or a section of blocks in the plane.
     """
@@ -431,7 +431,7 @@ class Drawer:
         tips = tails + (tips - tails) / swing.share
         into = into_sight(self._plane, tails)
         tails, tips = tails + into, tips + into
-        lengths = np.linalg.norm(self._projected(tips - tails)[:, :2], axis=1)
+        lengths = np.linalg.norm(tips - tails, axis=1)
         shown = lengths >= min(SPECK * float(self.scene.frame.size.max()), lengths.max(initial=0.0))
         tails, tips = tails[shown], tips[shown]
         self._along_arrows["motion"] = _along(tails, tips)

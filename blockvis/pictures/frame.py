@@ -20,8 +20,8 @@ from solver import mechanics
 from . import palette
 from .surface import left_blocks
 
-#: Height of the text as a fraction of the side of a square as large as the picture, and of the width: as wide as the text
-#: of an A4 page, 174 mm, the smallest letters then have 7 points. Its least size in pixels.
+#: Height of the text as a fraction of the side of a square as large as the picture, and of the width: as wide as the
+#: text of an A4 page, 174 mm, the smallest letters then have 7 points. Its least size in pixels.
 TEXT_FRACTION, OF_WIDTH, SMALLEST_TEXT = 1.0 / 48.0, 1.0 / 62.0, 12
 
 #: The smallest letters, in heights of the text.
@@ -143,9 +143,7 @@ class Sheet:
         self._title(ImageDraw.Draw(page), title, badge if beside_title else "")
         return page
 
-    def _around(
-        self, keys: Sequence[Key], pixel: float, detail: str, badge: str, beside_title: bool
-    ) -> Image.Image:
+    def _around(self, keys: Sequence[Key], pixel: float, detail: str, badge: str, beside_title: bool) -> Image.Image:
         """Draw what many pictures of a film share: scale bar, legend, colour bar, all of the caption but its title."""
         page = Image.new("RGB", self.size, palette.PAPER)
         draw = ImageDraw.Draw(page)

@@ -72,8 +72,8 @@ SHADE = 0.035
 #: Cracks in space, from narrow to wide: all stand out from stone.
 CRACKS = np.array([(244, 162, 97), (226, 78, 27), (122, 16, 16)], dtype=float)
 
-#: Pale to deep indigo, even in lightness, and light enough at its end for outlines to show: no support that moves, and no
-#: arrow on the blocks, has its hue.
+#: Pale to deep indigo, even in lightness, and light enough at its end for outlines to show: no support that moves, and
+#: no arrow on the blocks, has its hue.
 RAMP = np.array(
     [
         (241, 242, 248),
