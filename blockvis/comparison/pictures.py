@@ -36,11 +36,11 @@ from .compared import Comparison, Side
 #: Colours and lines of the two curves, told apart without colour, too.
 COLOURS, LINES = (palette.FORCE, palette.OPEN), ("-", "--")
 
-#: Width and height of the picture of one run [pixels], beside each other or, of wide structures, below each other.
+#: Usual width and height of the picture of one run [pixels], beside that of the other or, of wide structures, below it.
 TALL_PANEL, WIDE_PANEL = (800, 620), (1280, 480)
 
 #: Structures wider than this for their height stand below each other.
-WIDE = 1.8
+WIDE = 2.5
 
 #: Seconds for the path to the last equilibrium of both.
 SECONDS = 6.0
@@ -88,24 +88,27 @@ def draw_curves(comparison: Comparison, path: Path) -> Path:
 
 
 class Pair:
-    """What draws both runs in one picture; with their falls, which the frame then holds."""
+    """What draws both runs in one picture: at some parameters over all phases, or of a film, with their falls."""
 
-    def __init__(self, comparison: Comparison, look: Look, *, falls: bool = False) -> None:
+    def __init__(self, comparison: Comparison, look: Look, stations: np.ndarray | None = None) -> None:
         self.sides, self._longest = comparison.sides, comparison.longest
         self._below = all(_aspect(side) > WIDE for side in self.sides)
-        self._panel = WIDE_PANEL if self._below else TALL_PANEL
+        usual, across = (WIDE_PANEL, 1) if self._below else (TALL_PANEL, 2)
         in_space = all(side.response.assembly.dimension == 3 for side in self.sides)
         self.drawers: list[Drawer] = []
         for side in self.sides:
-            shown = side.response.path if falls and side.fall is not None else shown_increments(side.response)
-            fall = side.fall if falls else None
-            self.drawers.append(Drawer(side.response, look, self._panel, shown, fall=fall))
+            fall = side.fall if stations is None else None
+            shown = side.response.path if fall is not None else shown_increments(side.response)
+            if stations is not None:
+                shown = tuple(map(side.state, stations.tolist()))
+            self.drawers.append(Drawer(side.response, look, None, shown, fall=fall, usual=usual, across=across))
             # What is in front in one picture is so in the other.
             look = replace(look, sight=self.drawers[0].sight if in_space else None)
-        if comparison.same_layout():
-            # Openings and tilts can be compared by eye at one scale only.
-            for drawer in self.drawers:
-                drawer.hold(self.drawers)
+        # Openings and tilts can be compared by eye at one scale only.
+        alike = comparison.same_layout()
+        for drawer in self.drawers:
+            drawer.share(self.drawers, usual, across, alike=alike)
+        self._panel = self.drawers[0].sheet.size
 
     @property
     def size(self) -> tuple[int, int]:
@@ -139,7 +142,7 @@ class Pair:
 
 def draw_stations(comparison: Comparison, path: Path) -> Path:
     """Draw both at the same settlements, one row below the other."""
-    pair = Pair(comparison, Look(forces="none"))
+    pair = Pair(comparison, Look(forces="none"), comparison.stations)
     rows = [pair.at(at, widths=True) for at in comparison.stations.tolist()]
     page = Image.new("RGB", (pair.size[0], sum(row.height for row in rows)), palette.PAPER)
     for k, row in enumerate(rows):
@@ -154,7 +157,7 @@ def film_in_step(comparison: Comparison, path: Path, *, progress: Callable[[int,
 
     ``progress`` is called with the frames drawn and their number.
     """
-    pair = Pair(comparison, Look(colour_by="mechanism"), falls=True)
+    pair = Pair(comparison, Look(colour_by="mechanism"))
     end = max(side.end for side in comparison.sides)
     longest = max(_seconds(side, end) for side in comparison.sides)
     count = max(2, int(np.ceil((longest + PAUSE + END) * RATE)))

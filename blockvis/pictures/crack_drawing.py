@@ -40,10 +40,10 @@ def draw_cracks(
 ) -> Path:
     """Draw the cracks of an increment in equilibrium, by its number, alone, on the layout.
 
-    In the plane each main crack has a colour of its own and its largest width written at its widest point; the others
-    are grey. In space lines are the darker and the thicker the more joints are open there, in classes of width; main
-    cracks have their numbers and widths. Size, view and section are as of :func:`blockvis.draw_still`; cracks that the
-    section cuts away are counted, no more.
+    In the plane each main crack has a colour of its own, its number and its largest width where it is; the others are
+    grey. In space lines are the darker and the thicker the more joints are open there, in classes of width; main cracks
+    have their numbers and widths. Size, view and section are as of :func:`blockvis.draw_still`; cracks that the section
+    cuts away are counted, no more.
 
     Raises ``ValueError`` for a number that no increment in equilibrium has, and for a view of blocks in the plane.
     """
@@ -118,7 +118,7 @@ def _drawn_in_plane(
         scene.hide(increment.fallen)
         scene.pose(solver.Pose.initial(assembly))
     others = [crack for crack in cracks if id(crack) not in {id(one) for one in main}]
-    layers = [*zip(main, palette.SURVEYED, strict=False), *((crack, palette.FAINT) for crack in others)]
+    layers = [*zip(main, palette.SURVEYED, strict=False), *((crack, palette.GHOST) for crack in others)]
     height = scene.usual_height * scene.pixel
     thin, thick = THIN * height, max(min(THICK * height, OF_BLOCK * assembly.block_size), 2.0 * THIN * height)
     # The main ones are drawn last, on top.
@@ -129,13 +129,13 @@ def _drawn_in_plane(
     if main:
         dots = along_lines(np.concatenate([joints.ends[crack.joints] for crack in cracks]))
         places = scene.at_pixel(np.array([_widest_point(crack, joints, openings) for crack in main]))
-        words = [width_text(crack.width) for crack in main]
+        words = [f"{n}: {width_text(crack.width)}" for n, crack in zip(_numbers(main, cracks), main, strict=True)]
         colours = palette.SURVEYED[: len(main)]
         write_labels(picture, places, words, sheet.text, scene.at_pixel(dots), colours)
     named = zip(_numbers(main, cracks), palette.SURVEYED, strict=False)
     keys = [Key("line", f"crack {number}", colour) for number, colour in named]
     if others:
-        keys.append(Key("line", mechanics.counted(len(others), "other"), palette.FAINT))
+        keys.append(Key("line", mechanics.counted(len(others), "other"), palette.GHOST))
     return sheet, picture, keys, scene.pixel
 
 

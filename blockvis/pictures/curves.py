@@ -69,6 +69,10 @@ WIDE_BAND = 0.2
 #: Height of the text of the file [points], and how many letters a smaller line of it has per inch.
 TEXT, LETTERS = 11.0, 11.0
 
+#: Points of the letters beside the blocks per pixel of the sheet's, at 100 pixels per inch: those at ticks, a tenth
+#: smaller, are then as high as the smallest of the sheet.
+PANEL_TEXT = 0.72
+
 #: Colours of what is measured, of what fails, and of what is beside.
 BLUE, RED, GREY = map(palette.hexadecimal, (palette.FORCE, palette.WARNING, palette.FAINT))
 
@@ -136,7 +140,7 @@ class CurvePanel:
         figure = Figure(figsize=(size[0] / 100.0, size[1] / 100.0), dpi=100, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        _Plot(axes, response, words=False, text=text * 0.62).draw()
+        _Plot(axes, response, words=False, text=text * PANEL_TEXT).draw()
         canvas.draw()
         self._picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
         per_length, _ = parameter_unit(response)

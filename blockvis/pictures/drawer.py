@@ -25,6 +25,7 @@ from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, fall_text,
 from .flat_scene import FlatScene
 from .frame import (
     BAR,
+    CROSSED,
     CURVE,
     SEPARATOR,
     STILL_SIZE,
@@ -142,9 +143,9 @@ class Drawer:
 
     The curve stands beside the blocks where it is asked for. ``extra`` are poses that the frame has to hold, too, the
     fall comes after the last equilibrium, and the underlay is a photograph under blocks in the plane. Without a size
-    the sheet follows what it shows, with as many pixels as is ``usual``. ``still`` is one picture, worth more time than
-    a frame of a film: in space with smooth edges, shaded corners, and of vaults and domes the intrados beside the
-    extrados.
+    the sheet follows what it shows, with as many pixels as is ``usual``; so many go ``across`` a page. ``still`` is one
+    picture, worth more time than a frame of a film: in space with smooth edges, shaded corners, and of vaults and domes
+    the intrados beside the extrados.
 
     Raises ``ValueError`` for a view or a section of blocks in the plane.
     """
@@ -162,6 +163,7 @@ class Drawer:
         underlay: Underlay | None = None,
         still: bool = False,
         usual: tuple[int, int] = STILL_SIZE,
+        across: int = 1,
     ) -> None:
         assembly = self.assembly = response.assembly
         self._flat = assembly.dimension == 2
@@ -194,8 +196,8 @@ class Drawer:
         ends = np.concatenate([self.live.tails, ends[heights_over(self._plane, ends) >= 0.0]])
         frame = self._with_floor(frame.holding(self._projected(ends)))
         bar = ColourBar(self.largest, fall is not None) if look.colour_by == "displacement" else None
-        size = size or sheet_size(frame, usual, CURVE * curve + BAR * (bar is not None))
-        self.sheet = Sheet(size, bar, curve)
+        size = size or sheet_size(frame, usual, CURVE * curve + BAR * (bar is not None), across)
+        self.sheet = Sheet(size, bar, curve, across)
         self.panel: CurvePanel | None = None
         if curve:
             # Figures and axes of matplotlib are loaded where a curve is drawn only.
@@ -271,11 +273,18 @@ class Drawer:
             pair.show_ground(self.fall.ground)
         return pair
 
-    def hold(self, drawers: Sequence[Drawer]) -> None:
-        """Draw in one frame that holds those of several, this among them, with arrows of supports as long."""
+    def share(self, drawers: Sequence[Drawer], usual: tuple[int, int], across: int, *, alike: bool) -> None:
+        """Draw on a sheet for what any of several shows, this among them; blocks that are ``alike`` in one frame.
+
+        Arrows of their supports are as long. The sheet is as without a size; it has no curve.
+        """
         frames = [one.frame for one in drawers]
-        self.frame = Frame(np.min([of.low for of in frames], axis=0), np.max([of.high for of in frames], axis=0))
-        self._arrow = max(one._arrow for one in drawers)
+        if alike:
+            self.frame = Frame(np.min([of.low for of in frames], axis=0), np.max([of.high for of in frames], axis=0))
+            self._arrow = max(one._arrow for one in drawers)
+        largest = np.max([of.size for of in ([self.frame] if alike else frames)], axis=0)
+        size = sheet_size(Frame(np.zeros_like(largest), largest), usual, across=across)
+        self.sheet = Sheet(size, self.sheet.colour_bar, across=across)
         self.scene.close()
         self.scene = self._scene(self.frame)
         self.force_scale, self.force_shown = self._force_scale()
@@ -422,7 +431,7 @@ class Drawer:
         tips = tails + (tips - tails) / swing.share
         into = into_sight(self._plane, tails)
         tails, tips = tails + into, tips + into
-        lengths = np.linalg.norm(self._projected(tips - tails)[:, :2], axis=1)
+        lengths = np.linalg.norm(tips - tails, axis=1)
         shown = lengths >= min(SPECK * float(self.scene.frame.size.max()), lengths.max(initial=0.0))
         tails, tips = tails[shown], tips[shown]
         self._along_arrows["motion"] = _along(tails, tips)
@@ -689,8 +698,8 @@ class Drawer:
 
 
 def _along(tails: np.ndarray, tips: np.ndarray) -> np.ndarray:
-    """(3 n, d) array [m]: both ends and the middle of arrows."""
-    return np.concatenate([tails, (tails + tips) / 2.0, tips])
+    """(n, d) array [m]: points along arrows, so many that a label over one is as bad as over its own place."""
+    return np.repeat(along_lines(np.stack([tails, tips], axis=1)), CROSSED, axis=0)
 
 
 def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:

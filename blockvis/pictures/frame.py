@@ -20,15 +20,19 @@ from solver import mechanics
 from . import palette
 from .surface import left_blocks
 
-#: Height of the text as a fraction of the side of a square as large as the picture, and its least size in pixels.
-TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 48.0, 12
+#: Height of the text as a fraction of the side of a square as large as the picture, and of the width: as wide as the
+#: text of an A4 page, 174 mm, the smallest letters then have 7 points. Its least size in pixels.
+TEXT_FRACTION, OF_WIDTH, SMALLEST_TEXT = 1.0 / 48.0, 1.0 / 62.0, 12
 
-#: Sheets narrower than this, in heights of the text, have warnings below the title, and one more row in the legend.
+#: The smallest letters, in heights of the text.
+SMALL = 0.9
+
+#: Sheets narrower than this, in heights of the text, have one more row in the legend.
 NARROW = 48.0
 
-#: Heights of what is above and below the blocks, in those of the text, of usual and of narrow sheets, and rows of the
-#: caption below its title.
-HEADER, FOOTER, ROWS = (4.7, 5.1), (3.3, 4.6), 2
+#: Heights of what is above and below the blocks, in those of the text, this of usual and of narrow sheets, and rows of
+#: the caption below its title.
+HEADER, FOOTER, ROWS = 5.1, (3.3, 4.6), 2
 
 #: Widths of curve and colour bar beside the blocks, and the largest height of the curve, in heights of the text.
 CURVE, BAR, HIGHEST_CURVE = 23.0, 7.6, 29.0
@@ -79,16 +83,19 @@ class ColourBar:
 class Sheet:
     """Where the picture of the blocks goes, and the words around it.
 
-    Its size is in pixels; to the right of the blocks is room for the ``curve`` where it is asked for.
+    Its size is in pixels; to the right of the blocks is room for the ``curve`` where it is asked for, and so many
+    sheets stand side by side ``across`` a page.
     """
 
-    def __init__(self, size: tuple[int, int], colour_bar: ColourBar | None = None, curve: bool = False) -> None:
+    def __init__(
+        self, size: tuple[int, int], colour_bar: ColourBar | None = None, curve: bool = False, across: int = 1
+    ) -> None:
         self.size = size
         width, height = size
-        self.text = max(SMALLEST_TEXT, round(np.sqrt(width * height) * TEXT_FRACTION))
+        self.text = max(SMALLEST_TEXT, round(text_height(across * width, height)))
         self.pad = max(6, round(0.9 * self.text))
         self._narrow = width < NARROW * self.text
-        self.header = round(HEADER[self._narrow] * self.text)
+        self.header = round(HEADER * self.text)
         self.footer = round(FOOTER[self._narrow] * self.text)
         self.colour_bar = colour_bar
         beside = curve * min(round(CURVE * self.text), width // 2)
@@ -124,7 +131,8 @@ class Sheet:
         Title and detail are the lines of the caption, the badge is a warning at the upper right. A pixel has a size
         [m], and the picture ``beside`` that of :attr:`beside`.
         """
-        shared = tuple(keys), pixel, detail, badge
+        beside_title = self._room(badge) >= _font(round(1.15 * self.text), bold=True).getlength(title)
+        shared = tuple(keys), pixel, detail, badge, beside_title
         if shared != self._page_of:
             # One at a time: joints open and slide now and then, and a page at any size is memory.
             self._page, self._page_of = self._around(*shared), shared
@@ -132,10 +140,10 @@ class Sheet:
         page.paste(picture, self.inside[:2])
         if beside is not None:
             page.paste(beside, self.beside[:2])
-        self._title(ImageDraw.Draw(page), title, badge)
+        self._title(ImageDraw.Draw(page), title, badge if beside_title else "")
         return page
 
-    def _around(self, keys: Sequence[Key], pixel: float, detail: str, badge: str) -> Image.Image:
+    def _around(self, keys: Sequence[Key], pixel: float, detail: str, badge: str, beside_title: bool) -> Image.Image:
         """Draw what many pictures of a film share: scale bar, legend, colour bar, all of the caption but its title."""
         page = Image.new("RGB", self.size, palette.PAPER)
         draw = ImageDraw.Draw(page)
@@ -143,33 +151,32 @@ class Sheet:
         self._legend(draw, keys, end + 2 * self.pad)
         if self.colour_bar is not None:
             self._colour_bar(page, draw, self.colour_bar)
-        room = [self.size[0] - 2.0 * self.pad] * ROWS
-        if badge and self._narrow:
-            room[-1] = self._badge_box(badge)[0] - 2.0 * self.pad
-        rows, font = fitting_rows(detail, round(0.9 * self.text), room)
+        room = [self._room("")] * ROWS
+        if not beside_title:
+            room[-1] = self._room(badge)
+        rows, font = fitting_rows(detail, round(SMALL * self.text), room)
         for row, words in enumerate(rows):
             draw.text((self.pad, self.pad + (2.0 + 1.2 * row) * self.text), words, palette.FAINT, font, anchor="lm")
         if badge:
-            self._badge(draw, badge)
+            # Beside a long title it would make that small.
+            self._badge(draw, badge, self.pad + 2.55 * self.text * (not beside_title))
         return page
 
     def _title(self, draw: ImageDraw.ImageDraw, title: str, badge: str) -> None:
-        room = (self._badge_box(badge)[0] if badge and not self._narrow else self.size[0]) - 2 * self.pad
-        font = fitting_font(title, round(1.15 * self.text), room, bold=True)
+        font = fitting_font(title, round(1.15 * self.text), self._room(badge), bold=True)
         draw.text((self.pad, self.pad + 0.72 * self.text), title, palette.INK, font, anchor="lm")
 
-    def _badge(self, draw: ImageDraw.ImageDraw, badge: str) -> None:
-        box, half = self._badge_box(badge), 0.75 * self.text
+    def _badge(self, draw: ImageDraw.ImageDraw, badge: str, top: float) -> None:
+        left, half = self._room(badge) + 2 * self.pad, 0.75 * self.text
+        box = left, top, self.size[0] - self.pad, top + 2 * half
         draw.rounded_rectangle(box, radius=half * 0.5, fill=palette.WARNING)
-        place = box[0] + 0.6 * self.text, box[1] + half
-        draw.text(place, badge, palette.PAPER, _font(round(0.9 * self.text), bold=True), anchor="lm")
+        place = left + 0.6 * self.text, top + half
+        draw.text(place, badge, palette.PAPER, _font(round(SMALL * self.text), bold=True), anchor="lm")
 
-    def _badge_box(self, badge: str) -> tuple[float, float, float, float]:
-        """Left, top, right and bottom of a warning, in pixels."""
-        right = self.size[0] - self.pad
-        width = _font(round(0.9 * self.text), bold=True).getlength(badge)
-        top = self.pad + 2.55 * self.text * self._narrow
-        return right - width - 1.2 * self.text, top, right, top + 1.5 * self.text
+    def _room(self, badge: str) -> float:
+        """Width of a line beside a warning, or of one without, in pixels."""
+        beside = _font(round(SMALL * self.text), bold=True).getlength(badge) + 1.2 * self.text + self.pad
+        return self.size[0] - 2 * self.pad - beside * bool(badge)
 
     def _scale_bar(self, draw: ImageDraw.ImageDraw, pixel: float) -> int:
         """Draw the scale bar; returns its right end in pixels."""
@@ -181,14 +188,14 @@ class Sheet:
         draw.rectangle((x, y - thick // 2, x + pixels, y - thick // 2 + thick - 1), fill=palette.INK)
         for end in (x, x + pixels - thick + 1):
             draw.rectangle((end, y - tick, end + thick - 1, y + tick), fill=palette.INK)
-        font = _font(round(0.9 * self.text))
+        font = _font(round(SMALL * self.text))
         label = bar_text(length)
         draw.text((x + pixels / 2, y - tick - 0.15 * self.text), label, palette.INK, font, anchor="mb")
         return int(max(x + pixels, x + pixels / 2 + draw.textlength(label, font) / 2))
 
     def _legend(self, draw: ImageDraw.ImageDraw, keys: Sequence[Key], left: int) -> None:
         """Draw the legend, from its end on: what comes and goes in a film stands before what stays."""
-        room, size = self.size[0] - self.pad - left, round(0.9 * self.text)
+        room, size = self.size[0] - self.pad - left, round(SMALL * self.text)
         rows = self._rows(keys, size, room)
         # Small letters are harder to read than a second row; only what there is no room for is written smaller.
         while len(rows) > 2 + self._narrow and size > 8:
@@ -228,7 +235,7 @@ class Sheet:
         strip = np.repeat(ramp[:, None, :], round(0.9 * self.text), axis=1)
         page.paste(Image.fromarray(strip), (left, top))
         draw.rectangle((left, top, left + strip.shape[1] - 1, top + height - 1), outline=palette.OUTLINE)
-        font = _font(round(0.85 * self.text))
+        font = _font(round(SMALL * self.text))
         unit, factor = ("mm", 1e3) if bar.largest < 1.0 else ("m", 1.0)
         step = rounded_length(bar.largest * factor / 4.0)
         value, largest = 0.0, bar.largest * factor
@@ -255,7 +262,7 @@ def write_labels(
     They leave dots (n, 2) free where there is room beside them, and each has a leader to its place. All lengths are in
     pixels; the rims have the colour of open joints by default.
     """
-    draw, font = ImageDraw.Draw(picture), _font(round(0.85 * text))
+    draw, font = ImageDraw.Draw(picture), _font(round(SMALL * text))
     rim, written = 0.4 * text, list[_Label]()
     # A label over the place of another would seem to be its.
     dots = np.concatenate([dots, np.repeat(places, CROSSED, axis=0)])
@@ -313,7 +320,7 @@ def _inside(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
 
 def write_words(picture: Image.Image, place: tuple[float, float], words: str, text: int) -> None:
     """Write faint words, their middle at a place of a picture [pixel]."""
-    ImageDraw.Draw(picture).text(place, words, palette.FAINT, _font(round(0.85 * text)), anchor="mm")
+    ImageDraw.Draw(picture).text(place, words, palette.FAINT, _font(round(SMALL * text)), anchor="mm")
 
 
 def place_in(shape: shapely.Geometry) -> np.ndarray:
@@ -415,18 +422,26 @@ class Frame:
         return Frame(centre - half, centre + half)
 
 
-def sheet_size(frame: Frame, usual: tuple[int, int] = STILL_SIZE, beside: float = 0.0) -> tuple[int, int]:
+def text_height(width: int, height: int) -> float:
+    """Height [pixels] of the text of a sheet of so many pixels."""
+    return max(float(np.sqrt(width * height)) * TEXT_FRACTION, width * OF_WIDTH)
+
+
+def sheet_size(
+    frame: Frame, usual: tuple[int, int] = STILL_SIZE, beside: float = 0.0, across: int = 1
+) -> tuple[int, int]:
     """Width and height [pixels], both even, of a sheet in the proportions of what it shows, in views side by side.
 
-    It has as many pixels as the usual one, and ``beside`` the blocks goes something so wide, in heights of the text.
+    It has as many pixels as the usual one, and ``beside`` the blocks goes something so wide, in heights of the text,
+    which are those of so many sheets ``across`` a page.
     """
     width, height = frame.size.reshape(-1, 2).max(axis=0)
     proportion = height / (width * len(frame.size) / 2.0)
     pixels = float(np.prod(usual))
-    text = np.sqrt(pixels) * TEXT_FRACTION
-    for header, footer in zip(HEADER, FOOTER, strict=True):
+    text = text_height(across * usual[0], usual[1])
+    for footer in FOOTER:
         # A strip as high as the words, and the blocks' picture.
-        words = (header + footer - proportion * beside) * text
+        words = (HEADER + footer - proportion * beside) * text
         wide = (np.sqrt(words**2 + 4.0 * proportion * pixels) - words) / (2.0 * proportion)
         wide = float(np.clip(wide, usual[1], usual[0]))
         if wide >= NARROW * text:

@@ -48,6 +48,9 @@ ON_HINGE = 0.05
 #: stand for all, as they need not move alike.
 MOST_ARROWS, MOST_IN_PLANE = 24, 4
 
+#: Arrows shorter than so many times what their shafts are thick would be blobs.
+SHORTEST_ARROW = 2.0
+
 #: A support that turns has two arrows, so far from its middle as a part of its extent.
 END = 0.35
 
@@ -406,8 +409,7 @@ def arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float
     """Shafts (n, 4, 2) and heads (n, 3, 2) of arrows, a margin ``grown`` larger all around [m]."""
     along = tips - tails
     length = np.hypot(*along.T)
-    # Seen from their end, shorter ones would be blobs.
-    kept = length > 2.0 * thick
+    kept = length > SHORTEST_ARROW * thick
     tails, tips, along, length = tails[kept], tips[kept], along[kept], length[kept]
     unit = along / length[:, None]
     side = np.stack([-unit[:, 1], unit[:, 0]], axis=1)

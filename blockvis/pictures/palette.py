@@ -72,17 +72,18 @@ SHADE = 0.035
 #: Cracks in space, from narrow to wide: all stand out from stone.
 CRACKS = np.array([(244, 162, 97), (226, 78, 27), (122, 16, 16)], dtype=float)
 
-#: Pale to deep blue-green, even in lightness, and light enough at its end for outlines to show.
+#: Pale to deep indigo, even in lightness, and light enough at its end for outlines to show: no support that moves, and
+#: no arrow on the blocks, has its hue.
 RAMP = np.array(
     [
-        (240, 243, 243),
-        (205, 228, 231),
-        (168, 212, 218),
-        (131, 194, 204),
-        (101, 174, 188),
-        (78, 151, 170),
-        (58, 128, 151),
-        (45, 105, 131),
+        (241, 242, 248),
+        (217, 220, 238),
+        (193, 199, 228),
+        (169, 177, 217),
+        (146, 155, 204),
+        (124, 133, 190),
+        (103, 112, 173),
+        (84, 92, 153),
     ],
     dtype=float,
 )  # fmt: skip

@@ -22,7 +22,7 @@ from solver import mechanics
 from . import palette
 from .backfill import FillBodies
 from .frame import Frame, along_lines, framed, room_in
-from .marks import Marks, arrow_shapes
+from .marks import SHORTEST_ARROW, Marks, arrow_shapes
 from .painting import painted
 from .scene import Scene
 from .solid_view import ABOVE, AROUND, View, heights_over, kept_blocks, showing_faces
@@ -54,9 +54,8 @@ IN_FRONT_OF_ALL = 1_000_000.0
 #: Layers that are drawn in front of all, as ties are by their dashes.
 OVER_BLOCKS = ("force", "crushing", "tie")
 
-#: Radius of the ground of a fall, in larger sides of the picture, the part of it from where on it fades, and the least
-#: sine of the angle of views that decides where its middle is.
-GROUND, FADES, SLANTED = 0.75, 0.45, 0.2
+#: Radius of the ground of a fall, in larger sides of the picture, and the part of it from where on it fades.
+GROUND, FADES = 0.75, 0.45
 
 #: Ground and supports that go beyond a picture fade over this part of its smaller side: free blocks end before it.
 EDGE = 0.028
@@ -140,8 +139,8 @@ class SolidScene(Scene):
             pv.PolyData(np.array(assembly.vertices), lines=_line_cells(self.edges[of])) for of in (~traced, traced)
         )
         self._shadow: pv.PolyData | None = None
-        # Height of the ground of a fall, and vertices under supports that stand on it.
-        self._floor, self._feet = np.inf, np.zeros(0, dtype=int)
+        # Height of the ground of a fall, vertices of supports, and those under what stands on it.
+        self._floor, self._held, self._feet = -np.inf, np.zeros(0, dtype=int), np.zeros(0, dtype=int)
         width = float(np.clip(assembly.block_size / self.pixel / 40.0, 0.6, self.usual_height / 700.0))
         self._add("edges", self._edges, outline, width=width, forward=1.0)
         if traced.any():
@@ -151,7 +150,9 @@ class SolidScene(Scene):
     def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
         """Put the blocks where they are drawn, in new colours (n_blocks, 3) uint8 where these are given."""
         corners = mechanics.moved_vertices(self.assembly, shown)
-        corners[self._feet, 2] = np.minimum(corners[self._feet, 2], self._floor)
+        # What lies in the ground is not seen: where the ground ends it would be.
+        corners[self._held, 2] = np.maximum(corners[self._held, 2], self._floor)
+        corners[self._feet, 2] = self._floor
         # Of what ends in the plane of a section its faces there would stay, as sheets.
         gone, owner = self._gone | ~kept_blocks(self._cut, self.assembly, shown), self.assembly.block_of_vertex
         if gone.any():
@@ -160,14 +161,13 @@ class SolidScene(Scene):
         self._surface.points = corners
         self._edges.points = self._traces.points = corners
         if self._shadow is not None:
-            # Supports that reach below the ground throw theirs into it.
             flat, faces = corners, None
             if self._cut is not None:
                 # What the section leaves out throws none: the halves that are left would seem to float.
                 left = self._surface.clip(normal=-self._cut[1], origin=self._cut[0]).triangulate()
                 flat, faces = left.points, left.faces
             flat = np.array(flat)
-            flat[:, 2] = np.minimum(flat[:, 2], self._floor)
+            flat[:, 2] = self._floor
             if faces is None:
                 self._shadow.points = flat
             else:
@@ -194,21 +194,23 @@ class SolidScene(Scene):
     def show_ground(self, height: float) -> None:
         """Draw the ground of a fall, ``height`` [m], with the shadows of the blocks under a light from above.
 
-        It has no end but fades, and supports below the structure reach down to it: they are ground as well.
+        It is under the middle of what stands, has no end but fades, and lies behind all, as nothing is below it:
+        supports end in it, and those below the structure reach down to it, which are ground as well.
         """
-        # Where the middle of the picture looks at; a level view has it nowhere.
-        eye, radius = self.view.axes[2], GROUND * float(self.frame.size.max())
-        middle = (self.frame.low + self.frame.high) / 2.0 @ self.view.axes[:2]
-        middle += (height - middle[2]) / max(float(eye[2]), SLANTED) * eye
-        plane = pv.Disc(center=(*middle[:2], height), inner=0.0, outer=radius, normal=(0, 0, 1), r_res=48, c_res=96)
-        away = np.linalg.norm(plane.points[:, :2] - middle[:2], axis=1) / radius
+        corners, radius = self.assembly.vertices[:, :2], GROUND * float(self.frame.size.max())
+        stands = corners[self.assembly.free[self.assembly.block_of_vertex]]
+        middle = (stands.min(axis=0) + stands.max(axis=0)) / 2.0
+        plane = pv.Disc(center=(*middle, height), inner=0.0, outer=radius, normal=(0, 0, 1), r_res=48, c_res=96)
+        away = np.linalg.norm(plane.points[:, :2] - middle, axis=1) / radius
         left = np.clip((1.0 - away) / (1.0 - FADES), 0.0, 1.0)[:, None] ** 2
-        self._add("earth", plane, np.rint(left * palette.GROUND + (1.0 - left) * palette.PAPER), forward=-10.0 / 3.0)
+        colours = np.rint(left * palette.GROUND + (1.0 - left) * palette.PAPER)
+        self._add("earth", plane, colours, forward=-IN_FRONT_OF_ALL)
         shadow = self._surface.copy()
         shadow.clear_data()
         shadow.points = self.assembly.vertices * (1.0, 1.0, 0.0) + (0.0, 0.0, height)
-        self._add("earth/shadow", shadow, palette.SHADOW, forward=-5.0 / 3.0)
+        self._add("earth/shadow", shadow, palette.SHADOW, forward=10.0 - IN_FRONT_OF_ALL)
         self._shadow, self._floor, self._feet = shadow, height, _feet(self.assembly)
+        self._held = np.flatnonzero(~self.assembly.free[self.assembly.block_of_vertex])
 
     def lines(
         self,
@@ -381,9 +383,20 @@ class SolidScene(Scene):
             # One that is hidden still says where a single support goes.
             tails, tips = (tails[seen], tips[seen]) if seen.any() else (tails, tips)
         thick = self.usual_height / 130.0
+        start, end = self.at_pixel(tails), self.at_pixel(tips)
         for grown, colour in ((0.35 * thick, palette.PAPER), (0.0, arrows.colour)):
-            for polygon in chain(*arrow_shapes(self.at_pixel(tails), self.at_pixel(tips), thick, grown)):
+            for polygon in chain(*arrow_shapes(start, end, thick, grown)):
                 yield colour, 0.0, 1.0, Path(polygon)
+        long = np.linalg.norm(tips - tails, axis=1) > SHORTEST_ARROW * thick * self.pixel
+        for k in np.flatnonzero(long & (np.hypot(*(end - start).T) <= SHORTEST_ARROW * thick)):
+            # Seen from its end, the point of an arrow is a dot and its tail a cross.
+            yield palette.PAPER, 0.0, 1.0, Path.circle(end[k], 1.8 * thick)
+            yield arrows.colour, 0.5 * thick, 1.0, Path.circle(end[k], 1.3 * thick)
+            if self.view.depth(tips[[k]])[0] > self.view.depth(tails[[k]])[0]:
+                yield arrows.colour, 0.0, 1.0, Path.circle(end[k], 0.5 * thick)
+            else:
+                corners = 0.9 * thick * np.array([[-1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [1.0, -1.0]])
+                yield arrows.colour, 0.5 * thick, 1.0, Path(end[k] + corners, [Path.MOVETO, Path.LINETO] * 2)
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: pixel (column, row) of points (n, 3) [m]."""

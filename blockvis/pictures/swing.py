@@ -18,8 +18,8 @@ from .frame import framed
 #: whose fastest corner goes ``REACH``: what moves in a film is to be seen, and so its hinges may part.
 ENOUGH_FRAMES, SWING_FRAMES, SWING_REACH = 8, 15, 1.2
 
-#: The fastest corner of a mechanism goes so far, in sizes of the picture; in space less where hinges would part by
-#: more than ``TEAR`` beyond what they do to first order: a hinge is closed, however far its sides turn.
+#: The fastest corner of a mechanism goes so far, in sizes of the picture; less where hinges would part by more than
+#: ``TEAR`` beyond what they do to first order: a hinge is closed, however far its sides turn.
 REACH, TEAR = 0.05, 0.002
 
 #: Up to this many parts of a mechanism are tinted one by one: each has a colour of its own.
@@ -62,11 +62,9 @@ def swing_of(response: solver.Response) -> Swing:
         # Without collapse a single loose brick may be the fastest: it would make the motion of the whole invisible.
         fastest = _exceeded_by(0.01, speeds, assembly.shapes.volumes) or fastest
         motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
-    size, share = float(framed(assembly, [last.pose]).size.max()), 1.0
+    size = float(framed(assembly, [last.pose]).size.max())
     motion = motion * (REACH * size / fastest if fastest > 0 else 0.0)
-    if assembly.dimension == 3:
-        # Blocks in space are drawn after it; those in the plane stay where their hinges are.
-        share = min(1.0, float(np.sqrt(TEAR * size / max(_torn(assembly, last, motion), 1e-300))))
+    share = min(1.0, float(np.sqrt(TEAR * size / max(_torn(assembly, last, motion), 1e-300))))
     displaced = mechanics.swung(last.pose, share * motion)
     return Swing(last, begins, displaced, mechanics.rigid_parts(assembly, last), fastest > 0.0, share * motion, share)
 

@@ -36,8 +36,9 @@ from .page import certificate_rows, headline_of, range_rows, summary_rows, tie_r
 #: Width of the text, margin and height of a line [mm]; size of the text [points].
 WIDTH, MARGIN, LINE, TEXT = 174.0, 18.0, 5.2, 9.5
 
-#: Largest height of a picture, and height of its heading [mm].
-HIGHEST, HEADING = 150.0, 10.0
+#: Largest height of a picture, in which its smallest letters have 7 points, height of its heading, and width of the
+#: curve [mm].
+HIGHEST, HEADING, CURVE = 175.0, 10.0, 150.0
 
 #: Cracks and states that the tables list.
 MOST_CRACKS, MOST_STATES = 20, 16
@@ -81,7 +82,7 @@ def write_pdf(
             last = response.path[-1]
             state = "Last equilibrium" if response.parameter.is_path else "Last state"
             paper.picture(draw_still(response, last, Path(folder) / "last.png", underlay=underlay, **eye), state)
-            paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), "Curve", 140.0)
+            paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), "Curve", CURVE)
             paper.tabulate(*_states(response))
             cracks = cracks_of(response.assembly, last.pose, last.fallen)
             if cracks:

@@ -30,8 +30,10 @@ def test_each_main_crack_has_its_colour_and_its_width(tmp_path, monkeypatch):
     response, written = arch_response(), []
     monkeypatch.setattr(crack_drawing, "write_labels", lambda picture, places, words, *_: written.extend(words))
     picture = pixels(draw_cracks(response, -1, tmp_path / "cracks.png", size=SIZE))
-    main = main_cracks(cracks_of(response.assembly, response.path[-1].pose))
-    assert written == [width_text(crack.width) for crack in main]
+    cracks = cracks_of(response.assembly, response.path[-1].pose)
+    main = main_cracks(cracks)
+    numbers = [number for number, crack in enumerate(cracks, start=1) if any(crack is one for one in main)]
+    assert written == [f"{n}: {width_text(cracks[n - 1].width)}" for n in numbers]
     assert len(main) >= 3
     for colour in palette.SURVEYED[: len(main)]:
         assert covered(picture, colour) > 10

@@ -284,17 +284,28 @@ def test_a_long_caption_is_broken_between_its_parts_and_keeps_its_size():
     assert (drawn(*parts)[-2:] == 255).all(), "above the blocks"
 
 
-def test_a_warning_leaves_the_title_of_an_upright_sheet_its_size():
-    """As a film began to fall, its title was made a third smaller."""
-    sheet = Sheet((720, 1280))
+@pytest.mark.parametrize("size", [(1920, 1080), (1920, 640), (1280, 428), (720, 1280)])
+def test_the_smallest_letters_of_a_sheet_have_seven_points_at_the_width_of_a_page(size):
+    sheet = Sheet(size)
+    assert round(0.9 * sheet.text) / size[0] * 174.0 / 25.4 * 72.0 >= 7.0
+    # Beside another one each has half of the page.
+    assert Sheet(size, across=2).text == Sheet((2 * size[0], size[1])).text
+
+
+@pytest.mark.parametrize(
+    ("size", "title"),
+    [
+        ((720, 1280), "Settlement 0.1000 m   ·   Reaction 11.48 kN"),
+        ((960, 956), "Settlement 60.00 mm   ·   Load multiplier α = 0.35718   ·   Live load 2.444 kN"),
+    ],
+)
+def test_a_warning_leaves_the_title_of_a_sheet_its_size(size, title):
+    """As a film began to fall, its title was made a third smaller; of a limit load half as large."""
+    sheet = Sheet(size)
     page = Image.new("RGB", sheet.inside_size, "white")
 
     def drawn(badge):
-        said = {
-            "title": "Settlement 0.1000 m   ·   Reaction 11.48 kN",
-            "detail": "fall   ·   true scale",
-            "pixel": 0.01,
-        }
+        said = {"title": title, "detail": "fall   ·   true scale", "pixel": 0.01}
         return np.asarray(sheet.composed(page, badge=badge, **said))[: sheet.header].astype(int)
 
     calm, falling = drawn(""), drawn(FALL_BADGE)
