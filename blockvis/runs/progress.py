@@ -112,10 +112,8 @@ class Progress:
         driver = self._driver(state.phase)
         if driver is None:
             return f"increment {self.count + 1}"
-        words = (
-            f"{self.course.parameter.name} {state.place.s:.6g} of at most {driver.limit:g} {driver.unit}, increment "
-        )
-        words += str(self.count + 1)
+        words = f"{self.course.parameter.name} {state.place.s:.6g} of at most {driver.limit:g} {driver.unit}"
+        words += f", increment {self.count + 1}"
         if self._still:
             return f"{words}, step {self._still} in time: blocks fall or come to rest while the supports stand"
         words += f" in steps of {state.step:.2g}"
