@@ -181,7 +181,8 @@ def layout_of_bodies(found: Bodies, reading: Reading) -> Layout:
         first, last = bodies[int(middle.argmin())].name, bodies[int(middle.argmax())].name
         differ = (
             f"the middle planes of the bodies along {along} differ by up to {np.ptp(middle):.3g} in the file's unit "
-            f"('{first}' and '{last}'): an analysis in the plane knows nothing of that eccentricity"
+            f"('{first}' and '{last}'): an analysis in the plane knows nothing of that eccentricity, one in "
+            "space does: dimension = 3"
         )
         notes.append(Note(CHANGED, differ))
     layout = Layout(

@@ -39,7 +39,8 @@ MOST_SPECKS, SPECKS_OF_ONE = 200, 4
 #: Holes of no more than this fraction of a stone are filled.
 PINHOLES = 0.01
 
-#: A region of so many times the median area may be an opening; so many are named.
+#: A region of so many times the median area may be an opening, of a drawing of lines on paper, where each is one, of
+#: half as many: a door is four to six ashlars; so many are named.
 MAYBE_OPENING, NAMED = 8.0, 3
 
 #: What makes masks of photographs.
@@ -187,7 +188,7 @@ def maybe_openings(rings: Sequence[np.ndarray], names: Sequence[str], holed: Col
         return []
     paper, median = int(areas.argmax()), float(np.median(areas[stones]))
     order = stones[np.argsort(-areas[stones])]
-    large = order[areas[order] >= MAYBE_OPENING * median]
+    large = order[areas[order] >= (0.5 if paper in holed else 1.0) * MAYBE_OPENING * median]
     if paper in holed and len(large):
         why = f"paper around lines, '{names[paper]}', was left out, and blocks are what lines enclose, openings, too"
     elif len(large):

@@ -51,6 +51,10 @@ _READ = re.compile(
     re.IGNORECASE,
 )
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
+_XLINK = "{http://www.w3.org/1999/xlink}"
+
+#: Elements that draw nothing where they stand.
+_UNDRAWN = ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata")
 
 #: Properties by which shapes are painted, where nothing is said.
 _PAINTING = {
@@ -61,6 +65,9 @@ _PAINTING = {
 #: What paints nothing, and opacities of what nobody sees.
 _NO_PAINT = ("none", "transparent")
 _CLEAR = re.compile(r"0*\.?0+\s*(?:%|[a-z]*)")
+
+#: More clones than this are refused.
+MOST_CLONES = 10_000
 
 #: Layer on which blocks are written that have no group, role as a support or material.
 _LAYER = "blocks"
@@ -79,8 +86,10 @@ class _Part(NamedTuple):
 
 @dataclass
 class _Found(Drawing):
-    """What was found so far, in user units, y down."""
+    """What was found so far, in user units, y down, and what clones show: the elements by their id."""
 
+    originals: Mapping[str, ElementTree.Element] = field(default_factory=dict)
+    clones: int = 0
     clipped: Counter[str] = field(default_factory=Counter)
     sheets_missed: bool = False
 
@@ -137,7 +146,8 @@ def read(path: Path, reading: Reading) -> Layout:
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
     styled = _styled(root)
-    found = _Found(notes=[*doubts, *styled, *_pattern_fills(root)])
+    originals = {element.get("id", ""): element for element in root.iter()}
+    found = _Found(notes=[*doubts, *styled, *_pattern_fills(root)], originals=originals)
     if stated and stated not in UNITS and reading.unit is None:
         scale = f"1 unit of the drawing is {stated}, by its width and its viewBox"
         found.notes.append(Note(UNIT_TAKEN, scale))
@@ -277,15 +287,15 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
     if where.depth > DEEPEST:
         raise ValueError(f"it nests groups more than {DEEPEST} deep; ungroup it")
     tag = _tag(element)
-    if tag in ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata"):
+    if tag in _UNDRAWN:
         return
     if _style(element, "display") == "none" or _CLEAR.fullmatch(_style(element, "opacity")):
         found.skipped[f"hidden <{tag}>"] += 1
         return
+    matrix, shown = where.matrix @ _matrix(_transform(element)), list(element)
     if tag == "use":
-        found.skipped["<use> (clones; unlink them to have them read)"] += 1
-        return
-    matrix = where.matrix @ _matrix(_transform(element))
+        matrix[:2, 2] += matrix[:2, :2] @ [_length(element, "x"), _length(element, "y")]
+        shown = _originals(element, found)
     if tag == "svg" and where.depth:
         try:
             matrix = matrix @ _viewport(element)
@@ -307,8 +317,21 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
         except (ValueError, OverflowError) as error:
             raise ValueError(f"{_called(element)} {error}") from None
         _add(element, parts, where, found)
-    for child in element:
+    for child in shown:
         _walk(child, where, found)
+
+
+def _originals(element: ElementTree.Element, found: _Found) -> list[ElementTree.Element]:
+    """Find what a clone shows; none of it where that is a symbol, or in another file."""
+    original = found.originals.get((element.get("href") or element.get(f"{_XLINK}href", "")).removeprefix("#"))
+    if original is None or _tag(original) in _UNDRAWN:
+        found.skipped["<use> (clones; unlink them to have them read)"] += 1
+        return []
+    # Clones within clones, ten of each ten, can fill any memory.
+    found.clones += 1
+    if found.clones > MOST_CLONES:
+        raise ValueError(f"it shows more than {MOST_CLONES} clones (<use>); unlink those that are blocks")
+    return [original]
 
 
 def _in_group(element: ElementTree.Element, where: _Context) -> _Context:

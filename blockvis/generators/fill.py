@@ -200,8 +200,7 @@ def filled(
     grid = max(GRID * max(*wall.bounds[2:], length), float(np.spacing(np.abs(corner)).max()))
     solid = shapely.Polygon(wall.exterior)
     holes = _apart([*holes, *map(shapely.Polygon, wall.interiors), *_notches(solid, grid)])
-    rest = wall if taken is None else shapely.difference(wall, _shifted(taken, -corner), grid_size=grid)
-    rest = _without(rest, holes, grid)
+    rest = _without(wall, holes if taken is None else [_shifted(taken, -corner), *holes], grid)
     area = rest.area
     bearing = length / 2.0 if pattern.bearing is None else pattern.bearing
     units = Units(length=length, height=height, bearing=bearing, grid=grid)
@@ -322,19 +321,17 @@ def _quoins(solid: shapely.Polygon, rest: shapely.Geometry, pattern: Pattern, gr
             # The edge cuts it, as drawn.
             beyond = middle - inwards * abs(x - u)
             box = shapely.box(min(beyond, reach), levels[k], max(beyond, reach), levels[k + 1])
-            clipped = shapely.intersection(box, rest, grid_size=grid)
-            if (
-                clipped.area > 0.95 * abs(reach - middle) * (levels[k + 1] - levels[k])
-                and clipped.geom_type == "Polygon"
-                and not len(clipped.interiors)
-            ):
-                found.append(clipped)
+            clipped = pieces_of(shapely.intersection(box, rest, grid_size=grid))
+            least = 0.95 * abs(reach - middle) * (levels[k + 1] - levels[k])
+            if len(clipped) == 1 and clipped[0].area > least and not len(clipped[0].interiors):
+                found += clipped
     return found
 
 
-def _without(wall: shapely.Geometry, parts: Sequence[shapely.Polygon], grid: float) -> shapely.Geometry:
-    """Take parts out of a wall."""
-    return shapely.difference(wall, shapely.union_all(parts, grid_size=grid), grid_size=grid) if parts else wall
+def _without(wall: shapely.Geometry, parts: Sequence[shapely.Geometry], grid: float) -> shapely.Geometry:
+    """Take parts out of a wall; a line that is left of it, as of an edge that both share on a grid, is none of it."""
+    left = shapely.difference(wall, shapely.union_all(parts, grid_size=grid), grid_size=grid) if parts else wall
+    return shapely.multipolygons(pieces_of(left))
 
 
 def _note(what: str, openings: Sequence[shapely.Polygon], corner: np.ndarray) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from blockvis.layout.outlines import ring_of
+from blockvis.layout.outlines import pieces_of, ring_of
 
 from .arches import flat_joints, segmental_joints, voussoir_outlines
 from .openings import odd
@@ -143,9 +143,10 @@ def head_of(
         less = "" if not asked else LESS[0] if word == asked else LESS[1]
         asked = asked or word
         drawn = [shapely.difference(stone, opening, grid_size=units.grid) for stone in stones]
-        parts = [shapely.intersection(stone, room, grid_size=units.grid) for stone in drawn]
-        if not all(part.geom_type == "Polygon" and not len(part.interiors) and part.area > 0.0 for part in parts):
+        pieces = [pieces_of(shapely.intersection(stone, room, grid_size=units.grid)) for stone in drawn]
+        if not all(len(piece) == 1 and not len(piece[0].interiors) for piece in pieces):
             continue
+        parts = [piece for (piece,) in pieces]
         if shapely.union_all(parts).area > (1.0 - OUTSIDE) * sum(stone.area for stone in drawn):
             return word, parts, less
     return None

@@ -165,7 +165,9 @@ def _laid(found: Inspection) -> Ground:
         supports = _slab(found, beds, split, depth) if is_level and not springers else _pads(found, beds, split)
     elif beds:
         # Closing simplifies what it closes: as drawn, a stone may reach lower.
-        supports = _bedded([*outlines, *_as_simplified(found)], feet, split, depth, _opening(found))
+        both = zip(outlines, _as_simplified(found), _standing(found, outlines), strict=True)
+        rings = [ring for closed, drawn, stands in both if stands for ring in (closed, drawn)]
+        supports = _bedded(rings, feet, split, depth, _opening(found))
     where = "on the right" if split.axis == 0 else "on the far side"
     said = f"stands on one side and settles {where}"
     if roles:
@@ -202,8 +204,10 @@ def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> lis
     arch = _springers_of_arch(beside, low[:, 1])
     feet: list[_Foot] = []
     springers: set[int] = set()
-    for k in arch or np.argsort(low[:, 1], kind="stable").tolist():
-        if low[k, 1] > low[:, 1].min() + COURSE * height and not arch:
+    standing = _standing(found, outlines)
+    order = [k for k in np.argsort(low[:, 1], kind="stable").tolist() if standing[k]]
+    for k in arch or order:
+        if low[k, 1] > low[order[0], 1] + COURSE * height and not arch:
             break
         edges = _lower_edges(outlines[k])
         steep = _slope(edges, float(high[k, 0] - low[k, 0])) > (LEVEL if arch else SLOPE)
@@ -223,6 +227,14 @@ def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> lis
                 continue
         feet.append(_Foot(blocks[k], low[k, :1], high[k, :1], bed, float(low[k, 1])))
     return feet
+
+
+def _standing(found: Inspection, outlines: Sequence[np.ndarray]) -> np.ndarray:
+    """(n,) bool array: blocks that touch another or are half as high as the median: letters below a drawing are not."""
+    tall = np.array([np.ptp(ring[:, 1]) for ring in outlines])
+    height = float(np.median(tall))
+    beside = touching(np.array([shapely.Polygon(ring) for ring in outlines]), 1e-3 * height + _opening(found))
+    return (tall > COURSE * height) | np.array([len(others) > 0 for others in beside])
 
 
 def _as_in_a_run(found: Inspection) -> list[np.ndarray]:

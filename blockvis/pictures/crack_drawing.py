@@ -12,6 +12,7 @@ from PIL import Image
 
 import solver
 from blockvis.layout.sights import Cut, Sight
+from blockvis.results.about import phases_of
 from blockvis.results.cracks import Crack, cracks_of, main_cracks, slid_joints
 from blockvis.results.joint_faces import InitialJoints, initial_joints
 from blockvis.results.joints import carried_faces, opening_and_slip
@@ -22,6 +23,7 @@ from . import palette
 from .captions import loss_words, phase_words, state_text
 from .flat_scene import FlatScene
 from .frame import Key, Sheet, along_lines, framed, sheet_size, write_labels
+from .marks import ARROW, arrows_on_supports
 from .render import numbered, save_picture, seen_from
 
 #: Thickness of a crack that only slides and of the widest one, in heights of the picture; the latter in block sizes at
@@ -57,7 +59,7 @@ def draw_cracks(
         if view is not None or section is not None:
             raise ValueError("view and section are of blocks in space; these lie in the plane: leave both out")
         thickness = "lines as thick as they are open, the thickest "
-        sheet, picture, keys, pixel = _drawn_in_plane(assembly, increment, joints, cracks, size)
+        sheet, picture, keys, pixel = _drawn_in_plane(response, increment, joints, cracks, size)
         moved = opening_and_slip(assembly, joints, increment.pose, increment.fallen)
         slid = slid_joints(assembly, moved)[:1]
         slip = float(np.abs(moved[slid, 1]).max(initial=0.0))
@@ -99,24 +101,24 @@ def draw_cracks(
 
 
 def _drawn_in_plane(
-    assembly: solver.Assembly,
+    response: solver.Response,
     increment: solver.Increment,
     joints: InitialJoints,
     cracks: list[Crack],
     size: tuple[int, int] | None,
 ) -> tuple[Sheet, Image.Image, list[Key], float]:
-    """Draw the cracks of blocks in the plane; returns sheet, picture, legend and the size of a pixel [m]."""
-    main = main_cracks(cracks)
+    """Draw the cracks of blocks in the plane, and how supports move; returns sheet, picture, legend and pixel [m]."""
+    assembly, main, start = response.assembly, main_cracks(cracks), solver.Pose.initial(response.assembly)
     openings = np.maximum(carried_faces(assembly, joints, increment.pose).gaps.reshape(-1, 2), 0.0)
     widest = cracks[0].width if cracks else 1.0
     fill = palette.block_colours(assembly.materials, assembly.free)
     fill = palette.pale(fill, np.ones(assembly.n_blocks, dtype=bool), palette.SURVEY)
-    frame = framed(assembly, [solver.Pose.initial(assembly)])
+    frame = framed(assembly, [start])
     sheet = Sheet(size or sheet_size(frame))
     scene = FlatScene(assembly, frame, sheet.inside_size, fill, outline=palette.PALE_OUTLINE)
     if increment.fallen.any():
         scene.hide(increment.fallen)
-        scene.pose(solver.Pose.initial(assembly))
+        scene.pose(start)
     others = [crack for crack in cracks if id(crack) not in {id(one) for one in main}]
     layers = [*zip(main, palette.SURVEYED, strict=False), *((crack, palette.GHOST) for crack in others)]
     height = scene.usual_height * scene.pixel
@@ -125,9 +127,15 @@ def _drawn_in_plane(
     for k, (crack, colour) in list(enumerate(layers))[::-1]:
         half = (thin + (thick - thin) * openings[crack.joints] / widest) / 2.0
         scene.polygons(f"crack edge/{k}", _bars(joints.ends[crack.joints], half), colour)
+    arrows, phases = np.zeros((2, 0, 2)), phases_of(response)
+    if phases:
+        phase = phases[min(increment.phase, len(phases) - 1)]
+        arrows = np.stack(arrows_on_supports(assembly, phase, start, frame, ARROW * float(frame.size.max())))
+        scene.arrows("arrow", *arrows, palette.SETTLEMENT)
     picture = scene.image()
     if main:
-        dots = along_lines(np.concatenate([joints.ends[crack.joints] for crack in cracks]))
+        lines = [joints.ends[crack.joints] for crack in cracks]
+        dots = along_lines(np.concatenate([*lines, arrows.transpose(1, 0, 2)]))
         places = scene.at_pixel(np.array([_widest_point(crack, joints, openings) for crack in main]))
         words = [f"{n}: {width_text(crack.width)}" for n, crack in zip(_numbers(main, cracks), main, strict=True)]
         colours = palette.SURVEYED[: len(main)]

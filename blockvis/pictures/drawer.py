@@ -40,8 +40,9 @@ from .frame import (
 )
 from .live_load import LiveLoads
 from .marks import (
-    END,
+    ARROW,
     SMALLEST_RESULTANT,
+    arrows_on_supports,
     evenly,
     joint_forces,
     length_per_force,
@@ -76,7 +77,7 @@ GLASS = 0.35
 
 #: Length of the arrows at the supports, as a part of the larger side of what is drawn, in the plane and in space;
 #: in the plane none is longer than its support, to a third.
-ARROW, ARROW_IN_SPACE = 0.055, 0.09
+ARROW_IN_SPACE = 0.09
 
 #: Arrows of a mechanism of many parts stand apart by this fraction of the picture, in the plane and in space.
 CELL, CELL_IN_SPACE = 0.07, 0.09
@@ -684,17 +685,13 @@ class Drawer:
         if not phases:
             return np.zeros((0, self.assembly.dimension)), np.zeros((0, self.assembly.dimension))
         phase = phases[min(increment.phase, len(phases) - 1)]
-        blocks, places, directions = settlement_arrows(self.assembly, phase, shown, seen)
+        if self._flat:
+            return arrows_on_supports(self.assembly, phase, shown, seen, self._arrow)
+        blocks, places, directions = settlement_arrows(self.assembly, phase, shown)
         kept = kept_blocks(self._plane, self.assembly, shown)[blocks]
         places, directions = places[kept], directions[kept]
         places = places + into_sight(self._plane, places)
-        if not self._flat:
-            return places, places + self._arrow * directions
-        # Beside a wide structure one as long as usual would cover its support, and of one that turns both would cross.
-        extents = np.array([np.ptp(self.assembly.outline(block), axis=0).max() for block in blocks.tolist()])
-        longest = np.where(np.bincount(blocks)[blocks] > 1, 2.0 * END, 1.0) * extents
-        half = 0.5 * np.clip(longest, self._arrow / 3.0, self._arrow)[:, None] * directions
-        return places - half, places + half
+        return places, places + self._arrow * directions
 
 
 def _along(tails: np.ndarray, tips: np.ndarray) -> np.ndarray:

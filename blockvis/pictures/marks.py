@@ -46,13 +46,16 @@ ON_HINGE = 0.05
 
 #: Arrows of at most so many supports or blocks in space, and of supports in the plane; of more, evenly chosen ones
 #: stand for all, as they need not move alike.
-MOST_ARROWS, MOST_IN_PLANE = 24, 4
+MOST_ARROWS, MOST_IN_PLANE = 24, 8
 
 #: Arrows shorter than so many times what their shafts are thick would be blobs.
 SHORTEST_ARROW = 2.0
 
 #: A support that turns has two arrows, so far from its middle as a part of its extent.
 END = 0.35
+
+#: Length of the arrows at supports in the plane, as a part of the larger side of what is drawn.
+ARROW = 0.055
 
 
 def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndarray) -> np.ndarray:
@@ -264,8 +267,8 @@ def settlement_arrows(
     """Find where arrows show how supports move in a settlement, of which a picture in the plane shows what is ``seen``.
 
     Gives the supports (n,), one or a few of many for all, twice where they turn, the places (n, d) [m], in the plane
-    inside the part of each that is seen, in space where the arrow leaves it, and the directions (n, d), to the scale of
-    each support, whose longest is a unit vector.
+    inside the part of each that is seen, in space where the arrow leaves it, and the directions (n, d), to one scale:
+    the longest is a unit vector.
     """
     d, rate = assembly.dimension, settlement.rate(assembly, solver.Pose.initial(assembly), 0.0)
     blocks = np.flatnonzero(settlement.taking_part(assembly) & rate.any(axis=1))
@@ -279,14 +282,26 @@ def settlement_arrows(
         # Of a slab that goes on beyond the structure nobody sees the ends.
         extents = np.minimum(extents[1:], extents[0].max())
     blocks, places = _with_ends(blocks, places, extents, rate[:, d:], pose)
-    speeds, largest = mechanics.point_velocities(places, blocks, pose, rate), np.zeros(assembly.n_blocks)
+    speeds = mechanics.point_velocities(places, blocks, pose, rate)
     sizes = np.linalg.norm(speeds, axis=1)
-    np.maximum.at(largest, blocks, sizes)
-    moves = sizes > SMALLEST_RESULTANT * largest[blocks]
+    largest = sizes.max(initial=0.0)
+    moves = sizes > SMALLEST_RESULTANT * largest
     blocks, places, speeds, sizes = blocks[moves], places[moves], speeds[moves], sizes[moves]
     if d == 3:
         places = leaving(assembly, pose, blocks, places, speeds / sizes[:, None])
-    return blocks, places, speeds / largest[blocks, None]
+    return blocks, places, speeds / largest
+
+
+def arrows_on_supports(
+    assembly: solver.Assembly, settlement: solver.Settlement, pose: solver.Pose, seen: Frame | None, usual: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tails and tips (n, 2) [m] of the arrows on supports in the plane, mostly of a usual length [m]."""
+    blocks, places, directions = settlement_arrows(assembly, settlement, pose, seen)
+    # Beside a wide structure one as long as usual would cover its support, and of one that turns both would cross.
+    extents = np.array([np.ptp(assembly.outline(block), axis=0).max() for block in blocks.tolist()])
+    longest = np.where(np.bincount(blocks)[blocks] > 1, 2.0 * END, 1.0) * extents
+    half = 0.5 * np.clip(longest, usual / 3.0, usual)[:, None] * directions
+    return places - half, places + half
 
 
 def _with_ends(

@@ -87,7 +87,7 @@ class Progress:
     def __init__(self, course: Course, assembly: solver.Assembly, count: int = 0) -> None:
         self.course, self.count, self.assembly, self._line = course, count, assembly, _Line()
         self._state: mechanics.PathState | None = None
-        self._at = time.perf_counter()
+        self._at, self._still = time.perf_counter(), 0
         self._ended, self._writing = threading.Event(), threading.Lock()
 
     def watch(self) -> None:
@@ -112,10 +112,11 @@ class Progress:
         driver = self._driver(state.phase)
         if driver is None:
             return f"increment {self.count + 1}"
-        words = (
-            f"{self.course.parameter.name} {state.place.s:.6g} of at most {driver.limit:g} {driver.unit}, increment "
-            f"{self.count + 1} in steps of {state.step:.2g}"
-        )
+        words = f"{self.course.parameter.name} {state.place.s:.6g} of at most {driver.limit:g} {driver.unit}"
+        words += f", increment {self.count + 1}"
+        if self._still:
+            return f"{words}, step {self._still} in time: blocks fall or come to rest while the supports stand"
+        words += f" in steps of {state.step:.2g}"
         if np.isfinite(state.upper_bound):
             words += f", no equilibrium at {state.upper_bound:.6g}"
         return words + self._moving(state.place.velocity)
@@ -129,7 +130,8 @@ class Progress:
         return f", {counted(moving, 'block')} moving, '{self.assembly.names[int(speeds.argmax())]}' moves most"
 
     def step(self, state: mechanics.PathState) -> None:
-        """Show where an increment is that takes long."""
+        """Show where an increment is that takes long, at one state of the path also by how many steps in time."""
+        self._still = self._still + 1 if state is self._state else 0
         self._state, self._at = state, time.perf_counter()
         driver = self._driver(state.phase)
         if self._line.due and driver is not None:

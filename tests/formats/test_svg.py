@@ -267,6 +267,15 @@ def test_an_inner_svg_is_placed_and_scaled_by_its_view_box(tmp_path, ratio, low,
     np.testing.assert_allclose([layout.outlines[0].min(axis=0), layout.outlines[0].max(axis=0)], [low, high])
 
 
+def test_clones_are_read_where_they_show_their_original(tmp_path):
+    inner = '<defs><rect id="a" width="1" height="2"/><symbol id="s"><rect width="9" height="9"/></symbol></defs>'
+    inner += '<g id="b" transform="translate(10,0)"><use href="#a" x="3" transform="scale(-1,1)"/></g><use href="#s"/>'
+    inner += '<use xmlns:l="http://www.w3.org/1999/xlink" l:href="#b" y="5"/><use href="other.svg#a"/>'
+    layout = read_layout(saved(tmp_path, inner), unit="m")
+    np.testing.assert_allclose([ring.min(axis=0) for ring in layout.outlines], [[6, -2], [6, -7]])
+    assert any(note.startswith("skipped: 2 <use> (clones; unlink them") for note in layout.notes)
+
+
 def test_an_inner_svg_without_size_is_missed_in_a_note(tmp_path):
     inner = '<svg id="a" width="50%" viewBox="0 0 9 9"><rect width="9" height="9"/></svg><rect width="9" height="9"/>'
     layout = read_layout(saved(tmp_path, inner))

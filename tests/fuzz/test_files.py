@@ -13,9 +13,6 @@ from blockvis.cli import main
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are set the way Linux has them")
 
-#: Of the hostile files those that hold a drawing all the same: what is hostile in them is not followed.
-HARMLESS = {"uses.svg": "1 block"}
-
 
 @pytest.mark.slow
 def test_hostile_files_are_refused_within_bounds(tmp_path):
@@ -23,9 +20,8 @@ def test_hostile_files_are_refused_within_bounds(tmp_path):
     outcomes = {Path(str(o["file"])).name: o for o in read_all(paths, tmp_path)}
     assert set(outcomes) == set(FILES)
     for name, outcome in outcomes.items():
-        expected = "read" if name in HARMLESS else "refused"
-        assert outcome["outcome"] == expected, (name, outcome)
-        assert HARMLESS.get(name, name) in str(outcome["message"]) or "block '" in str(outcome["message"]), outcome
+        assert outcome["outcome"] == "refused", (name, outcome)
+        assert name in str(outcome["message"]) or "block '" in str(outcome["message"]), outcome
         assert len(str(outcome["message"])) < 1000, name
         assert float(str(outcome["seconds"])) < SECONDS
     assert not list(tmp_path.rglob("harmed"))

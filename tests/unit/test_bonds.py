@@ -100,6 +100,20 @@ def test_a_head_that_reaches_the_rim_by_less_than_rounding_is_cut_there():
     assert not layout.notes
 
 
+@pytest.mark.slow
+def test_an_oculus_has_its_ring_above_a_door_on_the_ground():
+    """Edges that were left of stones on a grid, as lines, ended this with a traceback, and rings of others."""
+    gable = shapely.Polygon([(0, 0), (7, 0), (7, 4), (3.5, 7.5), (0, 4)])
+    angle = np.pi * np.arange(48) / 24
+    arch = 0.75 * np.column_stack([np.cos(angle[:17] * 1.5), np.sin(angle[:17] * 1.5)]) + [3.5, 2.2]
+    door = shapely.Polygon([(2.75, 0), (4.25, 0), *arch])
+    oculus = shapely.Polygon(0.6 * np.column_stack([np.cos(angle), np.sin(angle)]) + [3.5, 4.9])
+    layout = generators.bond(gable, [door, oculus])
+    checked(layout, gable.difference(door).difference(oculus).area)
+    assert {"voussoir 1-1", "voussoir 2-1"} <= set(layout.names)
+    assert not layout.notes
+
+
 def test_other_heads_than_those_that_are_asked_for_are_told():
     wall, opening = shapely.box(0, 0, 2, 1.5), shapely.box(0.1, 0.0, 1.9, 1.1)
     said = "bond: 1 opening has no room for the head that is asked for and got "

@@ -37,6 +37,7 @@ def test_each_main_crack_has_its_colour_and_its_width(tmp_path, monkeypatch):
     assert len(main) >= 3
     for colour in palette.SURVEYED[: len(main)]:
         assert covered(picture, colour) > 10
+    assert covered(picture, palette.SETTLEMENT) > 10
     # The widest are the thickest, and nothing of statics is drawn.
     assert covered(picture, palette.SURVEYED[0]) > covered(picture, palette.SURVEYED[len(main) - 1])
     assert not covered(picture, palette.OPEN)

@@ -367,12 +367,15 @@ def test_the_supports_that_a_drawing_has_move_by_sides(tmp_path, capsys, name, p
 @pytest.mark.slow
 def test_what_does_not_stand_is_named_with_its_cause_and_marked(tmp_path, capsys):
     hanging = [(3.0, 1.0), (3.4, 1.0), (3.4, 1.2), (3.0, 1.2)]
-    drawing = drawn(tmp_path / "wall.json", [*wall([(0.0, 0.0)] * STONES), hanging])
+    # A letter below the wall, under which the only ground was laid.
+    letter = [(1.0, -0.6), (1.05, -0.6), (1.05, -0.55), (1.0, -0.55)]
+    drawing = drawn(tmp_path / "wall.json", [*wall([(0.0, 0.0)] * STONES), hanging, letter])
     assert main(["new", str(drawing), "-o", str(tmp_path / "wall.toml")]) == 0
     pixels = np.asarray(Image.open(tmp_path / "wall.supports.png").convert("RGB"))
     assert (pixels == (244, 176, 97)).all(axis=2).sum() > 1000
     said = capsys.readouterr().err
-    assert "1 of 14 blocks fall ('s13'), and would stand with 1570 N along y at 's13'; 1 of them touch nothing" in said
+    assert "2 of 15 blocks fall ('s13', 's14'), and would stand with " in said
+    assert "; 2 of them touch nothing that stands ('s13', 's14')" in said
 
 
 @pytest.mark.parametrize(

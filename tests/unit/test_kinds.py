@@ -258,22 +258,27 @@ def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monke
     )
 
 
-def test_a_listener_hears_each_step_in_which_blocks_come_to_rest():
+def test_a_listener_hears_each_step_in_which_blocks_come_to_rest(tmp_path, monkeypatch):
     """A stone that is drawn above its support drops on it before the first increment."""
+    monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
+    monkeypatch.setattr("sys.stderr", stream := Terminal())
+    text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
     outlines = [[[-1, -1], [1, -1], [1, 0], [-1, 0]], [[-0.2, 1e-3], [0.2, 1e-3], [0.2, 1], [-0.2, 1]]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
-    heard = []
+    bar, heard = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), assembly), []
     steps = mechanics.settlement_increments(
         assembly,
         [solver.Settlement(direction=(0, -1), increment=0.1, limit=0.1)],
         interfaces=solver.Interfaces(solver.InterfaceLaw(0.6)),
         loads=solver.self_weight(assembly),
-        on_step=lambda state: heard.append((state.phase, state.place.s)),
+        on_step=lambda state: (heard.append((state.phase, state.place.s)), bar.step(state)),
     )
     first = next(iter(steps))
     assert first.pose.positions[1, 1] < assembly.centroids[1, 1] - 9e-4
     assert len(heard) > 2
     assert set(heard) == {(0, 0.0)}
+    words = f"increment 1, step {len(heard) - 1} in time: blocks fall or come to rest while the supports stand"
+    assert f"settlement 0 of at most 0.4 m, {words}" in stream.getvalue()
 
 
 @pytest.mark.slow

@@ -644,15 +644,15 @@ def test_an_arch_has_an_opening_that_the_ground_closes_and_an_outer_face():
     assert found >= sides | {frozenset({"the head of the opening", "the top"})}
 
 
-def test_of_many_supports_each_side_has_arrows_of_its_own():
-    xs = range(6)
+def test_of_many_supports_each_side_has_arrows_of_its_own_to_one_scale():
+    xs = range(12)
     outlines = [rectangle(x, -0.5, x + 0.6, 0.0) for x in xs] + [rectangle(x, 0.0, x + 0.6, 1.0) for x in xs]
-    piers = solver.Assembly.from_outlines(outlines, roles=["moving"] * 6 + ["free"] * 6)
-    profile = {piers.names[k]: (0.0, -1.0 if k < 3 else 1.0, 0.0) for k in xs}
+    piers = solver.Assembly.from_outlines(outlines, roles=["moving"] * 12 + ["free"] * 12)
+    profile = {piers.names[k]: (0.0, -1.0 if k < 6 else 0.5, 0.0) for k in xs}
     settlement = solver.Settlement(profile=profile, increment=0.05, limit=0.1)
     blocks, _, directions = marks.settlement_arrows(piers, settlement, solver.Pose.initial(piers))
-    assert blocks.tolist() == [0, 2, 3, 5]
-    assert directions[:, 1].tolist() == [-1.0, -1.0, 1.0, 1.0]
+    assert blocks.tolist() == [0, 2, 3, 5, 6, 8, 9, 11]
+    assert directions[:, 1].tolist() == [-1.0] * 4 + [0.5] * 4
 
 
 def test_arrows_that_are_seen_from_their_end_are_left_out():
