@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import solver
+from blockvis.layout.layout import assembly_of, layout_of
 from blockvis.layout.outlines import rectangle
 from blockvis.layout.solids import box
 from solver import mechanics
@@ -58,18 +59,14 @@ def on_ground(
     middle, size = corners.mean(axis=0), 4.0 * float(np.ptp(corners, axis=0).max())
     low = np.append(middle[:-1] - size, ground - 0.5 * assembly.block_size)
     high = np.append(middle[:-1] + size, ground)
-    names = [*assembly.names, GROUND]
-    roles = [*(mechanics.FREE if free else mechanics.FIXED for free in assembly.free), mechanics.FIXED]
-    materials = [*assembly.materials, material]
-    density = np.append(assembly.density, 1.0)
-    if assembly.dimension == 2:
-        outlines = [*(assembly.outline(block) for block in range(assembly.n_blocks)), rectangle(*low, *high)]
-        thickness = np.append(assembly.thickness, assembly.thickness.max())
-        whole = solver.Assembly.from_outlines(
-            outlines, names=names, roles=roles, density=density, thickness=thickness, materials=materials
-        )
-    else:
-        solids = [*(assembly.polyhedra.surface(block) for block in range(assembly.n_blocks)), box(low, high)]
-        whole = solver.Assembly.from_solids(solids, names=names, roles=roles, density=density, materials=materials)
+    drawn = layout_of(assembly)
+    whole = assembly_of(
+        [*drawn.blocks, box(low, high) if assembly.dimension == 3 else rectangle(*low, *high)],
+        None if drawn.thickness is None else np.append(drawn.thickness, drawn.thickness.max()),
+        names=[*assembly.names, GROUND],
+        roles=[*(mechanics.FREE if free else mechanics.FIXED for free in assembly.free), mechanics.FIXED],
+        density=np.append(assembly.density, 1.0),
+        materials=[*assembly.materials, material],
+    )
     turns = np.append(pose.rotations, np.zeros((1, pose.rotations.shape[1])), axis=0)
     return whole, solver.Pose(np.vstack([pose.positions, whole.centroids[-1:]]), turns)
