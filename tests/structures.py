@@ -86,6 +86,17 @@ def upright(outline, first: float, last: float) -> tuple[np.ndarray, list[list[i
     return corners[:, [0, 2, 1]], [face[::-1] for face in faces]
 
 
+def with_hole(outer, inner) -> tuple[np.ndarray, list[list[int]]]:
+    """Extrude what lies between two outlines of four corners by 1 m upwards; its faces with the hole are two each."""
+    plan = np.array([*outer, *inner], dtype=float)
+    low, high = (np.column_stack([plan, np.full(8, z)]) for z in (0.0, 1.0))
+    halves = [[0, 1, 2, 6, 5, 4], [2, 3, 0, 4, 7, 6]]
+    faces = [face[::-1] for face in halves] + [[8 + k for k in face] for face in halves]
+    faces += [[k, (k + 1) % 4, (k + 1) % 4 + 8, k + 8] for k in range(4)]
+    faces += [[4 + (k + 1) % 4, 4 + k, 12 + k, 12 + (k + 1) % 4] for k in range(4)]
+    return np.concatenate([low, high]), faces
+
+
 def fans(faces) -> np.ndarray:
     """Convex faces cut into triangles from their first corners."""
     return np.array([[face[0], face[k], face[k + 1]] for face in faces for k in range(1, len(face) - 1)])
@@ -114,6 +125,12 @@ def film_frames(path) -> list[np.ndarray]:
 def alike(colours, wanted, tolerance: int = 12) -> np.ndarray:
     """Whether colours are a wanted one, but for what drawing blurs."""
     return (np.abs(np.asarray(colours, dtype=int) - np.array(wanted)) <= tolerance).all(axis=-1)
+
+
+def sideways(assembly: solver.Assembly, fraction: float = 1.0) -> solver.Loads:
+    """Self-weight, and of the free blocks a part of it as a live load along x."""
+    live = solver.weight_fraction(assembly, (fraction, 0.0), np.flatnonzero(assembly.free))
+    return solver.Loads(solver.self_weight(assembly).dead, live)
 
 
 def stacked(shift=(0.0, 0.0), turn: float = 0.0) -> tuple[solver.Assembly, solver.Pose]:

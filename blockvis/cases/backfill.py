@@ -12,7 +12,6 @@ import shapely
 import solver
 from blockvis.layout.names import blocks_matching
 from blockvis.layout.outlines import ring_of
-from blockvis.layout.triangulation import triangles_of_ring
 from blockvis.text import listed
 
 from .block_at import ON_EDGE
@@ -225,7 +224,7 @@ def _triangles(
         for polygon in shapely.get_parts(left):
             if polygon.area <= small * assembly.block_size:
                 continue
-            for triangle in _filling(polygon):
+            for triangle in map(ring_of, shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))):
                 rise = -((triangle - middle[:2]) @ normal[:2]) / normal[2]
                 pieces.append(np.column_stack([triangle, middle[2] + rise]))
                 block.append(int(shapes.block_of_face[f]))
@@ -245,12 +244,3 @@ def _above(
     share = height[a] / (height[a] - height[b])
     cut = points[a] + share[:, None] * (points[b] - points[a])
     return shapely.MultiPoint(np.vstack([points[height >= -small], cut])[:, :2]).convex_hull
-
-
-def _filling(polygon: shapely.Polygon) -> list[np.ndarray]:
-    """Counter-clockwise triangles that fill a polygon in plan, (3, 2) each."""
-    if len(polygon.interiors):
-        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-        return [ring_of(one) for one in triangles]
-    ring = ring_of(polygon)
-    return [ring[corners] for corners in triangles_of_ring(ring)]

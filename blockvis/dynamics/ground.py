@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 import solver
+from blockvis.layout.layout import assembly_of, layout_of
+from blockvis.layout.outlines import rectangle
+from blockvis.layout.solids import box
 from solver import mechanics
 
 #: Name of the slab that is the ground.
@@ -52,24 +55,18 @@ def on_ground(
     assembly: solver.Assembly, pose: solver.Pose, ground: float, material: str = ""
 ) -> tuple[solver.Assembly, solver.Pose]:
     """Add a slab as wide as anything can get, its upper face at the height of the ground [m], as the last block."""
-    corners, d = mechanics.moved_vertices(assembly, pose), assembly.dimension
+    corners = mechanics.moved_vertices(assembly, pose)
     middle, size = corners.mean(axis=0), 4.0 * float(np.ptp(corners, axis=0).max())
     low = np.append(middle[:-1] - size, ground - 0.5 * assembly.block_size)
     high = np.append(middle[:-1] + size, ground)
-    slab = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(d)] for k in range(2**d)])
-    names = [*assembly.names, GROUND]
-    roles = [*(mechanics.FREE if free else mechanics.FIXED for free in assembly.free), mechanics.FIXED]
-    materials = [*assembly.materials, material]
-    density = np.append(assembly.density, 1.0)
-    if d == 2:
-        outlines = [*(assembly.outline(block) for block in range(assembly.n_blocks)), slab[[0, 1, 3, 2]]]
-        thickness = np.append(assembly.thickness, assembly.thickness.max())
-        whole = solver.Assembly.from_outlines(
-            outlines, names=names, roles=roles, density=density, thickness=thickness, materials=materials
-        )
-    else:
-        faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
-        solids = [*(assembly.polyhedra.surface(block) for block in range(assembly.n_blocks)), (slab, faces)]
-        whole = solver.Assembly.from_solids(solids, names=names, roles=roles, density=density, materials=materials)
+    drawn = layout_of(assembly)
+    whole = assembly_of(
+        [*drawn.blocks, box(low, high) if assembly.dimension == 3 else rectangle(*low, *high)],
+        None if drawn.thickness is None else np.append(drawn.thickness, drawn.thickness.max()),
+        names=[*assembly.names, GROUND],
+        roles=[*(mechanics.FREE if free else mechanics.FIXED for free in assembly.free), mechanics.FIXED],
+        density=np.append(assembly.density, 1.0),
+        materials=[*assembly.materials, material],
+    )
     turns = np.append(pose.rotations, np.zeros((1, pose.rotations.shape[1])), axis=0)
     return whole, solver.Pose(np.vstack([pose.positions, whole.centroids[-1:]]), turns)

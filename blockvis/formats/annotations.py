@@ -7,7 +7,7 @@ import binascii
 import io
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
-from blockvis.layout.outlines import LARGEST_CHORD
+from blockvis.layout.outlines import LARGEST_CHORD, rectangle
 from blockvis.layout.refusal import Refused
 from solver.mechanics import counted
 
@@ -122,9 +122,10 @@ def placement_in(path: Path, found: _Annotated, reading: Reading) -> Placement:
         ends = [np.max(ring, axis=0) for _, rings in found.shapes for ring in rings if isinstance(ring, np.ndarray)]
         height = float(np.max(ends, axis=0)[1]) if ends else 0.0
         placement = placement_of(path, None, reading, image)
-        lifted = placement.matrix.copy()
-        lifted[:, 2] -= placement.matrix[:, 1] * height
-        return placement if "pixel" not in placement.source else Placement(lifted, placement.unit, placement.source)
+        if reading.image.get("pixel") is None:
+            # A world file says itself where the first row lies.
+            return placement
+        return replace(placement, matrix=placement.matrix - np.outer(height * placement.matrix[:, 1], [0.0, 0.0, 1.0]))
     return placement_of(path, found.size, reading, image)
 
 
@@ -164,10 +165,6 @@ def _corners(points: Any) -> np.ndarray:
     """(n, 2) array: corners of a polygon, the first not repeated."""
     ring = np.array(points, dtype=float).reshape(-1, 2)
     return ring[:-1] if len(ring) > 3 and (ring[0] == ring[-1]).all() else ring
-
-
-def _box(x: float, y: float, width: float, height: float) -> np.ndarray:
-    return np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]], dtype=float)
 
 
 def _ellipse(x: float, y: float, rx: float, ry: float, turn: float = 0.0) -> np.ndarray:
@@ -254,8 +251,7 @@ def _labelme(content: Mapping[str, Any]) -> _Annotated:
         if kind == "polygon" and len(points) > 2:
             outline = _corners(points)
         elif kind == "rectangle" and len(points) > 1:
-            low, high = points.min(axis=0), points.max(axis=0)
-            outline = _box(*low, *(high - low))
+            outline = rectangle(*points.min(axis=0), *points.max(axis=0))
         elif kind == "circle" and len(points) == 2:
             radius = float(np.hypot(*(points[1] - points[0])))
             outline = _ellipse(float(points[0, 0]), float(points[0, 1]), radius, radius)
@@ -304,7 +300,8 @@ def _via_outline(shape: Mapping[str, Any]) -> np.ndarray | None:
     if kind == "polygon" and len(shape["all_points_x"]) > 2:
         return _corners(np.stack([shape["all_points_x"], shape["all_points_y"]], axis=1))
     if kind == "rect":
-        return _box(*(float(shape[key]) for key in ("x", "y", "width", "height")))
+        x, y, width, height = (float(shape[key]) for key in ("x", "y", "width", "height"))
+        return rectangle(x, y, x + width, y + height)
     if kind in ("circle", "ellipse"):
         rx = float(shape.get("r", shape.get("rx", 0.0)))
         turn = float(shape.get("theta", 0.0))

@@ -19,6 +19,7 @@ from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
 from blockvis.layout.outlines import is_flat
+from blockvis.layout.solids import Solid, box
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -217,7 +218,7 @@ def _of_frame(frame: Any) -> np.ndarray:
     return matrix
 
 
-def _shape(data: dict[str, Any]) -> tuple[np.ndarray, list[list[int]]] | None:
+def _shape(data: dict[str, Any]) -> Solid | None:
     """(n, 3) points and faces of a mesh, a polyhedron, a box or a polygon; None for anything else."""
     if data.get("vertex") and isinstance(data["vertex"], dict) and isinstance(data.get("face"), dict) and data["face"]:
         default = data.get("default_vertex_attributes") or data.get("dva") or {}
@@ -230,15 +231,14 @@ def _shape(data: dict[str, Any]) -> tuple[np.ndarray, list[list[int]]] | None:
     return _shape_of_lists(data)
 
 
-def _shape_of_lists(data: dict[str, Any]) -> tuple[np.ndarray, list[list[int]]] | None:
+def _shape_of_lists(data: dict[str, Any]) -> Solid | None:
     """Give points and faces of a polyhedron, a box or a polygon; None for anything else."""
     if data.get("vertices") and data.get("faces") and isinstance(data["vertices"], list):
         corners = np.array([_unwrapped(point)[0] for point in data["vertices"]], dtype=float).reshape(-1, 3)
         return corners, [[int(k) for k in face] for face in data["faces"]]
     if {"xsize", "ysize", "zsize"} <= set(data):
         half = np.array([float(data[key]) for key in ("xsize", "ysize", "zsize")]) / 2.0
-        corners = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]) * half
-        faces = [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+        corners, faces = box(-half, half)
         matrix = _of_frame(_unwrapped(data.get("frame"))[0])
         return corners @ matrix[:3, :3].T + matrix[:3, 3], faces
     if isinstance(data.get("points"), list) and set(data) == {"points"} and len(data["points"]) > 2:

@@ -73,7 +73,8 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
         return None
     features = [_feature(one, k) for k, one in enumerate(_geojson_features(content))]
     crs = content.get("crs")
-    name = str(crs.get("properties", {}).get("name", "")) if isinstance(crs, dict) else ""
+    properties = crs.get("properties") if isinstance(crs, dict) else None
+    name = str(properties.get("name", "")) if isinstance(properties, dict) else ""
     says = name if re.search(r"CRS84|4326$", name) else ""
     known = [one for one in features if one is not None]
     lengths, skipped = "crs" in content and crs is None, {NO_GEOMETRY: len(features) - len(known)}
@@ -106,7 +107,7 @@ def _feature(found: Any, number: int) -> Feature | None:
     try:
         with np.errstate(invalid="ignore"):
             return Feature(shape(geometry), attributes)
-    except (ShapelyError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+    except (ShapelyError, ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError) as error:
         reason = " ".join(f"{type(error).__name__} {error}".split())[:120]
         raise ValueError(f"feature {number} has a geometry that cannot be read ({reason}); repair it") from None
 

@@ -326,15 +326,13 @@ def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
     n = numbers.line()
     remaining = n
     while remaining > 0:
-        if numbers.binary:
-            kind, follow, n_tags = map(int, numbers.take("int", 3))
-            rows = numbers.take("int", follow * (1 + n_tags + _width(kind, numbers))).reshape(follow, -1)[:, 1:]
-        else:
-            _number, kind, n_tags = map(int, numbers.take("int", 3))
-            follow = 1
-            rows = numbers.take("int", n_tags + _width(kind, numbers)).reshape(1, -1)
-        if follow < 1:
-            raise ValueError(f"its section $Elements has a header of {follow} elements; export again")
+        # As text each element has its number before its type; binary ones have it after the header of several.
+        first, second, n_tags = map(int, numbers.take("int", 3))
+        kind, follow = (first, second) if numbers.binary else (second, 1)
+        if follow < 1 or n_tags < 0:
+            raise ValueError(f"its section $Elements has a header of {follow} elements, {n_tags} tags; export it again")
+        width = numbers.binary + n_tags + _width(kind, numbers)
+        rows = numbers.take("int", follow * width).reshape(follow, width)[:, int(numbers.binary) :]
         remaining -= follow
         dimension = 2 if kind in GMSH else 3 if kind in GMSH_SOLIDS else 0
         if dimension == 0:

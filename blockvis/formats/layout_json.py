@@ -103,7 +103,7 @@ def _outline(block: Any, called: str) -> np.ndarray:
     """(n, 2) array: the outline of a block in the plane."""
     try:
         ring = np.array(block["outline"], dtype=float)
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise ValueError(f"{called} has no outline of numbers [[x, y], ...]; repair it") from None
     if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3:
         raise ValueError(f"{called} needs at least three corners [x, y]; its shape is {ring.shape}")
@@ -115,7 +115,7 @@ def _solid(block: Any, called: str) -> Solid:
     try:
         points = np.array(block["points"], dtype=float).reshape(-1, 3)
         faces = [[int(corner) for corner in face] for face in block["faces"]]
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise ValueError(f"{called} has no points [[x, y, z], ...] and faces [[0, 1, 2], ...]; repair it") from None
     outside = [corner for face in faces for corner in face if not 0 <= corner < len(points)]
     if outside:

@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 #: VTK's type of cell with a volume that lists its faces, which do not follow from the type.
 POLYHEDRON = 42
 
+#: VTK's type of flat cell with any number of corners.
+POLYGON = 7
+
 #: The cell array by which files of an increment say which blocks have left for good.
 GONE = "fallen"
 
@@ -396,7 +399,19 @@ def _within(numbers: np.ndarray, end: int) -> bool:
 
 def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
     """Make a dataset of a cell per block, polygon or polyhedron, with the cell arrays that the reader understands."""
-    grid = _polyhedra(layout) if layout.dimension == 3 else _polygons(layout)
+    import pyvista
+
+    cells, start = list[int](), 0
+    for block in layout.blocks:
+        points, faces = block if isinstance(block, tuple) else (block, [])
+        rings = [k for face in faces for k in (len(face), *(start + corner for corner in face))]
+        stream = [len(faces), *rings] if faces else range(start, start + len(points))
+        cells += [len(stream), *stream]
+        start += len(points)
+    flat = layout.dimension == 2
+    places = np.column_stack([layout.points, np.zeros(start)]) if flat else layout.points
+    types = np.full(layout.n_blocks, POLYGON if flat else POLYHEDRON, dtype=np.uint8)
+    grid = pyvista.UnstructuredGrid(np.array(cells), types, places)
     grid.cell_data["block_id"] = np.arange(layout.n_blocks, dtype=np.int32)
     rows = rows_of(layout)
     for key in ("name", "group", "role", "material"):
@@ -407,32 +422,6 @@ def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
         if any(key in row for row in rows):
             grid.cell_data[key] = np.array([float(row.get(key, np.nan)) for row in rows])
     return grid
-
-
-def _polygons(layout: Layout) -> pyvista.UnstructuredGrid:
-    import pyvista
-
-    counts = [len(ring) for ring in layout.outlines]
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    cells = np.concatenate([[n, *range(s, s + n)] for n, s in zip(counts, starts[:-1], strict=True)])
-    flat = np.concatenate(layout.outlines)
-    points = np.column_stack([flat, np.zeros(len(flat))])
-    return pyvista.UnstructuredGrid(cells, np.full(len(counts), 7, dtype=np.uint8), points)
-
-
-def _polyhedra(layout: Layout) -> pyvista.UnstructuredGrid:
-    import pyvista
-
-    cells: list[int] = []
-    start = 0
-    for points, faces in layout.solids:
-        stream = [len(faces)]
-        for face in faces:
-            stream += [len(face), *(start + corner for corner in face)]
-        cells += [len(stream), *stream]
-        start += len(points)
-    types = np.full(layout.n_blocks, POLYHEDRON, dtype=np.uint8)
-    return pyvista.UnstructuredGrid(np.array(cells), types, layout.points)
 
 
 def write(layout: Layout, path: Path) -> None:

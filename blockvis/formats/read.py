@@ -432,31 +432,29 @@ def inspect(
     layout = read_layout(path, ignore=ignore, **chosen)
     found = inspected(layout)
     deep = [(i, j) for i, j, depth in found.overlapping if depth > found.overlap_tolerance]
-    return replace(found, remedy=_remedy(layout, deep, ignore, chosen)) if deep else found
+    return replace(found, remedy=overlap_remedy(layout, ignore, deep, **chosen)) if deep else found
 
 
-def overlap_remedy(layout: Layout, ignore: str | Sequence[str], **chosen: Any) -> str:
-    """Propose what to leave out of a layout whose blocks overlap, by the options with which it was read; or ""."""
-    return _remedy(layout, deep_overlaps(layout), ignore, chosen)
-
-
-def _remedy(
-    layout: Layout, deep: Sequence[tuple[int, int]], ignore: str | Sequence[str], chosen: Mapping[str, Any]
+def overlap_remedy(
+    layout: Layout, ignore: str | Sequence[str], deep: Sequence[tuple[int, int]] | None = None, **chosen: Any
 ) -> str:
-    """Propose what to leave out so that no blocks overlap, having tried it; "" for walls and openings, to be filled."""
+    """Propose what to leave out so that no blocks overlap, having tried it; "" for walls and openings, to be filled.
+
+    ``deep`` are the pairs that do, where they are known; the options are those with which the layout was read.
+    """
     if walls_to_fill(layout):
         return ""
     before = (ignore,) if isinstance(ignore, str) else tuple(ignore)
-    chosen = {**chosen, "unit": layout.unit}
+    chosen, deep = {**chosen, "unit": layout.unit}, deep_overlaps(layout) if deep is None else deep
     return proposed_ignore(layout, deep, lambda more: read_layout(layout.source, ignore=(*before, *more), **chosen))
 
 
 def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     if path.stat().st_size == 0:
         raise ValueError(f"'{path}' is empty (0 bytes); export it again")
-    module = _module_of(path, "read")
+    known, module = _format(path, "read")
     with naming(f"'{path}'"):
-        if _format(path, "read").module not in HOLD_IMAGES:
+        if known.module not in HOLD_IMAGES:
             reading.refuse_image_keys()
         found: Layout | Bodies = module.read(path, reading)
     return found
@@ -464,19 +462,16 @@ def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
 
 def _write_by_suffix(layout: Layout, path: Path) -> None:
     """Write a file, whole or not at all, with the module of its suffix."""
-    module = _module_of(path, "write")
-    if layout.dimension == 3 and not _format(path, "write").writes_space:
-        able = " ".join(sorted(suffix for suffix, known in FORMATS.items() if known.writes_space))
+    known, module = _format(path, "write")
+    if layout.dimension == 3 and not known.writes_space:
+        able = " ".join(sorted(suffix for suffix, other in FORMATS.items() if other.writes_space))
         raise ValueError(f"'{path}': {path.suffix} holds no blocks in space; use one of {able}")
     with atomic_file(path) as partial:
         module.write(layout, partial)
 
 
-def _module_of(path: Path, verb: str) -> Any:
-    return importlib.import_module(f"blockvis.formats.{_format(path, verb).module}")
-
-
-def _format(path: Path, verb: str) -> Format:
+def _format(path: Path, verb: str) -> tuple[Format, Any]:
+    """Find the format of a file by its suffix, and the module that reads and writes it."""
     suffix = path.suffix.lower()
     known = FORMATS.get(suffix)
     if known is None or (verb == "write" and not known.writes):
@@ -486,4 +481,4 @@ def _format(path: Path, verb: str) -> Format:
         raise ValueError(
             f"'{path}': cannot write '{suffix or 'a file without suffix'}'; use one of {able}; .vtkhdf is for results"
         )
-    return known
+    return known, importlib.import_module(f"blockvis.formats.{known.module}")

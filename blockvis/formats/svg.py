@@ -23,7 +23,7 @@ from blockvis.layout.block_table import layer_of, layers_of, on_layer, rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
 from blockvis.layout.notes import CHANGED, LEFT_OUT, UNIT_TAKEN, Note
-from blockvis.layout.outlines import chords_of, filled
+from blockvis.layout.outlines import chords_of, filled, rectangle
 from blockvis.layout.units import UNITS, metres_per, unit_of
 from solver import mechanics
 
@@ -472,7 +472,7 @@ def _rectangle(element: ElementTree.Element, where: _Context) -> list[_Part]:
     x, y, w, h = (_length(element, key) for key in ("x", "y", "width", "height"))
     if not (w > 0 and h > 0):
         return []
-    corners = np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]])
+    corners = rectangle(x, y, x + w, y + h)
     # A radius that is not given is the other one.
     given = [_length(element, key) for key in ("rx", "ry") if element.get(key, "auto").strip() != "auto"] or [0.0]
     radii = np.minimum([given[0], given[-1]], [w / 2.0, h / 2.0])

@@ -18,7 +18,7 @@ import numpy as np
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import passed_over
-from blockvis.layout.solids import fans
+from blockvis.layout.solids import Solid, between, box, fans
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -68,9 +68,6 @@ REGION = {"reg": "region", "r": "region"}
 
 #: Words of the shapes of blocks, before the numbers of their corners.
 SHAPES = ("brick", "prism", "a", "b", "face-1", "face-2", "face")
-
-#: Faces of a brick by its corners, x fastest.
-BRICK = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 
 
 @dataclass
@@ -230,13 +227,13 @@ def _made(words: list[str]) -> _Block:
         if word in ABOUT and len(numbers) == 1:
             about[REGION.get(word, word)] = f"{numbers[0]:g}"
     shapes = [(word, numbers) for word, numbers in lists if word in SHAPES]
-    points, faces = _shape(shapes or lists[:1])
-    if not np.isfinite(points).all():
+    if not np.isfinite([number for _, numbers in shapes for number in numbers]).all():
         raise ValueError("it has a corner that is not finite; repair it")
+    points, faces = _shape(shapes or lists[:1])
     return _Block(points, faces, about, [about.pop("group")] if "group" in about else [])
 
 
-def _shape(shapes: list[tuple[str, list[float]]]) -> tuple[np.ndarray, list[list[int]]]:
+def _shape(shapes: list[tuple[str, list[float]]]) -> Solid:
     """Corners and faces of a block by the words of its shape, each with the numbers after it."""
     word = shapes[0][0] if shapes else ""
     if word == "brick":
@@ -248,27 +245,25 @@ def _shape(shapes: list[tuple[str, list[float]]]) -> tuple[np.ndarray, list[list
     raise ValueError(f"it makes a block by '{word}', which is not read; write it as brick, prism or faces")
 
 
-def _brick(numbers: list[float]) -> tuple[np.ndarray, list[list[int]]]:
+def _brick(numbers: list[float]) -> Solid:
     if len(numbers) not in (2, 4, 6):
         raise ValueError(f"brick takes x0 x1 y0 y1 z0 z1; {len(numbers)} numbers stand there")
     # The last pair holds for the directions that are not given.
     pairs = [*numbers, *numbers[-2:] * 2][:6]
-    x, y, z = pairs[:2], pairs[2:4], pairs[4:]
-    return np.array([[a, b, c] for c in z for b in y for a in x]), [list(face) for face in BRICK]
+    return box(pairs[::2], pairs[1::2])
 
 
-def _prism(first: list[float], second: list[float]) -> tuple[np.ndarray, list[list[int]]]:
+def _prism(first: list[float], second: list[float]) -> Solid:
     n = len(first) // 3
     if len(first) != len(second) or len(first) % 3 or n < 3:
         raise ValueError(
             f"both faces of a prism take as many corners (x, y, z), three or more; there are "
             f"{len(first)} and {len(second)} numbers"
         )
-    sides = [[k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)]
-    return np.reshape(first + second, (-1, 3)), [list(range(n)), list(range(n, 2 * n)), *sides]
+    return between(np.reshape(first, (n, 3)), np.reshape(second, (n, 3)))
 
 
-def _polyhedron(faces: list[list[float]]) -> tuple[np.ndarray, list[list[int]]]:
+def _polyhedron(faces: list[list[float]]) -> Solid:
     wrong = next((k for k, numbers in enumerate(faces) if len(numbers) % 3 or len(numbers) < 9), None)
     if wrong is not None or len(faces) < 4:
         what = f"there are {len(faces)}" if wrong is None else f"face {wrong + 1} has {len(faces[wrong])} numbers"

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import solver
+from blockvis.layout.layout import assembly_of
 from solver import mechanics
 
 from .dimensions import above_zero
@@ -31,6 +32,4 @@ def assembled(
         "materials": materials + ["ground"] * len(supports),
         "density": above_zero("density", density, "kg/m³"),
     }
-    if depth is None:
-        return solver.Assembly.from_solids(shapes, **of_blocks)
-    return solver.Assembly.from_outlines(shapes, thickness=above_zero("depth", depth), **of_blocks)
+    return assembly_of(shapes, None if depth is None else above_zero("depth", depth), **of_blocks)

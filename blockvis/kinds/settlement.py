@@ -26,7 +26,7 @@ from blockvis.results.about import (
 )
 from blockvis.results.bearing import bearings
 from blockvis.results.tables import changes_told
-from blockvis.text import force_text
+from blockvis.text import force_text, listed
 from solver import mechanics
 from solver.mechanics import counted
 
@@ -197,11 +197,9 @@ def losses_of(response: solver.Response) -> list[str]:
     """Say where blocks left for good while the structure stood, which, and what they weigh."""
     said = []
     for loss in response.losses:
-        names, more = ", ".join(loss.blocks[:4]), len(loss.blocks) - 4
-        names += f" and {more} more" if more > 0 else ""
         weight = f"{force_text(loss.weight)}, {100.0 * loss.share:.2g} % of the weight"
         place = f"{loss.settlement:.6g} {unit_and_phase(response, loss.phase)}"
-        said.append(f"{names} at {place}, {weight}; the structure stands without")
+        said.append(f"{listed(loss.blocks, 4)} at {place}, {weight}; the structure stands without")
     return said
 
 

@@ -71,8 +71,8 @@ def _number(value: Any, key: str, name: str) -> float:
     try:
         # A yes is no length.
         return float(str(value) if isinstance(value, bool) else value)
-    except (TypeError, ValueError):
-        raise ValueError(f"block '{name}' has {key} {value!r}; give a number") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"block '{name}' has {key} {value!r:.40}; give a number") from None
 
 
 def layer_of(row: Mapping[str, Any]) -> tuple[str, str]:

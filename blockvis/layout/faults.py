@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-import solver
-
 from .crossings import crossings_of
-from .layout import Layout, Outline
+from .layout import Layout, Outline, assembly_of
 from .outlines import ROUNDING
 from .solids import Solid
 from .surfaces import same_points
@@ -52,10 +50,7 @@ def no_blocks(shapes: Sequence[Outline | Solid]) -> list[int]:
     refused = []
     for k, shape in enumerate(shapes):
         try:
-            if isinstance(shape, tuple):
-                solver.Assembly.from_solids([shape])
-            else:
-                solver.Assembly.from_outlines([shape])
+            assembly_of([shape])
         except ValueError:
             refused.append(k)
     return refused

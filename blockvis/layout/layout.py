@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import solver
 from solver import mechanics
@@ -209,6 +210,15 @@ def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> 
         corners = np.split(vertices, shapes.offsets[1:-1])
         return Layout(blocks=tuple((own, shapes.surface(i)[1]) for i, own in enumerate(corners)), **shared)
     return Layout(blocks=tuple(np.split(vertices, assembly.offsets[1:-1])), thickness=assembly.thickness, **shared)
+
+
+def assembly_of(
+    blocks: Sequence[Outline | Solid], thickness: ArrayLike | None = 1.0, **of_blocks: Any
+) -> solver.Assembly:
+    """Make an assembly of blocks as a layout has them: only outlines have a thickness [m]."""
+    if isinstance(blocks[0], tuple):
+        return solver.Assembly.from_solids(cast(Any, blocks), **of_blocks)
+    return solver.Assembly.from_outlines(cast(Any, blocks), thickness=cast(Any, thickness), **of_blocks)
 
 
 def standing(layout: Layout, thickness: float) -> Layout:

@@ -128,7 +128,7 @@ def prism(outline: ArrayLike, bottom: float, top: float) -> Solid:
     return between(*(np.column_stack([ring, np.full(len(ring), z)]) for z in (bottom, top)))
 
 
-def box(low: Sequence[float], high: Sequence[float]) -> Solid:
+def box(low: Sequence[float] | np.ndarray, high: Sequence[float] | np.ndarray) -> Solid:
     """Make a box of two opposite corners [m]."""
     (x0, y0, z0), (x1, y1, z1) = low, high
     return extruded([[x0, z0], [x1, z0], [x1, z1], [x0, z1]], y0, y1)

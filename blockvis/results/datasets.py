@@ -21,7 +21,7 @@ from vtkmodules.vtkCommonDataModel import (
 )
 
 import solver
-from blockvis.system.vtk_files import string_array
+from blockvis.system.vtk_files import arrays_of, string_array
 from solver import mechanics
 
 from .about import STATIC, Quantities
@@ -336,12 +336,10 @@ def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str, ah
 def state_units(grid: vtkUnstructuredGrid, own: Mapping[str, str]) -> None:
     """Write the unit of each array into its metadata and into the field array ``units``; ``own`` beside the common."""
     listed, units = [], {**UNITS, **own}
-    for attributes in (grid.GetPointData(), grid.GetCellData(), grid.GetFieldData()):
-        for k in range(attributes.GetNumberOfArrays()):
-            array = attributes.GetAbstractArray(k)
-            if array.GetName() in units:
-                array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), units[array.GetName()])
-                listed.append(f"{array.GetName()} [{units[array.GetName()]}]")
+    for _, array in arrays_of(grid):
+        if array.GetName() in units:
+            array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), units[array.GetName()])
+            listed.append(f"{array.GetName()} [{units[array.GetName()]}]")
     add_arrays(grid.GetFieldData(), {"units": dict.fromkeys(listed)})
 
 

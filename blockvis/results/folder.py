@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 import solver
+from blockvis.layout.layout import assembly_of, layout_of
 from blockvis.system.atomic_files import PARTIAL, WINDOWS, flush, make_folder, remove, write_atomic
 from blockvis.text import resume_command
 from solver import mechanics
@@ -336,17 +337,10 @@ def stored_assembly(folder: Path) -> solver.Assembly:
         raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
     try:
         stored, _ = unpacked((folder / "assembly.npz").read_bytes(), solver.Assembly)
-        labels: dict[str, Any] = {"names": stored.names, "roles": stored.roles, "materials": stored.materials}
-        blocks = range(stored.n_blocks)
         # Checked like a layout: the file may come from anywhere.
-        if isinstance(stored.shapes, mechanics.Polyhedra):
-            surfaces = [stored.shapes.surface(block) for block in blocks]
-            assembly = solver.Assembly.from_solids(surfaces, density=stored.density, **labels)
-        else:
-            outlines = [stored.outline(block) for block in blocks]
-            assembly = solver.Assembly.from_outlines(
-                outlines, density=stored.density, thickness=stored.thickness, **labels
-            )
+        drawn = layout_of(stored)
+        labels: dict[str, Any] = {"names": stored.names, "roles": stored.roles, "materials": stored.materials}
+        assembly = assembly_of(drawn.blocks, drawn.thickness, density=stored.density, **labels)
         return replace(assembly, drawn_names=stored.drawn_names)
     except (ValueError, TypeError, IndexError) as error:
         raise ValueError(f"'{folder / 'assembly.npz'}' cannot be read ({error}); run the case again") from None

@@ -14,6 +14,7 @@ from vtkmodules.vtkIOHDF import vtkHDFWriter
 
 import solver
 from blockvis.system.atomic_files import atomic_file
+from blockvis.system.vtk_files import arrays_of
 
 from .datasets import grids_of
 from .mechanism_arrays import as_shown
@@ -71,8 +72,7 @@ class _Series(VTKPythonAlgorithmBase):
 
 
 def _without_strings(grid: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
-    for attributes in (grid.GetPointData(), grid.GetCellData(), grid.GetFieldData()):
-        for array in [attributes.GetAbstractArray(k) for k in range(attributes.GetNumberOfArrays())]:
-            if isinstance(array, vtkStringArray):
-                attributes.RemoveArray(array.GetName())
+    for attributes, array in arrays_of(grid):
+        if isinstance(array, vtkStringArray):
+            attributes.RemoveArray(array.GetName())
     return grid

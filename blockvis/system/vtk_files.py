@@ -9,7 +9,7 @@ import re
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -77,6 +77,12 @@ def string_array(name: str, words: Iterable[str]) -> vtkStringArray:
     return array
 
 
+def arrays_of(dataset: vtkUnstructuredGrid) -> list[tuple[Any, Any]]:
+    """List the arrays of points, cells and the whole dataset, each after the data that it belongs to."""
+    every = (dataset.GetPointData(), dataset.GetCellData(), dataset.GetFieldData())
+    return [(data, data.GetAbstractArray(k)) for data in every for k in range(data.GetNumberOfArrays())]
+
+
 def _with_bytes(dataset: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
     """Make a copy of a dataset with bytes among the field data in place of arrays of strings."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
@@ -84,15 +90,13 @@ def _with_bytes(dataset: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
 
     copy = dataset.NewInstance()
     copy.ShallowCopy(dataset)
-    for attributes in (copy.GetPointData(), copy.GetCellData(), copy.GetFieldData()):
-        arrays = [attributes.GetAbstractArray(k) for k in range(attributes.GetNumberOfArrays())]
-        for array in arrays:
-            if isinstance(array, vtkStringArray):
-                text = "".join(f"{array.GetValue(k)}\n" for k in range(array.GetNumberOfValues()))
-                written = numpy_to_vtk(np.frombuffer(text.encode(), dtype=np.uint8), deep=True)
-                written.SetName(array.GetName())
-                attributes.RemoveArray(array.GetName())
-                copy.GetFieldData().AddArray(written)
+    for attributes, array in arrays_of(copy):
+        if isinstance(array, vtkStringArray):
+            text = "".join(f"{array.GetValue(k)}\n" for k in range(array.GetNumberOfValues()))
+            written = numpy_to_vtk(np.frombuffer(text.encode(), dtype=np.uint8), deep=True)
+            written.SetName(array.GetName())
+            attributes.RemoveArray(array.GetName())
+            copy.GetFieldData().AddArray(written)
     return copy
 
 

@@ -202,6 +202,8 @@ def test_metres_that_a_program_calls_degrees_are_read_with_a_note(tmp_path):
         ({"type": "Polygon", "coordinates": [[[0, 0], [1, 0]]]}, "feature 0 has a geometry that cannot be read"),
         ({"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, float("nan")]]]}, "must be finite"),
         ({"type": "LineString", "coordinates": [[0, 0], [1, 0]]}, "has no polygon (found: 1 line closes nothing"),
+        ({"type": "Polygon", "coordinates": [[[0, 0], [10**400, 0], [1, 1]]]}, "feature 0 has a geometry that cannot"),
+        ({"type": "FeatureCollection", "crs": {"properties": None}, "features": []}, "has no polygon (found: nothing)"),
         ({"type": "Topology"}, "features of GeoJSON, or"),
     ],
 )

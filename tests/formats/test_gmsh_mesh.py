@@ -1,5 +1,6 @@
 """Meshes of gmsh: one surface, one block, groups by dimension and tag; and broken files."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -170,3 +171,15 @@ def test_truncated_anywhere_is_refused_or_complete(tmp_path):
         (tmp_path / "a.msh").write_bytes(data[:length])
         with pytest.raises(ValueError):
             read(tmp_path / "a.msh")
+
+
+@pytest.mark.parametrize("header", [(2, 0, 2), (2, 1, -4)], ids=["no elements", "no tags"])
+def test_headers_of_binary_elements_that_count_nothing_are_refused(header, tmp_path):
+    path = tmp_path / "broken.msh"
+    nodes = b"".join(struct.pack("<i3d", k, x, y, 0.0) for k, x, y in ((1, 0.0, 0.0), (2, 1.0, 0.0), (3, 0.0, 1.0)))
+    path.write_bytes(
+        b"$MeshFormat\n2.2 1 8\n\x01\x00\x00\x00\n$EndMeshFormat\n$Nodes\n3\n" + nodes + b"\n$EndNodes\n"
+        b"$Elements\n1\n" + struct.pack("<3i", *header) + b"\n$EndElements\n"
+    )
+    with pytest.raises(ValueError, match=f"header of {header[1]} elements, {header[2]} tags"):
+        read_layout(path)

@@ -580,6 +580,15 @@ def test_annotations_are_blocks_with_their_label_as_group(tmp_path, capsys, cont
     assert ("left out: 1 shapes of kind linestrip" in out) == ("shapes" in content)
 
 
+def test_a_world_file_places_annotations_of_an_image_that_is_not_there(tmp_path):
+    """Whatever it is called; without one the lowest of the shapes is at zero."""
+    content = json.dumps(_via()).replace("w.jpg", "pixels.jpg")
+    (tmp_path / "w.json").write_text(content, encoding="utf-8")
+    assert read_layout(tmp_path / "w.json", pixel=0.01).points[:, 1].min() == 0.0
+    (tmp_path / "pixels.jgw").write_text("0.01 0 0 -0.01 5.005 7.995", encoding="utf-8")
+    np.testing.assert_allclose(read_layout(tmp_path / "w.json").points.min(axis=0), [5.2, 7.0])
+
+
 def test_packed_runs_and_several_pieces_of_coco_are_read(tmp_path):
     packed = _coco()
     packed["annotations"] = packed["annotations"][:1]

@@ -34,6 +34,8 @@ STAR = [[(1 + k % 2) * math.cos(k * math.pi / 1250), (1 + k % 2) * math.sin(k * 
             r"a\.json': block 'a' has no 'thicknes' \(did you mean 'thickness'\?\); it has name, group",
         ),
         ({"units": "mm", "blocks": [{"outline": RING}]}, r"a\.json' has no 'units' \(did you mean 'unit'\?\)"),
+        ({"blocks": [{"name": "a", "outline": [*RING[:2], [10**400, 1]]}]}, "block 'a' has no outline of numbers"),
+        ({"blocks": [{"name": "a", "outline": RING, "density": 10**400}]}, r"block 'a' has density 1000\d+; give"),
         ({"unit": "parsec", "blocks": [{"outline": RING}]}, "unit 'parsec' is not known"),
         ({"blocks": [{"name": "a", "outline": STAR}]}, "has 2500 corners, more than 2000"),
     ],

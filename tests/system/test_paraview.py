@@ -71,6 +71,15 @@ print("TOLD" + json.dumps(told))
 """
 
 
+def told_by(script, folder, tmp_path):
+    """What a script of ParaView tells of a results folder."""
+    path = tmp_path / "script.py"
+    path.write_text(script, encoding="utf-8")
+    done = subprocess.run([PVPYTHON, path, folder], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return json.loads(done.stdout.split("TOLD")[1])
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """The results of the reference arch, and the script that a run writes beside its own."""
@@ -84,11 +93,7 @@ def folder(tmp_path_factory):
 @pytest.mark.paraview
 @pytest.mark.skipif(PVPYTHON is None, reason="pvpython is not installed (Debian: python3-paraview)")
 def test_paraview_reads_every_increment_and_every_array(folder, tmp_path):
-    script = tmp_path / "read.py"
-    script.write_text(READ, encoding="utf-8")
-    done = subprocess.run([PVPYTHON, script, folder], capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
-    told = json.loads(done.stdout.split("TOLD")[1])
+    told = told_by(READ, folder, tmp_path)
     response = arch_response()
     for part, dataset in DATASETS.items():
         assert len(told[part]) == len(response.path)
@@ -108,17 +113,13 @@ def test_apply_and_the_first_warp_show_what_their_names_say(shape, tmp_path):
     case = tmp_path / "case.toml"
     case.write_text(CASE.format(shape=shape), encoding="utf-8")
     run = blockvis.run_case(case, tmp_path / "out", outputs=())
-    script = tmp_path / "warp.py"
-    script.write_text(WARP, encoding="utf-8")
-    done = subprocess.run([PVPYTHON, script, run.folder], capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
     response = run.response
     assembly = response.assembly
     corners = {
         "undeformed": assembly.vertices,
         "moved": mechanics.moved_vertices(assembly, response.path[-1].pose),
     }
-    blocks, joints, contacts = json.loads(done.stdout.split("TOLD")[1])
+    blocks, joints, contacts = told_by(WARP, run.folder, tmp_path)
     assert blocks[0] == pytest.approx(response.settlement[-1])
     applied, warped = (np.reshape(bounds, (3, 2))[:2].T for bounds in blocks[2:])
     np.testing.assert_allclose(applied, np.stack([corners[shape].min(axis=0), corners[shape].max(axis=0)]), atol=1e-6)

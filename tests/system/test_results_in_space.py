@@ -4,7 +4,6 @@ import csv
 import json
 import re
 import shutil
-import subprocess
 import warnings
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
@@ -13,8 +12,8 @@ import numpy as np
 import pytest
 import pyvista as pv
 from PIL import Image
-from structures import alike, arch_response, box, pixels, vault_response
-from test_paraview import PVPYTHON, READ
+from structures import alike, arch_response, box, pixels, upright, vault_response
+from test_paraview import PVPYTHON, READ, told_by
 from test_report import browser, visited
 
 import blockvis
@@ -52,14 +51,6 @@ animation = "collapse.mp4"
 
 #: An L of unit thickness: its faces at both ends have a re-entrant corner.
 ELL = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 3], [0, 3]], dtype=float)
-
-
-def prism(outline, low=0.0, high=1.0):
-    """Vertices and faces of an outline in x and z, drawn out along y."""
-    n = len(outline)
-    corners = [[x, y, z] for y in (low, high) for x, z in outline]
-    sides = [[(k + 1) % n, k, n + k, n + (k + 1) % n] for k in range(n)]
-    return corners, [list(range(n)), list(range(2 * n - 1, n - 1, -1)), *sides]
 
 
 def same(one, other):
@@ -165,7 +156,7 @@ def test_contact_points_have_forces_and_slip_as_vectors():
 @pytest.mark.slow
 def test_slip_is_what_one_block_has_moved_along_another():
     plate, brick = [[0, 0], [4, 0], [4, 1], [0, 1]], [[1, 1], [2, 1], [2, 2], [1, 2]]
-    two = solver.Assembly.from_solids([prism(plate), prism(brick)], roles=["fixed", "free"])
+    two = solver.Assembly.from_solids([upright(plate, 0.0, 1.0), upright(brick, 0.0, 1.0)], roles=["fixed", "free"])
     start = solver.Pose.initial(two)
     pose = solver.Pose(start.positions + np.array([[0, 0, 0], [0.3, 0.1, 0]]), start.rotations)
     contacts = mechanics.find_contacts(two, mechanics.moved_vertices(two, pose), 0.01)
@@ -204,7 +195,7 @@ def test_results_come_back_bit_for_bit(tmp_path):
 
 
 def test_bent_faces_are_cut_into_triangles_that_cover_them():
-    ell = solver.Assembly.from_solids([prism(ELL)]).polyhedra
+    ell = solver.Assembly.from_solids([upright(ELL, 0.0, 1.0)]).polyhedra
     triangles, blocks = triangles_of(ell)
     a, b, c = np.moveaxis(ell.vertices[triangles], 1, 0)
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
@@ -217,7 +208,7 @@ def test_bent_faces_are_cut_into_triangles_that_cover_them():
 
 def test_edges_between_faces_in_one_plane_are_not_drawn():
     square = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [0, 1]], dtype=float)
-    flat = solver.Assembly.from_solids([prism(square)]).polyhedra
+    flat = solver.Assembly.from_solids([upright(square, 0.0, 1.0)]).polyhedra
     assert len(sharp_edges(flat)) in (12, 14)
     ends = flat.vertices[sharp_edges(flat)]
     across = (ends[:, :, 0] == 1.0).all(axis=1) & (ends[:, 0, 1] != ends[:, 1, 1])
@@ -658,11 +649,7 @@ def test_page_draws_blocks_cracks_and_supports(tmp_path):
 def test_paraview_reads_polyhedra_faces_and_contacts(tmp_path):
     response = vault_response()
     folder = blockvis.write(response, tmp_path / "out")
-    script = tmp_path / "read.py"
-    script.write_text(READ, encoding="utf-8")
-    done = subprocess.run([PVPYTHON, script, folder], capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
-    told = json.loads(done.stdout.split("TOLD")[1])
+    told = told_by(READ, folder, tmp_path)
     for part, dataset in (("blocks", block_grid), ("contacts", contact_grid), ("joints", joint_grid)):
         for (_, cells, names), increment in zip(told[part], response.path, strict=True):
             ours = pv.UnstructuredGrid(dataset(response.assembly, increment))

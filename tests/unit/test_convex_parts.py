@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from structures import prism, turn_by, upright
+from structures import prism, turn_by, upright, with_hole
 
 import solver
 from solver import mechanics
@@ -24,15 +24,9 @@ OUTLINES = {
 
 
 def ring():
-    """A square with a square hole through it, its faces with the hole cut in two each."""
+    """A square with a square hole through it."""
     outer, inner = ([(-r, -r), (r, -r), (r, r), (-r, r)] for r in (2.0, 1.0))
-    plan = np.array(outer + inner)
-    low, high = (np.column_stack([plan, np.full(8, z)]) for z in (0.0, 1.0))
-    halves = [[0, 1, 2, 6, 5, 4], [2, 3, 0, 4, 7, 6]]
-    faces = [face[::-1] for face in halves] + [[8 + c for c in face] for face in halves]
-    faces += [[k, (k + 1) % 4, (k + 1) % 4 + 8, k + 8] for k in range(4)]
-    faces += [[4 + (k + 1) % 4, 4 + k, 12 + k, 12 + (k + 1) % 4] for k in range(4)]
-    return np.concatenate([low, high]), faces
+    return with_hole(outer, inner)
 
 
 def parts_of(solid):

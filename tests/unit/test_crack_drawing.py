@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from PIL import Image
-from structures import arch_response, box, posed, rectangle
+from structures import arch_response, box, pixels, posed, rectangle
 
 import solver
 from blockvis.pictures import crack_drawing, palette
@@ -15,10 +14,6 @@ from blockvis.text import width_text
 from solver import mechanics
 
 SIZE = (640, 360)
-
-
-def pixels(path):
-    return np.asarray(Image.open(path).convert("RGB")).astype(int)
 
 
 def covered(picture, colour, tolerance=6):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from structures import box, of_cubes, prism, turn_by
+from structures import box, of_cubes, prism, turn_by, with_hole
 from test_convex_parts import out_of_faces
 
 import solver
@@ -36,15 +36,9 @@ def outline_of(name, a, b, c):
 
 
 def frame(a, b, c):
-    """A square frame of unequal bars, its faces with the hole cut in two each."""
+    """A square frame of unequal bars."""
     outer = [(-a, -b), (c + 1, -b), (c + 1, a + 1), (-a, a + 1)]
-    plan = np.array([*outer, (0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
-    low, high = (np.column_stack([plan, np.full(8, z)]) for z in (0.0, 1.0))
-    halves = [[0, 1, 2, 6, 5, 4], [2, 3, 0, 4, 7, 6]]
-    faces = [face[::-1] for face in halves] + [[8 + k for k in face] for face in halves]
-    faces += [[k, (k + 1) % 4, (k + 1) % 4 + 8, k + 8] for k in range(4)]
-    faces += [[4 + (k + 1) % 4, 4 + k, 12 + k, 12 + (k + 1) % 4] for k in range(4)]
-    return np.concatenate([low, high]), faces
+    return with_hole(outer, [(0, 0), (1, 0), (1, 1), (0, 1)])
 
 
 def parts_of(corners, faces):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from structures import box
 
 import blockvis
 import solver
@@ -19,12 +20,6 @@ def wall(dimension=2):
         boxes = [((-2, -2, -1), (2, 2, 0)), ((-B / 2, -0.5, 0), (B / 2, 0.5, H))]
         assembly = solver.Assembly.from_solids([box(*one) for one in boxes], roles=["moving", "free"])
     return assembly, assembly.masses[1] * solver.GRAVITY
-
-
-def box(low, high):
-    (x, y, z), (u, v, w) = low, high
-    corners = [(x, y, z), (u, y, z), (u, v, z), (x, v, z), (x, y, w), (u, y, w), (u, v, w), (x, v, w)]
-    return corners, [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
 
 
 def tilt(dimension, limit, increment=0.05):

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from structures import rectangle
+from structures import rectangle, sideways
 
 import blockvis
 import solver
@@ -26,11 +26,6 @@ def block():
         roles=["free", "fixed"],
         names=["block", "ground"],
     )
-
-
-def sideways(assembly):
-    live = solver.weight_fraction(assembly, (1.0, 0.0), np.flatnonzero(assembly.free))
-    return solver.Loads(solver.self_weight(assembly).dead, live)
 
 
 @cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from structures import box
+from structures import box, upright
 
 import solver
 from blockvis import generators, lay_backfill
@@ -21,20 +21,12 @@ def mirrored(outline: np.ndarray) -> np.ndarray:
     return (outline * [-1.0, 1.0])[::-1]
 
 
-def prism(outline: np.ndarray) -> tuple[np.ndarray, list[list[int]]]:
-    """The outline in the plane y = 0, one metre deep."""
-    n = len(outline)
-    front, back = (np.column_stack([outline[:, 0], np.full(n, y), outline[:, 1]]) for y in (0.0, 1.0))
-    sides = [[n + k, n + (k + 1) % n, (k + 1) % n, k] for k in range(n)]
-    return np.vstack([front, back]), [list(range(n)), list(range(2 * n - 1, n - 1, -1)), *sides]
-
-
 def two_block_arch(dimension: int) -> solver.Assembly:
     outlines = [HALF, mirrored(HALF), GROUND, mirrored(GROUND)]
     labels = {"names": ["left half", "right half", "ground", "moving"], "roles": ["free", "free", "fixed", "moving"]}
     if dimension == 2:
         return solver.Assembly.from_outlines(outlines, density=DENSITY, **labels)
-    return solver.Assembly.from_solids([prism(outline) for outline in outlines], density=DENSITY, **labels)
+    return solver.Assembly.from_solids([upright(outline, 0.0, 1.0) for outline in outlines], density=DENSITY, **labels)
 
 
 def under(assembly: solver.Assembly, fill: solver.Backfill) -> solver.Loads:

@@ -10,6 +10,7 @@ in another formulation; the block's curve is elementary statics.
 
 import numpy as np
 import pytest
+from structures import sideways
 
 import solver
 from solver import limit_load, pushover
@@ -45,11 +46,6 @@ def wall(rows):
 def on_ground(outlines, left, right, role="fixed"):
     ground = [[left, -0.5], [right, -0.5], [right, 0.0], [left, 0.0]]
     return solver.Assembly.from_outlines([*outlines, ground], roles=["free"] * len(outlines) + [role])
-
-
-def sideways(assembly, fraction=1.0):
-    live = solver.weight_fraction(assembly, (fraction, 0.0), np.flatnonzero(assembly.free))
-    return solver.Loads(solver.self_weight(assembly).dead, live)
 
 
 def stack(n, width=0.2, height=1.0, left=0.0, right=0.2, role="fixed"):

@@ -23,12 +23,6 @@ def along_x(outline, low, high):
     return corners[:, [2, 0, 1]], faces
 
 
-def along_y(outline, low, high):
-    """Extrude an outline in x and z from y = low to y = high."""
-    corners, faces = prism(outline, low, high)
-    return corners[:, [0, 2, 1]], [face[::-1] for face in faces]
-
-
 def on_ground(solids, extent=5.0):
     ground = box((-extent, -extent, -1.0), (extent, extent, 0.0))
     return solver.Assembly.from_solids([*solids, ground], roles=["free"] * len(solids) + ["fixed"])
@@ -151,7 +145,7 @@ def test_a_bar_across_two_bars_slides_on_their_edges(friction):
     """Edge on edge, pushed along its own edge and there: at μ."""
     upper = along_x([[0.0, 0.0], [0.3, 0.5], [-0.3, 0.5]], -2.0, 2.0)
     edges = [[[-0.3 + x, -0.5], [0.3 + x, -0.5], [x, 0.0]] for x in (-1.2, 1.0)]
-    lower = [along_y(edge, -1.0, 1.0) for edge in edges]
+    lower = [upright(edge, -1.0, 1.0) for edge in edges]
     assembly = solver.Assembly.from_solids([upper, *lower], roles=["free", "fixed", "fixed"])
     weight = assembly.masses[0] * solver.GRAVITY
     live = solver.point_load(assembly, 0, (weight, 0.0, 0.0), point=(0.0, 0.0, 0.0))
@@ -446,7 +440,7 @@ def test_a_bed_that_bends_by_less_than_a_degree_bears_on_both_faces(bend, first)
     bed = np.roll([(-1.0, -1.0), (1.0, -1.0), (1.0, 0.0), (0.0, 0.0), (-1.0, rise)], first, axis=0)
     stone = np.roll([(-1.0, rise), (0.0, 0.0), (1.0, 0.0), (1.0, 0.5), (-1.0, 0.5)], first, axis=0)
     plane = solver.Assembly.from_outlines([stone, bed], roles=["free", "fixed"])
-    space = solver.Assembly.from_solids([along_y(stone, 0.0, 1.0), along_y(bed, 0.0, 1.0)], roles=["free", "fixed"])
+    space = solver.Assembly.from_solids([upright(stone, 0.0, 1.0), upright(bed, 0.0, 1.0)], roles=["free", "fixed"])
     live = solver.weight_fraction(plane, (1.0, 0.0), np.array([0]))
     multiplier = limit(plane, live, 0.1).multiplier
     assert limit(space, push(space, 0.0), 0.1).multiplier == pytest.approx(multiplier, rel=EXACT)
@@ -466,7 +460,7 @@ def test_a_slab_on_a_slope_is_held_by_the_ledge_at_its_foot(ends):
         (-0.3 * s, 1.0 + 0.3 * c),
     ]
     plane = solver.Assembly.from_outlines([base, slab], roles=["fixed", "free"])
-    solids = [along_y(base, 0.0, 1.0), along_y(slab, *ends)]
+    solids = [upright(base, 0.0, 1.0), upright(slab, *ends)]
     space = solver.Assembly.from_solids(solids, roles=["fixed", "free"])
     for sense in (1.0, -1.0):
         expected = solver.Structure(plane, friction_coefficient=0.3).limit_load(acceleration=(sense, 0.0))
