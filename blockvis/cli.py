@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
+from mmap import mmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,8 +43,10 @@ BAD_INPUT, SOLVER_FAILED, NO_PICTURES, NO_EQUILIBRIUM, INTERRUPTED = 2, 3, 4, 5,
 #: What errors of the standard output have for the name of a file.
 OUTPUT = "standard output"
 
-#: What libraries say, and Python of threads, where there is no memory for them.
-NO_MEMORY = ("failed to map segment", "can't start new thread")
+#: What libraries of linear algebra take as they are loaded [bytes]; what Linux says where there is no memory, of
+#: libraries and of threads, too.
+LEAST_MEMORY = 5 << 27
+NO_MEMORY = ("Cannot allocate memory", "failed to map segment", "can't start new thread")
 
 #: What the exit codes mean, for ``--help``.
 EXIT_CODES = f"""exit codes:
@@ -93,18 +96,21 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Drawing] |
     try:
         options = _options(arguments)
         options.outputs = outputs
+        # A library that is loaded with HiGHS asks for 256 MiB until it gets them, for ever.
+        mmap(-1, LEAST_MEMORY).close()
         code: int = options.verb(options)
     except (ValueError, OSError, MissingExtra) as error:
         if isinstance(error, OSError) and (is_broken_pipe(error) or error.filename == OUTPUT):
             raise
+        if _lacks_memory(error):
+            return BAD_INPUT
         print(f"blockvis: {_in_plain_words(error)}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt as stop:
         print(f"blockvis: {stop}" if str(stop) else "blockvis: interrupted", file=sys.stderr)
         return INTERRUPTED
     except Exception as error:
-        if isinstance(error, MemoryError) or any(words in str(error) for words in NO_MEMORY):
-            print(f"blockvis: there is not enough memory for what is asked for: {error}".rstrip(": "), file=sys.stderr)
+        if _lacks_memory(error):
             return BAD_INPUT
         # Not in the clause, where the end of a help would load the mechanics to look whether it is one.
         if not isinstance(error, solver.SolveError):
@@ -112,6 +118,15 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Drawing] |
         print(f"blockvis: the linear program could not be solved: {error}", file=sys.stderr)
         return SOLVER_FAILED
     return code
+
+
+def _lacks_memory(error: Exception) -> bool:
+    """Whether an error is of memory that there is not, which is said then."""
+    lacks = isinstance(error, MemoryError) or any(words in str(error) for words in NO_MEMORY)
+    if lacks:
+        said = f"blockvis: there is not enough memory for what is asked for: {error}".removesuffix(": ")
+        print(f"{said}; raise its limit (ulimit -v), or ask for less", file=sys.stderr)
+    return lacks
 
 
 def _in_plain_words(error: Exception) -> str:

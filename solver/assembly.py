@@ -82,8 +82,8 @@ class Assembly(Kept, Shown):
         Raises
         ------
         ValueError
-            For an outline with fewer than three corners, with coordinates that are not finite, without area, crossing
-            or touching itself, also but for rounding, an unknown role, a density or thickness that is not positive.
+            For an outline with fewer than three corners, with coordinates that are not finite, without
+            area, crossing or touching itself, an unknown role, a density or thickness that is not positive.
 
         Examples
         --------
@@ -111,11 +111,6 @@ class Assembly(Kept, Shown):
             raise ValueError(
                 f"block {i} ('{names[i]}') crosses itself or doubles back: the edges that start at ({a[0]:.6g}, "
                 f"{a[1]:.6g}) and ({b[0]:.6g}, {b[1]:.6g}) meet; order its corners around the outline"
-            )
-        for k in drawn.spikes.tolist():
-            (x, y), i = drawn.vertices[k], drawn.block_of_vertex[k]
-            raise ValueError(
-                f"block {i} ('{names[i]}') has a spike of rounding at ({x:.9g}, {y:.9g}): drop that corner"
             )
         return cls(
             shapes=Polygons(vertices, offsets, _positive(thickness, "thickness", "m", names)),
@@ -249,21 +244,6 @@ class Assembly(Kept, Shown):
     def areas(self) -> np.ndarray:
         """(n_blocks,) array [m²]: in the plane."""
         return self.polygons.areas
-
-    @property
-    def next_vertex(self) -> np.ndarray:
-        """(n_vertices,) int array: in the plane, the vertex that follows; edge i runs from i to it."""
-        return self.polygons.next_vertex
-
-    @property
-    def previous_vertex(self) -> np.ndarray:
-        """(n_vertices,) int array: in the plane, the vertex before."""
-        return self.polygons.previous_vertex
-
-    @property
-    def edge_lengths(self) -> np.ndarray:
-        """(n_vertices,) array [m]: in the plane, length of the edge that starts at each vertex."""
-        return self.polygons.edge_lengths
 
     def outline(self, block: int) -> np.ndarray:
         """(n, 2) array [m]: in the plane, corners of one block, counter-clockwise, before any movement."""

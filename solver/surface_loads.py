@@ -128,7 +128,7 @@ def force_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1
     owner = int(assembly.block_of_vertex[edge])
     if not assembly.free[owner]:
         raise ValueError(f"the load at x = {x:g} m stands on the support '{assembly.names[owner]}'")
-    start, stop = assembly.vertices[[edge, assembly.next_vertex[edge]]]
+    start, stop = assembly.vertices[[edge, assembly.polygons.next_vertex[edge]]]
     top = start[1] + (x - start[0]) / (stop[0] - start[0]) * (stop[1] - start[1])
     return PointForces.at(owner, force, (x, float(top)))
 
@@ -141,7 +141,7 @@ def _first_met(
     Gives the ends of the strips, (n + 1,) [m] across, the depth in the middle of each, infinite where there is no
     block, and the edge there, by the vertex it starts at, -1 where there is none.
     """
-    start, stop = assembly.vertices, assembly.vertices[assembly.next_vertex]
+    start, stop = assembly.vertices, assembly.vertices[assembly.polygons.next_vertex]
     a, b = start @ across, stop @ across
     strips = np.unique(np.concatenate([a, b]))
     # Narrower ones are rounding of the drawing.

@@ -9,8 +9,7 @@ from typing import Any
 
 @cache
 def _views() -> Any:
-    entries = tuple(entry_points(group="solver.views"))
-    return entries[0].load() if entries else None
+    return next((entry.load() for entry in entry_points(group="solver.views")), None)
 
 
 def views() -> Any:

@@ -162,7 +162,7 @@ def _extrados(assembly: solver.Assembly, chosen: np.ndarray, surface: float) -> 
 def _segments(
     assembly: solver.Assembly, chosen: np.ndarray, surface: float, small: float
 ) -> tuple[list[np.ndarray], list[int]]:
-    start, stop = assembly.vertices, assembly.vertices[assembly.next_vertex]
+    start, stop = assembly.vertices, assembly.vertices[assembly.polygons.next_vertex]
     owner = assembly.block_of_vertex
     edges = np.flatnonzero(chosen[owner] & (start[:, 0] - stop[:, 0] > small))
     outlines = np.array([shapely.Polygon(assembly.outline(k)) for k in range(assembly.n_blocks)])

@@ -137,16 +137,16 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
             f"{np.median(LARGEST_SHARE * share):.3g} m; make them smaller"
         )
     drawn *= np.where(too_far, LARGEST_SHARE * share / np.maximum(size, 1e-300), 1.0)[:, None]
-    new = _on_rails(positions, drawn, rails, place, assembly.next_vertex)
+    new = _on_rails(positions, drawn, rails, place, assembly.polygons.next_vertex)
     for _ in range(HALVINGS):
         # A cut brick has edges much shorter than those along which its corners slide, and moves with them.
         distorted = _distorted(assembly, positions, new, place)
         if not distorted.any():
             break
         near_by = set(place[distorted[owner]].tolist())
-        rail_ends = [(place[rails[p]], place[assembly.next_vertex[rails[p]]]) for p in near_by if p in rails]
+        rail_ends = [(place[rails[p]], place[assembly.polygons.next_vertex[rails[p]]]) for p in near_by if p in rails]
         drawn[sorted(near_by.union(*rail_ends))] /= 2.0
-        new = _on_rails(positions, drawn, rails, place, assembly.next_vertex)
+        new = _on_rails(positions, drawn, rails, place, assembly.polygons.next_vertex)
 
     try:
         moved = solver.Assembly.from_outlines(
@@ -162,7 +162,7 @@ def _rails(assembly: solver.Assembly, positions: np.ndarray, place: np.ndarray, 
 
     A place inside the edges of two blocks slides along the longer one.
     """
-    start, end = positions[place], positions[place[assembly.next_vertex]]
+    start, end = positions[place], positions[place[assembly.polygons.next_vertex]]
     edges = shapely.linestrings(np.stack([start, end], axis=1))
     point, edge = shapely.STRtree(edges).query(shapely.points(positions), predicate="dwithin", distance=near)
     length = np.hypot(*(end - start).T)
@@ -179,7 +179,7 @@ def _rails(assembly: solver.Assembly, positions: np.ndarray, place: np.ndarray, 
 
 def _distorted(assembly: solver.Assembly, positions: np.ndarray, new: np.ndarray, place: np.ndarray) -> np.ndarray:
     """(n_blocks,) bool array: blocks with an edge that has changed by more than half its length."""
-    following = assembly.next_vertex
+    following = assembly.polygons.next_vertex
     before = positions[place[following]] - positions[place]
     change = new[place[following]] - new[place] - before
     too_much = np.hypot(*change.T) > LARGEST_CHANGE * np.hypot(*before.T)

@@ -33,7 +33,7 @@ def ground_below(assembly: solver.Assembly, pose: solver.Pose, removed: np.ndarr
     extents = np.maximum.reduceat(drawn, offsets) - lowest
     piers = supports & (extents[:, :-1] < extents[:, -1:]).all(axis=1)
     if assembly.dimension == 2:
-        following, owner = corners[assembly.next_vertex], assembly.block_of_vertex
+        following, owner = corners[assembly.polygons.next_vertex], assembly.block_of_vertex
         # The outward normal of an edge points up where the edge runs to the left.
         normals = (following - corners)[:, ::-1] * [1.0, -1.0]
         heights = np.minimum(corners[:, 1], following[:, 1])

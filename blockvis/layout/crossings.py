@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import shapely
 
-from solver import mechanics
-
 from .layout import Layout
 from .left_out import LeftOut
 from .notes import CHANGED, Note
-from .outlines import ROUNDING, around_hole, pieces_of, ring_of, without_collinear
+from .outlines import ROUNDING, around_hole, pieces_of, ring_area, ring_of, without_collinear
 from .surfaces import same_points
 
 #: The largest piece of an outline that crosses itself is the block if it holds at least this share of its area.
@@ -65,14 +63,24 @@ def uncrossed(layout: Layout) -> Layout:
 
 
 def _turning_back(rings: Sequence[np.ndarray]) -> dict[int, np.ndarray]:
-    """Numbers of the corners of each (n, 2) ring at which its line comes back on itself, where it does."""
-    if not rings:
-        return {}
-    offsets = np.cumsum([0, *map(len, rings)])
-    drawn = mechanics.Polygons(np.concatenate(rings), offsets, np.ones(len(rings)))
-    spikes = drawn.spikes
-    of = drawn.block_of_vertex[spikes]
-    return {int(i): spikes[of == i] - offsets[i] for i in np.unique(of)}
+    """Numbers of the corners of each (n, 2) ring with an area at which its line comes back on itself, where it does.
+
+    Such a spike has no width but that of rounding, so that the outline need not touch itself.
+    """
+    points, counts = np.concatenate([np.zeros((0, 2)), *rings]), np.array([len(ring) for ring in rings], dtype=int)
+    ends = np.cumsum(counts)
+    of, last, first = np.repeat(np.arange(len(rings)), counts), ends - 1, ends - counts
+    following, before = np.arange(len(points)) + 1, np.arange(len(points)) - 1
+    following[last], before[first] = first, last
+    back, on = points[before] - points, points[following] - points
+    extents = np.array([np.ptp(ring, axis=0).max() for ring in rings])
+    areas = np.array([abs(ring_area(ring)) for ring in rings])
+    across = np.abs(back[:, 0] * on[:, 1] - back[:, 1] * on[:, 0])
+    shorter, longer = np.sort([np.hypot(*back.T), np.hypot(*on.T)], axis=0)
+    near = ROUNDING * extents[of]
+    turns = ((back * on).sum(axis=1) > 0.0) & (across <= near * longer) & (shorter > near)
+    turns &= (areas > ROUNDING * extents**2)[of]
+    return {int(i): np.flatnonzero(turns[first[i] : ends[i]]) for i in np.unique(of[turns])}
 
 
 def _refusal(name: str, ring: np.ndarray, around: Any, share: float) -> LeftOut:

@@ -108,10 +108,14 @@ def noted(layout: Layout) -> Layout:
     doubted = "" if layout.unit_by == "user" else doubt(layout.unit, size, page=layout.unit_by == "page")
     found = [Note(UNIT, words) for words in (doubted, _thickness_doubt(layout, size)) if words]
     found += [Note(SPECK, words) for words in (_specks(layout, size),) if words]
-    for label in sorted({group for group in (*layout.groups, *layout.materials) if VOIDS.fullmatch(group)}):
-        words = f"what is called '{label}' counts as a stone; of an opening leave it out: ignore = [\"{label}\"]"
-        found.append(Note(CHANGED, words))
     walls = [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]
+    # Those of walls that a bond is to fill are told with these.
+    labels = () if walls else sorted({*layout.groups, *layout.materials})
+    found += [
+        Note(CHANGED, f"what is called '{label}' counts as a stone; of an opening leave it out: ignore = [\"{label}\"]")
+        for label in labels
+        if VOIDS.fullmatch(label)
+    ]
     return replace(layout, notes=(*layout.notes, *walls, *in_words(layout.left_out), *found))
 
 

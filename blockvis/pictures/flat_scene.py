@@ -94,7 +94,7 @@ class FlatScene(Scene):
     def lost(self, blocks: np.ndarray) -> None:
         """Edge blocks that have fallen, (n_blocks,) bool array, where they are drawn."""
         corners = mechanics.moved_vertices(self.assembly, self._shown)
-        edges = np.stack([corners, corners[self.assembly.next_vertex]], axis=1)
+        edges = np.stack([corners, corners[self.assembly.polygons.next_vertex]], axis=1)
         width = max(2.0 * self._outline_width(), THINNEST)
         self.lines("lost", edges[blocks[self.assembly.block_of_vertex]], palette.WARNING, width)
 
@@ -203,7 +203,7 @@ class FlatScene(Scene):
     def show_start(self) -> None:
         """Draw the first position of the moving supports, behind everything."""
         assembly = self.assembly
-        edges = np.stack([assembly.vertices, assembly.vertices[assembly.next_vertex]], axis=1)
+        edges = np.stack([assembly.vertices, assembly.vertices[assembly.polygons.next_vertex]], axis=1)
         moving = assembly.moving[assembly.block_of_vertex]
         self.lines("ghost", edges[moving], palette.GHOST, self.usual_height / 800.0)
 

@@ -141,23 +141,24 @@ def _touching_faces(assembly: solver.Assembly) -> InitialJoints:
 
 
 def _joints_in_plane(assembly: solver.Assembly, contacts: mechanics.Contacts, tolerance: float) -> InitialJoints:
+    shapes = assembly.polygons
     vertex, edge_b, _ = mechanics.corners_and_edges(contacts.features)
     # The corner belongs to two faces of block a; either may lie on the edge of block b.
-    edge_a = np.concatenate([vertex, assembly.previous_vertex[vertex]])
+    edge_a = np.concatenate([vertex, shapes.previous_vertex[vertex]])
     edge_b = np.concatenate([edge_b, edge_b])
     pairs = np.unique(np.stack([np.minimum(edge_a, edge_b), np.maximum(edge_a, edge_b)], axis=1), axis=0)
     a, b = pairs[:, 0], pairs[:, 1]
-    start, stop = assembly.vertices[b], assembly.vertices[assembly.next_vertex[b]]
-    length = assembly.edge_lengths[b]
+    start, stop = assembly.vertices[b], assembly.vertices[shapes.next_vertex[b]]
+    length = shapes.edge_lengths[b]
     tangent = (stop - start) / length[:, None]
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
-    ends_a = np.stack([assembly.vertices[a], assembly.vertices[assembly.next_vertex[a]]], axis=1) - start[:, None]
+    ends_a = np.stack([assembly.vertices[a], assembly.vertices[shapes.next_vertex[a]]], axis=1) - start[:, None]
     along = np.einsum("nij,nj->ni", ends_a, tangent)
     across = np.abs(np.einsum("nij,nj->ni", ends_a, normal))
-    lean = np.abs(across[:, 1] - across[:, 0]) / assembly.edge_lengths[a]
+    lean = np.abs(across[:, 1] - across[:, 0]) / shapes.edge_lengths[a]
     low = np.maximum(0.0, along.min(axis=1))
     high = np.minimum(length, along.max(axis=1))
-    keep = (high - low > 2.0 * tolerance) | (high - low > 0.5 * np.minimum(length, assembly.edge_lengths[a]))
+    keep = (high - low > 2.0 * tolerance) | (high - low > 0.5 * np.minimum(length, shapes.edge_lengths[a]))
     keep &= (lean < PARALLEL) & (across.min(axis=1) <= 2.0 * tolerance) & (along[:, 0] > along[:, 1])
     ends = np.stack([start + low[:, None] * tangent, start + high[:, None] * tangent], axis=1)
     owner = assembly.block_of_vertex

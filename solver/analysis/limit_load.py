@@ -220,9 +220,7 @@ class _Problem:
         velocity, (kinematic, violation) = state.velocity, program.kinematic(state)
         balance = program.matrix @ state.forces.ravel() + program.dead + multiplier * program.live
         total, crushing = model.total_load or 1.0, program.limits.beyond_least
-        size = float(np.abs(velocity).max(initial=0.0)) or 1.0
-        missing, mechanism = np.zeros((2, *model.load.shape))
-        missing[model.assembly.free] = -balance.reshape(-1, model.n_dof)
+        size, mechanism = float(np.abs(velocity).max(initial=0.0)) or 1.0, np.zeros_like(model.load)
         mechanism[model.assembly.free] = velocity.reshape(-1, model.n_dof) / size
         mechanism /= unit_lengths(model.n_dof, model.length)
         found = status not in (LimitStatus.UNBOUNDED, LimitStatus.NO_EQUILIBRIUM)
@@ -246,7 +244,7 @@ class _Problem:
             live_force=model.live_force,
             programs=program.programs,
             torsion=POINTS if program.faces is None else UNIFORM,
-            held_by=model.held_by(missing) if status is LimitStatus.NO_EQUILIBRIUM else "",
+            held_by=model.held_by(-balance.reshape(-1, model.n_dof)) if status is LimitStatus.NO_EQUILIBRIUM else "",
             held=self._held(forces * model.force, mechanism, state.forces[:, 0] >= crushing * (1.0 - USED_UP)),
         )
 

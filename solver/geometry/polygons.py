@@ -21,9 +21,6 @@ LARGEST_TILT = 0.5
 #: may open, and less than the right angle between diagonal neighbours.
 FACING_COSINE = 0.2
 
-#: Width of a spike that is rounding of coordinates, as a fraction of the extent of its block.
-OF_ROUNDING = 2e-6
-
 #: Kinds of contact in the plane, column 0 of the features. A corner on an edge: the corner (a vertex of ``block_a``),
 #: the edge (of ``block_b``, named by the vertex it starts at), -1. A corner on a corner: both vertices, and the edge of
 #: ``block_b`` that the first one faces.
@@ -79,18 +76,6 @@ class Polygons(Bodies):
         along = (self.vertices[self.next_vertex] - self.vertices) / self.edge_lengths[:, None]
         before = along[self.previous_vertex]
         return before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0] > GEOMETRY_TOLERANCE
-
-    @property
-    def spikes(self) -> np.ndarray:
-        """(k,) int array: the vertices at which an outline with an area comes back on itself but for rounding."""
-        on, first, of = self.vertices[self.next_vertex] - self.vertices, self.offsets[:-1], self.block_of_vertex
-        back, lengths = -on[self.previous_vertex], self.edge_lengths
-        across = np.abs(back[:, 0] * on[:, 1] - back[:, 1] * on[:, 0])
-        shorter, longer = np.sort([lengths[self.previous_vertex], lengths], axis=0)
-        extents = (np.maximum.reduceat(self.vertices, first) - np.minimum.reduceat(self.vertices, first)).max(axis=1)
-        near, whole = OF_ROUNDING * extents[of], np.abs(self.areas) > OF_ROUNDING * extents**2
-        turns = ((back * on).sum(axis=1) > 0.0) & (across <= near * longer) & (shorter > near)
-        return np.flatnonzero(turns & whole[of])
 
     @kept
     def widths(self) -> np.ndarray:

@@ -57,13 +57,12 @@ class Controls:
         for name, fits, wanted in (
             ("falling_frames", self.falling_frames >= 0, "of at least 0, by default 10"),
             ("step_tolerance", 0.0 < self.step_tolerance < 1.0, "between 0 and 1, by default 0.005"),
+            ("local_loss", 0.0 <= self.local_loss <= 1.0, "from 0 to 1, a share of the weight, by default 0.05"),
             ("compliance_factor", 0.0 < self.compliance_factor < math.inf, "above 0, by default 1"),
             ("imperfection_factor", 0.0 <= self.imperfection_factor < math.inf, "of at least 0, by default 1"),
         ):
             if not fits:
                 raise ValueError(f"{name} is {getattr(self, name):g}; it is a number {wanted}")
-        if not 0.0 <= self.local_loss <= 1.0:
-            raise ValueError(f"local_loss is {self.local_loss:g}; give a share of the weight from 0 to 1")
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from .collapse import MECHANISM, Fall
 from .controls import Controls, Ending
 from .drivers import Driver
 from .equilibrium_check import EquilibriumChecks
-from .reports import Reports
+from .reports import Reports, no_equilibrium
 from .state import EquilibriumCheck, PathState, Place
 from .stepping import CARRIES, StepError, Stepper
 
@@ -237,7 +237,8 @@ class Path:
             return replace(ending, message="; ".join([*words, ending.message]))
         if not bounds.in_equilibrium:
             yield (frame := next(self.fall.frames(place)))
-            return Ending(Status.NO_INITIAL_EQUILIBRIUM, self.reports.no_equilibrium(check, frame.velocity))
+            held = model.held_by(-self.reports.unbalanced(check))
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, frame.velocity, held))
         # The control displacement would hold it.
         unloaded = Stepper(replace(model, has_live=False), self.driver) if model.has_live else self.stepper
         if place.multiplier == 0.0 and not unloaded.is_stable(place):

@@ -45,7 +45,7 @@ class Reports:
         in_place = replace(state.contacts, gaps=gaps[between])
         excess = friction_excess(beyond[between], state.friction, cohesion[between])
         certificate = Certificate(
-            equilibrium_residual=float(np.abs(self._unbalanced(check)).max(initial=0.0)) / model.total_load,
+            equilibrium_residual=float(np.abs(self.unbalanced(check)).max(initial=0.0)) / model.total_load,
             friction_excess=excess / model.total_load,
             carrying_gap=carrying_gap(in_place, check.forces[between]),
             largest_penetration=max(largest_penetration(in_place), self._overlap(place)),
@@ -58,17 +58,12 @@ class Reports:
         found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
         return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
 
-    def _unbalanced(self, check: EquilibriumCheck) -> np.ndarray:
-        """(n_blocks, n_dof) array: what is out of balance on free blocks, in units of the program."""
+    def unbalanced(self, check: EquilibriumCheck) -> np.ndarray:
+        """(n_free, n_dof) array: what is out of balance on free blocks, in units of the program."""
         model, pose = self.model, check.place.pose
         resultant = (wrench_matrix(check.contacts, pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
         live, live_size = model.scaled_live(pose)
-        multiplier = check.measured * live_size if model.has_live else 0.0
-        return np.where(model.assembly.free[:, None], resultant + model.scaled_load_at(pose) + multiplier * live, 0.0)
-
-    def no_equilibrium(self, check: EquilibriumCheck, motion: np.ndarray) -> str:
-        """Message that names the blocks that fall before any settlement, and the forces that would hold them."""
-        return no_equilibrium(self.model.assembly, motion, self.model.held_by(-self._unbalanced(check)))
+        return (resultant + model.scaled_load_at(pose) + check.measured * live_size * live)[model.assembly.free]
 
     def _overlap(self, place: Place) -> float:
         """Deepest overlap [m] of blocks that no contact point keeps apart; told of each two once."""

@@ -82,12 +82,12 @@ class Model:
         return np.where(free, self.loads.live_at(self.assembly, pose) / units, 0.0) / (size or 1.0), size
 
     def held_by(self, missing: np.ndarray) -> str:
-        """Words that go on with the forces which balance what falls, (n_blocks, n_dof) in units of the program."""
-        d, size = self.dimension, np.abs(missing)
+        """Words that go on with the forces which balance what falls, (n_free, n_dof) in units of the program."""
+        d, size, free = self.dimension, np.abs(missing), np.flatnonzero(self.assembly.free)
         newtons = missing * self.force * unit_lengths(self.n_dof, self.length)
         ways = [f"N along {x}" for x in "xyz"[:d]] + [f"N·m about {x}" for x in "xyz"[d - self.n_dof :]]
         told = np.argwhere(size > 0.1 * size.max()).tolist()
-        words = [f"{newtons[k, way]:.4g} {ways[way]} at '{self.assembly.names[k]}'" for k, way in told[:4]]
+        words = [f"{newtons[k, way]:.4g} {ways[way]} at '{self.assembly.names[free[k]]}'" for k, way in told[:4]]
         return f", and would stand with {', '.join(words)}" + " and others" * (len(told) > 4)
 
     @cached_property

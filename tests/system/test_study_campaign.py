@@ -27,7 +27,7 @@ from blockvis.studies.run_one import run_once
 from blockvis.studies.study_file import read_study
 from blockvis.studies.study_folder import StudyFolder, finished_runs
 from blockvis.studies.summary import in_words, summary_of
-from solver.path import path
+from solver import mechanics
 
 #: A block 0.5 × 1 on a ground that tilts: it overturns at atan(0.5) or slides at atan(μ), whichever is first.
 TILT = {
@@ -241,17 +241,17 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, monkeypatch):
     assert (row["last_settlement"], row["increments"]) == (0.0, 1)
     assert row["last_reaction"] == pytest.approx(0.0)
     assert shape == b""
-    advance = path.Path.advance
+    following, calls = mechanics.Increments.__next__, iter(range(100))
 
-    def fail_at_the_third(of, state, target):
-        if state.reported > 0.0:
+    def fail_at_the_fourth(increments):
+        if next(calls) == 3:
             raise MemoryError("no room")
-        return advance(of, state, target)
+        return following(increments)
 
-    monkeypatch.setattr(path.Path, "advance", fail_at_the_third)
+    monkeypatch.setattr(mechanics.Increments, "__next__", fail_at_the_fourth)
     row, _ = run_once(plan.values, "case", plan.order(0), 0)
     assert (row["status"], row["message"]) == ("solver failed", "MemoryError: no room")
-    assert (row["last_settlement"], row["increments"]) == (pytest.approx(0.05), 2)
+    assert (row["last_settlement"], row["increments"]) == (pytest.approx(0.1), 3)
 
 
 @pytest.mark.slow

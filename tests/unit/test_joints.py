@@ -26,16 +26,16 @@ from structures import (
 
 import blockvis
 import solver
-from blockvis.results.joint_faces import initial_joints
 from solver import mechanics
 
 
-def test_blocks_that_bear_on_each_other_by_little_have_a_joint_too():
+def test_blocks_that_bear_on_each_other_by_little_have_a_joint_too(tmp_path):
     """The upper left one by 1 % of its length; by 0.1 % it is rounding of the drawing."""
     for by, joints in ((0.01, 3), (0.001, 2)):
         below = [rectangle(0.0, 0.0, 1.0, 1.0), rectangle(1.0, 0.0, 2.0, 1.0)]
         assembly = solver.Assembly.from_outlines([*below, rectangle(0.0, 1.0, 1.0 + by, 2.0)])
-        assert len(initial_joints(assembly).block_a) == joints
+        blockvis.write(posed(assembly, solver.Pose.initial(assembly)), out := tmp_path / str(by))
+        assert len((out / "joints.csv").read_text(encoding="utf-8").splitlines()) == 1 + joints
 
 
 @pytest.mark.slow

@@ -155,7 +155,7 @@ def test_text_in_place_of_a_number_is_named(make):
         ({"falling_frames": -1}, "falling_frames is -1; it is a number of at least 0"),
         ({"falling_frames": 2.5}, "falling_frames is 2.5; give a whole number"),
         ({"overlap_tolerance": np.nan}, "overlap_tolerance is nan; give a number"),
-        ({"local_loss": 1.5}, "local_loss is 1.5; give a share of the weight from 0 to 1"),
+        ({"local_loss": 1.5}, "local_loss is 1.5; it is a number from 0 to 1, a share of the weight"),
         ({"step_tolerance": 0.0}, "step_tolerance is 0; it is a number between 0 and 1"),
     ],
 )

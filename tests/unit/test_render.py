@@ -468,8 +468,8 @@ def test_magnified_keeps_blocks_rigid():
     response = arch_response()
     pose = magnified(response.assembly, response.path[-1].pose, 3.0)
     corners = mechanics.moved_vertices(response.assembly, pose)
-    lengths = np.hypot(*(corners[response.assembly.next_vertex] - corners).T)
-    np.testing.assert_allclose(lengths, response.assembly.edge_lengths, rtol=1e-12)
+    lengths = np.hypot(*(corners[response.assembly.polygons.next_vertex] - corners).T)
+    np.testing.assert_allclose(lengths, response.assembly.polygons.edge_lengths, rtol=1e-12)
     moved = pose.displacements(response.assembly)
     np.testing.assert_allclose(moved, 3.0 * response.path[-1].pose.displacements(response.assembly), atol=1e-12)
 

@@ -63,5 +63,5 @@ def test_the_first_loss_ends_it_where_that_is_asked_for(local_loss):
 
 @pytest.mark.parametrize("share", [1.5, -0.1])
 def test_a_share_is_from_0_to_1(share):
-    with pytest.raises(ValueError, match=rf"local_loss is {share:g}; give a share of the weight from 0 to 1"):
+    with pytest.raises(ValueError, match=rf"local_loss is {share:g}; it is a number from 0 to 1"):
         solver.Controls(local_loss=share)
