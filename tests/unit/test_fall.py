@@ -777,7 +777,7 @@ def test_supports_in_space_end_in_the_ground_of_a_fall(tmp_path):
     fall = Fall(np.array([0.0, 0.1]), np.stack([last.positions] * 2), np.stack([last.rotations] * 2), -1.0)
     seen = {"view": {"azimuth": -90, "elevation": 20}, "size": (270, 480), "fps": 2, "seconds": 1.0}
     frames = blockvis.animate(response, tmp_path / "frames", fall=fall, **seen)
-    dark = (pixels(max(frames.iterdir()))[30:440] < 205).any(axis=2)
+    dark = (pixels(max(frames.iterdir()))[64:420] < 205).any(axis=2)
     columns = np.flatnonzero(dark.any(axis=0))
     feet = [np.flatnonzero(dark[:, column]).max() for column in (columns.min() + 5, columns.max() - 5)]
     assert feet[0] == pytest.approx(feet[1], abs=1)
