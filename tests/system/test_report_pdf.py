@@ -39,7 +39,7 @@ def test_upright_pictures_on_paper_fit_on_the_page_of_their_heading(tmp_path, mo
     sinks = solver.Settlement((0.0, -1.0), increment=0.01, limit=0.01)
     blockvis.write(tower.settle(sinks), tmp_path / "out")
     assert main(["report", str(tmp_path / "out"), "--pdf"]) == 0
-    assert [round(height) for _, height, _, _ in placed[:2]] == [150, 150]
+    assert [round(height) for _, height, _, _ in placed[:2]] == [175, 175]
     for top, height, left, width in placed:
         assert top + height < 297.0 - 18.0
         assert left + width / 2.0 == pytest.approx(105.0)

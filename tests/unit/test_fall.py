@@ -11,7 +11,7 @@ import pytest
 import pyvista as pv
 import shapely
 from scipy.integrate import solve_ivp
-from structures import box, parted, rectangle, report_of, wall
+from structures import box, parted, pixels, rectangle, report_of, wall
 
 import blockvis
 import solver
@@ -763,3 +763,21 @@ def test_a_stone_slides_as_far_as_the_scattered_friction_of_its_joint_lets_it():
     far = engine.pose.positions[0, 0] - assembly.centroids[0, 0]
     # By its friction alone: v² / (2 μ g).
     assert far == pytest.approx(1.0 / (2.0 * 0.1 * solver.GRAVITY), rel=0.05)
+
+
+@pytest.mark.slow
+def test_supports_in_space_end_in_the_ground_of_a_fall(tmp_path):
+    """One that had sunk into it was seen below where the ground faded, of what is tall."""
+    slabs = [box((x, -1, -2), (x + 3, 1, 0)) for x in (0, 3)]
+    piers = [box((x, -0.5, 0), (x + 1, 0.5, 6)) for x in (1, 4)]
+    assembly = solver.Assembly.from_solids([*slabs, *piers], roles=["fixed", "moving", "free", "free"])
+    down = solver.Settlement(direction=(0, 0, -1), increment=0.5, limit=1.0)
+    response = solver.settle(assembly, down, friction_coefficient=0.6)
+    last = response.path[-1].pose
+    fall = Fall(np.array([0.0, 0.1]), np.stack([last.positions] * 2), np.stack([last.rotations] * 2), -1.0)
+    seen = {"view": {"azimuth": -90, "elevation": 20}, "size": (270, 480), "fps": 2, "seconds": 1.0}
+    frames = blockvis.animate(response, tmp_path / "frames", fall=fall, **seen)
+    dark = (pixels(max(frames.iterdir()))[64:420] < 205).any(axis=2)
+    columns = np.flatnonzero(dark.any(axis=0))
+    feet = [np.flatnonzero(dark[:, column]).max() for column in (columns.min() + 5, columns.max() - 5)]
+    assert feet[0] == pytest.approx(feet[1], abs=1)
