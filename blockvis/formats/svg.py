@@ -323,7 +323,8 @@ def _walk(element: ElementTree.Element, where: _Context, found: _Found) -> None:
 
 def _originals(element: ElementTree.Element, found: _Found) -> list[ElementTree.Element]:
     """Find what a clone shows; none of it where that is a symbol, or in another file."""
-    original = found.originals.get((element.get("href") or element.get(f"{_XLINK}href", "")).removeprefix("#"))
+    called = element.get("href", element.get(f"{_XLINK}href", ""))
+    original = found.originals.get(called.removeprefix("#"))
     if original is None or _tag(original) in _UNDRAWN:
         found.skipped["<use> (clones; unlink them to have them read)"] += 1
         return []

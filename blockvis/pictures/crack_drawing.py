@@ -127,15 +127,15 @@ def _drawn_in_plane(
     for k, (crack, colour) in list(enumerate(layers))[::-1]:
         half = (thin + (thick - thin) * openings[crack.joints] / widest) / 2.0
         scene.polygons(f"crack edge/{k}", _bars(joints.ends[crack.joints], half), colour)
-    arrows, phases = np.zeros((2, 0, 2)), phases_of(response)
+    tails, tips, phases = *np.zeros((2, 0, 2)), phases_of(response)
     if phases:
         phase = phases[min(increment.phase, len(phases) - 1)]
-        arrows = np.stack(arrows_on_supports(assembly, phase, start, frame, ARROW * float(frame.size.max())))
-        scene.arrows("arrow", *arrows, palette.SETTLEMENT)
+        tails, tips = arrows_on_supports(assembly, phase, start, frame, ARROW * float(frame.size.max()))
+        scene.arrows("arrow", tails, tips, palette.SETTLEMENT)
     picture = scene.image()
     if main:
         lines = [joints.ends[crack.joints] for crack in cracks]
-        dots = along_lines(np.concatenate([*lines, arrows.transpose(1, 0, 2)]))
+        dots = along_lines(np.concatenate([*lines, np.stack([tails, tips], axis=1)]))
         places = scene.at_pixel(np.array([_widest_point(crack, joints, openings) for crack in main]))
         words = [f"{n}: {width_text(crack.width)}" for n, crack in zip(_numbers(main, cracks), main, strict=True)]
         colours = palette.SURVEYED[: len(main)]

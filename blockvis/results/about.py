@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 import solver
 from blockvis.dynamics.fall import with_mechanism
 from blockvis.text import force_text, listed
@@ -20,7 +22,8 @@ from .record import Record, read_json, read_record, versions
 #: A mechanism that takes less than this share of the weight with it is the loss of a few blocks: the structure stands.
 LOCAL = 0.05
 
-#: A reaction below this part of the weight, of moments at a block's length, is none: programs reach a tenth of it.
+#: A reaction below this part of the weight, of moments at the extent of what it acts on, is none: programs reach a
+#: tenth of it.
 NOTHING = 1e-6
 
 #: Equilibria are exact to this: openings and slips in block sizes, forces and multipliers in the largest, motions in
@@ -89,7 +92,14 @@ def reaction_size(response: solver.Response, moment: bool) -> float:
 
 def told_reaction(value: float, response: solver.Response, moment: bool) -> float:
     """Give a reaction [N, or N·m of a moment] as it is told: 0 where it is the rounding of none."""
-    return value if abs(value) > NOTHING * reaction_size(response, moment) else 0.0
+    return value if abs(value) > rounding_of(response, moment) else 0.0
+
+
+def rounding_of(response: solver.Response, moment: bool) -> float:
+    """Give the rounding of a reaction [N], or of a moment [N·m]: weight acts as far from supports as its extent."""
+    assembly = response.assembly
+    extent = float(np.ptp(assembly.vertices[assembly.free[assembly.block_of_vertex]], axis=0).max())
+    return NOTHING * response.total_weight * (extent if moment else 1.0)
 
 
 class Measured(Protocol):

@@ -12,7 +12,7 @@ import numpy as np
 
 import solver
 from blockvis.cases.contents import Case
-from blockvis.results.about import NOTHING, reaction_size
+from blockvis.results.about import rounding_of
 from blockvis.results.folder import RANGE, add_to_summary
 from blockvis.results.reaction_range import COMPLIANCE, FRICTION, WORDS, ReactionRange
 from blockvis.system.atomic_files import write_atomic
@@ -155,8 +155,8 @@ def find_range(folder: str | Path, waiting: Callable[[int, int], None]) -> PathR
     at_once = min(cores(), len(VARIATIONS))
     waiting(len(VARIATIONS), at_once)
     others = _all_followed([variation.of(case) for variation in VARIATIONS], folder, at_once)
-    sizes = [reaction_size(response, settlement.unit == "rad") for settlement in response.settlements]
-    told = [run and run.without_rounding(NOTHING * np.array(sizes)) for run in (traced(response), *others)]
+    rounding = np.array([rounding_of(response, settlement.unit == "rad") for settlement in response.settlements])
+    told = [run and run.without_rounding(rounding) for run in (traced(response), *others)]
     runs = list(zip((Variation(), *VARIATIONS), told, strict=True))
     found = PathRange(runs, [settlement.unit for settlement in response.settlements])
     write_atomic(folder / RANGE, found.reaction().table())

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from solver.tolerances import CORNER_TOLERANCE, DRAWN_GAP
 from solver.words import Kept, kept
 
 from .contacts import frames_of
 from .flat_faces import ONE_WAY, merged_faces
-from .portions import alike
+from .portions import alike, linked
 from .solids import ROUNDING, Faces, Solids, cross, dot, unit
 
 if TYPE_CHECKING:
@@ -349,7 +347,7 @@ def _flat_faces(whole: _Piece) -> np.ndarray:
     own = np.repeat(np.arange(n), 3)
     flat = dot(whole.normals[own], whole.normals[beyond]) >= 1.0 - REENTRANT**2 / 2.0
     k = np.flatnonzero(flat | (whole.face[own] == whole.face[beyond]))
-    return np.asarray(connected_components(coo_array((np.ones(len(k)), (own[k], beyond[k])), shape=(n, n)))[1])
+    return linked(np.stack([own[k], beyond[k]]), n)
 
 
 def _drawn_face(

@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 from solver.words import kept
@@ -19,6 +17,7 @@ from .convex_parts import ENDS, ConvexParts, PlacedParts, convex_parts
 from .cut_points import without_points_of_cuts
 from .entering import Movement, across, entered
 from .facing import FacingParts, edge_separations, face_separations, facing_parts, near_parts
+from .portions import linked
 from .solids import ROUNDING, Solids, cross, dot, unit
 from .spatial_features import ACROSS, BEFORE_EDGE, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
 
@@ -268,10 +267,8 @@ def _without_duplicates(contacts: Contacts, near: float) -> Contacts:
     sense = np.where(contacts.block_a[first] == contacts.block_a[second], 1.0, -1.0)
     same = pairs[first] == pairs[second]
     same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > 1.0 - ROUNDING
-    n = len(contacts)
-    links = coo_array((np.ones(np.count_nonzero(same)), (first[same], second[same])), shape=(n, n))
-    count, group = connected_components(links, directed=False)
-    areas = np.bincount(group, contacts.areas, minlength=count)
+    group = linked(np.stack([first[same], second[same]]), len(contacts))
+    areas = np.bincount(group, contacts.areas)
     return replace(contacts, areas=areas[group])[np.sort(np.unique(group, return_index=True)[1])]
 
 

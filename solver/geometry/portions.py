@@ -1,4 +1,4 @@
-"""Portions: what has as many members each is worked on at once, in arrays that fit into memory."""
+"""Portions: what has as many members is worked on at once, in arrays that fit into memory; groups that pairs link."""
 
 from __future__ import annotations
 
@@ -33,3 +33,12 @@ def alike(*groups: tuple[np.ndarray, np.ndarray]) -> Iterator[tuple[np.ndarray, 
                     for (offsets, owner), size in zip(groups, sizes, strict=True)
                 )
                 yield items, *members
+
+
+def linked(pairs: np.ndarray, n: int) -> np.ndarray:
+    """(n,) int array: number of the group of each of n items that pairs of them, (2, n_pairs) int, link."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    links = coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(n, n))
+    return np.asarray(connected_components(links, directed=False)[1])

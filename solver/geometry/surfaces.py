@@ -6,8 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from solver.tolerances import DRAWN_GAP
 from solver.words import numbers_of
@@ -15,6 +13,7 @@ from solver.words import numbers_of
 from .convex_parts import NoParts
 from .flat_faces import ONE_WAY, SLIVER, edges_of, merged_faces, renumbered
 from .polyhedra import Polyhedra
+from .portions import linked
 from .solids import Solids, dot
 
 #: A block with less volume than this fraction of its surface to the power 3/2 is a sheet, one with less area than this
@@ -135,10 +134,7 @@ def _place(point: np.ndarray) -> str:
 
 
 def _refuse_pieces(solids: Solids, names: Sequence[str]) -> None:
-    n = len(solids.vertices)
-    edges = solids.corners, solids.corners[solids.next_corner]
-    links = coo_array((np.ones(len(solids.corners)), edges), shape=(n, n))
-    _, which = connected_components(links, directed=False)
+    which = linked(np.stack([solids.corners, solids.corners[solids.next_corner]]), len(solids.vertices))
     pieces = np.bincount(solids.block_of_vertex[np.unique(which, return_index=True)[1]], minlength=len(solids))
     i = int(pieces.argmax())
     if pieces[i] > 1:

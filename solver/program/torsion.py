@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from solver.assembly import Assembly
 from solver.geometry.contacts import Contacts
 from solver.geometry.outlines import polygon_integrals
-from solver.geometry.portions import alike
+from solver.geometry.portions import alike, linked
 
 #: Laws of torsion of the faces between blocks in space.
 POINTS, UNIFORM = TORSIONS = ("points", "uniform")
@@ -110,9 +109,7 @@ def _faces(contacts: Contacts, length: float) -> np.ndarray:
         normal_difference = np.linalg.norm(normal - sign[:, None] * contacts.frames[other, 0], axis=1)
         same = (distance <= ONE_FACE * length) & (normal_difference <= ONE_FACE)
         links.append(np.stack([one[same], other[same]]))
-    first, second = np.concatenate(links, axis=1)
-    graph = sp.coo_array((np.ones(len(first)), (first, second)), shape=(n, n))
-    return connected_components(graph, directed=False)[1]
+    return linked(np.concatenate(links, axis=1), n)
 
 
 def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from solver.assembly import Assembly
 from solver.geometry.contacts import Contacts
+from solver.geometry.portions import linked
 from solver.kinematics import motion_size, relative_velocities
 from solver.tolerances import CLOSED, NOTICEABLE
 
@@ -55,16 +54,19 @@ class Mechanism:
 def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     """(n_blocks,) int array: the part each block moves with in the motion that follows an increment.
 
-    Part -1 is at rest. The others are numbered from 0, the largest volume first. The contact points of two blocks that
-    move together come apart, and their corners turn against each other, by next to nothing.
+    Part -1 is at rest, as is what hangs together with a support at rest. The others are numbered from 0, the largest
+    volume first. The contact points of two blocks that move together come apart, and their corners turn against each
+    other, by next to nothing.
     """
     # Read once: the arrays may be in a file.
     increment = increment.with_arrays()
-    n, (pairs, apart, slow) = assembly.n_blocks, joint_rates(assembly, increment)
-    a, b = pairs[apart <= slow].T
-    part = connected_components(sp.coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[1]
+    pairs, apart, slow = joint_rates(assembly, increment)
+    part = linked(pairs[apart <= slow].T, assembly.n_blocks)
     # Corners, not centroids: a block may turn about its own centroid.
-    moves = (motion_size(increment.velocity, assembly.block_size) > slow) & assembly.free
+    fast = motion_size(increment.velocity, assembly.block_size) > slow
+    # A tower on a support at rest leans at its top where each joint gives next to nothing: it does not move.
+    still = np.setdiff1d(part[~assembly.free & ~fast], part[~assembly.free & fast])
+    moves = fast & assembly.free & ~np.isin(part, still)
     volume = np.bincount(part, weights=assembly.shapes.volumes * moves)
     rank = np.argsort(np.argsort(-volume, kind="stable"))
     return np.where(moves, rank[part], -1)

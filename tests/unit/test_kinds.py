@@ -322,6 +322,11 @@ def test_words_of_phases_in_other_units():
     lines = KINDS["settlement"].lines(response)
     assert any(re.fullmatch(r"first reaction +9810 N   1\.000000 W", line) for line in lines)
     assert any(re.fullmatch(r"last reaction +[\d.]+ N·m", line) for line in lines)
+    # At the height of the block, twice its width, programs leave so much of none.
+    *others, last = response.increments
+    tiny = 0.9e-6 * response.total_weight
+    ended = replace(response, increments=(*others, replace(last, reaction=tiny, measured=tiny)))
+    assert state_text(ended.path[-1], ended).endswith("Reaction 0 N·m")
 
 
 def test_lines_rows_and_pictures_round_a_reaction_alike():
