@@ -153,6 +153,16 @@ def twisted(order, corner, angle) -> tuple[solver.Assembly, solver.Pose]:
     return assembly, solver.Pose(places, free * turn)
 
 
+def sunk_and_tilted(limit: float) -> solver.Response:
+    """A block on a support that sinks by so much [m], then tilts."""
+    assembly = solver.Assembly.from_outlines(
+        [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]], roles=["moving", "free"]
+    )
+    sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.05, limit=limit)
+    tilts = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.1, limit=0.1)
+    return solver.settle(assembly, (sinks, tilts), friction_coefficient=0.8)
+
+
 @cache
 def moved_and_turned() -> solver.Response:
     """An arch whose springer moves by a millimetre, in the first settlement, and turns by a milliradian."""

@@ -36,9 +36,6 @@ if TYPE_CHECKING:
 #: VTK's type of cell with a volume that lists its faces, which do not follow from the type.
 POLYHEDRON = 42
 
-#: VTK's type of flat cell with any number of corners.
-POLYGON = 7
-
 #: The cell array by which files of an increment say which blocks have left for good.
 GONE = "fallen"
 
@@ -410,7 +407,7 @@ def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
         start += len(points)
     flat = layout.dimension == 2
     places = np.column_stack([layout.points, np.zeros(start)]) if flat else layout.points
-    types = np.full(layout.n_blocks, POLYGON if flat else POLYHEDRON, dtype=np.uint8)
+    types = np.full(layout.n_blocks, pyvista.CellType.POLYGON if flat else POLYHEDRON, dtype=np.uint8)
     grid = pyvista.UnstructuredGrid(np.array(cells), types, places)
     grid.cell_data["block_id"] = np.arange(layout.n_blocks, dtype=np.int32)
     rows = rows_of(layout)

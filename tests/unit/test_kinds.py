@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from structures import case_from, rectangle, report_of
+from structures import case_from, rectangle, report_of, sunk_and_tilted
 
 import blockvis
 import solver
@@ -308,13 +308,7 @@ def test_a_stone_that_creeps_keeps_no_increment():
 
 
 def test_words_of_phases_in_other_units():
-    """A block on a support that sinks, then tilts."""
-    assembly = solver.Assembly.from_outlines(
-        [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]], roles=["moving", "free"]
-    )
-    sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.05, limit=0.05)
-    tilts = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.1, limit=0.1)
-    response = solver.settle(assembly, (sinks, tilts), friction_coefficient=0.8)
+    response = sunk_and_tilted(0.05)
     first, last = (state_text(increment, response) for increment in (response.path[1], response.path[-1]))
     assert first.startswith(("Settlement 50.00 mm", "Settlement 0.0500 m"))
     assert "1.0000 W" in first

@@ -22,6 +22,7 @@ from structures import (
     pixels,
     rectangle,
     report_of,
+    sunk_and_tilted,
     wall,
 )
 
@@ -560,12 +561,7 @@ def test_the_dot_moves_along_the_curve_beside_the_blocks():
 
 
 def test_the_curve_beside_the_blocks_has_no_dot_for_a_phase_that_is_not_on_it():
-    assembly = solver.Assembly.from_outlines(
-        [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]], roles=["moving", "free"]
-    )
-    sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.05, limit=0.1)
-    tilts = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.1, limit=0.1)
-    response = solver.settle(assembly, (sinks, tilts), friction_coefficient=0.8)
+    response = sunk_and_tilted(0.1)
     panel = CurvePanel(response, (300, 200), 12)
     blank = panel.image(response.path[1])
     assert not alike(blank, palette.SETTLEMENT, 20).any()
