@@ -63,7 +63,7 @@ class EquilibriumChecks:
 
         With a reaction [N or N·m] those that have it; ``at_rest`` those of least elastic energy. Raises ``NotSolved``.
         """
-        every, _ = self._contacts_at(place)
+        every = self.stepper.contacts_at(place)
         program, closed = self._program(place, gap, None if reaction is None else self.driver.rate(place.s))
         forces = np.zeros_like(every.points)
         reference = forces if at_rest else self.stepper.transferred(place, every)[0]
@@ -77,7 +77,8 @@ class EquilibriumChecks:
         self, place: Place, reaction: float, gap: float = COMPUTED_GAP, known: EquilibriumBounds | None = None
     ) -> EquilibriumCheck:
         """Bounds at a place, unless known, and forces in equilibrium with the path's reaction, or its multiplier."""
-        contacts, friction = self._contacts_at(place)
+        contacts = self.stepper.contacts_at(place)
+        friction = self.stepper.friction(contacts)
         bounds = known or self.bounds(place, gap)
         target = reaction if not self.model.has_live else place.multiplier
         if not bounds.in_equilibrium:
@@ -120,7 +121,7 @@ class EquilibriumChecks:
         Where friction with dilatancy has no limit the path does not begin.
         """
         program, closed = self._program(place, COMPUTED_GAP)
-        forces = self.stepper.transferred(place, self._contacts_at(place)[0])[0][closed] - program.least
+        forces = self.stepper.transferred(place, self.stepper.contacts_at(place))[0][closed] - program.least
         resting = ProgramState(forces, place.multiplier / program.unit, np.zeros_like(program.dead), 0.0)
         try:
             limit, converged = non_associative_limit(program, forces[:, 0], resting, bounded=True)
@@ -136,18 +137,14 @@ class EquilibriumChecks:
             motion = program.bound(-1.0, program.most_balanced()[0]).velocity
         except Unbounded:
             return False
-        assert control is not None
         grows = float(motion @ (control * self.model.lengths / self.model.length)[self.stepper.free].ravel())
         return grows > SMALLEST_RATE * float(np.abs(motion).max())
 
     def _program(self, place: Place, gap: float, rate: np.ndarray | None = None) -> tuple[StaticProgram, np.ndarray]:
         """The program over the contact points that may carry, and which these are, (n_contacts,) bool array."""
-        contacts, friction = self._contacts_at(place)
+        contacts = self.stepper.contacts_at(place)
+        friction = self.stepper.friction(contacts)
         closed, limits = self.stepper.force_limits(place, contacts, gap)
         points = contacts[closed], friction[closed], limits[closed], np.zeros(closed.sum())
         senses = (1.0, -1.0) if self.model.has_live else ()
         return StaticProgram(self.model, place.pose, *points, senses=senses, rate=rate), closed
-
-    def _contacts_at(self, place: Place) -> tuple[Contacts, np.ndarray]:
-        contacts = self.stepper.contacts_at(place)
-        return contacts, self.stepper.friction(contacts)
