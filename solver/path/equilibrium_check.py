@@ -143,8 +143,7 @@ class EquilibriumChecks:
     def _program(self, place: Place, gap: float, rate: np.ndarray | None = None) -> tuple[StaticProgram, np.ndarray]:
         """The program over the contact points that may carry, and which these are, (n_contacts,) bool array."""
         contacts = self.stepper.contacts_at(place)
-        friction = self.stepper.friction(contacts)
         closed, limits = self.stepper.force_limits(place, contacts, gap)
-        points = contacts[closed], friction[closed], limits[closed], np.zeros(closed.sum())
+        points = contacts[closed], self.stepper.friction(contacts)[closed], limits[closed], np.zeros(closed.sum())
         senses = (1.0, -1.0) if self.model.has_live else ()
         return StaticProgram(self.model, place.pose, *points, senses=senses, rate=rate), closed

@@ -40,6 +40,7 @@ class Members:
         self.model, self.ties = model, model.ties
         self.strength = np.array([tie.strength for tie in self.ties]) / model.force
         self.brittle = np.array([tie.brittle for tie in self.ties], dtype=bool)
+        self.give = np.array([tie.prestress / tie.stiffness * (-1.0 if tie.kind == PROP else 1.0) for tie in self.ties])
         # In units of the program.
         self.compliance = model.force / (np.array([tie.stiffness for tie in self.ties]) * model.length)
         self.held = held_ties(self.ties, model.fallen)
@@ -52,8 +53,9 @@ class Members:
         lengths = place.tie_lengths if len(place.tie_lengths) else np.full((len(self.ties), 2), np.nan)
         new = np.array([tie.phase == phase + 1 for tie in self.ties])
         length = tie_lengths(tie_ends(self.ties, self.model.assembly, place.pose))
-        give = np.array([tie.prestress / tie.stiffness * (-1.0 if tie.kind == PROP else 1.0) for tie in self.ties])
-        return replace(place, tie_lengths=np.where(new[:, None], np.stack([length, length - give], axis=1), lengths))
+        return replace(
+            place, tie_lengths=np.where(new[:, None], np.column_stack([length, length - self.give]), lengths)
+        )
 
     def beside(self, contacts: Contacts, pose: Pose, lengths: np.ndarray) -> Contacts:
         """The contact points of blocks, then those of the members that are there."""
@@ -104,13 +106,15 @@ class Members:
         return lengths
 
     def part_to_strength(self, place: Place, new: Place) -> float:
-        """Part of a step, from one place to another, in which a member comes to its strength; 1 where none does."""
+        """Part of a step, from place to place, in which a member first comes to its strength; 1 where none does."""
         assert new.contacts is not None
         full = self._at_strength(new.contacts, new.trial)
         started = self.measured(new.contacts[full], place.pose, place.tie_lengths)
         number, after = started.features[:, 1], new.trial[full, 0]
         before, strength = -started.gaps / self.model.length / self.compliance[number], self.strength[number]
-        far = (before < strength) & (after > (1.0 + STRETCHED) * strength)
+        # Those that have yielded are at their strength, or a little below it as joints give.
+        whole = np.isclose(place.tie_lengths[:, 1], place.tie_lengths[:, 0] - self.give, rtol=1e-12, atol=0.0)[number]
+        far = whole & (before < strength) & (after > (1.0 + STRETCHED) * strength)
         return float((((1.0 + 0.5 * STRETCHED) * strength - before) / (after - before))[far].min(initial=1.0))
 
     def without_broken(self, place: Place) -> Place:

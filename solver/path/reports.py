@@ -132,12 +132,11 @@ class Reports:
 
     def no_step(self, s: float, reason: str) -> Ending:
         """The ending at a step that was not solved, from a parameter s [m or rad]."""
-        live = self.model.has_live
-        turns = "it may have its largest value there: control another point or direction, or " if live else ""
+        largest = "it may have its largest value there: control another point or direction, or "
         return Ending(
             Status.SOLVER_FAILED,
             f"steps of the {self.driver.what}, however small, lead no further at {s:.6g} {self.driver.unit}: {reason}; "
-            f"{turns}repeat the analysis with another increment, and send the case to the developers if it stays",
+            f"{largest if self.model.has_live else ''}repeat the analysis with another increment, and send the case to the developers if it stays",
         )
 
     def settled(self, start: Pose, end: Pose) -> str:
