@@ -78,12 +78,11 @@ class EquilibriumChecks:
     ) -> EquilibriumCheck:
         """Bounds at a place, unless known, and forces in equilibrium with the path's reaction, or its multiplier."""
         contacts = self.stepper.contacts_at(place)
-        friction = self.stepper.friction(contacts)
         bounds = known or self.bounds(place, gap)
         target = reaction if not self.model.has_live else place.multiplier
         if not bounds.in_equilibrium:
             # The forces of the program that comes nearest to equilibrium.
-            return EquilibriumCheck(place, contacts, friction, bounds.forces[0], bounds.high, bounds)
+            return EquilibriumCheck(place, contacts, bounds.forces[0], bounds.high, bounds)
         low, high = (value if np.isfinite(value) else target for value in (bounds.low, bounds.high))
         measured = float(np.clip(target, low, max(low, high)))
         if not self.model.has_live and self.model.interfaces.ground:
@@ -91,7 +90,7 @@ class EquilibriumChecks:
             with suppress(NotSolved):
                 forces = self.nearest(place, gap)
                 measured = float(np.clip(self.reaction(place, contacts, forces), low, max(low, high)))
-                return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
+                return EquilibriumCheck(place, contacts, forces, measured, bounds)
         determined = self.model.has_live or not bounds.high - bounds.low > 1e-6 * max(abs(low), abs(high))
         try:
             forces = self.nearest(replace(place, multiplier=measured), gap, None if determined else measured)
@@ -99,7 +98,7 @@ class EquilibriumChecks:
             # A mean of the forces of both bounds is in equilibrium, too.
             part = float(np.interp(measured, (low, max(low, high)), (0.0, 1.0)))
             forces = (1.0 - part) * bounds.forces[0] + part * bounds.forces[-1]
-        return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
+        return EquilibriumCheck(place, contacts, forces, measured, bounds)
 
     def reaction(self, place: Place, contacts: Contacts, forces: np.ndarray) -> float:
         """Reaction of forces in units of the program [N or N·m]."""

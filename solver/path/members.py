@@ -53,9 +53,8 @@ class Members:
         lengths = place.tie_lengths if len(place.tie_lengths) else np.full((len(self.ties), 2), np.nan)
         new = np.array([tie.phase == phase + 1 for tie in self.ties])
         length = tie_lengths(tie_ends(self.ties, self.model.assembly, place.pose))
-        return replace(
-            place, tie_lengths=np.where(new[:, None], np.column_stack([length, length - self.give]), lengths)
-        )
+        both = np.column_stack([length, length - self.give])
+        return replace(place, tie_lengths=np.where(new[:, None], both, lengths))
 
     def beside(self, contacts: Contacts, pose: Pose, lengths: np.ndarray) -> Contacts:
         """The contact points of blocks, then those of the members that are there."""
@@ -114,7 +113,7 @@ class Members:
         before, strength = -started.gaps / self.model.length / self.compliance[number], self.strength[number]
         # Those that have yielded are at their strength, or a little below it as joints give.
         whole = np.isclose(place.tie_lengths[:, 1], place.tie_lengths[:, 0] - self.give, rtol=1e-12, atol=0.0)[number]
-        far = whole & (before < strength) & (after > (1.0 + STRETCHED) * strength)
+        far = whole & (after > (1.0 + STRETCHED) * strength)
         return float((((1.0 + 0.5 * STRETCHED) * strength - before) / (after - before))[far].min(initial=1.0))
 
     def without_broken(self, place: Place) -> Place:

@@ -41,7 +41,7 @@ class Reports:
         multiplier = check.measured * live_size if model.has_live else 0.0
         balance = (resultant + model.scaled_load_at(place.pose) + multiplier * live)[model.assembly.free]
         support_forces = on_supports(model, contacts, place.pose, check.forces)
-        state = self._state(place, contacts, check.forces, check.friction, velocity, support_forces)
+        state = self._state(place, contacts, check.forces, self.stepper.friction(contacts), velocity, support_forces)
         gaps, least, cohesion = self.stepper.joint_limits(place, contacts, check.forces)
         between, beyond = ~is_member(contacts), check.forces.copy()
         beyond[:, 0] -= least
@@ -132,11 +132,12 @@ class Reports:
 
     def no_step(self, s: float, reason: str) -> Ending:
         """The ending at a step that was not solved, from a parameter s [m or rad]."""
-        largest = "it may have its largest value there: control another point or direction, or "
+        live = self.model.has_live
+        turns = "it may have its largest value there: control another point or direction, or " if live else ""
         return Ending(
             Status.SOLVER_FAILED,
             f"steps of the {self.driver.what}, however small, lead no further at {s:.6g} {self.driver.unit}: {reason}; "
-            f"{largest if self.model.has_live else ''}repeat the analysis with another increment, and send the case to the developers if it stays",
+            f"{turns}repeat the analysis with another increment, and send the case to the developers if it stays",
         )
 
     def settled(self, start: Pose, end: Pose) -> str:
